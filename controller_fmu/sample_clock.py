@@ -1,0 +1,34 @@
+"""The controller's own sample clock: when a sample is due, on a grid that does not drift."""
+
+import math
+from dataclasses import dataclass
+
+TOLERANCE = 1e-6
+"""Of a period: masters accumulate time, and some end with a step of 1e-13 s."""
+
+
+@dataclass(slots=True)
+class SampleClock:
+    """Due times offset + k·period, k = 0, 1, …; a sample happens at the first communication point from then."""
+
+    period: float
+    """[s]; 0: every communication point is a sample"""
+    offset: float
+    """[s]"""
+    next_index: int = 0
+    """k of the next due time"""
+
+    def start(self, t: float) -> None:
+        """Begin at `t` [s]: due times before it are past."""
+        if self.period > 0.0:
+            self.next_index = max(0, math.ceil((t - self.offset) / self.period - TOLERANCE))
+
+    def is_due(self, t: float) -> bool:
+        """Whether a sample is due at the communication point `t` [s]; if so, the clock moves on to the next."""
+        if self.period == 0.0:
+            return True
+        elapsed = (t - self.offset) / self.period + TOLERANCE
+        if elapsed < self.next_index:
+            return False
+        self.next_index = math.floor(elapsed) + 1
+        return True

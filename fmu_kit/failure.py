@@ -1,0 +1,78 @@
+"""How a failure gets out of a slave: as one readable message, without bringing the host down.
+
+Everything here answers to how the native part of pythonfmu 0.7.0 treats exceptions and references.
+"""
+
+import traceback
+from typing import Any
+
+from pythonfmu.enums import Fmi2Status
+from pythonfmu.logmsg import LogMsg
+
+from fmu_kit.errors import DivergenceError, FmuError
+
+_kept_references: list[Any] = []
+
+
+def keep(module_globals: dict[str, Any]) -> None:
+    """Called by an entry script: give back the reference to its globals that each instantiation drops.
+
+    The native part decrements the borrowed reference of the module's dictionary every time that it looks
+    for the slave class; after a few instances the dictionary would be freed under the running module.
+    """
+    _kept_references.append(module_globals)
+
+
+def keep_failed(slave: Any, *, again: bool) -> None:
+    """Keep a slave whose call is about to raise alive for as long as the process.
+
+    After an exception the native part drops its references to the instance, the class and the log queue
+    but keeps the pointers, and drops them once more when the instance is freed or reset. So one reference
+    each is given for every exception, and one more the first time so that the count never ends.
+    """
+    dropped = [slave, type(slave), slave.log_queue]
+    _kept_references.extend(dropped if again else 2 * dropped)
+
+
+class Failure(Exception):
+    """What a callback raises: the native part logs its repr, as a printf format."""
+
+    def __init__(self, error: Exception) -> None:
+        message = str(error) if isinstance(error, FmuError) else repr(error)
+        details = "".join(traceback.format_exception(error)).rstrip()
+        self.text = printf_safe(f"{message}\n{details}")
+        super().__init__(self.text)
+
+    def __repr__(self) -> str:
+        return self.text
+
+
+class DivergenceMessage(LogMsg):  # type: ignore[misc]
+    """A message of category `divergence`, read by the native part while the exception is still pending."""
+
+    def __init__(self, failure: Failure) -> None:
+        self.status = Fmi2Status.fatal
+        self.category = "divergence"
+        self._text = failure.text
+
+    @property
+    def msg(self) -> str:
+        """The text; catching an exception clears the pending one, under which a Python logger would fail."""
+        try:
+            raise LookupError
+        except LookupError:
+            return self._text
+
+
+def printf_safe(text: str) -> str:
+    """`text` as a printf format that prints it."""
+    return text.replace("%", "%%")
+
+
+def report(slave: Any, error: Exception, *, again: bool) -> Failure:
+    """What to raise for `error` in a callback of `slave`; `again` if this instance has failed before."""
+    keep_failed(slave, again=again)
+    failure = Failure(error)
+    if isinstance(error, DivergenceError):
+        slave.log_queue.append(DivergenceMessage(failure))
+    return failure

@@ -1,0 +1,245 @@
+"""Packing a slave as an .fmu: same sources, same bytes, and no name that another FMU could answer to.
+
+At run time pythonfmu puts an FMU's `resources` first on `sys.path` and imports its module by name, in an
+interpreter that all FMUs and the host share. So everything that an FMU brings along, pythonfmu's own
+Python files and the entry script included, lives in one package whose name carries the hash of its
+content. That, and a reproducible archive, is why pythonfmu's builder is not used: it packs plain names
+and refuses a slave whose base class has been renamed. Its slave base and its binaries are used as they are.
+
+Packing imports the slave, so it runs in a process of its own: `python -m fmu_kit.packaging`.
+"""
+
+import ast
+import hashlib
+import importlib
+import importlib.metadata
+import importlib.util
+import os
+import re
+import sys
+import uuid
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from xml.dom.minidom import parseString
+from xml.etree.ElementTree import tostring
+
+from fmu_kit.model_description import GUID_PLACEHOLDER
+
+OWN_PACKAGES = ("fmu_kit", "controller_fmu", "plant_fmu", "pythonfmu")
+"""Top-level packages that may be bundled; all else must be the standard library."""
+
+EMPTY_INIT = {"pythonfmu/__init__.py"}
+"""Package files replaced by empty ones: pythonfmu's imports its builder."""
+
+SOURCE_HASH_FILE = "resources/source_hash.txt"
+_STAMP = (1980, 1, 1, 0, 0, 0)
+
+_ENTRY = '''\
+"""Entry of {model}.fmu. pythonfmu runs this file once for each instance."""
+
+from {bundle}.fmu_kit.failure import keep
+from {bundle}.{module} import {model} as Model
+
+keep(globals())
+
+
+class {model}(Model):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+
+    def do_step(self, current_time, step_size):
+        return super().do_step(current_time, step_size)
+'''
+
+
+class PackagingError(Exception):
+    """The slave cannot be packed; the text says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A slave class, by the module that defines it."""
+
+    module: str
+    model: str
+
+    @classmethod
+    def parse(cls, text: str) -> "Target":
+        """From `module:Class`; raises `PackagingError` for another form."""
+        module, colon, model = text.partition(":")
+        if not (module and colon and model):
+            raise PackagingError(f"{text}: expected module:Class")
+        return cls(module, model)
+
+
+def bundled_sources(target: Target) -> dict[str, str]:
+    """The text of every module that the slave needs, by its path in the bundle; none is imported.
+
+    Raises `PackagingError` if one of them imports what is neither bundled nor the standard library.
+    """
+    sources: dict[str, str] = {}
+    waiting = [target.module, "fmu_kit.failure"]
+    while waiting:
+        module = waiting.pop()
+        path = _module_path(module)
+        key = "/".join(module.split(".")) + ("/__init__.py" if path.name == "__init__.py" else ".py")
+        if key in sources:
+            continue
+        sources[key] = "" if key in EMPTY_INIT else path.read_text(encoding="utf-8")
+        package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+        waiting += _imported_modules(sources[key], package, path)
+        if "." in module:
+            waiting.append(module.rpartition(".")[0])
+    return dict(sorted(sources.items()))
+
+
+def source_hash(target: Target) -> str:
+    """The hash of all that decides the content of the FMU: its modules, binaries and the packaging itself."""
+    digest = hashlib.sha256()
+    sources = bundled_sources(target)
+    packaging = {"packaging": Path(__file__).read_text(encoding="utf-8")}
+    for name, text in {**sources, **packaging}.items():
+        digest.update(f"{name}\0{text}\0".encode())
+    for name, content in _binaries(target.model).items():
+        digest.update(name.encode() + b"\0" + hashlib.sha256(content).digest())
+    digest.update(os.environ.get("SOURCE_DATE_EPOCH", "").encode())
+    return digest.hexdigest()
+
+
+def read_source_hash(fmu: Path) -> str | None:
+    """The source hash that an .fmu carries; None if it is not one of ours or not readable."""
+    try:
+        with zipfile.ZipFile(fmu) as archive:
+            return archive.read(SOURCE_HASH_FILE).decode().strip()
+    except (OSError, KeyError, zipfile.BadZipFile):
+        return None
+
+
+def build(target: Target, folder: Path) -> Path:
+    """Write `folder`/Model.fmu, replacing it in one go, and return its path."""
+    sources = bundled_sources(target)
+    digest = source_hash(target)
+    bundle = f"quadcosim_{digest[:16]}"
+    entry = f"{bundle}_entry"
+    files = {f"resources/{bundle}/{name}": _renamed(text, bundle).encode() for name, text in sources.items()}
+    files[f"resources/{bundle}/__init__.py"] = b""
+    files[f"resources/{entry}.py"] = _ENTRY.format(bundle=bundle, module=target.module, model=target.model).encode()
+    files["resources/slavemodule.txt"] = entry.encode()
+    files[SOURCE_HASH_FILE] = digest.encode()
+    files["documentation/licenses/pythonfmu.txt"] = _license_of_pythonfmu().encode()
+    files |= _binaries(target.model)
+    slave = getattr(importlib.import_module(target.module), target.model)
+    description = parseString(tostring(slave(instance_name="description").to_xml())).toprettyxml(
+        indent="  ", encoding="UTF-8"
+    )
+    files["modelDescription.xml"] = description
+    files["modelDescription.xml"] = description.replace(GUID_PLACEHOLDER.encode(), content_guid(files).encode())
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{target.model}.fmu"
+    temporary = path.with_suffix(f".{os.getpid()}.partial")
+    _write_archive(temporary, files)
+    os.replace(temporary, path)
+    return path
+
+
+def content_guid(files: dict[str, bytes]) -> str:
+    """A GUID from the content of an FMU: all files, in the description all but the GUID and the date."""
+    digest = hashlib.sha256()
+    for name in sorted(files):
+        content = files[name]
+        if name == "modelDescription.xml":
+            content = re.sub(rb'(guid|generationDateAndTime)="[^"]*"', rb"", content)
+        digest.update(name.encode() + b"\0" + hashlib.sha256(content).digest())
+    return str(uuid.UUID(bytes=digest.digest()[:16]))
+
+
+def _write_archive(path: Path, files: dict[str, bytes]) -> None:
+    """Stored, not compressed: the bytes must not depend on a version of zlib."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
+        for name in sorted(files, key=lambda name: (name != "modelDescription.xml", name)):
+            entry = zipfile.ZipInfo(name, _STAMP)
+            entry.create_system = 3
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, files[name])
+
+
+def _module_path(module: str) -> Path:
+    """Where a module's source is, without importing it or its package."""
+    top, *rest = module.split(".")
+    spec = importlib.util.find_spec(top)
+    if spec is None or spec.origin is None:
+        raise PackagingError(f"{module}: expected an importable package with sources")
+    base = Path(spec.origin).parent.joinpath(*rest)
+    path = base / "__init__.py" if base.is_dir() else base.with_suffix(".py")
+    if not path.is_file():
+        raise PackagingError(f"{module}: no source at {path}")
+    return path
+
+
+def _imported_modules(text: str, package: str, path: Path) -> list[str]:
+    """The bundled modules that a source imports; only the forms that renaming understands are allowed."""
+    found = []
+    for node in ast.walk(ast.parse(text, str(path))):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+            if any(name.partition(".")[0] in OWN_PACKAGES for name in names):
+                raise PackagingError(f"{path}:{node.lineno}: expected `from package.module import name` in an FMU")
+        elif isinstance(node, ast.ImportFrom):
+            base = importlib.util.resolve_name("." * node.level + (node.module or ""), package)
+            names = [base]
+            if base.partition(".")[0] in OWN_PACKAGES:
+                found += [base, *(f"{base}.{alias.name}" for alias in node.names if _is_module(base, alias.name))]
+                continue
+        else:
+            continue
+        for name in names:
+            if name.partition(".")[0] not in sys.stdlib_module_names:
+                raise PackagingError(f"{path}:{node.lineno}: imports {name}, but an FMU has the standard library only")
+    return found
+
+
+def _is_module(package: str, name: str) -> bool:
+    base = _module_path(package)
+    return base.name == "__init__.py" and ((base.parent / f"{name}.py").is_file() or (base.parent / name).is_dir())
+
+
+def _renamed(text: str, bundle: str) -> str:
+    """The source with its imports of bundled packages going to the bundle."""
+    names = "|".join(OWN_PACKAGES)
+    return re.sub(rf"^(\s*from )({names})\b", rf"\1{bundle}.\2", text, flags=re.MULTILINE)
+
+
+def _binaries(model: str) -> dict[str, bytes]:
+    """pythonfmu's binaries, by their place in the FMU of `model`."""
+    folder = _module_path("pythonfmu").parent / "resources" / "binaries"
+    return {
+        f"binaries/{path.parent.name}/{model}{path.suffix}": path.read_bytes()
+        for path in sorted(folder.glob("*/*"))
+        if path.suffix in (".so", ".dll", ".dylib")
+    }
+
+
+def _license_of_pythonfmu() -> str:
+    """Its licence, which must go with every copy of it."""
+    distribution = importlib.metadata.distribution("pythonfmu")
+    text = distribution.read_text("licenses/LICENSE") or distribution.read_text("LICENSE")
+    if text is None:
+        raise PackagingError("pythonfmu: its licence file is not installed with it")
+    return text
+
+
+def main(arguments: list[str]) -> int:
+    """`python -m fmu_kit.packaging FOLDER MODULE:CLASS …`: build each, print its path."""
+    folder, *targets = arguments
+    try:
+        for text in targets:
+            print(build(Target.parse(text), Path(folder)))
+    except PackagingError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

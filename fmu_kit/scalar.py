@@ -1,0 +1,41 @@
+"""What the equations need of a scalar beyond arithmetic, so that they do not care which kind it is.
+
+Laws and dynamics are written once, on `+ - * / **` and the functions of a `ScalarOps`. An FMU passes
+`FLOAT` (the standard library); a batch of points passes the same functions of numpy, a derivation
+those of a computer-algebra system. Nothing here imports either.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+Scalar = Any  # a float, a numpy array of one value a point, or a symbol
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ScalarOps:
+    """Elementary functions of one kind of scalar; all act elementwise and preserve shape."""
+
+    sqrt: Callable[[Scalar], Scalar]
+    tanh: Callable[[Scalar], Scalar]
+    sin: Callable[[Scalar], Scalar]
+    cos: Callable[[Scalar], Scalar]
+    sign: Callable[[Scalar], Scalar]
+    maximum: Callable[[Scalar, Scalar], Scalar]
+    where: Callable[[Any, Scalar, Scalar], Scalar]
+    all: Callable[[Any], Any]
+    """Whether a condition holds, as one truth value: at every point of a batch; True for a symbol."""
+
+
+FLOAT = ScalarOps(
+    sqrt=math.sqrt,
+    tanh=math.tanh,
+    sin=math.sin,
+    cos=math.cos,
+    sign=lambda x: math.copysign(1.0, x) if x else 0.0,
+    maximum=max,
+    where=lambda condition, a, b: a if condition else b,
+    all=bool,
+)
+"""Python floats, through the standard library."""

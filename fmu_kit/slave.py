@@ -1,0 +1,370 @@
+"""The base of every slave: what FMI asks of an FMU and pythonfmu 0.7.0 leaves to its user.
+
+A model lists its variables and defines `read_parameters`, `initialise`, `step`, `internal_state` and
+`restore`; this class keeps the values in a list, checks every call and turns any failure into one
+readable message.
+"""
+
+import enum
+import functools
+import math
+import sys
+from abc import abstractmethod
+from collections.abc import Callable, Iterable
+from typing import Any, ClassVar, TypeVar
+from xml.etree.ElementTree import Element
+
+from pythonfmu.default_experiment import DefaultExperiment
+from pythonfmu.enums import Fmi2Status
+from pythonfmu.fmi2slave import Fmi2Slave
+
+from fmu_kit import model_description
+from fmu_kit.algebra import Inertia, Quaternion, Vec3, is_positive_definite
+from fmu_kit.errors import DivergenceError, FmuError, require
+from fmu_kit.failure import Failure, printf_safe, report
+from fmu_kit.variables import INERTIA_AXES, Variable
+
+State = dict[str, Any]  # of JSON types only: it is serialised as JSON
+
+class Phase(enum.IntEnum):
+    """Where in its life an instance is (FMI 2.0, section 4.2.4)."""
+
+    INSTANTIATED = 0
+    INITIALIZATION = 1
+    STEPPING = 2
+    TERMINATED = 3
+    FAILED = 4
+
+
+_Method = TypeVar("_Method", bound=Callable[..., Any])
+
+
+def guarded(method: _Method) -> _Method:
+    """Let no exception of `method` out but as the readable failure of this instance."""
+
+    @functools.wraps(method)
+    def call(self: "Slave", *args: Any) -> Any:
+        try:
+            return method(self, *args)
+        except Exception as error:
+            raise self._failed(error) from None
+
+    return call  # type: ignore[return-value]
+
+
+class Slave(Fmi2Slave):  # type: ignore[misc]
+    """A co-simulation slave with declared variables, checked calls and a complete saved state.
+
+    Subclasses set `variables` (Reals first) and `description`. The class that is packaged must define
+    `__init__` and `do_step` itself, or pythonfmu crashes on the second instance: the entry script that
+    packaging writes does.
+    """
+
+    variables: ClassVar[tuple[Variable, ...]]
+    description: ClassVar[str]
+    initial_outputs_depend_on_inputs: ClassVar[bool]
+    """Whether outputs depend on the inputs when initialisation ends; at no other time they do."""
+
+    author = "The quadcosim authors"
+    license = "MIT"
+    default_experiment = DefaultExperiment(start_time=0.0, stop_time=30.0, step_size=0.01)
+    log_categories: ClassVar[dict[str, str]] = {
+        "logStatusWarning": "What the user should know about how the FMU is used.",
+        "logStatusFatal": "Failures: the variable, its value and what was expected.",
+        "divergence": "Failures because the closed loop diverged: a state that is not finite, "
+        "a virtual control without a desired attitude.",
+        "logAll": "All messages.",
+    }
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if "variables" in cls.__dict__:
+            cls._index = {v.name: i for i, v in enumerate(cls.variables)}
+            cls._real_count = sum(v.type == "Real" for v in cls.variables)
+            cls._inputs = frozenset(i for i, v in enumerate(cls.variables) if v.causality == "input")
+            cls._tunable = frozenset(i for i, v in enumerate(cls.variables) if v.variability == "tunable")
+
+    _index: ClassVar[dict[str, int]]
+    _real_count: ClassVar[int]
+    _inputs: ClassVar[frozenset[int]]
+    _tunable: ClassVar[frozenset[int]]
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        # All imports are done: the host's import path is left as it was before pythonfmu added to it.
+        sys.path[:] = [entry for entry in sys.path if entry != self.resources]
+        starts = [v.start for v in self.variables]
+        self._reals: list[float] = [float(v) for v in starts[: self._real_count]]
+        self._others: dict[int, int | bool] = {
+            i: v for i, v in enumerate(starts) if i >= self._real_count
+        }  # Integers and Booleans by value reference
+        self._phase = Phase.INSTANTIATED
+        self._start_time = 0.0
+        self._stale = True  # values were set that initialise() or step() has not seen yet
+        self._quickly_settable: frozenset[int] = frozenset()
+        self._warned: list[str] = []
+
+    # -- what a model defines ---------------------------------------------------------------------------
+
+    @abstractmethod
+    def read_parameters(self) -> None:
+        """Take over the parameters, each within its own bounds; raise `FmuError` for what they are together."""
+
+    @abstractmethod
+    def initialise(self, t: float) -> None:
+        """Compute the outputs at the start time `t` [s]; may be called again before initialisation ends."""
+
+    @abstractmethod
+    def step(self, t: float, h: float) -> None:
+        """Advance from `t` to `t + h` [s] with the inputs held."""
+
+    @abstractmethod
+    def internal_state(self) -> State:
+        """What a step depends on beyond the variables, in JSON types."""
+
+    @abstractmethod
+    def restore(self, state: State) -> None:
+        """Put back what `internal_state` gave, after the variables have been put back."""
+
+    # -- values, for the model ----------------------------------------------------------------------------
+
+    def real(self, name: str) -> float:
+        """The value of a Real variable."""
+        return self._reals[self._index[name]]
+
+    def boolean(self, name: str) -> bool:
+        """The value of a Boolean variable."""
+        return bool(self._others[self._index[name]])
+
+    def vec3(self, name: str) -> Vec3:
+        """The values of `name.x`, `.y`, `.z`."""
+        i, reals = self._index[name + ".x"], self._reals
+        return Vec3(reals[i], reals[i + 1], reals[i + 2])
+
+    def quaternion(self, name: str) -> Quaternion:
+        """The values of `name.x`, `.y`, `.z`, `.w`."""
+        i, reals = self._index[name + ".x"], self._reals
+        return Quaternion(Vec3(reals[i], reals[i + 1], reals[i + 2]), reals[i + 3])
+
+    def inertia(self) -> Inertia:
+        """The matrix of `inertia.xx` to `.yz`; raises `FmuError` unless it is positive definite."""
+        entries = {axis: self.real(f"inertia.{axis}") for axis in INERTIA_AXES}
+        listed = ", ".join(f"{axis} {value:g}" for axis, value in entries.items())
+        require(
+            is_positive_definite(**entries), "inertia.{xx,yy,zz,xy,xz,yz}", listed, "a positive definite matrix"
+        )
+        return Inertia(**entries)
+
+    def put(self, name: str, value: float) -> None:
+        """Set a Real variable."""
+        self._reals[self._index[name]] = value
+
+    def count(self, name: str) -> int:
+        """The value of an Integer variable."""
+        return int(self._others[self._index[name]])
+
+    def put_count(self, name: str, value: int) -> None:
+        """Set an Integer variable."""
+        self._others[self._index[name]] = value
+
+    def put_vec3(self, name: str, v: Vec3) -> None:
+        """Set `name.x`, `.y`, `.z`."""
+        i = self._index[name + ".x"]
+        self._reals[i : i + 3] = (v.x, v.y, v.z)
+
+    def put_quaternion(self, name: str, q: Quaternion) -> None:
+        """Set `name.x`, `.y`, `.z`, `.w`."""
+        i, v = self._index[name + ".x"], q.vector
+        self._reals[i : i + 4] = (v.x, v.y, v.z, q.scalar)
+
+    def warn_once(self, key: str, text: str) -> None:
+        """Log a warning, the first time only."""
+        if key not in self._warned:
+            self._warned.append(key)
+            self.log(printf_safe(text), Fmi2Status.warning)
+
+    # -- FMI ----------------------------------------------------------------------------------------------
+
+    @guarded
+    def setup_experiment(
+        self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
+    ) -> None:
+        """fmi2SetupExperiment; some versions of pythonfmu pass the start time alone."""
+        self._expect(Phase.INSTANTIATED, "fmi2SetupExperiment")
+        require(math.isfinite(start_time), "startTime", start_time, "a finite time")
+        self._start_time = start_time
+
+    @guarded
+    def enter_initialization_mode(self) -> None:
+        """fmi2EnterInitializationMode."""
+        self._expect(Phase.INSTANTIATED, "fmi2EnterInitializationMode")
+        self._phase = Phase.INITIALIZATION
+
+    @guarded
+    def exit_initialization_mode(self) -> None:
+        """fmi2ExitInitializationMode: parameters are checked together here."""
+        self._expect(Phase.INITIALIZATION, "fmi2ExitInitializationMode")
+        self._initialise()
+        self._phase = Phase.STEPPING
+        self._quickly_settable = self._inputs
+
+    @guarded
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        """fmi2DoStep."""
+        self._expect(Phase.STEPPING, "fmi2DoStep")
+        if not (step_size > 0.0 and math.isfinite(current_time + step_size)):
+            require(math.isfinite(current_time), "currentCommunicationPoint", current_time, "a finite time")
+            require(False, "communicationStepSize", step_size, "a positive number of seconds")
+        if self._stale:
+            self._take_parameters()
+        try:
+            self.step(current_time, step_size)
+        except (ArithmeticError, ValueError) as error:  # a float left its range on the way to a result
+            raise DivergenceError(f"at t = {current_time}: {error}, expected finite values") from error
+        return True
+
+    @guarded
+    def terminate(self) -> None:
+        """fmi2Terminate."""
+        self._phase = Phase.TERMINATED
+
+    @guarded
+    def get_real(self, vrs: list[int]) -> list[float]:
+        """fmi2GetReal."""
+        if self._stale and self._phase is Phase.INITIALIZATION:
+            self._initialise()
+        reals = self._reals
+        try:
+            return [reals[vr] for vr in vrs]
+        except IndexError:
+            raise self._wrong_type(vrs, "Real") from None
+
+    @guarded
+    def set_real(self, vrs: list[int], values: list[float]) -> None:
+        """fmi2SetReal."""
+        if self._quickly_settable.issuperset(vrs) and math.isfinite(sum(values)):
+            reals = self._reals
+            for vr, value in zip(vrs, values):
+                reals[vr] = value
+            return
+        for vr, value in zip(vrs, values):
+            variable = self._settable(vr, "Real")
+            require(math.isfinite(value), variable.name, value, "a finite value")
+            self._reals[vr] = value
+
+    @guarded
+    def get_integer(self, vrs: list[int]) -> list[int]:
+        """fmi2GetInteger."""
+        return [int(self._others[vr]) for vr in self._of_type(vrs, "Integer")]
+
+    @guarded
+    def set_integer(self, vrs: list[int], values: list[int]) -> None:
+        """fmi2SetInteger."""
+        self._set_others("Integer", vrs, values)
+
+    @guarded
+    def get_boolean(self, vrs: list[int]) -> list[bool]:
+        """fmi2GetBoolean."""
+        return [bool(self._others[vr]) for vr in self._of_type(vrs, "Boolean")]
+
+    @guarded
+    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
+        """fmi2SetBoolean."""
+        self._set_others("Boolean", vrs, values)
+
+    @guarded
+    def get_string(self, vrs: list[int]) -> list[str]:
+        """fmi2GetString; there are no String variables."""
+        raise self._wrong_type(vrs, "String")
+
+    @guarded
+    def set_string(self, vrs: list[int], values: list[str]) -> None:
+        """fmi2SetString; there are no String variables."""
+        raise self._wrong_type(vrs, "String")
+
+    @guarded
+    def _get_fmu_state(self) -> State:
+        return {
+            "model": type(self).__name__,
+            "reals": list(self._reals),
+            "others": [[vr, value] for vr, value in self._others.items()],
+            "phase": int(self._phase),
+            "start_time": self._start_time,
+            "stale": self._stale,
+            "warned": list(self._warned),
+            "internal": self.internal_state() if self._phase >= Phase.STEPPING else None,
+        }
+
+    @guarded
+    def _set_fmu_state(self, state: State) -> None:
+        mine = (type(self).__name__, len(self._reals))
+        given = (state["model"], len(state["reals"]))
+        require(given == mine, "FMU state (model, number of Reals)", given, f"{mine}")
+        self._reals[:] = state["reals"]
+        self._others.update(state["others"])
+        self._phase = Phase(state["phase"])
+        self._start_time = state["start_time"]
+        self._stale = state["stale"]
+        self._warned = list(state["warned"])
+        self._quickly_settable = self._inputs if self._phase is Phase.STEPPING else frozenset()
+        if state["internal"] is not None:
+            self.read_parameters()
+            self.restore(state["internal"])
+
+    def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
+        """The model description; called when the FMU is built."""
+        return model_description.to_xml(type(self))
+
+    # -- inside ---------------------------------------------------------------------------------------------
+
+    def _initialise(self) -> None:
+        self._take_parameters()
+        try:
+            self.initialise(self._start_time)
+        except (ArithmeticError, ValueError) as error:
+            raise DivergenceError(f"at initialisation: {error}, expected finite values") from error
+
+    def _take_parameters(self) -> None:
+        for variable, value in zip(self.variables, self._reals):
+            if variable.causality == "parameter":
+                variable.check(value)
+        self.read_parameters()
+        self._stale = False
+
+    def _expect(self, phase: Phase, call: str) -> None:
+        if self._phase is not phase:
+            raise FmuError(f"{call} in phase {self._phase.name.lower()}: expected phase {phase.name.lower()}")
+
+    def _settable(self, vr: int, kind: str) -> Variable:
+        """The variable of `vr` if its value may be set now; raises `FmuError` if not."""
+        self._of_type([vr], kind)
+        variable = self.variables[vr]
+        if not variable.has_start:
+            raise FmuError(f"{variable.name}: a variable with causality {variable.causality} cannot be set")
+        if self._phase >= Phase.STEPPING and vr not in self._inputs and vr not in self._tunable:
+            raise FmuError(f"{variable.name}: a fixed parameter cannot be set after initialisation")
+        if vr not in self._inputs or self._phase is not Phase.STEPPING:
+            self._stale = True
+        return variable
+
+    def _set_others(self, kind: str, vrs: list[int], values: Iterable[int | bool]) -> None:
+        for vr, value in zip(vrs, values):
+            self._settable(vr, kind)
+            self._others[vr] = value
+
+    def _of_type(self, vrs: list[int], kind: str) -> list[int]:
+        if any(not 0 <= vr < len(self.variables) or self.variables[vr].type != kind for vr in vrs):
+            raise self._wrong_type(vrs, kind)
+        return vrs
+
+    def _wrong_type(self, vrs: list[int], kind: str) -> FmuError:
+        known = [i for i, v in enumerate(self.variables) if v.type == kind]
+        expected = f"{known[0]} to {known[-1]}" if known else "none, this FMU has no such variables"
+        bad = [vr for vr in vrs if vr not in known]
+        return FmuError(f"value reference {bad}: expected one of a {kind} variable ({expected})")
+
+    def _failed(self, error: Exception) -> Failure:
+        failure = report(self, error, again=self._phase is Phase.FAILED)
+        self._phase = Phase.FAILED
+        self._quickly_settable = frozenset()
+        return failure

@@ -1,0 +1,55 @@
+"""quadcosim: fly a quadrotor controller FMU and a plant FMU under a realistic digital clock.
+
+    import orchestration as quadcosim
+
+    result = quadcosim.run(quadcosim.Scenario(timing=quadcosim.Timing(period=0.02)))
+    print(result.metrics["ultimate_bound"])
+    result.save("results/20ms")
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from orchestration.errors import QuadcosimError, SimulatorError, UsageError
+    from orchestration.flight import run
+    from orchestration.result import Result, load_result
+    from orchestration.scenario import FmuChoice, Record, ReferenceChoice, Scenario, load_scenario
+    from orchestration.timing import Timing
+
+_HOMES = {
+    "QuadcosimError": "errors",
+    "SimulatorError": "errors",
+    "UsageError": "errors",
+    "run": "flight",
+    "Result": "result",
+    "load_result": "result",
+    "FmuChoice": "scenario",
+    "Record": "scenario",
+    "ReferenceChoice": "scenario",
+    "Scenario": "scenario",
+    "load_scenario": "scenario",
+    "Timing": "timing",
+}
+
+__all__ = [
+    "FmuChoice",
+    "QuadcosimError",
+    "Record",
+    "ReferenceChoice",
+    "Result",
+    "Scenario",
+    "SimulatorError",
+    "Timing",
+    "UsageError",
+    "load_result",
+    "load_scenario",
+    "run",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load what is asked for and no more: the command line answers `--help` without numpy."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__} has no attribute {name}")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

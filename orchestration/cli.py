@@ -1,0 +1,172 @@
+"""The command `quadcosim`."""
+
+import json
+import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from orchestration.errors import QuadcosimError, SimulatorError, UsageError
+from orchestration.flags import FlightFlags, flies, scenario_from
+
+if TYPE_CHECKING:
+    from orchestration.flight import Progress
+    from orchestration.result import Result
+
+app = typer.Typer(
+    name="quadcosim",
+    help="Fly a quadrotor controller FMU under a realistic digital clock.",
+    epilog="A first flight: quadcosim run --out results/paper. Add --debug to any command for a traceback.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+@app.command()
+def build(
+    out: Annotated[Path | None, typer.Option("--out", help="Folder for the FMUs; fmus/ unless told.")] = None,
+) -> None:
+    """Build QuadrotorPlant.fmu and UnifiedController.fmu. Same sources give the same bytes."""
+    from orchestration import fmus
+    from orchestration.wiring import MODELS
+
+    for path in fmus.build(MODELS, out or fmus.default_folder()):
+        print(path)
+
+
+@app.command()
+@flies
+def run(
+    scenario: Annotated[
+        Path | None, typer.Argument(help="Scenario file; without one, the paper's flight.", show_default=False)
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Directory for signals, events, metrics and figures.", metavar="DIR")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the metrics as JSON.")] = False,
+    figures: Annotated[bool, typer.Option(help="Draw the figures into the directory.")] = True,
+    *,
+    flags: FlightFlags,
+) -> None:
+    """Fly a scenario and print its metrics. FMUs that are missing or out of date are built first."""
+    from orchestration.flight import run as fly
+
+    chosen = scenario_from(scenario, flags)
+    with progress_bar("flying") as progress:
+        result = fly(chosen, progress=progress, announce=_say)
+    _report(result, as_json)
+    if out is not None:
+        _say(f"results in {result.save(out, figures=figures)}")
+    elif not as_json:
+        _say("add --out DIR to keep the signals and the figures")
+
+
+@app.command()
+def plot(
+    directory: Annotated[Path, typer.Argument(help="Directory of a run.", metavar="DIR")],
+    start: Annotated[float | None, typer.Option("--from", help="Start of the zoom on the commands, in seconds.")] = None,
+    end: Annotated[float | None, typer.Option("--to", help="End of the zoom on the commands, in seconds.")] = None,
+) -> None:
+    """Draw the figures of a run again, the commands zoomed on a window of time."""
+    from orchestration import plots
+    from orchestration.result import load_result
+
+    result = load_result(directory)
+    last = float(result.signals["time"][-1])
+    window = None
+    if start is not None or end is not None:
+        window = (start or 0.0, last if end is None else end)
+        if not 0.0 <= window[0] < window[1]:
+            raise UsageError(f"--from {window[0]:g} --to {window[1]:g}: expected 0 <= from < to")
+    for path in plots.draw(result, directory, window):
+        print(path)
+
+
+@app.command()
+def validate(
+    fmu: Annotated[list[Path] | None, typer.Argument(help="FMUs; without any, those of this project.")] = None,
+) -> None:
+    """Check FMUs against the FMI standard; exit code 1 if there is any problem."""
+    from fmpy.validation import validate_fmu
+
+    from orchestration import fmus
+    from orchestration.wiring import MODELS
+
+    count = 0
+    for path in fmu or [fmus.locate(name, _say) for name in MODELS]:
+        if not path.is_file():
+            raise UsageError(f"{path}: expected an .fmu file")
+        problems = validate_fmu(str(path))
+        count += len(problems)
+        print(f"{path}: {'no problems found' if not problems else f'{len(problems)} problems'}")
+        for problem in problems:
+            print(f"  {problem}")
+    if count:
+        raise typer.Exit(1)
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr)
+
+
+def _report(result: "Result", as_json: bool) -> None:
+    for warning in result.warnings:
+        _say(f"warning: {warning}")
+    if as_json:
+        print(json.dumps(result.metrics, indent=2))
+        return
+    width = max(map(len, result.metrics))
+    for name, value in result.metrics.items():
+        shown = f"{value:.6g}" if isinstance(value, float) else {None: "-"}.get(value, str(value))
+        print(f"{name:<{width}}  {shown}")
+    if result.divergence is not None:
+        print(f"diverged: {result.divergence}")
+
+
+@contextmanager
+def progress_bar(what: str) -> Iterator["Progress | None"]:
+    """A bar on standard error while the work goes on, if that is a terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import Progress as Bar
+
+    with Bar(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=1.0)
+        yield lambda share: bar.update(task, completed=share)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line: 0 done, 1 failure, 2 wrong usage; one line for an error, more with --debug."""
+    given = sys.argv[1:] if arguments is None else arguments
+    debug = "--debug" in given
+    try:
+        app([argument for argument in given if argument != "--debug"])
+    except KeyboardInterrupt:
+        _say("quadcosim: interrupted")
+        sys.exit(130)
+    except Exception as error:
+        _fail(error, debug)
+
+
+def _fail(error: Exception, debug: bool) -> None:
+    if debug:
+        traceback.print_exc()
+        if isinstance(error, SimulatorError) and error.details:
+            _say(f"in the FMU:\n{error.details}")
+    if isinstance(error, QuadcosimError):
+        _say(f"quadcosim: {error}")
+    else:
+        _say(f"quadcosim: {type(error).__name__}: {error} (an error of quadcosim itself; --debug shows where)")
+    sys.exit(2 if isinstance(error, UsageError) else 1)
+
+
+if __name__ == "__main__":
+    main()

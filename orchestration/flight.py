@@ -1,0 +1,187 @@
+"""From a scenario to a result: instantiates the FMUs, lets the master fly them, computes the metrics."""
+
+import importlib.metadata
+import math
+import platform
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fmu_kit.trajectory import Trajectory
+from orchestration import fmus, metrics, wiring
+from orchestration.errors import UsageError
+from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.master import Master, Signals
+from orchestration.reference import BuiltIn, FromFile, ReferencePath
+from orchestration.result import Result, sampled_rows
+from orchestration.scenario import FmuChoice, Parameter, Scenario
+from orchestration.sensors import Sensors
+from orchestration.timing import NANOSECONDS, Clock, random_streams
+
+Progress = Callable[[float], None]
+"""Hears the share of the run that is done."""
+Announce = Callable[[str], None]
+"""Hears what is done before the run begins."""
+
+
+def run(
+    scenario: Scenario | None = None, *, progress: Progress | None = None, announce: Announce | None = None
+) -> Result:
+    """Fly a scenario, the paper's if none is given; divergence is a result, not an error.
+
+    Raises `UsageError` for an FMU, variable or value that does not exist, `SimulatorError` if an FMU
+    refuses a call for another reason than divergence.
+    """
+    with prepared(scenario or Scenario(), announce) as flight:
+        flight.master.initialise()
+        flight.master.run(progress=progress)
+        return flight.result()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flight:
+    """A master over two FMUs that have their parameters, ready to initialise or to restore."""
+
+    scenario: Scenario
+    plant: FmuSimulator
+    controller: FmuSimulator
+    reference: ReferencePath
+    master: Master
+    started: float
+    """on the performance counter [s]"""
+
+    def result(self) -> Result:
+        """What was recorded so far, with its metrics."""
+        master, columns = self.master, self.master.board.columns
+        rows = master.rows()
+        events = tuple(sorted(master.events, key=lambda event: event.time))
+        desired = self.reference.positions(rows[:, 0])
+        computed = metrics.compute(
+            {name: rows[:, i] for i, name in enumerate(columns)},
+            desired,
+            sampled_rows(rows[:, 0], events),
+            thrust_max=_parameter(self.plant, self.scenario.plant, wiring.THRUST_MAX, math.inf),
+            torque_max=_parameter(self.plant, self.scenario.plant, wiring.TORQUE_MAX, math.inf),
+        )
+        diverged_at = master.divergence_time
+        return Result(
+            scenario=self.scenario,
+            columns=columns,
+            rows=rows,
+            desired=desired,
+            events=events,
+            metrics={
+                **computed,
+                "diverged": master.divergence is not None,
+                "divergence_time": None if diverged_at is None else diverged_at / NANOSECONDS,
+                "steps": master.steps,
+                "wall_time": time.perf_counter() - self.started,
+            },
+            divergence=master.divergence,
+            provenance=provenance(self.plant, self.controller),
+            warnings=tuple(self.plant.warnings + self.controller.warnings),
+        )
+
+
+@contextmanager
+def prepared(scenario: Scenario, announce: Announce | None = None) -> Iterator[Flight]:
+    """Both FMUs of `scenario`, built if need be, instantiated and with their parameters; freed at the end."""
+    started = time.perf_counter()
+    plant_path = fmus.locate(scenario.plant.fmu, announce)
+    controller_path = fmus.locate(scenario.controller.fmu, announce)
+    with FmuSimulator(plant_path, "plant") as plant, FmuSimulator(controller_path, "controller") as controller:
+        _set_parameters(plant, scenario.plant)
+        _set_parameters(controller, scenario.controller)
+        _set_clock(controller, scenario)
+        reference = _reference(controller, scenario)
+        streams = random_streams(scenario.seed)
+        yield Flight(
+            scenario=scenario,
+            plant=plant,
+            controller=controller,
+            reference=reference,
+            started=started,
+            master=Master(
+                plant,
+                controller,
+                clock=Clock(scenario.timing, scenario.stop_time, streams),
+                timing=scenario.timing,
+                sensors=Sensors(wiring.MEASUREMENT, scenario.timing, streams["noise"]),
+                reference=reference,
+                signals=Signals(
+                    plant=_recorded(plant, scenario.record.plant),
+                    controller=_recorded(controller, scenario.record.controller),
+                ),
+            ),
+        )
+
+
+def provenance(plant: FmuSimulator, controller: FmuSimulator) -> dict[str, Any]:
+    """What the numbers of a run came from: versions of the software and GUIDs of the FMUs."""
+    packages = ("quadcosim", "numpy", "fmpy", "pythonfmu")
+    return {
+        "versions": {"python": platform.python_version(), **{name: _version(name) for name in packages}},
+        "platform": platform.platform(),
+        "fmus": {
+            fmu.name: {"model": fmu.description.modelName, "guid": fmu.description.guid, "path": str(fmu.path)}
+            for fmu in (plant, controller)
+        },
+    }
+
+
+def _version(package: str) -> str:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return "not installed"
+
+
+def _set_parameters(fmu: FmuSimulator, choice: FmuChoice) -> None:
+    for name, value in choice.parameters.items():
+        causality = fmu.variable(name).causality
+        if causality not in ("parameter", "input") or name in wiring.MEASUREMENT + wiring.COMMAND:
+            raise UsageError(f"{fmu.name}.{name}: expected a parameter or an input that nothing is connected to")
+        fmu.set(name, value)
+
+
+def _set_clock(controller: FmuSimulator, scenario: Scenario) -> None:
+    """With the master's clock the controller samples at every step that it is given."""
+    timing = scenario.timing
+    by_fmu = timing.clock == "fmu"
+    controller.set(wiring.SAMPLE_PERIOD, timing.period if by_fmu else 0.0)
+    controller.set(wiring.SAMPLE_OFFSET, timing.offset if by_fmu else 0.0)
+
+
+def _reference(controller: FmuSimulator, scenario: Scenario) -> ReferencePath:
+    if scenario.reference.file is not None:
+        controller.set(wiring.USE_REFERENCE_INPUTS, True)
+        return FromFile(Path(scenario.reference.file), scenario.stop_time)
+    if scenario.controller.parameters.get(wiring.USE_REFERENCE_INPUTS):
+        raise UsageError(f"controller.{wiring.USE_REFERENCE_INPUTS}: expected [reference] file = … to feed them")
+    values = {
+        field: _parameter(controller, scenario.controller, name, None) for name, field in wiring.TRAJECTORY.items()
+    }
+    return BuiltIn(Trajectory(**values))
+
+
+def _parameter(fmu: FmuSimulator, choice: FmuChoice, name: str, absent: Any) -> Any:
+    """The value of a parameter in this run; `absent` if the FMU has none of that name."""
+    if name not in fmu.variables and absent is not None:
+        return absent
+    value: Parameter = choice.parameters.get(name, float(fmu.variable(name).start))
+    return float(value)
+
+
+def _recorded(fmu: FmuSimulator, chosen: tuple[str, ...] | None) -> tuple[str, ...]:
+    """The Real variables to record of an FMU: those chosen, or all outputs and locals."""
+    recordable = fmu.names("output", "local")
+    for name in chosen or ():
+        if name not in recordable:
+            fmu.variable(name)
+            raise UsageError(f"record.{fmu.name}: {name} cannot be recorded; expected one of {', '.join(recordable)}")
+    return recordable if chosen is None else chosen
+
+

@@ -1,0 +1,217 @@
+"""An FMU as a `Simulator`, through fmpy, with every array of a step allocated once."""
+
+import ctypes
+import difflib
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import fmpy.logging
+from fmpy import fmi2
+from fmpy.fmi1 import FMICallException
+from fmpy.model_description import ModelDescription, ScalarVariable
+
+from orchestration.errors import QuadcosimError, SimulatorError, UsageError
+from orchestration.simulator import Floats, Transfer
+
+_WARNING = fmi2.fmi2Warning
+DIVERGENCE_CATEGORY = b"divergence"
+
+
+class FmuSimulator:
+    """One instance of a co-simulation FMU.
+
+    The FMU's log is on and collected, so that a failed call raises `SimulatorError` with the FMU's own
+    words. After a failed call the instance is never called again, not even to free it: FMI leaves what
+    would happen undefined.
+    """
+
+    def __init__(self, path: Path, instance_name: str) -> None:
+        self.path = path
+        self.name = instance_name
+        self.warnings: list[str] = []
+        self._messages: list[tuple[int, bytes | None, bytes]] = []
+        self._failed = False
+        self._folder: str | None = None
+        try:
+            self.description: ModelDescription = fmpy.read_model_description(str(path))
+            self._folder = fmpy.extract(str(path))
+            self._fmu = fmi2.FMU2Slave(
+                guid=self.description.guid,
+                unzipDirectory=self._folder,
+                modelIdentifier=self.description.coSimulation.modelIdentifier,
+                instanceName=instance_name,
+            )
+            self._fmu.instantiate(callbacks=self._callbacks(), loggingOn=True)
+        except Exception as error:
+            self._failed = True
+            self.close()
+            raise QuadcosimError(f"{path}: expected a co-simulation FMU that loads here: {error}") from error
+        self.variables: dict[str, ScalarVariable] = {v.name: v for v in self.description.modelVariables}
+        self._component = self._fmu.component
+        self._do_step = self._fmu.dll.fmi2DoStep
+
+    # -- a run --------------------------------------------------------------------------------------------
+
+    def enter_initialization(self, start: float, stop: float) -> None:
+        """Begin initialisation of a run over [start, stop] seconds."""
+        self._call("setupExperiment", startTime=start, stopTime=stop)
+        self._call("enterInitializationMode")
+
+    def exit_initialization(self) -> None:
+        """End initialisation."""
+        self._call("exitInitializationMode")
+        self._collect_warnings()
+
+    def step(self, t: float, h: float) -> None:
+        """Advance from `t` to `t + h` seconds."""
+        if self._do_step(self._component, t, h, True) > _WARNING:
+            raise self._failure("fmi2DoStep")
+        if self._messages:
+            self._collect_warnings()
+
+    def reset(self) -> None:
+        """Back to the state after instantiation, all parameters at their defaults."""
+        self._call("reset")
+
+    def save(self) -> bytes:
+        """The whole state, serialised."""
+        state = self._call("getFMUstate")
+        try:
+            return bytes(self._call("serializeFMUstate", state))
+        finally:
+            self._call("freeFMUstate", state)
+
+    def restore(self, state: bytes) -> None:
+        """Put back what `save` gave."""
+        handle = self._call("deSerializeFMUstate", state)
+        try:
+            self._call("setFMUstate", handle)
+        finally:
+            self._call("freeFMUstate", handle)
+
+    def close(self) -> None:
+        """Free the instance and what was unpacked for it."""
+        if not self._failed:
+            self._failed = True
+            self._fmu.freeInstance()
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
+            self._folder = None
+
+    def __enter__(self) -> "FmuSimulator":
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    # -- values -------------------------------------------------------------------------------------------
+
+    def names(self, *causalities: str, kind: str = "Real") -> tuple[str, ...]:
+        """Variables of a type and of one of the causalities, in the order of the description."""
+        return tuple(v.name for v in self.variables.values() if v.type == kind and v.causality in causalities)
+
+    def reader(self, names: Sequence[str], into: Floats) -> Transfer:
+        """A call that puts the values of the Real variables `names` into `into`."""
+        return self._transfer("fmi2GetReal", names, into)
+
+    def writer(self, names: Sequence[str], source: Floats) -> Transfer:
+        """A call that sets the Real variables `names` from `source`."""
+        return self._transfer("fmi2SetReal", names, source)
+
+    def set(self, name: str, value: float | bool) -> None:
+        """Set one variable, converted to its type; raises `UsageError` for a value it cannot take."""
+        variable = self.variable(name)
+        reference = [variable.valueReference]
+        if variable.type == "Boolean":
+            self._expect(isinstance(value, bool), name, value, "true or false")
+            self._call("setBoolean", reference, [value])
+        elif variable.type == "Integer":
+            self._expect(isinstance(value, int) and not isinstance(value, bool), name, value, "a whole number")
+            self._call("setInteger", reference, [value])
+        else:
+            self._expect(not isinstance(value, bool), name, value, "a number")
+            self._call("setReal", reference, [float(value)])
+
+    def get(self, name: str) -> float | bool:
+        """The value of one variable."""
+        variable = self.variable(name)
+        getter = {"Boolean": "getBoolean", "Integer": "getInteger"}.get(variable.type, "getReal")
+        value = self._call(getter, [variable.valueReference])[0]
+        return bool(value) if variable.type == "Boolean" else value  # type: ignore[no-any-return]
+
+    def variable(self, name: str) -> ScalarVariable:
+        """The declaration of a variable; raises `UsageError` naming the valid parameters."""
+        if name in self.variables:
+            return self.variables[name]
+        parameters = [v.name for v in self.variables.values() if v.causality == "parameter"]
+        close = difflib.get_close_matches(name, list(self.variables), n=1)
+        hint = f"did you mean {close[0]}? " if close else ""
+        raise UsageError(
+            f"{self.name}.{name}: {self.description.modelName} has no such variable; {hint}"
+            f"its parameters are {', '.join(parameters)}"
+        )
+
+    # -- inside -------------------------------------------------------------------------------------------
+
+    def _expect(self, condition: bool, name: str, value: object, expected: str) -> None:
+        if not condition:
+            raise UsageError(f"{self.name}.{name} = {value}: expected {expected}")
+
+    def _transfer(self, function: str, names: Sequence[str], array: Floats) -> Transfer:
+        count = len(names)
+        if array.shape != (count,):
+            raise ValueError(f"{function}: expected an array of {count} values, got shape {array.shape}")
+        references = (ctypes.c_uint32 * count)(*(self.variable(name).valueReference for name in names))
+        values = (ctypes.c_double * count).from_buffer(array)  # type: ignore[arg-type]
+        call, component, failure = getattr(self._fmu.dll, function), self._component, self._failure
+
+        def transfer() -> None:
+            if call(component, references, count, values) > _WARNING:
+                raise failure(function)
+
+        return transfer
+
+    def _call(self, method: str, *args: Any, **kwargs: Any) -> Any:
+        if self._failed:
+            raise SimulatorError(f"{self.name}: the FMU has failed and is not called again")
+        try:
+            return getattr(self._fmu, method)(*args, **kwargs)
+        except FMICallException as error:
+            raise self._failure(error.function) from None
+
+    def _callbacks(self) -> fmi2.fmi2CallbackFunctions:
+        """Callbacks that collect the FMU's messages."""
+
+        def log(environment: Any, instance: bytes, status: int, category: bytes | None, message: bytes) -> None:
+            self._messages.append((status, category, message))
+
+        callbacks = fmi2.fmi2CallbackFunctions()
+        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(log)
+        callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+        callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
+        fmpy.logging.addLoggerProxy(ctypes.byref(callbacks))  # formats what the FMU passes to printf
+        return callbacks
+
+    def _collect_warnings(self) -> None:
+        for status, _, message in self._messages:
+            if status == _WARNING:
+                self.warnings.append(f"{self.name}: {message.decode('utf-8', 'replace')}")
+        self._messages.clear()
+
+    def _failure(self, function: str) -> SimulatorError:
+        """The error for a call that failed, in the words that the FMU logged."""
+        self._failed = True
+        bad = [m for m in self._messages if m[0] > _WARNING]
+        diverged = [m for m in bad if m[1] == DIVERGENCE_CATEGORY]
+        text = (diverged or bad or [(0, None, b"no message")])[0][2].decode("utf-8", "replace")
+        if text.startswith("Fatal py exception"):  # pythonfmu's own line comes before the slave's text
+            text = text.partition("\n")[2]
+        summary, _, details = text.partition("\n")
+        return SimulatorError(
+            f"{self.name} ({self.description.modelName}): {function}: {summary}",
+            divergence=bool(diverged),
+            details=details,
+        )

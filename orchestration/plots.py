@@ -1,0 +1,158 @@
+"""Figures of one run: the path, the errors, the commands with what happened when, the energy."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from orchestration.metrics import position_error
+from orchestration.result import Result
+from orchestration.simulator import Floats
+from orchestration.wiring import COMMAND, ENERGY, POSITION, components
+
+STYLE = {
+    "axes.grid": True,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "figure.constrained_layout.use": True,
+    "figure.dpi": 110,
+    "font.size": 10,
+    "grid.alpha": 0.3,
+    "legend.frameon": False,
+    "lines.linewidth": 1.4,
+}
+BLUE, ORANGE, GREEN, RED, GREY = "#1f6f9f", "#e0812b", "#2f8f5b", "#b5323e", "#8a8a8a"
+
+Window = tuple[float, float]
+"""A span of time [s]."""
+
+
+def draw(result: Result, folder: Path, window: Window | None = None) -> list[Path]:
+    """Write the figures of a run as PNG; `window` is what the commands are zoomed on. Returns their paths."""
+    figures: Mapping[str, Callable[[], Figure]] = {
+        "path": lambda: path(result),
+        "errors": lambda: errors(result),
+        "commands": lambda: commands(result, window),
+        "energy": lambda: energy(result),
+    }
+    written = []
+    with matplotlib.rc_context(STYLE):
+        for name, make in figures.items():
+            target = folder / f"{name}.png"
+            make().savefig(target)
+            written.append(target)
+    return written
+
+
+def path(result: Result) -> Figure:
+    """The flight in space with its reference, up being up."""
+    figure = Figure(figsize=(7.0, 6.0))
+    axes = figure.add_subplot(projection="3d")
+    x, y, z = (result.signals[f"plant.{name}"] for name in POSITION)
+    axes.plot(*result.desired.T, color=ORANGE, linestyle="--", label="reference $P_d$")
+    axes.plot(x, y, z, color=BLUE, label="flown $P$")
+    axes.scatter(x[:1], y[:1], z[:1], color=BLUE, s=25)
+    axes.text(x[0], y[0], z[0], "  start", color=BLUE)
+    axes.set(xlabel="x north [m]", ylabel="y east [m]", zlabel="z down [m]", title=_title(result))
+    axes.invert_zaxis()
+    axes.invert_yaxis()
+    axes.view_init(elev=24, azim=-50)
+    axes.legend(loc="upper left")
+    return figure
+
+
+def errors(result: Result) -> Figure:
+    """The norms of the four errors: position at every recorded row, the others as of the last sample."""
+    figure = Figure(figsize=(8.0, 4.5))
+    axes = figure.add_subplot()
+    t = result.signals["time"]
+    _log_line(axes, t, position_error(result.signals, result.desired), BLUE, "position  [m]")
+    for label, color, names in (
+        (r"velocity  [m/s]", ORANGE, components("velocity_error")),
+        (r"attitude  $\|\tilde q\|$  [1]", GREEN, components("attitude_error")),
+        (r"angular velocity  [rad/s]", RED, components("angular_velocity_error")),
+    ):
+        columns = [result.signals.get(f"controller.{name}") for name in names]
+        if all(column is not None for column in columns):
+            _log_line(axes, t, np.linalg.norm(np.array(columns), axis=0), color, label)
+    axes.set(xlabel="time [s]", ylabel="norm of the error", yscale="log", title=_title(result))
+    axes.margins(x=0)
+    axes.legend(ncols=2)
+    return figure
+
+
+def commands(result: Result, window: Window | None = None) -> Figure:
+    """Thrust and torques as applied: the whole run, and a window with the instants of the digital loop."""
+    t = result.signals["time"]
+    start, end = window or (0.0, min(1.0, float(t[-1])))
+    figure = Figure(figsize=(11.0, 7.0))
+    rows = figure.subplots(len(COMMAND), 2, sharex="col", width_ratios=(1.0, 1.3))
+    for (whole, zoom), name in zip(rows, COMMAND, strict=True):
+        applied = result.signals[f"plant.{name}"]
+        for axes in (whole, zoom):
+            axes.step(t, applied, where="post", color=BLUE)
+        inside = (t >= start) & (t <= end)
+        visible = applied[inside] if inside.any() else applied
+        margin = 0.06 * (float(np.ptp(visible)) or 1.0)
+        zoom.set(xlim=(start, end), ylim=(visible.min() - margin, visible.max() + margin))
+        whole.set_ylabel(f"{name} [{'N' if name == COMMAND[0] else 'N·m'}]")
+        whole.margins(x=0)
+        _mark_events(zoom, result, start, end)
+    for axes in rows[-1]:
+        axes.set_xlabel("time [s]")
+    rows[0][0].set_title(_title(result))
+    rows[0][1].set_title(f"{start:g} s to {end:g} s, with the instants of the digital loop")
+    handles, labels = rows[0][1].get_legend_handles_labels()
+    if handles:
+        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    return figure
+
+
+def energy(result: Result) -> Figure:
+    """The energy function L at the samples; in theory it falls outside the boundary layer once s is small."""
+    figure = Figure(figsize=(8.0, 4.0))
+    axes = figure.add_subplot()
+    values = result.signals.get(f"controller.{ENERGY}")
+    if values is not None and result.sampled.any():
+        _log_line(axes, result.signals["time"][result.sampled], values[result.sampled], BLUE, "L")
+    axes.set(xlabel="time [s]", ylabel="energy L (33) [J]", yscale="log", title=_title(result))
+    axes.margins(x=0)
+    return figure
+
+
+def _log_line(axes: Axes, t: Floats, values: Floats, color: str, label: str) -> None:
+    axes.plot(t, np.where(values > 0.0, values, np.nan), color=color, label=label)
+
+
+def _mark_events(axes: Axes, result: Result, start: float, end: float) -> None:
+    """Ticks along the lower and upper edge for what happened in the window."""
+    for kind, what, marker, color, height, label in (
+        ("sampled", "measurement", "|", GREY, 0.02, "sampled"),
+        ("arrived", "command", "^", GREEN, 0.06, "command arrives"),
+        ("lost", "measurement", "x", ORANGE, 0.94, "measurement lost"),
+        ("lost", "command", "x", RED, 0.98, "command lost"),
+    ):
+        times = [e.time / 1e9 for e in result.events if e.kind == kind and e.what == what]
+        times = [time for time in times if start <= time <= end]
+        if times:
+            axes.plot(
+                times, [height] * len(times), linestyle="", marker=marker, color=color, markersize=5,
+                transform=axes.get_xaxis_transform(), label=label, clip_on=False,
+            )  # fmt: skip
+
+
+def _title(result: Result) -> str:
+    timing = result.scenario.timing
+    parts = [f"{result.scenario.controller.fmu}, period {timing.period * 1e3:g} ms"]
+    if timing.delay:
+        parts.append(f"delay {timing.delay * 1e3:g} ms")
+    if timing.order != "gauss-seidel":
+        parts.append("Jacobi")
+    if result.divergence is not None:
+        parts.append(f"diverged at {result.metrics['divergence_time']:g} s")
+    return ", ".join(parts)
+
+

@@ -1,0 +1,180 @@
+"""What a run is, as one frozen value, and its TOML form."""
+
+import dataclasses
+import math
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+from orchestration.errors import UsageError
+from orchestration.timing import Timing
+from orchestration.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT, SAMPLE_OFFSET, SAMPLE_PERIOD
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:  # pragma: no cover
+    import tomli as tomllib
+
+Parameter = float | bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class FmuChoice:
+    """An FMU, by the name of one of this project's or a path, and the parameters to set."""
+
+    fmu: str
+    parameters: dict[str, Parameter] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReferenceChoice:
+    """Where the reference comes from: the controller's built-in trajectory unless a CSV file is named."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    file: Path | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Record:
+    """Variables to record beside what is exchanged; None: all outputs and locals."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    plant: tuple[str, ...] | None = None
+    controller: tuple[str, ...] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """One run; the defaults are the paper's scenario (section V) at a 10 ms period.
+
+    Raises `UsageError` for values that cannot be.
+    """
+
+    stop_time: float = 30.0
+    """[s]"""
+    seed: int = 0
+    """of all random numbers"""
+    controller: FmuChoice = field(default_factory=lambda: FmuChoice(fmu=DEFAULT_CONTROLLER))
+    plant: FmuChoice = field(default_factory=lambda: FmuChoice(fmu=DEFAULT_PLANT))
+    timing: Timing = field(default_factory=Timing)
+    reference: ReferenceChoice = field(default_factory=ReferenceChoice)
+    record: Record = field(default_factory=Record)
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.stop_time) and self.stop_time > 0.0):
+            raise UsageError(f"stop_time = {self.stop_time}: expected a positive number of seconds")
+        if self.seed < 0:
+            raise UsageError(f"seed = {self.seed}: expected a whole number, zero or positive")
+        for name, flag in ((SAMPLE_PERIOD, "--period and --clock"), (SAMPLE_OFFSET, "--offset")):
+            if name in self.controller.parameters:
+                raise UsageError(
+                    f"controller.{name}: expected {flag} instead; the master sets it, to 0 with clock master "
+                    "(the master decides when to sample) and to the timing's value with clock fmu"
+                )
+
+    def with_changes(
+        self,
+        *,
+        timing: Mapping[str, Any] | None = None,
+        parameters: Mapping[str, Parameter] | None = None,
+        **fields: Any,
+    ) -> "Scenario":
+        """This scenario with other timing keys, parameters (`controller.NAME`, `plant.NAME`) or fields.
+
+        Raises `UsageError` for a key that does not exist.
+        """
+        changed = dataclasses.replace(self, **fields)
+        if timing:
+            changed = dataclasses.replace(changed, timing=dataclasses.replace(self.timing, **dict(timing)))
+        for name, value in (parameters or {}).items():
+            side, _, parameter = name.partition(".")
+            if side not in ("controller", "plant") or not parameter:
+                raise UsageError(f"{name}: expected controller.NAME or plant.NAME")
+            choice: FmuChoice = getattr(changed, side)
+            choice = dataclasses.replace(choice, parameters={**choice.parameters, parameter: value})
+            changed = dataclasses.replace(changed, **{side: choice})
+        return changed
+
+    def to_toml(self) -> str:
+        """The scenario file that loads as this scenario."""
+        import tomli_w
+
+        timing = {
+            key: value
+            for key, value in dataclasses.asdict(self.timing).items()
+            if value is not None and value != {}
+        }  # fmt: skip
+        tables: dict[str, Any] = {
+            "stop_time": self.stop_time,
+            "seed": self.seed,
+            "controller": {"fmu": self.controller.fmu, **self.controller.parameters},
+            "plant": {"fmu": self.plant.fmu, **self.plant.parameters},
+            "timing": timing,
+        }
+        if self.reference.file is not None:
+            tables["reference"] = {"file": str(self.reference.file)}
+        record = {key: list(value) for key, value in dataclasses.asdict(self.record).items() if value is not None}
+        if record:
+            tables["record"] = record
+        return tomli_w.dumps(tables)
+
+
+def load_scenario(path: str | Path) -> Scenario:
+    """Read a scenario file; paths in it are relative to its folder.
+
+    Raises `UsageError` for a file that cannot be read, a key that does not exist (naming those that do)
+    or a value of the wrong kind.
+    """
+    path = Path(path)
+    try:
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(f"{path}: expected a readable scenario file: {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise UsageError(f"{path}: expected TOML: {error}") from error
+    try:
+        return _scenario(tables, path.parent)
+    except UsageError as error:
+        raise UsageError(f"{path}: {error}") from error
+
+
+def _scenario(tables: dict[str, Any], folder: Path) -> Scenario:
+    from orchestration import scenario_file  # pydantic loads only where a file is read
+
+    parsed = scenario_file.parse(tables)
+    file = parsed.reference.file
+    return Scenario(
+        stop_time=parsed.stop_time,
+        seed=parsed.seed,
+        controller=_choice("controller", parsed.controller, DEFAULT_CONTROLLER, folder),
+        plant=_choice("plant", parsed.plant, DEFAULT_PLANT, folder),
+        timing=parsed.timing,
+        reference=ReferenceChoice(file=None if file is None else folder / file),
+        record=parsed.record,
+    )
+
+
+def _choice(side: str, table: dict[str, Any], default: str, folder: Path) -> FmuChoice:
+    parameters = dict(_flattened(table))
+    fmu = parameters.pop("fmu", default)
+    if not isinstance(fmu, str):
+        raise UsageError(f"{side}.fmu = {fmu}: expected the name of an FMU or a path")
+    for name, value in parameters.items():
+        if not isinstance(value, (int, float, bool)):
+            raise UsageError(f"{side}.{name} = {value!r}: expected a number, true or false")
+    if fmu.endswith(".fmu"):
+        fmu = str(folder / fmu)
+    return FmuChoice(fmu=fmu, parameters=parameters)
+
+
+def _flattened(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Nested tables as dotted names: `gain.eta = 15` and `"gain.eta" = 15` mean the same."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _flattened(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value

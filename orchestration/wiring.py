@@ -1,0 +1,51 @@
+"""The names of both FMUs and what is connected to what; no other file of this package knows them."""
+
+MODELS = {
+    "UnifiedController": "controller_fmu.slave:UnifiedController",
+    "QuadrotorPlant": "plant_fmu.slave:QuadrotorPlant",
+}
+"""FMUs of this project by name, and the slave that each is built from."""
+
+DEFAULT_CONTROLLER = "UnifiedController"
+DEFAULT_PLANT = "QuadrotorPlant"
+
+
+def components(name: str, axes: str = "xyz") -> tuple[str, ...]:
+    """The scalar variables of a vector."""
+    return tuple(f"{name}.{axis}" for axis in axes)
+
+
+POSITION = components("position")
+VELOCITY = components("velocity")
+QUATERNION = components("quaternion", "xyzw")
+ANGULAR_VELOCITY = components("angular_velocity")
+
+MEASUREMENT = POSITION + VELOCITY + QUATERNION + ANGULAR_VELOCITY
+"""Outputs of the plant and, by the same names, inputs of the controller."""
+
+COMMAND = ("thrust", *components("torque"))
+"""Outputs of the controller and, by the same names, inputs of the plant."""
+
+REFERENCE = tuple(
+    name
+    for derivative in ("position", "velocity", "acceleration", "jerk", "snap")
+    for name in components(f"reference.{derivative}")
+)
+"""Inputs of the controller that a reference from a file feeds."""
+
+USE_REFERENCE_INPUTS = "use_reference_inputs"
+SAMPLE_PERIOD = "sample_period"
+SAMPLE_OFFSET = "sample_offset"
+
+TRAJECTORY = {
+    f"trajectory.{name}": name for name in ("amplitude_x", "amplitude_y", "frequency", "start_z", "rate_z")
+}
+"""Parameters of the controller's built-in trajectory, and the fields of `Trajectory` they are."""
+
+POSITION_REFERENCE = components("reference.position")
+"""P_d as it is recorded beside the signals."""
+
+ATTITUDE_ERROR_SCALAR = "attitude_error.w"
+ENERGY = "energy"
+THRUST_MAX = "thrust_max"
+TORQUE_MAX = "torque_max"

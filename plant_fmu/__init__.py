@@ -1,0 +1,1 @@
+"""The quadrotor as a rigid body, and its FMU."""
