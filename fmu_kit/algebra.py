@@ -163,7 +163,8 @@ class Quaternion:
 
     def normalised(self, ops: ScalarOps = FLOAT) -> Quaternion:
         """The unit quaternion in this direction; division by zero for a zero quaternion."""
-        return self / self.norm(ops)
+        length = self.norm(ops)
+        return Quaternion(self.vector / length, self.scalar / length)
 
     def __iter__(self) -> Iterator[Scalar]:
         return iter((self.vector.x, self.vector.y, self.vector.z, self.scalar))
@@ -206,8 +207,7 @@ class Inertia:
 
     def __repr__(self) -> str:
         return (
-            f"Inertia(xx={self.xx!r}, yy={self.yy!r}, zz={self.zz!r}, "
-            f"xy={self.xy!r}, xz={self.xz!r}, yz={self.yz!r})"
+            f"Inertia(xx={self.xx!r}, yy={self.yy!r}, zz={self.zz!r}, xy={self.xy!r}, xz={self.xz!r}, yz={self.yz!r})"
         )
 
 

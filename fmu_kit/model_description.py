@@ -89,7 +89,7 @@ def _scalar_variable(variable: Variable, value_reference: int) -> Element:
     attributes: dict[str, str] = {}
     if variable.has_start:
         attributes["start"] = _literal(variable.start)
-    if not (variable.causality == "input"):  # an input's initial is exact and must not be written
+    if variable.causality != "input":  # an input's initial is exact and must not be written
         element.set("initial", "exact" if variable.has_start else "calculated")
     if variable.unit is not None:
         attributes["unit"] = variable.unit

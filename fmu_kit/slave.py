@@ -26,6 +26,7 @@ from fmu_kit.variables import INERTIA_AXES, Variable
 
 State = dict[str, Any]  # of JSON types only: it is serialised as JSON
 
+
 class Phase(enum.IntEnum):
     """Where in its life an instance is (FMI 2.0, section 4.2.4)."""
 
@@ -96,7 +97,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         starts = [v.start for v in self.variables]
         self._reals: list[float] = [float(v) for v in starts[: self._real_count]]
         self._others: dict[int, int | bool] = {
-            i: v for i, v in enumerate(starts) if i >= self._real_count
+            i: int(v) for i, v in enumerate(starts) if i >= self._real_count
         }  # Integers and Booleans by value reference
         self._phase = Phase.INSTANTIATED
         self._start_time = 0.0
@@ -150,9 +151,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         """The matrix of `inertia.xx` to `.yz`; raises `FmuError` unless it is positive definite."""
         entries = {axis: self.real(f"inertia.{axis}") for axis in INERTIA_AXES}
         listed = ", ".join(f"{axis} {value:g}" for axis, value in entries.items())
-        require(
-            is_positive_definite(**entries), "inertia.{xx,yy,zz,xy,xz,yz}", listed, "a positive definite matrix"
-        )
+        require(is_positive_definite(**entries), "inertia.{xx,yy,zz,xy,xz,yz}", listed, "a positive definite matrix")
         return Inertia(**entries)
 
     def put(self, name: str, value: float) -> None:

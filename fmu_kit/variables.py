@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, Protocol
 
 from fmu_kit.errors import require
 
@@ -64,14 +64,45 @@ class Variable:
         require(inside, self.name, value, self.bounds)
 
 
+class _Kind(Protocol):
+    def __call__(
+        self, name: str, description: str, unit: str | None, start: float | int | bool = 0.0, **bounds: float
+    ) -> Variable: ...
+
+
+def _kind(causality: Causality, variability: Variability) -> _Kind:
+    def declare(
+        name: str, description: str, unit: str | None, start: float | int | bool = 0.0, **bounds: float
+    ) -> Variable:
+        return Variable(
+            name=name,
+            description=description,
+            causality=causality,
+            variability=variability,
+            unit=unit,
+            start=start,
+            **bounds,
+        )
+
+    return declare
+
+
+continuous_input = _kind("input", "continuous")
+continuous_output = _kind("output", "continuous")
+discrete_output = _kind("output", "discrete")
+continuous_local = _kind("local", "continuous")
+discrete_local = _kind("local", "discrete")
+fixed_parameter = _kind("parameter", "fixed")
+tunable_parameter = _kind("parameter", "tunable")
+
+
 def vector(
     template: Variable, axes: Sequence[str] = ("x", "y", "z"), start: Iterable[float] | None = None
 ) -> list[Variable]:
     """`template` once for each axis, as `name.axis`, with the starts given or else that of the template."""
     starts = [template.start] * len(axes) if start is None else list(start)
     return [
-        replace(template, name=f"{template.name}.{axis}", start=value)
-        for axis, value in zip(axes, starts, strict=True)
+        replace(template, name=f"{template.name}.{axis}", start=value) for axis, value in zip(axes, starts, strict=True)
     ]
 
 

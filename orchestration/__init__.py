@@ -1,10 +1,10 @@
 """quadcosim: fly a quadrotor controller FMU and a plant FMU under a realistic digital clock.
 
-    import orchestration as quadcosim
+import orchestration as quadcosim
 
-    result = quadcosim.run(quadcosim.Scenario(timing=quadcosim.Timing(period=0.02)))
-    print(result.metrics["ultimate_bound"])
-    result.save("results/20ms")
+result = quadcosim.run(quadcosim.Scenario(timing=quadcosim.Timing(period=0.02)))
+print(result.metrics["ultimate_bound"])
+quadcosim.save_run(result, "results/20ms")
 """
 
 from importlib import import_module
@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from orchestration.errors import QuadcosimError, SimulatorError, UsageError
     from orchestration.flight import run
-    from orchestration.result import Result, load_result
-    from orchestration.scenario import FmuChoice, Record, ReferenceChoice, Scenario, load_scenario
+    from orchestration.result import Result
+    from orchestration.run_directory import load_run, save_run
+    from orchestration.scenario import FmuChoice, Record, ReferenceChoice, Scenario
+    from orchestration.scenario_file import load_scenario
     from orchestration.timing import Timing
 
 _HOMES = {
@@ -23,12 +25,13 @@ _HOMES = {
     "UsageError": "errors",
     "run": "flight",
     "Result": "result",
-    "load_result": "result",
+    "load_run": "run_directory",
+    "save_run": "run_directory",
     "FmuChoice": "scenario",
     "Record": "scenario",
     "ReferenceChoice": "scenario",
     "Scenario": "scenario",
-    "load_scenario": "scenario",
+    "load_scenario": "scenario_file",
     "Timing": "timing",
 }
 
@@ -42,9 +45,10 @@ __all__ = [
     "SimulatorError",
     "Timing",
     "UsageError",
-    "load_result",
+    "load_run",
     "load_scenario",
     "run",
+    "save_run",
 ]
 
 

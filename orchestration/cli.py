@@ -56,13 +56,14 @@ def run(
 ) -> None:
     """Fly a scenario and print its metrics. FMUs that are missing or out of date are built first."""
     from orchestration.flight import run as fly
+    from orchestration.run_directory import save_run
 
     chosen = scenario_from(scenario, flags)
     with progress_bar("flying") as progress:
         result = fly(chosen, progress=progress, announce=_say)
     _report(result, as_json)
     if out is not None:
-        _say(f"results in {result.save(out, figures=figures)}")
+        _say(f"results in {save_run(result, out, figures=figures)}")
     elif not as_json:
         _say("add --out DIR to keep the signals and the figures")
 
@@ -70,14 +71,16 @@ def run(
 @app.command()
 def plot(
     directory: Annotated[Path, typer.Argument(help="Directory of a run.", metavar="DIR")],
-    start: Annotated[float | None, typer.Option("--from", help="Start of the zoom on the commands, in seconds.")] = None,
+    start: Annotated[
+        float | None, typer.Option("--from", help="Start of the zoom on the commands, in seconds.")
+    ] = None,
     end: Annotated[float | None, typer.Option("--to", help="End of the zoom on the commands, in seconds.")] = None,
 ) -> None:
     """Draw the figures of a run again, the commands zoomed on a window of time."""
     from orchestration import plots
-    from orchestration.result import load_result
+    from orchestration.run_directory import load_run
 
-    result = load_result(directory)
+    result = load_run(directory)
     last = float(result.signals["time"][-1])
     window = None
     if start is not None or end is not None:
@@ -123,7 +126,7 @@ def _report(result: "Result", as_json: bool) -> None:
         return
     width = max(map(len, result.metrics))
     for name, value in result.metrics.items():
-        shown = f"{value:.6g}" if isinstance(value, float) else {None: "-"}.get(value, str(value))
+        shown = f"{value:.6g}" if isinstance(value, float) else "-" if value is None else str(value)
         print(f"{name:<{width}}  {shown}")
     if result.divergence is not None:
         print(f"diverged: {result.divergence}")

@@ -25,26 +25,92 @@ def _option(*names: str, panel: str, text: str, metavar: str = "SECONDS", **opti
 class FlightFlags:
     """What was given on the command line; None: not given, the scenario decides."""
 
-    period: Annotated[float | None, _option("--period", panel=TIMING, text="Controller period; 0.01 unless told.")] = None
+    period: Annotated[float | None, _option("--period", panel=TIMING, text="Controller period; 0.01 unless told.")] = (
+        None
+    )
     offset: Annotated[float | None, _option("--offset", panel=TIMING, text="Time of the first sample.")] = None
-    plant_interval: Annotated[float | None, _option("--plant-interval", panel=TIMING, text="Plant's communication interval; 0.001 unless told.")] = None
-    order: Annotated[str | None, _option("--order", panel=TIMING, metavar="gauss-seidel|jacobi", text="Whether a command is there at its sample, or at the next one.")] = None
-    hold: Annotated[str | None, _option("--hold", panel=TIMING, metavar="zero|first", text="Hold of the command between arrivals.")] = None
-    clock: Annotated[str | None, _option("--clock", panel=TIMING, metavar="master|fmu", text="Who decides when the controller samples.")] = None
-    delay: Annotated[float | None, _option("--delay", panel=EFFECTS, text="From sample to application of its command; may exceed the period.")] = None
-    delay_jitter: Annotated[float | None, _option("--delay-jitter", panel=EFFECTS, text="Largest random addition to the delay.")] = None
-    jitter: Annotated[float | None, _option("--jitter", panel=EFFECTS, text="Largest lateness of a sampling instant.")] = None
-    jitter_distribution: Annotated[str | None, _option("--jitter-distribution", panel=EFFECTS, metavar="uniform|normal", text="Of both jitters.")] = None
-    measurement_loss: Annotated[float | None, _option("--measurement-loss", panel=EFFECTS, metavar="P", text="Probability that a measurement is lost.")] = None
-    command_loss: Annotated[float | None, _option("--command-loss", panel=EFFECTS, metavar="P", text="Probability that a command is lost.")] = None
+    plant_interval: Annotated[
+        float | None,
+        _option("--plant-interval", panel=TIMING, text="Plant's communication interval; 0.001 unless told."),
+    ] = None
+    order: Annotated[
+        str | None,
+        _option(
+            "--order",
+            panel=TIMING,
+            metavar="gauss-seidel|jacobi",
+            text="Whether a command is there at its sample, or at the next one.",
+        ),
+    ] = None
+    hold: Annotated[
+        str | None, _option("--hold", panel=TIMING, metavar="zero|first", text="Hold of the command between arrivals.")
+    ] = None
+    clock: Annotated[
+        str | None,
+        _option("--clock", panel=TIMING, metavar="master|fmu", text="Who decides when the controller samples."),
+    ] = None
+    delay: Annotated[
+        float | None,
+        _option("--delay", panel=EFFECTS, text="From sample to application of its command; may exceed the period."),
+    ] = None
+    delay_jitter: Annotated[
+        float | None, _option("--delay-jitter", panel=EFFECTS, text="Largest random addition to the delay.")
+    ] = None
+    jitter: Annotated[
+        float | None, _option("--jitter", panel=EFFECTS, text="Largest lateness of a sampling instant.")
+    ] = None
+    jitter_distribution: Annotated[
+        str | None, _option("--jitter-distribution", panel=EFFECTS, metavar="uniform|normal", text="Of both jitters.")
+    ] = None
+    measurement_loss: Annotated[
+        float | None,
+        _option("--measurement-loss", panel=EFFECTS, metavar="P", text="Probability that a measurement is lost."),
+    ] = None
+    command_loss: Annotated[
+        float | None, _option("--command-loss", panel=EFFECTS, metavar="P", text="Probability that a command is lost.")
+    ] = None
     loss: Annotated[float | None, _option("--loss", panel=EFFECTS, metavar="P", text="Both losses at once.")] = None
-    burst_length: Annotated[float | None, _option("--burst-length", panel=EFFECTS, metavar="N", text="Mean number of losses in a row; independent unless given.")] = None
-    clock_ratio: Annotated[float | None, _option("--clock-ratio", panel=EFFECTS, metavar="R", text="Seconds that the controller believes pass per true second.")] = None
-    noise: Annotated[list[str] | None, _option("--noise", panel=EFFECTS, metavar="NAME=SIGMA", text="Gaussian noise on a measurement; may be repeated.")] = None
-    quantisation: Annotated[list[str] | None, _option("--quantisation", panel=EFFECTS, metavar="NAME=Q", text="Rounding of a measurement; may be repeated.")] = None
+    burst_length: Annotated[
+        float | None,
+        _option(
+            "--burst-length",
+            panel=EFFECTS,
+            metavar="N",
+            text="Mean number of losses in a row; independent unless given.",
+        ),
+    ] = None
+    clock_ratio: Annotated[
+        float | None,
+        _option(
+            "--clock-ratio",
+            panel=EFFECTS,
+            metavar="R",
+            text="Seconds that the controller believes pass per true second.",
+        ),
+    ] = None
+    noise: Annotated[
+        list[str] | None,
+        _option(
+            "--noise", panel=EFFECTS, metavar="NAME=SIGMA", text="Gaussian noise on a measurement; may be repeated."
+        ),
+    ] = None
+    quantisation: Annotated[
+        list[str] | None,
+        _option("--quantisation", panel=EFFECTS, metavar="NAME=Q", text="Rounding of a measurement; may be repeated."),
+    ] = None
     seed: Annotated[int | None, _option("--seed", panel=EFFECTS, metavar="N", text="Of all random numbers.")] = None
-    stop_time: Annotated[float | None, _option("--stop-time", panel=MODEL, text="End of the run; 30 unless told.")] = None
-    set: Annotated[list[str] | None, _option("--set", panel=MODEL, metavar="SIDE.NAME=V", text="A parameter of an FMU, as controller.NAME=V or plant.NAME=V; may be repeated.")] = None
+    stop_time: Annotated[float | None, _option("--stop-time", panel=MODEL, text="End of the run; 30 unless told.")] = (
+        None
+    )
+    set: Annotated[
+        list[str] | None,
+        _option(
+            "--set",
+            panel=MODEL,
+            metavar="SIDE.NAME=V",
+            text="A parameter of an FMU, as controller.NAME=V or plant.NAME=V; may be repeated.",
+        ),
+    ] = None
 
     def applied_to(self, scenario: "Scenario") -> "Scenario":
         """`scenario` with what was given; raises `UsageError` for what cannot be."""
@@ -90,7 +156,8 @@ def flies(command: Callable[..., None]) -> Callable[..., None]:
 
 def scenario_from(path: Path | None, flags: FlightFlags) -> "Scenario":
     """The scenario of a file, or the paper's, with the flags applied."""
-    from orchestration.scenario import Scenario, load_scenario
+    from orchestration.scenario import Scenario
+    from orchestration.scenario_file import load_scenario
 
     return flags.applied_to(Scenario() if path is None else load_scenario(path))
 
@@ -116,5 +183,3 @@ def _value(name: str, text: str) -> "Parameter":
     if text.lower() in ("true", "false"):
         return text.lower() == "true"
     return _number(f"--set {name} =", text)
-
-

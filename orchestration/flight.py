@@ -183,5 +183,3 @@ def _recorded(fmu: FmuSimulator, chosen: tuple[str, ...] | None) -> tuple[str, .
             fmu.variable(name)
             raise UsageError(f"record.{fmu.name}: {name} cannot be recorded; expected one of {', '.join(recordable)}")
     return recordable if chosen is None else chosen
-
-

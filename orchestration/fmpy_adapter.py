@@ -140,7 +140,7 @@ class FmuSimulator:
         variable = self.variable(name)
         getter = {"Boolean": "getBoolean", "Integer": "getInteger"}.get(variable.type, "getReal")
         value = self._call(getter, [variable.valueReference])[0]
-        return bool(value) if variable.type == "Boolean" else value  # type: ignore[no-any-return]
+        return bool(value) if variable.type == "Boolean" else float(value)
 
     def variable(self, name: str) -> ScalarVariable:
         """The declaration of a variable; raises `UsageError` naming the valid parameters."""

@@ -217,16 +217,16 @@ class Master:
         self._read_controller()
         if sample is None:
             return
-        self.events.append(Event(sample.sent, "sent", "command", sample.index))
+        self.events.append(Event(sample.sent, "sent", "command", sample.k))
         if sample.arrival is None:
-            self.events.append(Event(sample.sent, "lost", "command", sample.index))
+            self.events.append(Event(sample.sent, "lost", "command", sample.k))
         else:
-            self._in_flight[sample.index] = self.board.computed.tolist()
+            self._in_flight[sample.k] = self.board.computed.tolist()
 
     def _sense(self, time: int, sample: Sample) -> None:
-        self.events.append(Event(time, "sampled", "measurement", sample.index))
+        self.events.append(Event(time, "sampled", "measurement", sample.k))
         if sample.measurement_lost:
-            self.events.append(Event(time, "lost", "measurement", sample.index))
+            self.events.append(Event(time, "lost", "measurement", sample.k))
         else:
             self._sensors.receive(self.board.measured, self._received)
             self._write_measurement()

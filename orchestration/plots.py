@@ -96,8 +96,8 @@ def commands(result: Result, window: Window | None = None) -> Figure:
             axes.step(t, applied, where="post", color=BLUE)
         inside = (t >= start) & (t <= end)
         visible = applied[inside] if inside.any() else applied
-        margin = 0.06 * (float(np.ptp(visible)) or 1.0)
-        zoom.set(xlim=(start, end), ylim=(visible.min() - margin, visible.max() + margin))
+        span = float(np.ptp(visible)) or 1.0  # room below for what happened, above for what was lost
+        zoom.set(xlim=(start, end), ylim=(visible.min() - 0.25 * span, visible.max() + 0.15 * span))
         whole.set_ylabel(f"{name} [{'N' if name == COMMAND[0] else 'N·m'}]")
         whole.margins(x=0)
         _mark_events(zoom, result, start, end)
@@ -112,7 +112,7 @@ def commands(result: Result, window: Window | None = None) -> Figure:
 
 
 def energy(result: Result) -> Figure:
-    """The energy function L at the samples; in theory it falls outside the boundary layer once s is small."""
+    """The energy function L at the samples."""
     figure = Figure(figsize=(8.0, 4.0))
     axes = figure.add_subplot()
     values = result.signals.get(f"controller.{ENERGY}")
@@ -130,16 +130,17 @@ def _log_line(axes: Axes, t: Floats, values: Floats, color: str, label: str) -> 
 def _mark_events(axes: Axes, result: Result, start: float, end: float) -> None:
     """Ticks along the lower and upper edge for what happened in the window."""
     for kind, what, marker, color, height, label in (
-        ("sampled", "measurement", "|", GREY, 0.02, "sampled"),
-        ("arrived", "command", "^", GREEN, 0.06, "command arrives"),
-        ("lost", "measurement", "x", ORANGE, 0.94, "measurement lost"),
+        ("sampled", "measurement", "|", GREY, 0.04, "sampled"),
+        ("arrived", "command", "^", GREEN, 0.11, "command arrives"),
+        ("lost", "measurement", "x", ORANGE, 0.93, "measurement lost"),
         ("lost", "command", "x", RED, 0.98, "command lost"),
     ):
         times = [e.time / 1e9 for e in result.events if e.kind == kind and e.what == what]
         times = [time for time in times if start <= time <= end]
         if times:
             axes.plot(
-                times, [height] * len(times), linestyle="", marker=marker, color=color, markersize=5,
+                times, [height] * len(times), linestyle="", marker=marker, color=color, markersize=4,
+                markeredgewidth=0.8,
                 transform=axes.get_xaxis_transform(), label=label, clip_on=False,
             )  # fmt: skip
 
@@ -154,5 +155,3 @@ def _title(result: Result) -> str:
     if result.divergence is not None:
         parts.append(f"diverged at {result.metrics['divergence_time']:g} s")
     return ", ".join(parts)
-
-

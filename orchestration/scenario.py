@@ -1,9 +1,8 @@
-"""What a run is, as one frozen value, and its TOML form."""
+"""What a run is, as one frozen value."""
 
 import dataclasses
 import math
-import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -11,11 +10,6 @@ from typing import Any, ClassVar
 from orchestration.errors import UsageError
 from orchestration.timing import Timing
 from orchestration.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT, SAMPLE_OFFSET, SAMPLE_PERIOD
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:  # pragma: no cover
-    import tomli as tomllib
 
 Parameter = float | bool
 
@@ -96,7 +90,8 @@ class Scenario:
                 raise UsageError(f"{name}: expected controller.NAME or plant.NAME")
             choice: FmuChoice = getattr(changed, side)
             choice = dataclasses.replace(choice, parameters={**choice.parameters, parameter: value})
-            changed = dataclasses.replace(changed, **{side: choice})
+            replaced: dict[str, Any] = {side: choice}
+            changed = dataclasses.replace(changed, **replaced)
         return changed
 
     def to_toml(self) -> str:
@@ -121,60 +116,3 @@ class Scenario:
         if record:
             tables["record"] = record
         return tomli_w.dumps(tables)
-
-
-def load_scenario(path: str | Path) -> Scenario:
-    """Read a scenario file; paths in it are relative to its folder.
-
-    Raises `UsageError` for a file that cannot be read, a key that does not exist (naming those that do)
-    or a value of the wrong kind.
-    """
-    path = Path(path)
-    try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path}: expected a readable scenario file: {error}") from error
-    except tomllib.TOMLDecodeError as error:
-        raise UsageError(f"{path}: expected TOML: {error}") from error
-    try:
-        return _scenario(tables, path.parent)
-    except UsageError as error:
-        raise UsageError(f"{path}: {error}") from error
-
-
-def _scenario(tables: dict[str, Any], folder: Path) -> Scenario:
-    from orchestration import scenario_file  # pydantic loads only where a file is read
-
-    parsed = scenario_file.parse(tables)
-    file = parsed.reference.file
-    return Scenario(
-        stop_time=parsed.stop_time,
-        seed=parsed.seed,
-        controller=_choice("controller", parsed.controller, DEFAULT_CONTROLLER, folder),
-        plant=_choice("plant", parsed.plant, DEFAULT_PLANT, folder),
-        timing=parsed.timing,
-        reference=ReferenceChoice(file=None if file is None else folder / file),
-        record=parsed.record,
-    )
-
-
-def _choice(side: str, table: dict[str, Any], default: str, folder: Path) -> FmuChoice:
-    parameters = dict(_flattened(table))
-    fmu = parameters.pop("fmu", default)
-    if not isinstance(fmu, str):
-        raise UsageError(f"{side}.fmu = {fmu}: expected the name of an FMU or a path")
-    for name, value in parameters.items():
-        if not isinstance(value, (int, float, bool)):
-            raise UsageError(f"{side}.{name} = {value!r}: expected a number, true or false")
-    if fmu.endswith(".fmu"):
-        fmu = str(folder / fmu)
-    return FmuChoice(fmu=fmu, parameters=parameters)
-
-
-def _flattened(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Nested tables as dotted names: `gain.eta = 15` and `"gain.eta" = 15` mean the same."""
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _flattened(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", value

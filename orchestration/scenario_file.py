@@ -1,14 +1,23 @@
-"""Checks the types and keys of a scenario file; values are checked where they mean something."""
+"""Reads scenario files: keys and types are checked here, values where they mean something."""
 
 import dataclasses
+import sys
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, ClassVar
 
 import pydantic
 
 from orchestration.errors import UsageError
-from orchestration.scenario import Record, ReferenceChoice, Scenario
+from orchestration.scenario import FmuChoice, Record, ReferenceChoice, Scenario
 from orchestration.timing import Timing
+from orchestration.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +35,62 @@ class ScenarioFile:
     record: Record = field(default_factory=Record)
 
 
-def parse(tables: dict[str, Any]) -> ScenarioFile:
+def load_scenario(path: str | Path) -> Scenario:
+    """Read a scenario file; paths in it are relative to its folder.
+
+    Raises `UsageError` for a file that cannot be read, a key that does not exist (naming those that do)
+    or a value of the wrong kind.
+    """
+    path = Path(path)
+    try:
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(f"{path}: expected a readable scenario file: {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise UsageError(f"{path}: expected TOML: {error}") from error
+    try:
+        return _scenario(tables, path.parent)
+    except UsageError as error:
+        raise UsageError(f"{path}: {error}") from error
+
+
+def _scenario(tables: dict[str, Any], folder: Path) -> Scenario:
+    parsed = _parse(tables)
+    file = parsed.reference.file
+    return Scenario(
+        stop_time=parsed.stop_time,
+        seed=parsed.seed,
+        controller=_choice("controller", parsed.controller, DEFAULT_CONTROLLER, folder),
+        plant=_choice("plant", parsed.plant, DEFAULT_PLANT, folder),
+        timing=parsed.timing,
+        reference=ReferenceChoice(file=None if file is None else folder / file),
+        record=parsed.record,
+    )
+
+
+def _choice(side: str, table: dict[str, Any], default: str, folder: Path) -> FmuChoice:
+    parameters = dict(_flattened(table))
+    fmu = parameters.pop("fmu", default)
+    if not isinstance(fmu, str):
+        raise UsageError(f"{side}.fmu = {fmu}: expected the name of an FMU or a path")
+    for name, value in parameters.items():
+        if not isinstance(value, (int, float, bool)):
+            raise UsageError(f"{side}.{name} = {value!r}: expected a number, true or false")
+    if fmu.endswith(".fmu"):
+        fmu = str(folder / fmu)
+    return FmuChoice(fmu=fmu, parameters=parameters)
+
+
+def _flattened(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Nested tables as dotted names: `gain.eta = 15` and `"gain.eta" = 15` mean the same."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _flattened(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def _parse(tables: dict[str, Any]) -> ScenarioFile:
     """The typed form of a TOML document; raises `UsageError` in one line for the first thing wrong."""
     try:
         return pydantic.TypeAdapter(ScenarioFile).validate_python(tables)

@@ -158,8 +158,8 @@ def _round_ratio(numerator: int, denominator: int) -> int:
 class Sample(NamedTuple):
     """One sampling instant of the controller."""
 
-    index: int
-    """k"""
+    k: int
+    """its index"""
     time: int
     """true time [ns]"""
     next_time: int
@@ -228,7 +228,7 @@ class Clock(Iterator[Instant]):
         elif time == sample.time:
             due = sample
             if due.arrival is not None:
-                queue.append((due.arrival, due.index))
+                queue.append((due.arrival, due.k))
             self._next = self._draw()
         if not (queue and queue[0][0] == time):
             return Instant(time, due, ())

@@ -37,9 +37,7 @@ USE_REFERENCE_INPUTS = "use_reference_inputs"
 SAMPLE_PERIOD = "sample_period"
 SAMPLE_OFFSET = "sample_offset"
 
-TRAJECTORY = {
-    f"trajectory.{name}": name for name in ("amplitude_x", "amplitude_y", "frequency", "start_z", "rate_z")
-}
+TRAJECTORY = {f"trajectory.{name}": name for name in ("amplitude_x", "amplitude_y", "frequency", "start_z", "rate_z")}
 """Parameters of the controller's built-in trajectory, and the fields of `Trajectory` they are."""
 
 POSITION_REFERENCE = components("reference.position")

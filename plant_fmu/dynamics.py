@@ -10,6 +10,7 @@ from typing import NamedTuple
 from fmu_kit.algebra import Inertia, Quaternion, Vec3
 from fmu_kit.scalar import FLOAT, Scalar, ScalarOps
 
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Body:
     """A rigid body in a uniform field of gravity."""
@@ -99,7 +100,7 @@ class Wind:
 
     def force(self, t: Scalar, ops: ScalarOps = FLOAT) -> Vec3:
         """F_d [N], inertial, at `t` [s]."""
-        return ops.cos(self.frequency * t) * self.amplitude
+        return self.amplitude * ops.cos(self.frequency * t)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

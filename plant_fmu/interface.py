@@ -1,7 +1,16 @@
 """The variables of the plant FMU."""
 
 from fmu_kit.algebra import Quaternion, Vec3
-from fmu_kit.variables import INERTIA_AXES, QUATERNION_AXES, Variable, vector
+from fmu_kit.variables import (
+    INERTIA_AXES,
+    QUATERNION_AXES,
+    continuous_input,
+    continuous_local,
+    continuous_output,
+    fixed_parameter,
+    tunable_parameter,
+    vector,
+)
 from plant_fmu.dynamics import Actuators, Body, Wind
 
 PAPER_ATTITUDE = Quaternion.from_xyzw(0.1699, 0.3058, 0.1699, 0.9212)
@@ -13,80 +22,62 @@ LARGEST_INTERNAL_STEP = 0.002
 _BODY, _WIND, _ACTUATORS, _ORIGIN = Body(), Wind(), Actuators(), Vec3(0.0, 0.0, 0.0)
 
 
-def _input(name: str, description: str, unit: str, start: float = 0.0) -> Variable:
-    return Variable(
-        name=name, description=description, causality="input", variability="continuous", unit=unit, start=start
-    )
-
-
-def _output(name: str, description: str, unit: str) -> Variable:
-    return Variable(name=name, description=description, causality="output", variability="continuous", unit=unit)
-
-
-def _local(name: str, description: str, unit: str) -> Variable:
-    return Variable(name=name, description=description, causality="local", variability="continuous", unit=unit)
-
-
-def _parameter(name: str, description: str, unit: str, start: float = 0.0, **bounds: float) -> Variable:
-    return Variable(
-        name=name, description=description, causality="parameter", variability="fixed", unit=unit, start=start, **bounds
-    )
-
-
-def _tunable(name: str, description: str, unit: str, start: float = 0.0) -> Variable:
-    return Variable(
-        name=name, description=description, causality="parameter", variability="tunable", unit=unit, start=start
-    )
-
-
 COMMAND = (
-    _input("thrust", "total thrust along -z of the body, before limits and lag", "N", _BODY.mass * _BODY.gravity),
-    *vector(_input("torque", "body torque, before limits and lag", "N.m")),
+    continuous_input(
+        "thrust", "total thrust along -z of the body, before limits and lag", "N", _BODY.mass * _BODY.gravity
+    ),
+    *vector(continuous_input("torque", "body torque, before limits and lag", "N.m")),
 )
 
 MOTION = (
-    *vector(_output("position", "position P, inertial frame (north-east-down)", "m")),
-    *vector(_output("velocity", "velocity V, inertial frame", "m/s")),
-    *vector(_output("quaternion", "attitude Q, inertial to body, scalar last", "1"), QUATERNION_AXES),
-    *vector(_output("angular_velocity", "angular velocity, body frame (forward-right-down)", "rad/s")),
+    *vector(continuous_output("position", "position P, inertial frame (north-east-down)", "m")),
+    *vector(continuous_output("velocity", "velocity V, inertial frame", "m/s")),
+    *vector(continuous_output("quaternion", "attitude Q, inertial to body, scalar last", "1"), QUATERNION_AXES),
+    *vector(continuous_output("angular_velocity", "angular velocity, body frame (forward-right-down)", "rad/s")),
 )
 
 PARAMETERS = (
-    _parameter("mass", "mass m", "kg", _BODY.mass, above=0.0),
-    _parameter("gravity", "gravity g, along +z of the inertial frame", "m/s2", _BODY.gravity, minimum=0.0),
+    fixed_parameter("mass", "mass m", "kg", _BODY.mass, above=0.0),
+    fixed_parameter("gravity", "gravity g, along +z of the inertial frame", "m/s2", _BODY.gravity, minimum=0.0),
     *vector(
-        _parameter("inertia", "entry of the inertia matrix J, body frame", "kg.m2"),
+        fixed_parameter("inertia", "entry of the inertia matrix J, body frame", "kg.m2"),
         INERTIA_AXES,
         (1.0, 1.0, 1.0, 0.0, 0.0, 0.0),
     ),
-    *vector(_parameter("initial.position", "P(0)", "m"), start=_ORIGIN),
-    *vector(_parameter("initial.velocity", "V(0)", "m/s"), start=_ORIGIN),
+    *vector(fixed_parameter("initial.position", "P(0)", "m"), start=_ORIGIN),
+    *vector(fixed_parameter("initial.velocity", "V(0)", "m/s"), start=_ORIGIN),
     *vector(
-        _parameter("initial.quaternion", "Q(0), normalised at initialisation", "1"), QUATERNION_AXES, PAPER_ATTITUDE
+        fixed_parameter("initial.quaternion", "Q(0), normalised at initialisation", "1"),
+        QUATERNION_AXES,
+        PAPER_ATTITUDE,
     ),
-    *vector(_parameter("initial.angular_velocity", "angular velocity at the start, body frame", "rad/s"), start=_ORIGIN),
+    *vector(fixed_parameter("initial.angular_velocity", "angular velocity at 0, body frame", "rad/s"), start=_ORIGIN),
     *vector(
-        _tunable("wind.amplitude", "a of the wind force a cos(w t), inertial frame", "N"), start=_WIND.amplitude
+        tunable_parameter("wind.amplitude", "a of the wind force a cos(w t), inertial frame", "N"),
+        start=_WIND.amplitude,
     ),
-    _tunable("wind.frequency", "w of the wind force a cos(w t)", "rad/s", _WIND.frequency),
-    _parameter("thrust_max", "thrust is limited to [0, thrust_max]", "N", _ACTUATORS.thrust_max, minimum=0.0),
-    _parameter("torque_max", "each torque is limited to +-torque_max", "N.m", _ACTUATORS.torque_max, minimum=0.0),
-    _parameter(
-        "actuator_time_constant", "first-order lag of thrust and torques, after the limits; 0: none", "s",
-        _ACTUATORS.time_constant, minimum=0.0,
+    tunable_parameter("wind.frequency", "w of the wind force a cos(w t)", "rad/s", _WIND.frequency),
+    fixed_parameter("thrust_max", "thrust is limited to [0, thrust_max]", "N", _ACTUATORS.thrust_max, minimum=0.0),
+    fixed_parameter("torque_max", "each torque is limited to +-torque_max", "N.m", _ACTUATORS.torque_max, minimum=0.0),
+    fixed_parameter(
+        "actuator_time_constant",
+        "first-order lag of thrust and torques, after the limits; 0: none",
+        "s",
+        _ACTUATORS.time_constant,
+        minimum=0.0,
     ),
-    _parameter("max_internal_step", "largest internal integration step", "s", LARGEST_INTERNAL_STEP, above=0.0),
-)  # fmt: skip
+    fixed_parameter("max_internal_step", "largest internal integration step", "s", LARGEST_INTERNAL_STEP, above=0.0),
+)
 
 LOCALS = (
-    *vector(_local("acceleration", "dV/dt, inertial frame", "m/s2")),
-    *vector(_local("wind.force", "wind force, inertial frame", "N")),
-    _local("tilt", "angle between the z axes of body and inertial frame", "rad"),
+    *vector(continuous_local("acceleration", "dV/dt, inertial frame", "m/s2")),
+    *vector(continuous_local("wind.force", "wind force, inertial frame", "N")),
+    continuous_local("tilt", "angle between the z axes of body and inertial frame", "rad"),
 )
 
 QUADROTOR = (
     *COMMAND,
-    *vector(_input("external_force", "force in the inertial frame, added to the wind", "N")),
+    *vector(continuous_input("external_force", "force in the inertial frame, added to the wind", "N")),
     *MOTION,
     *PARAMETERS,
     *LOCALS,

@@ -1,0 +1,37 @@
+# make demo: build the FMUs, fly the paper's scenario, draw it. make test: lint and run all tests.
+# make bench: time the loop. Each makes its own environment in .venv first.
+PYTHON ?= python3
+BIN := .venv/bin
+export CI
+
+.PHONY: demo test bench figures clean
+
+demo: .venv/.base
+	$(BIN)/quadcosim build
+	$(BIN)/quadcosim run --period 0.01 --out results/demo
+	@echo "figures: results/demo/path.png errors.png commands.png energy.png"
+
+test: .venv/.test
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/pytest
+
+bench: .venv/.base
+	$(BIN)/python benchmarks/bench.py
+
+figures: .venv/.base
+	$(BIN)/python docs/make_figures.py
+
+.venv/.base: pyproject.toml
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --editable .
+	touch $@
+
+.venv/.test: pyproject.toml .venv/.base
+	$(BIN)/python -m pip install --quiet --editable ".[test]"
+	touch $@
+
+clean:
+	rm -rf .venv results fmus/*.fmu
