@@ -164,13 +164,15 @@ class DesiredRate:
 
     def angular_velocity(self) -> Vec3:
         """Ω_d = Φ(F) dF [rad/s], desired body frame (13) (erratum 4)."""
-        return self._numerator(self._F_dot) * self._scale
+        omega_d: Vec3 = self._scale * self._numerator(self._F_dot)
+        return omega_d
 
     def angular_acceleration(self, F_ddot: Vec3) -> Vec3:
         """dΩ_d = dΦ dF + Φ ddF [rad/s²], desired body frame (erratum 4)."""
         relative = 2.0 * self._a1_dot / self._a1 + self._a2_dot / self._a2  # of the denominator α1² α2
         numerator = self._numerator(F_ddot) + self._numerator_dot(self._F_dot) - relative * self._numerator(self._F_dot)
-        return numerator * self._scale
+        omega_d_dot: Vec3 = self._scale * numerator
+        return omega_d_dot
 
     def _numerator(self, v: Vec3) -> Vec3:
         x, y, a1, a2 = self._F.x, self._F.y, self._a1, self._a2

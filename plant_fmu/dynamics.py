@@ -100,7 +100,8 @@ class Wind:
 
     def force(self, t: Scalar, ops: ScalarOps = FLOAT) -> Vec3:
         """F_d [N], inertial, at `t` [s]."""
-        return self.amplitude * ops.cos(self.frequency * t)
+        force: Vec3 = ops.cos(self.frequency * t) * self.amplitude
+        return force
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
