@@ -19,7 +19,7 @@ test: .venv/.test
 	$(BIN)/pytest
 
 bench: .venv/.base
-	$(BIN)/python benchmarks/bench.py
+	$(BIN)/python -m benchmarks.bench
 
 figures: .venv/.base
 	$(BIN)/python docs/make_figures.py

@@ -26,8 +26,8 @@ from xml.etree.ElementTree import tostring
 
 from fmu_kit.model_description import GUID_PLACEHOLDER
 
-OWN_PACKAGES = ("fmu_kit", "controller_fmu", "plant_fmu", "pythonfmu")
-"""Top-level packages that may be bundled; all else must be the standard library."""
+SHARED_PACKAGES = ("fmu_kit", "controller_fmu", "plant_fmu", "pythonfmu")
+"""Top-level packages that may be bundled beside the slave's own; all else must be the standard library."""
 
 EMPTY_INIT = {"pythonfmu/__init__.py"}
 """Package files replaced by empty ones: pythonfmu's imports its builder."""
@@ -72,6 +72,11 @@ class Target:
             raise PackagingError(f"{text}: expected module:Class")
         return cls(module, model)
 
+    @property
+    def packages(self) -> frozenset[str]:
+        """Top-level packages that may be bundled."""
+        return frozenset((*SHARED_PACKAGES, self.module.partition(".")[0]))
+
 
 def bundled_sources(target: Target) -> dict[str, str]:
     """The text of every module that the slave needs, by its path in the bundle; none is imported.
@@ -88,7 +93,7 @@ def bundled_sources(target: Target) -> dict[str, str]:
             continue
         sources[key] = "" if key in EMPTY_INIT else path.read_text(encoding="utf-8")
         package = module if path.name == "__init__.py" else module.rpartition(".")[0]
-        waiting += _imported_modules(sources[key], package, path)
+        waiting += _imported_modules(sources[key], package, path, target.packages)
         if "." in module:
             waiting.append(module.rpartition(".")[0])
     return dict(sorted(sources.items()))
@@ -122,7 +127,9 @@ def build(target: Target, folder: Path) -> Path:
     digest = source_hash(target)
     bundle = f"quadcosim_{digest[:16]}"
     entry = f"{bundle}_entry"
-    files = {f"resources/{bundle}/{name}": _renamed(text, bundle).encode() for name, text in sources.items()}
+    files = {
+        f"resources/{bundle}/{name}": _renamed(text, bundle, target.packages).encode() for name, text in sources.items()
+    }
     files[f"resources/{bundle}/__init__.py"] = b""
     files[f"resources/{entry}.py"] = _ENTRY.format(bundle=bundle, module=target.module, model=target.model).encode()
     files["resources/slavemodule.txt"] = entry.encode()
@@ -177,18 +184,18 @@ def _module_path(module: str) -> Path:
     return path
 
 
-def _imported_modules(text: str, package: str, path: Path) -> list[str]:
+def _imported_modules(text: str, package: str, path: Path, own: frozenset[str]) -> list[str]:
     """The bundled modules that a source imports; only the forms that renaming understands are allowed."""
     found = []
     for node in ast.walk(ast.parse(text, str(path))):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
-            if any(name.partition(".")[0] in OWN_PACKAGES for name in names):
+            if any(name.partition(".")[0] in own for name in names):
                 raise PackagingError(f"{path}:{node.lineno}: expected `from package.module import name` in an FMU")
         elif isinstance(node, ast.ImportFrom):
             base = importlib.util.resolve_name("." * node.level + (node.module or ""), package)
             names = [base]
-            if base.partition(".")[0] in OWN_PACKAGES:
+            if base.partition(".")[0] in own:
                 found += [base, *(f"{base}.{alias.name}" for alias in node.names if _is_module(base, alias.name))]
                 continue
         else:
@@ -204,9 +211,9 @@ def _is_module(package: str, name: str) -> bool:
     return base.name == "__init__.py" and ((base.parent / f"{name}.py").is_file() or (base.parent / name).is_dir())
 
 
-def _renamed(text: str, bundle: str) -> str:
+def _renamed(text: str, bundle: str, own: frozenset[str]) -> str:
     """The source with its imports of bundled packages going to the bundle."""
-    names = "|".join(OWN_PACKAGES)
+    names = "|".join(sorted(own))
     return re.sub(rf"^(\s*from )({names})\b", rf"\1{bundle}.\2", text, flags=re.MULTILINE)
 
 

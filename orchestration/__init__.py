@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from orchestration.errors import QuadcosimError, SimulatorError, UsageError
     from orchestration.flight import run
+    from orchestration.pause import fly_until, resume
     from orchestration.result import Result
     from orchestration.run_directory import load_run, save_run
     from orchestration.scenario import FmuChoice, Record, ReferenceChoice, Scenario
@@ -27,6 +28,8 @@ _HOMES = {
     "Result": "result",
     "load_run": "run_directory",
     "save_run": "run_directory",
+    "fly_until": "pause",
+    "resume": "pause",
     "FmuChoice": "scenario",
     "Record": "scenario",
     "ReferenceChoice": "scenario",
@@ -45,8 +48,10 @@ __all__ = [
     "SimulatorError",
     "Timing",
     "UsageError",
+    "fly_until",
     "load_run",
     "load_scenario",
+    "resume",
     "run",
     "save_run",
 ]

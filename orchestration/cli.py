@@ -51,16 +51,35 @@ def run(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the metrics as JSON.")] = False,
     figures: Annotated[bool, typer.Option(help="Draw the figures into the directory.")] = True,
+    pause_at: Annotated[
+        float | None, typer.Option("--pause-at", help="Stop here, the state in --out DIR.", metavar="SECONDS")
+    ] = None,
+    resume: Annotated[
+        Path | None, typer.Option("--resume", help="Go on with the run paused in DIR, to the same bits.", metavar="DIR")
+    ] = None,
     *,
     flags: FlightFlags,
 ) -> None:
     """Fly a scenario and print its metrics. FMUs that are missing or out of date are built first."""
+    from orchestration import pause
     from orchestration.flight import run as fly
     from orchestration.run_directory import save_run
 
-    chosen = scenario_from(scenario, flags)
+    if resume is not None and (scenario is not None or pause_at is not None or flags != FlightFlags()):
+        raise UsageError("--resume: expected no scenario and no flags of the flight; the paused run has its own")
+    if pause_at is not None and out is None:
+        raise UsageError("--pause-at: expected --out DIR for the state")
     with progress_bar("flying") as progress:
-        result = fly(chosen, progress=progress, announce=_say)
+        if resume is not None:
+            result: Result | None = pause.resume(resume, progress=progress, announce=_say)
+        elif pause_at is not None and out is not None:
+            chosen = scenario_from(scenario, flags)
+            result = pause.fly_until(chosen, pause_at, out, progress=progress, announce=_say)
+        else:
+            result = fly(scenario_from(scenario, flags), progress=progress, announce=_say)
+    if result is None:
+        _say(f"paused in {out}; go on with: quadcosim run --resume {out}")
+        return
     _report(result, as_json)
     if out is not None:
         _say(f"results in {save_run(result, out, figures=figures)}")

@@ -33,6 +33,15 @@ class FlightFlags:
         float | None,
         _option("--plant-interval", panel=TIMING, text="Plant's communication interval; 0.001 unless told."),
     ] = None
+    preset: Annotated[
+        str | None,
+        _option(
+            "--preset",
+            panel=TIMING,
+            metavar="px4|crazyflie|betaflight",
+            text="Rate and latency of a real stack; other flags go before it.",
+        ),
+    ] = None
     order: Annotated[
         str | None,
         _option(
@@ -114,9 +123,10 @@ class FlightFlags:
 
     def applied_to(self, scenario: "Scenario") -> "Scenario":
         """`scenario` with what was given; raises `UsageError` for what cannot be."""
-        timing: dict[str, Any] = {
-            name: getattr(self, name) for name in _TIMING_FLAGS if getattr(self, name) is not None
-        }
+        from orchestration.presets import preset_timing
+
+        timing: dict[str, Any] = {} if self.preset is None else preset_timing(self.preset)
+        timing |= {name: getattr(self, name) for name in _TIMING_FLAGS if getattr(self, name) is not None}
         if self.loss is not None:
             timing.setdefault("measurement_loss", self.loss)
             timing.setdefault("command_loss", self.loss)

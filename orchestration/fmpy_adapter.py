@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import fmpy
-import fmpy.logging
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription, ScalarVariable
@@ -35,6 +34,10 @@ class FmuSimulator:
         self._messages: list[tuple[int, bytes | None, bytes]] = []
         self._failed = False
         self._folder: str | None = None
+        if path.is_file() and fmpy.platform not in fmpy.supported_platforms(str(path)):
+            raise QuadcosimError(
+                f"{path}: has no binary for {fmpy.platform}; pythonfmu ships them for 64-bit Linux and Windows only"
+            )
         try:
             self.description: ModelDescription = fmpy.read_model_description(str(path))
             self._folder = fmpy.extract(str(path))
@@ -183,16 +186,19 @@ class FmuSimulator:
             raise self._failure(error.function) from None
 
     def _callbacks(self) -> fmi2.fmi2CallbackFunctions:
-        """Callbacks that collect the FMU's messages."""
+        """Callbacks that collect the messages of this instance.
+
+        fmpy's own proxy, which formats messages, keeps one logger for the whole process; pythonfmu passes no
+        arguments to format, only doubled percent signs.
+        """
 
         def log(environment: Any, instance: bytes, status: int, category: bytes | None, message: bytes) -> None:
-            self._messages.append((status, category, message))
+            self._messages.append((status, category, message.replace(b"%%", b"%")))
 
         callbacks = fmi2.fmi2CallbackFunctions()
         callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(log)
         callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
         callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
-        fmpy.logging.addLoggerProxy(ctypes.byref(callbacks))  # formats what the FMU passes to printf
         return callbacks
 
     def _collect_warnings(self) -> None:

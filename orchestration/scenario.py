@@ -106,13 +106,19 @@ class Scenario:
         tables: dict[str, Any] = {
             "stop_time": self.stop_time,
             "seed": self.seed,
-            "controller": {"fmu": self.controller.fmu, **self.controller.parameters},
-            "plant": {"fmu": self.plant.fmu, **self.plant.parameters},
+            "controller": _table(self.controller),
+            "plant": _table(self.plant),
             "timing": timing,
         }
         if self.reference.file is not None:
-            tables["reference"] = {"file": str(self.reference.file)}
+            tables["reference"] = {"file": str(self.reference.file.absolute())}
         record = {key: list(value) for key, value in dataclasses.asdict(self.record).items() if value is not None}
         if record:
             tables["record"] = record
         return tomli_w.dumps(tables)
+
+
+def _table(choice: FmuChoice) -> dict[str, Any]:
+    """A choice as a table of a scenario file that may lie in any folder."""
+    fmu = str(Path(choice.fmu).absolute()) if choice.fmu.endswith(".fmu") else choice.fmu
+    return {"fmu": fmu, **choice.parameters}

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import pydantic
 
 from orchestration.errors import UsageError
+from orchestration.presets import preset_timing
 from orchestration.scenario import FmuChoice, Record, ReferenceChoice, Scenario
 from orchestration.timing import Timing
 from orchestration.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
@@ -55,7 +56,7 @@ def load_scenario(path: str | Path) -> Scenario:
 
 
 def _scenario(tables: dict[str, Any], folder: Path) -> Scenario:
-    parsed = _parse(tables)
+    parsed = _parse(_with_preset(tables))
     file = parsed.reference.file
     return Scenario(
         stop_time=parsed.stop_time,
@@ -66,6 +67,15 @@ def _scenario(tables: dict[str, Any], folder: Path) -> Scenario:
         reference=ReferenceChoice(file=None if file is None else folder / file),
         record=parsed.record,
     )
+
+
+def _with_preset(tables: dict[str, Any]) -> dict[str, Any]:
+    """The tables with the timing of `timing.preset`, if one is named, below what the file says itself."""
+    timing = tables.get("timing")
+    if not isinstance(timing, dict) or "preset" not in timing:
+        return tables
+    own = {key: value for key, value in timing.items() if key != "preset"}
+    return {**tables, "timing": {**preset_timing(str(timing["preset"])), **own}}
 
 
 def _choice(side: str, table: dict[str, Any], default: str, folder: Path) -> FmuChoice:

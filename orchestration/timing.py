@@ -145,6 +145,8 @@ class Grid:
         self._period = int(period * self._denominator)
 
     def __getitem__(self, k: int) -> int:
+        if self._denominator == 1:
+            return self._offset + k * self._period
         return _round_ratio(self._offset + k * self._period, self._denominator)
 
 

@@ -1,7 +1,6 @@
 """Settings and fixtures that all tests share."""
 
 import os
-from collections.abc import Iterator
 from pathlib import Path
 
 import hypothesis
@@ -24,7 +23,7 @@ def data() -> Path:
 
 
 @pytest.fixture(scope="session")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Path]]:
+def built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Both FMUs by model name, freshly built into a folder of the session."""
     folder = tmp_path_factory.mktemp("fmus")
-    yield {path.stem: path for path in fmus.build(MODELS, folder)}
+    return {path.stem: path for path in fmus.build(MODELS, folder)}

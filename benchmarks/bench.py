@@ -1,0 +1,169 @@
+"""What a step costs, and where: run as `make bench`. One process, one run, medians of several repetitions."""
+
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from controller_fmu.law import Gains, Measurement, Model, evaluate
+from fmu_kit import packaging
+from fmu_kit.algebra import Quaternion, Vec3
+from fmu_kit.trajectory import Trajectory
+from orchestration import wiring
+from orchestration.flight import prepared
+from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.master import Board, Signals
+from orchestration.scenario import FmuChoice, Scenario
+from orchestration.timing import Clock, Timing, random_streams
+from plant_fmu.dynamics import Body, RigidState, Wind, Wrench, derivative
+from plant_fmu.integrator import rk4_step
+
+STEPS = 5000
+REPETITIONS = 7
+MILLISECOND = 1e-3
+
+
+def microseconds(work: Callable[[], object], count: int) -> float:
+    """Median time of one of `count` units of `work` [µs]; the first repetition is a warm-up."""
+    times = []
+    for _ in range(REPETITIONS + 1):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return statistics.median(times[1:]) / count * 1e6
+
+
+def law() -> float:
+    """One evaluation of the law on floats."""
+    state = Measurement(
+        Vec3(0.1, 0.2, 1.8), Vec3(0.5, 0.6, 0.1), Quaternion.from_xyzw(0.1, 0.2, -0.1, 0.9).normalised(), Vec3(0.1, 0.2, 0.3)
+    )  # fmt: skip
+    reference, gains, model = Trajectory().at(0.5), Gains(), Model()
+
+    def work() -> None:
+        for _ in range(STEPS):
+            evaluate(state, reference, gains, model)
+
+    return microseconds(work, STEPS)
+
+
+def plant() -> float:
+    """One Runge-Kutta step of the plant."""
+    state = RigidState(
+        Vec3(0.0, 0.0, 0.0), Vec3(0.5, 0.6, 0.1), Quaternion.from_xyzw(0.1, 0.2, -0.1, 0.9).normalised(), Vec3(0.1, 0.2, 0.3)
+    )  # fmt: skip
+    body, wind, wrench = Body(), Wind(), Wrench(9.0, Vec3(0.1, 0.2, 0.3))
+
+    def f(t: float, x: RigidState) -> RigidState:
+        return derivative(x, wrench, wind.force(t), body)
+
+    def work() -> None:
+        for i in range(STEPS):
+            rk4_step(f, i * MILLISECOND, state, MILLISECOND)
+
+    return microseconds(work, STEPS)
+
+
+def loop(scenario: Scenario) -> float:
+    """One closed-loop step of the master, recording included."""
+
+    def work() -> float:
+        with prepared(scenario) as flight:
+            flight.master.initialise()
+            start = time.perf_counter()
+            flight.master.run()
+            assert flight.master.steps == STEPS
+            return time.perf_counter() - start
+
+    work()
+    return statistics.median(work() for _ in range(REPETITIONS)) / STEPS * 1e6
+
+
+def bare(scenario: Scenario) -> float:
+    """The same FMI calls as the master makes in a step, and nothing else."""
+    with (
+        FmuSimulator(Path(scenario.plant.fmu), "plant") as plant_fmu,
+        FmuSimulator(Path(scenario.controller.fmu), "controller") as controller_fmu,
+    ):
+        board = Board(
+            Signals(plant=plant_fmu.names("output", "local"), controller=controller_fmu.names("output", "local"))
+        )
+        received = np.zeros(len(wiring.MEASUREMENT))
+        read_plant = plant_fmu.reader(board.plant_names, board.plant)
+        write_command = plant_fmu.writer(wiring.COMMAND, board.applied)
+        read_controller = controller_fmu.reader(board.controller_names, board.controller)
+        write_measurement = controller_fmu.writer(wiring.MEASUREMENT, received)
+        for fmu in (plant_fmu, controller_fmu):
+            fmu.enter_initialization(0.0, 1.0)
+            fmu.exit_initialization()
+        step_plant, step_controller = plant_fmu.step, controller_fmu.step
+
+        def work() -> None:
+            for i in range(STEPS):
+                step_plant(i * MILLISECOND, MILLISECOND)
+                read_plant()
+                write_measurement()
+                step_controller(i * MILLISECOND, MILLISECOND)
+                read_controller()
+                write_command()
+
+        return microseconds(work, STEPS)
+
+
+def clock(timing: Timing) -> float:
+    """One instant of the timing alone, no FMU."""
+
+    def work() -> int:
+        return sum(1 for _ in Clock(timing, STEPS * MILLISECOND, random_streams(0)))
+
+    return microseconds(work, work())
+
+
+def main() -> None:
+    """Print the figures and their ratios."""
+    plain = Timing(period=MILLISECOND)
+    # Everything that adds no instant of its own, so that the number of FMI calls stays the same.
+    on = Timing(
+        period=MILLISECOND, delay=MILLISECOND, measurement_loss=1e-9, command_loss=1e-9,
+        noise={"position": 1e-9, "quaternion": 1e-9}, quantisation={"position": 1e-9}, clock_ratio=1.0,
+    )  # fmt: skip
+    irregular = Timing(period=MILLISECOND, delay=3e-4, delay_jitter=2e-4, jitter=2e-4, command_loss=0.05)
+    with tempfile.TemporaryDirectory() as folder:
+        for name in ("EmptyPlant", "EmptyController"):
+            packaging.build(packaging.Target("benchmarks.empty", name), Path(folder))
+
+        def hollow(timing: Timing) -> Scenario:
+            return Scenario(
+                stop_time=STEPS * MILLISECOND,
+                timing=timing,
+                plant=FmuChoice(fmu=f"{folder}/EmptyPlant.fmu"),
+                controller=FmuChoice(fmu=f"{folder}/EmptyController.fmu"),
+            )
+
+        law_us, plant_us = law(), plant()
+        loop_us = loop(Scenario(stop_time=STEPS * MILLISECOND, timing=plain))
+        floor_us, bare_us, on_us = loop(hollow(plain)), bare(hollow(plain)), loop(hollow(on))
+    clock_us, irregular_us = clock(plain), clock(irregular)
+    rows = [
+        ("law, called directly", law_us, "aim: under 40"),
+        ("plant, one RK4 step, called directly", plant_us, "aim: under 30"),
+        ("closed loop, FMUs through the master", loop_us, f"{1e6 / loop_us:.0f} steps/s"),
+        ("same loop, empty slaves (floor)", floor_us, f"{1e6 / floor_us:.0f} steps/s, {floor_us / loop_us:.0%} of it"),
+        ("same FMI calls on empty slaves, bare", bare_us, f"{bare_us / loop_us:.0%} of it"),
+        ("the master's own cost", floor_us - bare_us, "aim: under 10"),
+        ("law + plant as a share of the loop", law_us + plant_us, f"{(law_us + plant_us) / loop_us:.0%} of it"),
+        ("delay, loss, noise, quantisation on", on_us - floor_us, "added to the floor a step; aim: under 5"),
+        ("timing alone, one instant", clock_us, "within the master's own cost"),
+        ("timing alone, jitter, delay, loss on", irregular_us, f"{irregular_us - clock_us:.2f} more; aim: under 5"),
+    ]
+    print(f"python {sys.version.split()[0]}, medians of {REPETITIONS} x {STEPS} steps of 1 ms, both FMUs at 1 kHz")
+    for name, value, note in rows:
+        print(f"{name:<40} {value:8.2f} µs   {note}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,112 @@
+"""An FMU driven by plain FMI calls through fmpy, without the project's own adapter in between."""
+
+import ctypes
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import fmpy
+import fmpy.logging
+from fmpy import fmi2
+
+
+class Message(NamedTuple):
+    """What an FMU logged."""
+
+    status: int
+    category: bytes | None
+    text: str
+
+
+class Instance:
+    """One instance, its log collected in `messages` unless fmpy's own logger is asked for."""
+
+    def __init__(self, path: Path, *, unpacked: Path | None = None, default_logger: bool = False) -> None:
+        self.description = fmpy.read_model_description(str(path), validate=False)
+        self.variables = {v.name: v for v in self.description.modelVariables}
+        self.messages: list[Message] = []
+        self._own_folder = None if unpacked is not None else Path(fmpy.extract(str(path)))
+        self.fmu = fmi2.FMU2Slave(
+            guid=self.description.guid,
+            unzipDirectory=str(unpacked or self._own_folder),
+            modelIdentifier=self.description.coSimulation.modelIdentifier,
+            instanceName="instance",
+        )
+        self.fmu.instantiate(callbacks=None if default_logger else self._collecting(), loggingOn=True)
+
+    def __enter__(self) -> "Instance":
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.free()
+
+    def free(self) -> None:
+        """fmi2FreeInstance, and what was unpacked for this instance."""
+        self.fmu.freeInstance()
+        if self._own_folder is not None:
+            shutil.rmtree(self._own_folder)
+
+    def initialise(self, values: Mapping[str, float | bool], *, start: float = 0.0) -> None:
+        """Set the values and go through initialisation."""
+        self.set(values)
+        self.fmu.setupExperiment(startTime=start)
+        self.fmu.enterInitializationMode()
+        self.fmu.exitInitializationMode()
+
+    def step(self, t: float, h: float) -> None:
+        """fmi2DoStep."""
+        self.fmu.doStep(currentCommunicationPoint=t, communicationStepSize=h)
+
+    def set(self, values: Mapping[str, float | bool]) -> None:
+        """Set variables by name."""
+        for name, value in values.items():
+            variable = self.variables[name]
+            setter = {"Real": self.fmu.setReal, "Integer": self.fmu.setInteger, "Boolean": self.fmu.setBoolean}
+            setter[variable.type]([variable.valueReference], [value])
+
+    def get(self, *names: str) -> list[float]:
+        """The values of Real variables."""
+        return [float(v) for v in self.fmu.getReal([self.variables[name].valueReference for name in names])]
+
+    def value(self, name: str) -> Any:
+        """The value of a variable of any type."""
+        variable = self.variables[name]
+        getter = {"Real": self.fmu.getReal, "Integer": self.fmu.getInteger, "Boolean": self.fmu.getBoolean}
+        return getter[variable.type]([variable.valueReference])[0]
+
+    def names(self, *causalities: str) -> list[str]:
+        """Real variables of these causalities."""
+        return [v.name for v in self.variables.values() if v.type == "Real" and v.causality in causalities]
+
+    def everything(self) -> list[str]:
+        """Every variable as `name=value`, the value to the last bit."""
+        return [f"{name}={_exact(self.value(name))}" for name in self.variables]
+
+    def save(self) -> bytes:
+        """The serialised state."""
+        state = self.fmu.getFMUstate()
+        content = bytes(self.fmu.serializeFMUstate(state))
+        self.fmu.freeFMUstate(state)
+        return content
+
+    def restore(self, content: bytes) -> None:
+        """Put back what `save` of any instance gave."""
+        state = self.fmu.deSerializeFMUstate(content)
+        self.fmu.setFMUstate(state)
+        self.fmu.freeFMUstate(state)
+
+    def _collecting(self) -> fmi2.fmi2CallbackFunctions:
+        def log(environment: Any, instance: bytes, status: int, category: bytes | None, message: bytes) -> None:
+            self.messages.append(Message(status, category, message.decode()))
+
+        callbacks = fmi2.fmi2CallbackFunctions()
+        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(log)
+        callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+        callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
+        fmpy.logging.addLoggerProxy(ctypes.byref(callbacks))
+        return callbacks
+
+
+def _exact(value: float | int | bool) -> str:
+    return value.hex() if isinstance(value, float) else str(value)

@@ -1,0 +1,27 @@
+"""Python programs in a process of their own: for what would crash, leak into or mislead the test process."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def run(
+    *arguments: str, cwd: Path = ROOT, environment: dict[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    """A program to its end, whatever that is; `environment` is added to this process's own."""
+    return subprocess.run(
+        arguments, cwd=cwd, env={**os.environ, **(environment or {})}, capture_output=True, text=True, timeout=60
+    )
+
+
+def run_script(name: str, *arguments: str | Path) -> Any:
+    """What the script of that name prints as JSON in its last line; fails the test if it does not end well."""
+    module = f"tests.fmus.scripts.{name}"
+    done = run(sys.executable, "-X", "faulthandler", "-m", module, *map(str, arguments))
+    assert done.returncode == 0, f"{module} ended with {done.returncode}:\n{done.stdout[-2000:]}\n{done.stderr[-4000:]}"
+    return json.loads(done.stdout.splitlines()[-1])

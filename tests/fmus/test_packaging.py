@@ -1,0 +1,280 @@
+"""Packing: same sources, same bytes, and nothing in an FMU that another could answer for."""
+
+import ast
+import datetime
+import shutil
+import sys
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath
+
+import fmpy
+import pytest
+
+from fmu_kit import packaging
+from orchestration import fmus
+from orchestration.errors import QuadcosimError
+from orchestration.wiring import MODELS
+from tests.fmus.source_tree import build, copy_sources, python, replace, try_to_build
+
+EPOCH = 1_000_000_000  # 2001-09-09T01:46:40Z
+
+
+@pytest.fixture
+def sources(tmp_path: Path) -> Path:
+    """A copy of the sources that a test may change."""
+    return copy_sources(tmp_path / "sources")
+
+
+@pytest.fixture(autouse=True)
+def no_source_date(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The environment of a packager must not decide these tests."""
+    monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
+
+
+def files_of(fmu: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(fmu) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def hash_of(sources: Path, model: str) -> str:
+    program = "import sys; from fmu_kit import packaging as p; print(p.source_hash(p.Target.parse(sys.argv[1])))"
+    done = python(sources, "-c", program, MODELS[model])
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+# -- reproducible ---------------------------------------------------------------------------------------
+
+
+def test_building_again_in_another_folder_gives_the_same_bytes(built: dict[str, Path], tmp_path: Path) -> None:
+    for path in fmus.build(MODELS, tmp_path / "elsewhere"):
+        assert path.read_bytes() == built[path.stem].read_bytes()
+
+
+def test_building_again_in_the_same_folder_gives_the_same_bytes(tmp_path: Path) -> None:
+    (path,) = fmus.build(["QuadrotorPlant"], tmp_path)
+    first = path.read_bytes()
+    (again,) = fmus.build(["QuadrotorPlant"], tmp_path)
+    assert again == path
+    assert again.read_bytes() == first
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_copied_source_tree_gives_the_same_bytes(
+    model: str, built: dict[str, Path], sources: Path, tmp_path: Path
+) -> None:
+    assert build(sources, tmp_path, model).read_bytes() == built[model].read_bytes()
+
+
+def test_the_copied_tree_is_what_is_built(built: dict[str, Path], sources: Path, tmp_path: Path) -> None:
+    replace(sources / "controller_fmu" / "law.py", "model.mass * n  #", "2.0 * model.mass * n  #")
+    fmu = build(sources, tmp_path, "UnifiedController")
+    assert fmu.read_bytes() != built["UnifiedController"].read_bytes()
+    assert any(b"2.0 * model.mass * n" in content for content in files_of(fmu).values())
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_without_a_source_date_the_date_is_1980(model: str, built: dict[str, Path]) -> None:
+    assert fmpy.read_model_description(str(built[model])).generationDateAndTime == "1980-01-01T00:00:00Z"
+
+
+def test_source_date_epoch_sets_the_date(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", str(EPOCH))
+    (path,) = fmus.build(["QuadrotorPlant"], tmp_path)
+    date = fmpy.read_model_description(str(path)).generationDateAndTime
+    expected = datetime.datetime.fromtimestamp(EPOCH, datetime.timezone.utc)
+    assert date == expected.strftime("%Y-%m-%dT%H:%M:%SZ") == "2001-09-09T01:46:40Z"
+
+
+def test_source_date_epoch_does_not_change_the_guid(
+    built: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", str(EPOCH))
+    (path,) = fmus.build(["QuadrotorPlant"], tmp_path)
+    plain = fmpy.read_model_description(str(built["QuadrotorPlant"]))
+    assert fmpy.read_model_description(str(path)).guid == plain.guid
+
+
+# -- content --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_guid_is_that_of_the_content(model: str, built: dict[str, Path]) -> None:
+    guid = fmpy.read_model_description(str(built[model])).guid
+    assert guid
+    assert guid == packaging.content_guid(files_of(built[model]))
+
+
+def test_the_guid_changes_with_any_file(built: dict[str, Path]) -> None:
+    files = files_of(built["QuadrotorPlant"])
+    guid = packaging.content_guid(files)
+    for name in files:
+        assert packaging.content_guid({**files, name: files[name] + b" "}) != guid, name
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_every_bundled_module_lives_under_a_name_with_the_hash(model: str, built: dict[str, Path]) -> None:
+    files = files_of(built[model])
+    digest = files["resources/source_hash.txt"].decode()
+    bundle = f"quadcosim_{digest[:16]}"
+    modules = [PurePosixPath(name) for name in files if name.endswith(".py")]
+    tops = {path.relative_to("resources").parts[0] for path in modules}
+    assert tops == {bundle, f"{bundle}_entry.py"}
+    assert files["resources/slavemodule.txt"].decode() == f"{bundle}_entry"
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_bundled_sources_import_only_the_standard_library_and_the_bundle(model: str, built: dict[str, Path]) -> None:
+    files = files_of(built[model])
+    bundle = f"quadcosim_{files['resources/source_hash.txt'].decode()[:16]}"
+    sources = {name: content for name, content in files.items() if name.endswith(".py")}
+    imported = {module for content in sources.values() for module in imported_modules(content)}
+    assert imported - sys.stdlib_module_names == {bundle}
+
+
+def imported_modules(source: bytes) -> Iterator[str]:
+    """The top-level packages of all absolute imports, at any depth of the code."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.partition(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            assert node.module is not None
+            yield node.module.partition(".")[0]
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_every_import_from_the_bundle_finds_a_bundled_file(model: str, built: dict[str, Path]) -> None:
+    files = files_of(built[model])
+    bundle = f"quadcosim_{files['resources/source_hash.txt'].decode()[:16]}"
+    for name, content in files.items():
+        for node in ast.walk(ast.parse(content)) if name.endswith(".py") else ():
+            if isinstance(node, ast.ImportFrom) and node.level == 0 and str(node.module).startswith(bundle):
+                path = "resources/" + str(node.module).replace(".", "/")
+                assert f"{path}.py" in files or f"{path}/__init__.py" in files, f"{name}: {node.module}"
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_archive_has_the_licence_of_pythonfmu(model: str, built: dict[str, Path]) -> None:
+    licence = files_of(built[model])["documentation/licenses/pythonfmu.txt"].decode()
+    assert "Permission is hereby granted, free of charge" in licence
+    assert "Copyright" in licence
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_archive_has_a_binary_named_after_the_model_for_linux_and_windows(
+    model: str, built: dict[str, Path]
+) -> None:
+    binaries = {name for name in files_of(built[model]) if name.startswith("binaries/")}
+    assert {f"binaries/linux64/{model}.so", f"binaries/win64/{model}.dll"} <= binaries
+
+
+# -- refused --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("statement", "module"),
+    [
+        ("import numpy", "numpy"),
+        ("import math, numpy.linalg as la", "numpy.linalg"),
+        ("from numpy import array", "numpy"),
+        ("def late():\n    import numpy", "numpy"),
+        ("from orchestration.wiring import MODELS", "orchestration.wiring"),
+    ],
+)
+def test_a_slave_that_needs_more_than_the_standard_library_is_refused(
+    statement: str, module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "thirsty_fmu"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    (package / "slave.py").write_text("from thirsty_fmu.helper import late\n")
+    (package / "helper.py").write_text(f"{statement}\n")  # found though the slave imports it only indirectly
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(packaging.PackagingError) as refusal:
+        packaging.bundled_sources(packaging.Target("thirsty_fmu.slave", "Thirsty"))
+    assert str(package / "helper.py") in str(refusal.value)
+    assert f"imports {module}," in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_the_command_refuses_a_slave_that_imports_numpy_in_one_line(sources: Path, tmp_path: Path) -> None:
+    law = sources / "controller_fmu" / "law.py"
+    replace(law, "from typing import NamedTuple\n", "from typing import NamedTuple\n\nimport numpy as np\n")
+    done = try_to_build(sources, tmp_path / "out", "UnifiedController")
+    assert done.returncode == 1
+    (line,) = done.stderr.splitlines()
+    assert str(law) in line
+    assert "numpy" in line
+    assert not (tmp_path / "out" / "UnifiedController.fmu").exists()
+
+
+def test_an_import_that_renaming_would_miss_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    package = tmp_path / "plain_fmu"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    (package / "slave.py").write_text("import fmu_kit.algebra\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(packaging.PackagingError, match=r"slave\.py:1: expected `from package\.module import name`"):
+        packaging.bundled_sources(packaging.Target("plain_fmu.slave", "Plain"))
+
+
+def test_a_module_without_sources_is_refused_by_name() -> None:
+    with pytest.raises(packaging.PackagingError, match="no_such_package"):
+        packaging.bundled_sources(packaging.Target("no_such_package.slave", "Slave"))
+
+
+@pytest.mark.parametrize("text", ["controller_fmu.slave", ":UnifiedController", "controller_fmu.slave:", ""])
+def test_a_target_must_name_module_and_class(text: str) -> None:
+    with pytest.raises(packaging.PackagingError, match="expected module:Class"):
+        packaging.Target.parse(text)
+
+
+def test_a_failed_build_says_why(sources: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(MODELS, "Missing", "controller_fmu.no_such_module:Missing")
+    with pytest.raises(QuadcosimError, match=r"building .*failed: .*no_such_module"):
+        fmus.build(["Missing"], tmp_path)
+
+
+# -- out of date ----------------------------------------------------------------------------------------
+
+
+def test_the_source_hash_changes_with_a_source(sources: Path) -> None:
+    before = {model: hash_of(sources, model) for model in MODELS}
+    replace(sources / "plant_fmu" / "dynamics.py", "amplitude: Vec3 = Vec3(0.01, ", "amplitude: Vec3 = Vec3(0.02, ")
+    assert hash_of(sources, "QuadrotorPlant") != before["QuadrotorPlant"]
+    assert hash_of(sources, "UnifiedController") == before["UnifiedController"]
+
+
+@pytest.mark.parametrize("file", ["packaging.py", "slave.py", "failure.py", "algebra.py", "units.py"])
+def test_the_source_hash_changes_with_what_both_fmus_stand_on(file: str, sources: Path) -> None:
+    before = {model: hash_of(sources, model) for model in MODELS}
+    with (sources / "fmu_kit" / file).open("a", encoding="utf-8") as source:
+        source.write("# changed\n")
+    assert all(hash_of(sources, model) != before[model] for model in MODELS)
+
+
+def test_fresh_fmus_are_up_to_date(built: dict[str, Path]) -> None:
+    assert fmus.out_of_date(MODELS, built["QuadrotorPlant"].parent) == []
+
+
+def test_an_fmu_of_other_sources_is_out_of_date(built: dict[str, Path], sources: Path, tmp_path: Path) -> None:
+    shutil.copy(built["QuadrotorPlant"], tmp_path)
+    replace(sources / "controller_fmu" / "law.py", "model.mass * n  #", "2.0 * model.mass * n  #")
+    build(sources, tmp_path, "UnifiedController")
+    assert fmus.out_of_date(MODELS, tmp_path) == ["UnifiedController"]
+
+
+@pytest.mark.parametrize("content", [None, b"", b"no archive"])
+def test_a_missing_or_broken_fmu_is_out_of_date(content: bytes | None, tmp_path: Path) -> None:
+    if content is not None:
+        (tmp_path / "QuadrotorPlant.fmu").write_bytes(content)
+    assert fmus.out_of_date(["QuadrotorPlant"], tmp_path) == ["QuadrotorPlant"]
+
+
+def test_building_replaces_an_fmu_and_leaves_nothing_else(built: dict[str, Path], tmp_path: Path) -> None:
+    path = tmp_path / "QuadrotorPlant.fmu"
+    path.write_bytes(b"not an archive")
+    assert fmus.build(["QuadrotorPlant"], tmp_path) == [path]
+    assert path.read_bytes() == built["QuadrotorPlant"].read_bytes()
+    assert list(tmp_path.iterdir()) == [path]
