@@ -25,6 +25,8 @@ from plant_fmu.integrator import rk4_step
 STEPS = 5000
 REPETITIONS = 7
 MILLISECOND = 1e-3
+ATTITUDE = Quaternion.from_xyzw(0.1, 0.2, -0.1, 0.9).normalised()
+MOTION = (Vec3(0.1, 0.2, 1.8), Vec3(0.5, 0.6, 0.1), ATTITUDE, Vec3(0.1, 0.2, 0.3))
 
 
 def microseconds(work: Callable[[], object], count: int) -> float:
@@ -39,9 +41,7 @@ def microseconds(work: Callable[[], object], count: int) -> float:
 
 def law() -> float:
     """One evaluation of the law on floats."""
-    state = Measurement(
-        Vec3(0.1, 0.2, 1.8), Vec3(0.5, 0.6, 0.1), Quaternion.from_xyzw(0.1, 0.2, -0.1, 0.9).normalised(), Vec3(0.1, 0.2, 0.3)
-    )  # fmt: skip
+    state = Measurement(*MOTION)
     reference, gains, model = Trajectory().at(0.5), Gains(), Model()
 
     def work() -> None:
@@ -53,9 +53,7 @@ def law() -> float:
 
 def plant() -> float:
     """One Runge-Kutta step of the plant."""
-    state = RigidState(
-        Vec3(0.0, 0.0, 0.0), Vec3(0.5, 0.6, 0.1), Quaternion.from_xyzw(0.1, 0.2, -0.1, 0.9).normalised(), Vec3(0.1, 0.2, 0.3)
-    )  # fmt: skip
+    state = RigidState(*MOTION)
     body, wind, wrench = Body(), Wind(), Wrench(9.0, Vec3(0.1, 0.2, 0.3))
 
     def f(t: float, x: RigidState) -> RigidState:

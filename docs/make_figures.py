@@ -3,22 +3,77 @@
 from pathlib import Path
 
 import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from orchestration import plots
 from orchestration.flight import run
+from orchestration.scenario import Scenario
+from orchestration.timing import Clock, Timing, random_streams
 
 FIGURES = Path(__file__).parent / "figures"
+MILLISECONDS = 1e-6
+"""of a nanosecond"""
 
 
 def main() -> None:
     """Fly what the figures show and write them, small enough for a repository."""
     FIGURES.mkdir(exist_ok=True)
     flight = run()
+    lossy = Timing(period=0.02, delay=0.012, jitter=0.006, measurement_loss=0.15, command_loss=0.15)
     with matplotlib.rc_context({**plots.STYLE, "figure.dpi": 80}):
         plots.path(flight).savefig(FIGURES / "path.png")
         plots.errors(flight).savefig(FIGURES / "errors.png")
-        plots.commands(flight).savefig(FIGURES / "commands.png")
-        plots.energy(flight).savefig(FIGURES / "energy.png")
+        timing_diagram().savefig(FIGURES / "timing.png")
+        plots.commands(run(Scenario(stop_time=2.0, timing=lossy)), (0.2, 0.8)).savefig(FIGURES / "commands.png")
+
+
+def timing_diagram() -> Figure:
+    """When each sample is taken and its command applied, as the clock of a run says."""
+    cases = (
+        ("Gauss-Seidel", Timing(period=0.01)),
+        ("Jacobi", Timing(period=0.01, order="jacobi")),
+        ("Gauss-Seidel, delay 4 ms", Timing(period=0.01, delay=0.004)),
+        ("delay 4 ms, delay jitter 8 ms", Timing(period=0.01, delay=0.004, delay_jitter=0.008)),
+        ("jitter 6 ms, command loss 0.3", Timing(period=0.01, jitter=0.006, command_loss=0.3)),
+    )
+    figure = Figure(figsize=(9.0, 6.5))
+    for axes, (title, timing) in zip(figure.subplots(len(cases), 1, sharex=True), cases, strict=True):
+        _draw_case(axes, timing)
+        axes.set_title(title, loc="left", fontsize=10)
+    axes.set_xlabel("time [ms]")
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    return figure
+
+
+def _draw_case(axes: Axes, timing: Timing) -> None:
+    sampled: dict[int, float] = {}
+    for instant in Clock(timing, 0.065, random_streams(3)):
+        now = instant.time * MILLISECONDS
+        axes.plot(now, 0.0, "|", color=plots.GREY, markersize=4, label="plant point")
+        if instant.sample is not None:
+            sampled[instant.sample.k] = now
+            lost = instant.sample.arrival is None
+            axes.plot(now, 1.0, "o", color=plots.BLUE, markersize=5, label="sample")
+            if lost:
+                axes.plot(now, 0.72, "x", color=plots.RED, markersize=6, label="command lost")
+        for k in instant.arrivals:
+            arrow = {"arrowstyle": "-|>", "color": plots.GREEN, "shrinkA": 3, "shrinkB": 0}
+            axes.annotate("", xy=(now, 0.0), xytext=(sampled[k], 1.0), arrowprops=arrow)
+    axes.set(yticks=(0.0, 1.0), yticklabels=("plant", "controller"), ylim=(-0.3, 1.35), xlim=(-1.0, 66.0))
+    axes.grid(False)
+    axes.spines["left"].set_visible(False)
+    _label_once(axes)
+
+
+def _label_once(axes: Axes) -> None:
+    seen = set()
+    for line in axes.lines:
+        label = str(line.get_label())
+        if label in seen:
+            line.set_label("_repeated")
+        seen.add(label)
 
 
 if __name__ == "__main__":

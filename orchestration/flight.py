@@ -14,7 +14,7 @@ from fmu_kit.trajectory import Trajectory
 from orchestration import fmus, metrics, wiring
 from orchestration.errors import UsageError
 from orchestration.fmpy_adapter import FmuSimulator
-from orchestration.master import Master, Signals
+from orchestration.master import Event, Master, Signals
 from orchestration.reference import BuiltIn, FromFile, ReferencePath
 from orchestration.result import Result, sampled_rows
 from orchestration.scenario import FmuChoice, Parameter, Scenario
@@ -57,7 +57,7 @@ class Flight:
         """What was recorded so far, with its metrics."""
         master, columns = self.master, self.master.board.columns
         rows = master.rows()
-        events = tuple(sorted(master.events, key=lambda event: event.time))
+        events = tuple(sorted(map(Event._make, master.events), key=lambda event: event.time))
         desired = self.reference.positions(rows[:, 0])
         computed = metrics.compute(
             {name: rows[:, i] for i, name in enumerate(columns)},

@@ -79,7 +79,7 @@ class Master:
         signals: Signals,
     ) -> None:
         self.board = board = Board(signals)
-        self.events: list[Event] = []
+        self.events: list[tuple[int, str, str, int]] = []  # fields of `Event`, made cheaply
         self.divergence: str | None = None
         self.divergence_time: int | None = None
         self.steps = 0
@@ -88,8 +88,8 @@ class Master:
         self._clock, self._timing, self._sensors, self._reference = clock, timing, sensors, reference
         self._rows = bytearray()
         self._received: Floats = np.zeros(len(MEASUREMENT))
-        self._in_flight: dict[int, list[float]] = {}
-        self._applied: list[tuple[int, list[float]]] = []  # the last two, with their times
+        self._in_flight: dict[int, Floats] = {}
+        self._applied: list[tuple[int, Floats]] = []  # the last two, with their times
         self._read_plant = plant.reader(board.plant_names, board.plant)
         self._write_command = plant.writer(COMMAND, board.applied)
         self._read_controller = controller.reader(board.controller_names, board.controller)
@@ -113,7 +113,7 @@ class Master:
         self._write_reference(0.0)
         self._controller.exit_initialization()
         self._read_controller()
-        self._apply(0, self.board.computed.tolist())
+        self._apply(0, self.board.computed.copy())
         self._plant.exit_initialization()
         self._read_plant()
 
@@ -159,9 +159,9 @@ class Master:
             "row": self.board.row.tobytes(),
             "rows": bytes(self._rows),
             "received": self._received.tobytes(),
-            "in_flight": sorted(self._in_flight.items()),
-            "applied": self._applied,
-            "events": [tuple(event) for event in self.events],
+            "in_flight": [(index, command.tolist()) for index, command in self._in_flight.items()],
+            "applied": [(time, command.tolist()) for time, command in self._applied],
+            "events": self.events,
         }
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -173,9 +173,9 @@ class Master:
         self.board.row[:] = np.frombuffer(state["row"])
         self._rows = bytearray(state["rows"])
         self._received[:] = np.frombuffer(state["received"])
-        self._in_flight = {index: list(values) for index, values in state["in_flight"]}
-        self._applied = [(time, list(values)) for time, values in state["applied"]]
-        self.events = [Event(*event) for event in state["events"]]
+        self._in_flight = {index: np.array(command) for index, command in state["in_flight"]}
+        self._applied = [(time, np.array(command)) for time, command in state["applied"]]
+        self.events = [(time, kind, what, k) for time, kind, what, k in state["events"]]
 
     # -- what happens at an instant -------------------------------------------------------------------------
 
@@ -217,16 +217,16 @@ class Master:
         self._read_controller()
         if sample is None:
             return
-        self.events.append(Event(sample.sent, "sent", "command", sample.k))
+        self.events.append((sample.sent, "sent", "command", sample.k))
         if sample.arrival is None:
-            self.events.append(Event(sample.sent, "lost", "command", sample.k))
+            self.events.append((sample.sent, "lost", "command", sample.k))
         else:
-            self._in_flight[sample.k] = self.board.computed.tolist()
+            self._in_flight[sample.k] = self.board.computed.copy()
 
     def _sense(self, time: int, sample: Sample) -> None:
-        self.events.append(Event(time, "sampled", "measurement", sample.k))
+        self.events.append((time, "sampled", "measurement", sample.k))
         if sample.measurement_lost:
-            self.events.append(Event(time, "lost", "measurement", sample.k))
+            self.events.append((time, "lost", "measurement", sample.k))
         else:
             self._sensors.receive(self.board.measured, self._received)
             self._write_measurement()
@@ -234,11 +234,11 @@ class Master:
 
     def _arrive(self, time: int, samples: Sequence[int]) -> None:
         for index in samples:
-            self.events.append(Event(time, "arrived", "command", index))
+            self.events.append((time, "arrived", "command", index))
             newest = self._in_flight.pop(index)
         self._apply(time, newest)
 
-    def _apply(self, time: int, command: list[float]) -> None:
+    def _apply(self, time: int, command: Floats) -> None:
         self._applied = [*self._applied[-1:], (time, command)]
         self.board.applied[:] = command
         self._write_command()
@@ -251,7 +251,7 @@ class Master:
         if t0 == t1 or time == t1:
             return
         share = (time - t1) / (t1 - t0)
-        self.board.applied[:] = [b + share * (b - a) for a, b in zip(before, last, strict=True)]
+        self.board.applied[:] = last + share * (last - before)
         self._write_command()
 
     def _record(self, time: int) -> None:

@@ -16,18 +16,22 @@ class Sensors:
         self._sigma = expand("noise", timing.noise, names)
         self._quantum = expand("quantisation", timing.quantisation, names)
         self._noisy = bool(self._sigma.any())
-        self._rounding = self._quantum > 0.0
-        self._rounds = bool(self._rounding.any())
+        self._rounded = np.flatnonzero(self._quantum)
+        self._quantum = self._quantum[self._rounded]
+        self._noise: Floats = np.zeros(len(names))
         self._stream = stream
 
     def receive(self, true: Floats, received: Floats) -> None:
         """Write what arrives of `true` into `received`; both have one value a measurement."""
         received[:] = true
         if self._noisy:  # one number for each measurement, so that noise on one does not shift another's
-            received += self._sigma * self._stream.standard_normal(len(received))
-        if self._rounds:
-            quantum = self._quantum[self._rounding]
-            received[self._rounding] = np.round(received[self._rounding] / quantum) * quantum
+            self._stream.standard_normal(out=self._noise)
+            self._noise *= self._sigma
+            received += self._noise
+        if len(self._rounded):
+            multiples = received[self._rounded] / self._quantum
+            np.rint(multiples, out=multiples)
+            received[self._rounded] = multiples * self._quantum
 
 
 def expand(what: str, values: Mapping[str, float], names: Sequence[str]) -> Floats:

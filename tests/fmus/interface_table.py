@@ -1,0 +1,114 @@
+"""What people wire to: names, causalities, variabilities, units and starts, written down apart from the sources."""
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+XYZ, XYZW, INERTIA = ("x", "y", "z"), ("x", "y", "z", "w"), ("xx", "yy", "zz", "xy", "xz", "yz")
+
+
+class Row(NamedTuple):
+    """One scalar variable; a start of None: calculated."""
+
+    name: str
+    causality: str
+    variability: str
+    type: str
+    unit: str | None
+    start: float | bool | None
+
+
+def row(
+    name: str,
+    kind: str,
+    unit: str | None,
+    start: float | bool | None = None,
+    *,
+    axes: Iterable[str] = (),
+    starts: Iterable[float] = (),
+    type: str = "Real",
+) -> Iterator[Row]:
+    """The rows of a scalar, or of a vector with these axes."""
+    causality, variability = kind.split()
+    names = [f"{name}.{axis}" for axis in axes] or [name]
+    values = list(starts) or [start] * len(names)
+    for scalar, value in zip(names, values, strict=True):
+        yield Row(scalar, causality, variability, type, unit, value)
+
+
+def _motion(kind: str, starts: Iterable[float] = ()) -> Iterator[Row]:
+    at_rest = 0.0 if kind == "input continuous" else None
+    yield from row("position", kind, "m", at_rest, axes=XYZ)
+    yield from row("velocity", kind, "m/s", at_rest, axes=XYZ)
+    yield from row("quaternion", kind, "1", axes=XYZW, starts=starts)
+    yield from row("angular_velocity", kind, "rad/s", at_rest, axes=XYZ)
+
+
+def _body() -> Iterator[Row]:
+    yield from row("mass", "parameter fixed", "kg", 1.0)
+    yield from row("gravity", "parameter fixed", "m/s2", 9.81)
+    yield from row("inertia", "parameter fixed", "kg.m2", axes=INERTIA, starts=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+
+
+PLANT = (
+    *row("thrust", "input continuous", "N", 9.81),
+    *row("torque", "input continuous", "N.m", 0.0, axes=XYZ),
+    *row("external_force", "input continuous", "N", 0.0, axes=XYZ),
+    *_motion("output continuous"),
+    *_body(),
+    *row("initial.position", "parameter fixed", "m", 0.0, axes=XYZ),
+    *row("initial.velocity", "parameter fixed", "m/s", 0.0, axes=XYZ),
+    *row("initial.quaternion", "parameter fixed", "1", axes=XYZW, starts=(0.1699, 0.3058, 0.1699, 0.9212)),
+    *row("initial.angular_velocity", "parameter fixed", "rad/s", 0.0, axes=XYZ),
+    *row("wind.amplitude", "parameter tunable", "N", 0.01, axes=XYZ),
+    *row("wind.frequency", "parameter tunable", "rad/s", 0.1),
+    *row("thrust_max", "parameter fixed", "N", 1e6),
+    *row("torque_max", "parameter fixed", "N.m", 1e6),
+    *row("actuator_time_constant", "parameter fixed", "s", 0.0),
+    *row("max_internal_step", "parameter fixed", "s", 0.002),
+    *row("acceleration", "local continuous", "m/s2", axes=XYZ),
+    *row("wind.force", "local continuous", "N", axes=XYZ),
+    *row("tilt", "local continuous", "rad"),
+)
+
+_REFERENCE_UNITS = {"position": "m", "velocity": "m/s", "acceleration": "m/s2", "jerk": "m/s3", "snap": "m/s4"}
+
+CONTROLLER = (
+    *_motion("input continuous", (0.0, 0.0, 0.0, 1.0)),
+    *(
+        variable
+        for derivative, unit in _REFERENCE_UNITS.items()
+        for variable in row(f"reference.{derivative}", "input continuous", unit, 0.0, axes=XYZ)
+    ),
+    *row("use_reference_inputs", "parameter fixed", None, False, type="Boolean"),
+    *row("trajectory.amplitude_x", "parameter fixed", "m", 4.0),
+    *row("trajectory.amplitude_y", "parameter fixed", "m", 4.0),
+    *row("trajectory.frequency", "parameter fixed", "rad/s", 0.15),
+    *row("trajectory.start_z", "parameter fixed", "m", 2.0),
+    *row("trajectory.rate_z", "parameter fixed", "m/s", 0.1),
+    *row("thrust", "output discrete", "N"),
+    *row("torque", "output discrete", "N.m", axes=XYZ),
+    *_body(),
+    *row("gain.translation", "parameter tunable", "m/s2", 2.0, axes=XYZ),
+    *row("gain.disturbance", "parameter tunable", "m/s2", 0.99),
+    *row("gain.surface", "parameter tunable", "1/s", 5.0),
+    *row("gain.eta", "parameter tunable", "rad/s", 15.0),
+    *row("gain.theta", "parameter tunable", "N.m.s", 15.0),
+    *row("gain.attitude", "parameter tunable", "N.m", 15.0),
+    *row("surface_exponent", "parameter tunable", "1", 0.99),
+    *row("boundary_layer", "parameter tunable", "m", 0.001),
+    *row("coupling", "parameter tunable", "1", 1.0),
+    *row("sample_period", "parameter fixed", "s", 0.01),
+    *row("sample_offset", "parameter fixed", "s", 0.0),
+    *row("desired_quaternion", "local discrete", "1", axes=XYZW),
+    *row("position_error", "local discrete", "m", axes=XYZ),
+    *row("velocity_error", "local discrete", "m/s", axes=XYZ),
+    *row("attitude_error", "local discrete", "1", axes=XYZW),
+    *row("angular_velocity_error", "local discrete", "rad/s", axes=XYZ),
+    *row("sliding", "local discrete", "m/s", axes=XYZ),
+    *row("theta", "local discrete", "rad/s", axes=XYZ),
+    *row("desired_angular_velocity", "local discrete", "rad/s", axes=XYZ),
+    *row("energy", "local discrete", "J"),
+    *row("sample_count", "local discrete", None, type="Integer"),
+)
+
+TABLES = {"QuadrotorPlant": PLANT, "UnifiedController": CONTROLLER}

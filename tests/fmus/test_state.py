@@ -1,0 +1,201 @@
+"""Saved states: going on from one is the same flight, to the last bit."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from fmpy.fmi1 import FMICallException
+
+from orchestration.errors import SimulatorError
+from orchestration.fmpy_adapter import FmuSimulator
+from tests.fmus.flights import FLIGHTS, Flight
+from tests.fmus.instance import Instance
+from tests.fmus.process import run_script
+
+SAVED, END = 7, 20  # step at which the state is taken, and the end of the flight
+
+
+@pytest.fixture(params=FLIGHTS)
+def name(request: pytest.FixtureRequest) -> str:
+    """Of each flight in turn."""
+    return str(request.param)
+
+
+@pytest.fixture
+def flight(name: str) -> Flight:
+    return FLIGHTS[name]
+
+
+@pytest.fixture
+def fmu(flight: Flight, built: dict[str, Path]) -> Path:
+    return built[flight.model]
+
+
+@pytest.fixture
+def instance(flight: Flight, fmu: Path) -> Iterator[Instance]:
+    """Flown up to the point where the state is taken."""
+    with Instance(fmu) as instance:
+        flight.begin(instance)
+        flight.fly(instance, 0, SAVED)
+        yield instance
+
+
+def test_restoring_and_stepping_again_repeats_the_flight(instance: Instance, flight: Flight) -> None:
+    state = instance.fmu.getFMUstate()
+    at_the_state = instance.everything()
+    first = flight.fly(instance, SAVED, END)
+    instance.fmu.setFMUstate(state)
+    assert instance.everything() == at_the_state
+    assert flight.fly(instance, SAVED, END) == first
+    assert first[0] != first[-1]  # a flight that stands still would prove nothing
+    instance.fmu.freeFMUstate(state)
+
+
+def test_a_state_can_be_restored_more_than_once(instance: Instance, flight: Flight) -> None:
+    state = instance.fmu.getFMUstate()
+    flights = []
+    for _ in range(3):
+        instance.fmu.setFMUstate(state)
+        flights.append(flight.fly(instance, SAVED, END))
+    instance.fmu.freeFMUstate(state)
+    assert flights[0] == flights[1] == flights[2]
+
+
+def test_a_serialised_state_repeats_the_flight(instance: Instance, flight: Flight) -> None:
+    content = instance.save()
+    first = flight.fly(instance, SAVED, END)
+    instance.restore(content)
+    assert flight.fly(instance, SAVED, END) == first
+
+
+def test_serialising_a_restored_state_gives_the_same_bytes(instance: Instance, flight: Flight) -> None:
+    content = instance.save()
+    flight.fly(instance, SAVED, END)
+    assert instance.save() != content
+    instance.restore(content)
+    assert instance.save() == content
+
+
+def test_taking_a_state_does_not_change_the_flight(instance: Instance, flight: Flight, fmu: Path) -> None:
+    with Instance(fmu) as undisturbed:
+        flight.begin(undisturbed)
+        expected = flight.fly(undisturbed, 0, END)[SAVED:]
+    instance.save()
+    assert flight.fly(instance, SAVED, END) == expected
+
+
+def test_another_instance_goes_on_from_the_state(instance: Instance, flight: Flight, fmu: Path) -> None:
+    content = instance.save()
+    first = flight.fly(instance, SAVED, END)
+    with Instance(fmu) as other:  # not initialised: the state says that it was
+        other.restore(content)
+        assert flight.fly(other, SAVED, END) == first
+
+
+def test_an_instance_in_another_flight_goes_on_from_the_state(instance: Instance, flight: Flight, fmu: Path) -> None:
+    content = instance.save()
+    first = flight.fly(instance, SAVED, END)
+    with Instance(fmu) as other:
+        other.initialise({"mass": 3.0, "gravity": 5.0}, start=4.0)
+        other.step(4.0, 0.5)
+        other.restore(content)
+        assert flight.fly(other, SAVED, END) == first
+
+
+def test_another_process_goes_on_from_the_state(
+    instance: Instance, name: str, flight: Flight, fmu: Path, tmp_path: Path
+) -> None:
+    file = tmp_path / "state"
+    file.write_bytes(instance.save())
+    first = flight.fly(instance, SAVED, END)
+    assert run_script("continue_flight", fmu, name, file, str(SAVED), str(END)) == first
+
+
+def test_the_hidden_lag_of_the_actuators_is_in_the_state(built: dict[str, Path]) -> None:
+    flight = FLIGHTS["plant with lag and wind"]
+    with Instance(built[flight.model]) as plant:
+        flight.begin(plant)
+        flight.fly(plant, 0, SAVED)
+        state = json.loads(plant.save())
+        first = flight.fly(plant, SAVED, END)
+        state["internal"]["thrust"] += 1.0
+        plant.restore(json.dumps(state).encode())
+        assert flight.fly(plant, SAVED, END) != first
+
+
+def test_a_sample_that_is_pending_happens_once_when_due(built: dict[str, Path]) -> None:
+    with Instance(built["UnifiedController"]) as controller:
+        controller.initialise({})  # samples are due every 10 ms
+        for k in range(6):
+            controller.step(k * 0.004, 0.004)  # sampled at 0, 12 ms and 20 ms
+        assert controller.value("sample_count") == 3
+        content = controller.save()
+        for _ in range(2):
+            counts = []
+            for k in range(6, 12):  # 24, 28, 32 (due since 30), 36, 40 (due), 44 ms
+                controller.step(k * 0.004, 0.004)
+                counts.append(controller.value("sample_count"))
+            assert counts == [3, 3, 4, 4, 5, 5]
+            controller.restore(content)
+            assert controller.value("sample_count") == 3
+
+
+def test_a_warning_is_not_repeated_after_a_restore(built: dict[str, Path]) -> None:
+    with Instance(built["UnifiedController"]) as controller:
+        controller.initialise({"quaternion.w": 0.0})  # a zero quaternion: no measurement
+        assert len([m for m in controller.messages if "no measurement" in m.text]) == 1
+        controller.restore(controller.save())
+        controller.step(0.0, 0.01)
+        assert len([m for m in controller.messages if "no measurement" in m.text]) == 1
+
+
+def test_a_changed_tunable_parameter_is_in_the_state(built: dict[str, Path]) -> None:
+    flight = FLIGHTS["controller"]
+    with Instance(built[flight.model]) as controller:
+        flight.begin(controller)
+        flight.fly(controller, 0, SAVED)
+        controller.set({"gain.eta": 3.0})  # not seen by a step yet
+        content = controller.save()
+        first = flight.fly(controller, SAVED, END)
+        controller.set({"gain.eta": 20.0})
+        assert flight.fly(controller, SAVED, END) != first
+        controller.restore(content)
+        assert flight.fly(controller, SAVED, END) == first
+
+
+def test_reset_and_flying_again_equals_the_first_flight(flight: Flight, fmu: Path) -> None:
+    with Instance(fmu) as instance:
+        flight.begin(instance)
+        first = flight.fly(instance, 0, END)
+        instance.fmu.reset()
+        flight.begin(instance)
+        assert flight.fly(instance, 0, END) == first
+
+
+@pytest.mark.parametrize(
+    ("mine", "other"), [("QuadrotorPlant", "UnifiedController"), ("UnifiedController", "QuadrotorPlant")]
+)
+def test_the_state_of_the_other_model_is_refused_in_words(mine: str, other: str, built: dict[str, Path]) -> None:
+    with Instance(built[other]) as stranger:
+        stranger.initialise({})
+        content = stranger.save()
+    with Instance(built[mine]) as instance:
+        instance.initialise({})
+        with pytest.raises(FMICallException):
+            instance.restore(content)
+        (message,) = (m.text for m in instance.messages if m.status > 1)
+        assert f"FMU state (model, number of Reals) = ('{other}', " in message
+        assert f"expected ('{mine}', " in message
+
+
+def test_the_adapter_refuses_the_state_of_the_other_model_in_the_words_of_the_fmu(built: dict[str, Path]) -> None:
+    with FmuSimulator(built["UnifiedController"], "controller") as controller:
+        controller.enter_initialization(0.0, 1.0)
+        controller.exit_initialization()
+        content = controller.save()
+    with (
+        FmuSimulator(built["QuadrotorPlant"], "plant") as plant,
+        pytest.raises(SimulatorError, match=r"FMU state \(model, number of Reals\) = \('UnifiedController', "),
+    ):
+        plant.restore(content)
