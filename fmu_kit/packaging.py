@@ -10,6 +10,7 @@ Packing imports the slave, so it runs in a process of its own: `python -m fmu_ki
 """
 
 import ast
+import functools
 import hashlib
 import importlib
 import importlib.metadata
@@ -184,7 +185,8 @@ def _module_path(module: str) -> Path:
     return path
 
 
-def _imported_modules(text: str, package: str, path: Path, own: frozenset[str]) -> list[str]:
+@functools.cache
+def _imported_modules(text: str, package: str, path: Path, own: frozenset[str]) -> tuple[str, ...]:
     """The bundled modules that a source imports; only the forms that renaming understands are allowed."""
     found = []
     for node in ast.walk(ast.parse(text, str(path))):
@@ -203,7 +205,7 @@ def _imported_modules(text: str, package: str, path: Path, own: frozenset[str]) 
         for name in names:
             if name.partition(".")[0] not in sys.stdlib_module_names:
                 raise PackagingError(f"{path}:{node.lineno}: imports {name}, but an FMU has the standard library only")
-    return found
+    return tuple(found)
 
 
 def _is_module(package: str, name: str) -> bool:

@@ -12,10 +12,13 @@ import typer
 
 from orchestration.errors import QuadcosimError, SimulatorError, UsageError
 from orchestration.flags import FlightFlags, flies, scenario_from
+from orchestration.studies import cli as studies
 
 if TYPE_CHECKING:
     from orchestration.flight import Progress
     from orchestration.result import Result
+
+STUDY_PACKAGES = ("dask", "distributed", "filelock", "pandas", "SALib", "scipy", "xarray")
 
 app = typer.Typer(
     name="quadcosim",
@@ -133,6 +136,9 @@ def validate(
         raise typer.Exit(1)
 
 
+studies.register(app)
+
+
 def _say(text: str) -> None:
     print(text, file=sys.stderr)
 
@@ -185,6 +191,8 @@ def _fail(error: Exception, debug: bool) -> None:
             _say(f"in the FMU:\n{error.details}")
     if isinstance(error, QuadcosimError):
         _say(f"quadcosim: {error}")
+    elif isinstance(error, ModuleNotFoundError) and error.name in STUDY_PACKAGES:
+        _say(f"quadcosim: {error.name} is not installed; studies need: pip install 'quadcosim[studies]'")
     else:
         _say(f"quadcosim: {type(error).__name__}: {error} (an error of quadcosim itself; --debug shows where)")
     sys.exit(2 if isinstance(error, UsageError) else 1)

@@ -13,6 +13,7 @@ from typing import Any
 from fmu_kit.trajectory import Trajectory
 from orchestration import fmus, metrics, wiring
 from orchestration.errors import UsageError
+from orchestration.fleet import Loader
 from orchestration.fmpy_adapter import FmuSimulator
 from orchestration.master import Event, Master, Signals
 from orchestration.reference import BuiltIn, FromFile, ReferencePath
@@ -87,12 +88,12 @@ class Flight:
 
 
 @contextmanager
-def prepared(scenario: Scenario, announce: Announce | None = None) -> Iterator[Flight]:
-    """Both FMUs of `scenario`, built if need be, instantiated and with their parameters; freed at the end."""
+def prepared(scenario: Scenario, announce: Announce | None = None, *, load: Loader = FmuSimulator) -> Iterator[Flight]:
+    """Both FMUs of `scenario`, built if need be, instantiated by `load` and with their parameters."""
     started = time.perf_counter()
     plant_path = fmus.locate(scenario.plant.fmu, announce)
     controller_path = fmus.locate(scenario.controller.fmu, announce)
-    with FmuSimulator(plant_path, "plant") as plant, FmuSimulator(controller_path, "controller") as controller:
+    with load(plant_path, "plant") as plant, load(controller_path, "controller") as controller:
         _set_parameters(plant, scenario.plant)
         _set_parameters(controller, scenario.controller)
         _set_clock(controller, scenario)

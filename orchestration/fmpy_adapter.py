@@ -31,8 +31,9 @@ class FmuSimulator:
         self.path = path
         self.name = instance_name
         self.warnings: list[str] = []
+        self.failed = False
+        """Whether a call has failed: the instance is then never called again."""
         self._messages: list[tuple[int, bytes | None, bytes]] = []
-        self._failed = False
         self._folder: str | None = None
         if path.is_file() and fmpy.platform not in fmpy.supported_platforms(str(path)):
             raise QuadcosimError(
@@ -49,7 +50,7 @@ class FmuSimulator:
             )
             self._fmu.instantiate(callbacks=self._callbacks(), loggingOn=True)
         except Exception as error:
-            self._failed = True
+            self.failed = True
             self.close()
             raise QuadcosimError(f"{path}: expected a co-simulation FMU that loads here: {error}") from error
         self.variables: dict[str, ScalarVariable] = {v.name: v for v in self.description.modelVariables}
@@ -78,6 +79,7 @@ class FmuSimulator:
     def reset(self) -> None:
         """Back to the state after instantiation, all parameters at their defaults."""
         self._call("reset")
+        self.warnings.clear()
 
     def save(self) -> bytes:
         """The whole state, serialised."""
@@ -97,8 +99,8 @@ class FmuSimulator:
 
     def close(self) -> None:
         """Free the instance and what was unpacked for it."""
-        if not self._failed:
-            self._failed = True
+        if not self.failed:
+            self.failed = True
             self._fmu.freeInstance()
         if self._folder is not None:
             shutil.rmtree(self._folder, ignore_errors=True)
@@ -178,7 +180,7 @@ class FmuSimulator:
         return transfer
 
     def _call(self, method: str, *args: Any, **kwargs: Any) -> Any:
-        if self._failed:
+        if self.failed:
             raise SimulatorError(f"{self.name}: the FMU has failed and is not called again")
         try:
             return getattr(self._fmu, method)(*args, **kwargs)
@@ -209,7 +211,7 @@ class FmuSimulator:
 
     def _failure(self, function: str) -> SimulatorError:
         """The error for a call that failed, in the words that the FMU logged."""
-        self._failed = True
+        self.failed = True
         bad = [m for m in self._messages if m[0] > _WARNING]
         diverged = [m for m in bad if m[1] == DIVERGENCE_CATEGORY]
         text = (diverged or bad or [(0, None, b"no message")])[0][2].decode("utf-8", "replace")

@@ -94,6 +94,14 @@ class Scenario:
             changed = dataclasses.replace(changed, **replaced)
         return changed
 
+    def with_fmus(self, *, plant: Path, controller: Path) -> "Scenario":
+        """This scenario with its FMUs at these paths, so that none is looked for."""
+        return dataclasses.replace(
+            self,
+            plant=dataclasses.replace(self.plant, fmu=str(plant)),
+            controller=dataclasses.replace(self.controller, fmu=str(controller)),
+        )
+
     def to_toml(self) -> str:
         """The scenario file that loads as this scenario."""
         import tomli_w

@@ -2,6 +2,7 @@
 
 import dataclasses
 import sys
+import typing
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -50,12 +51,13 @@ def load_scenario(path: str | Path) -> Scenario:
     except tomllib.TOMLDecodeError as error:
         raise UsageError(f"{path}: expected TOML: {error}") from error
     try:
-        return _scenario(tables, path.parent)
+        return scenario_from_tables(tables, path.parent)
     except UsageError as error:
         raise UsageError(f"{path}: {error}") from error
 
 
-def _scenario(tables: dict[str, Any], folder: Path) -> Scenario:
+def scenario_from_tables(tables: dict[str, Any], folder: Path) -> Scenario:
+    """The scenario of a TOML document whose relative paths start at `folder`; raises `UsageError`."""
     parsed = _parse(_with_preset(tables))
     file = parsed.reference.file
     return Scenario(
@@ -105,16 +107,19 @@ def _parse(tables: dict[str, Any]) -> ScenarioFile:
     try:
         return pydantic.TypeAdapter(ScenarioFile).validate_python(tables)
     except pydantic.ValidationError as error:
-        raise UsageError(_first_problem(error)) from error
+        raise UsageError(first_problem(error, ScenarioFile)) from error
 
 
-def _first_problem(error: pydantic.ValidationError) -> str:
+def first_problem(error: pydantic.ValidationError, file: type) -> str:
+    """The first thing wrong with a document of the shape `file`, in one line that says what is valid."""
     problem = error.errors()[0]
     place = ".".join(str(part) for part in problem["loc"])
     if problem["type"] == "unexpected_keyword_argument":
-        table: Any = ScenarioFile
+        table: Any = file
         for part in problem["loc"][:-1]:
-            table = next(f.type for f in dataclasses.fields(table) if f.name == part)
+            if isinstance(part, str):
+                hint = next(f.type for f in dataclasses.fields(table) if f.name == part)
+                table = typing.get_args(hint)[0] if typing.get_origin(hint) is list else hint
         keys = ", ".join(f.name for f in dataclasses.fields(table))
         return f"{place}: no such key; expected one of {keys}"
     message = problem["msg"]

@@ -1,6 +1,7 @@
 """Signals and events as Parquet files."""
 
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 import pyarrow as pa
@@ -11,7 +12,7 @@ from orchestration.simulator import Floats
 from orchestration.wiring import POSITION_REFERENCE
 
 
-def write_signals(path: Path, columns: tuple[str, ...], rows: Floats, desired: Floats) -> None:
+def write_signals(path: Path | BinaryIO, columns: tuple[str, ...], rows: Floats, desired: Floats) -> None:
     """One column each for the recorded values (n, m) and for P_d (n, 3), all float64."""
     arrays = {name: rows[:, i] for i, name in enumerate(columns)}
     arrays |= {name: desired[:, i] for i, name in enumerate(POSITION_REFERENCE)}

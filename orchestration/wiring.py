@@ -45,5 +45,9 @@ POSITION_REFERENCE = components("reference.position")
 
 ATTITUDE_ERROR_SCALAR = "attitude_error.w"
 ENERGY = "energy"
+DISTURBANCE = components("wind.amplitude") + components("external_force")
+"""What moves the plant beside its commands."""
+
+ACTUATOR_TIME_CONSTANT = "actuator_time_constant"
 THRUST_MAX = "thrust_max"
 TORQUE_MAX = "torque_max"

@@ -1,0 +1,44 @@
+"""FMUs loaded once in a process and reset between runs."""
+
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import Protocol
+
+from orchestration.fmpy_adapter import FmuSimulator
+
+
+class Loader(Protocol):
+    """Gives an instance of an FMU for one run."""
+
+    def __call__(self, path: Path, instance_name: str) -> AbstractContextManager[FmuSimulator]:
+        """An instance with all parameters at their defaults."""
+
+
+class Fleet:
+    """Keeps one instance of each FMU and name; an instance that has failed is left and made anew."""
+
+    def __init__(self) -> None:
+        self._instances: dict[tuple[Path, str], FmuSimulator] = {}
+
+    @contextmanager
+    def load(self, path: Path, instance_name: str) -> Iterator[FmuSimulator]:
+        """The instance of the FMU at `path`, fresh or reset."""
+        key = (path, instance_name)
+        fmu = self._instances.pop(key, None)
+        if fmu is None:
+            fmu = FmuSimulator(path, instance_name)
+        else:
+            fmu.reset()
+        try:
+            yield fmu
+        finally:
+            if fmu.failed:
+                fmu.close()
+            else:
+                self._instances[key] = fmu
+
+    def close(self) -> None:
+        """Free all instances."""
+        while self._instances:
+            self._instances.popitem()[1].close()

@@ -1,0 +1,103 @@
+"""The axes of a study and the points that they span."""
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from orchestration.errors import UsageError
+from orchestration.simulator import Floats
+from orchestration.studies import sensitivity
+
+Value = float | int | bool | str
+Scale = Literal["linear", "logarithmic"]
+Method = Literal["random", "latin-hypercube", "sobol", "morris", "saltelli"]
+"""How sampled axes are: the last two for sensitivity (Morris screening, Sobol indices)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Axis:
+    """One quantity that a study varies.
+
+    It sets `targets` (`timing.KEY`, `controller.NAME`, `plant.NAME`, `seed`, `stop_time`), or, if it
+    `multiplies`, scales what they are in the base scenario. It takes `values` in turn, or is sampled
+    between `low` and `high` together with all other sampled axes.
+    """
+
+    name: str
+    targets: tuple[str, ...]
+    multiplies: bool = False
+    values: tuple[Value, ...] | None = None
+    low: float = 0.0
+    high: float = 1.0
+    scale: Scale = "linear"
+
+    def __post_init__(self) -> None:
+        if self.values is not None and not self.values:
+            raise UsageError(f"axis {self.name}: expected at least one value")
+        if self.values is None:
+            _check_range(self.name, self.low, self.high, self.scale)
+
+    def at(self, share: float) -> float:
+        """The value at a share in [0, 1] of the range."""
+        if self.scale == "logarithmic":
+            return math.exp(math.log(self.low) + share * math.log(self.high / self.low))
+        return self.low + share * (self.high - self.low)
+
+
+def span(name: str, low: float, high: float, number: int, scale: Scale) -> tuple[float, ...]:
+    """`number` values from `low` to `high`, in equal steps or equal ratios; the ends are exact."""
+    _check_range(name, low, high, scale)
+    if number < 2:
+        raise UsageError(f"axis {name}: number = {number}, expected at least 2")
+    axis = Axis(name=name, targets=(), low=low, high=high, scale=scale)
+    # Twelve digits: the steps of a decimal range are decimal numbers, 0.003 and not 0.0030000000000000005.
+    inner = [float(f"{axis.at(i / (number - 1)):.12g}") for i in range(1, number - 1)]
+    return (low, *inner, high)
+
+
+def points(axes: Sequence[Axis], method: Method, samples: int, seed: int) -> list[dict[str, Value]]:
+    """The design: every combination of the listed values, each with every sampled point, in that order.
+
+    Returns one value by axis name for each point; the last listed axis varies fastest, then the samples.
+    """
+    listed = [axis for axis in axes if axis.values is not None]
+    sampled = [axis for axis in axes if axis.values is None]
+    combinations = [
+        dict(zip([axis.name for axis in listed], combination, strict=True))
+        for combination in itertools.product(*(axis.values or () for axis in listed))
+    ]
+    if not sampled:
+        return combinations
+    shares = unit_points(method, len(sampled), samples, seed)
+    draws = [{axis.name: axis.at(float(share)) for axis, share in zip(sampled, row, strict=True)} for row in shares]
+    return [{**combination, **draw} for combination in combinations for draw in draws]
+
+
+def unit_points(method: Method, dimension: int, samples: int, seed: int) -> Floats:
+    """Points of the unit cube, shape (n, dimension); n is `samples` but for the sensitivity designs."""
+    if samples < 1:
+        raise UsageError(f"design.samples = {samples}: expected at least 1 for sampled axes")
+    if method in ("morris", "saltelli"):
+        return sensitivity.shares(method, dimension, samples, seed)
+    generator = np.random.default_rng(seed)
+    if method == "random":
+        return generator.random((samples, dimension))
+    from scipy.stats import qmc
+
+    if method == "latin-hypercube":
+        return np.asarray(qmc.LatinHypercube(dimension, rng=generator).random(samples))
+    exponent = round(math.log2(samples))
+    if 2**exponent != samples:
+        raise UsageError(f"design.samples = {samples}: expected a power of two for a Sobol sequence")
+    return np.asarray(qmc.Sobol(dimension, rng=generator).random_base2(exponent))
+
+
+def _check_range(name: str, low: float, high: float, scale: Scale) -> None:
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        raise UsageError(f"axis {name}: from = {low}, to = {high}, expected finite numbers with from < to")
+    if scale == "logarithmic" and low <= 0.0:
+        raise UsageError(f"axis {name}: from = {low}, expected a positive number on a logarithmic scale")

@@ -1,0 +1,158 @@
+"""The commands of `quadcosim` that fly many runs."""
+
+import dataclasses
+import json
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from orchestration.flags import FlightFlags, flies, scenario_from
+
+if TYPE_CHECKING:
+    from orchestration.studies.sweep import Progress
+
+StudyFile = Annotated[Path, typer.Argument(help="Study file.", metavar="STUDY.toml", show_default=False)]
+Out = Annotated[
+    Path | None, typer.Option("--out", help="Folder of the store; results/NAME unless told.", metavar="DIR")
+]
+
+
+def sweep(
+    study: StudyFile,
+    out: Out = None,
+    workers: Annotated[int, typer.Option("--workers", help="Processes on this machine.", metavar="N")] = 1,
+    dask: Annotated[
+        str | None, typer.Option("--dask", help="A dask scheduler instead, e.g. tcp://host:8786.", metavar="URL")
+    ] = None,
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Fly failed runs again.")] = False,
+) -> None:
+    """Fly the runs of a study that are missing; kill it and start it again as you like."""
+    from orchestration.studies.study_file import load_study
+    from orchestration.studies.sweep import sweep as fly
+
+    with _bar() as progress:
+        summary = fly(
+            load_study(study), folder=out, workers=workers, dask=dask, retry_failed=retry_failed, progress=progress
+        )
+    failed = f", {summary.failed} failed (quadcosim export shows why; --retry-failed)" if summary.failed else ""
+    print(f"{summary.path}: {summary.total} runs, {summary.flown} flown now{failed}")
+
+
+def status(study: StudyFile, out: Out = None) -> None:
+    """Tell how far a study is, also while it runs in another process."""
+    from orchestration.studies.store import open_for_reading
+    from orchestration.studies.study_file import load_study
+    from orchestration.studies.sweep import TOTAL, store_path
+
+    path = store_path(load_study(study).name, out)
+    with open_for_reading(path) as opened:
+        total, counts = int(opened.about().get(TOTAL, "0")), opened.counts()
+    done, failed = counts.get("done", 0), counts.get("failed", 0)
+    print(f"{path}: {done + failed} of {total} runs, {failed} failed, {total - done - failed} missing")
+
+
+def export(study: StudyFile, out: Out = None) -> None:
+    """Write the rows of a study as runs.parquet and runs.csv beside its store, sorted by design index."""
+    from orchestration.studies.study_file import load_study
+    from orchestration.studies.sweep import store_path
+    from orchestration.studies.table import export as write
+
+    path = store_path(load_study(study).name, out)
+    for written in write(path, path.parent):
+        print(written)
+
+
+def draw(
+    study: StudyFile,
+    out: Out = None,
+    metric: Annotated[str, typer.Option("--metric", help="What to draw.")] = "ultimate_bound",
+) -> None:
+    """Draw a study: a metric over one or two axes with what flies, or sensitivity bars."""
+    from orchestration.studies.drawing import draw_study
+    from orchestration.studies.study_file import load_study
+
+    for written in draw_study(load_study(study), out, metric):
+        print(written)
+
+
+@flies
+def limit(
+    scenario: Annotated[
+        Path | None, typer.Argument(help="Scenario file; without one, the paper's flight.", show_default=False)
+    ] = None,
+    of: Annotated[str, typer.Option("--of", help="The quantity.", metavar="period|delay|jitter|loss")] = "period",
+    tolerance: Annotated[
+        float | None, typer.Option("--tolerance", help="Width of the last bracket.", show_default=False)
+    ] = None,
+    confidence: Annotated[
+        float, typer.Option("--confidence", help="For random quantities: that nine seeds in ten fly.")
+    ] = 0.95,
+    workers: Annotated[int, typer.Option("--workers", help="Processes for the seeds.", metavar="N")] = 1,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Draw the spectral radius with both limits here.", metavar="DIR")
+    ] = None,
+    *,
+    flags: FlightFlags,
+) -> None:
+    """Find the largest period, delay, jitter or loss that still flies, measured and by linear theory."""
+    from orchestration.studies import limit as limits
+
+    chosen = scenario_from(scenario, flags)
+    found = limits.find(
+        chosen, of, tolerance=tolerance, confidence=confidence, workers=workers, announce=_say
+    )  # fmt: skip
+    if out is not None:
+        from orchestration.studies.drawing import draw_limit
+
+        _say(str(draw_limit(chosen, found, out)))
+    if as_json:
+        print(json.dumps(dataclasses.asdict(found), indent=2))
+        return
+    for name, value in dataclasses.asdict(found).items():
+        print(f"{name:<18}  {'-' if value is None else value}")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the command line."""
+    for command in (sweep, status, export, draw, limit):
+        app.command()(command)
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr)
+
+
+@contextmanager
+def _bar() -> Iterator["Progress | None"]:
+    """A bar with rate and time left on a terminal; else a line now and then."""
+    started = time.monotonic()
+    if not sys.stderr.isatty():
+        last = [started]
+
+        def say(done: int, total: int) -> None:
+            if time.monotonic() - last[0] > 10.0:
+                last[0] = time.monotonic()
+                print(f"{done} of {total} runs", file=sys.stderr)
+
+        yield say
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[rate]}"), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task("runs", total=None, rate="")
+        first: list[int] = []
+
+        def update(done: int, total: int) -> None:
+            first[:] = first or [done]
+            rate = (done - first[0]) / max(time.monotonic() - started, 1e-9)
+            bar.update(task, completed=done, total=total, rate=f"{rate:.1f} runs/s")
+
+        yield update

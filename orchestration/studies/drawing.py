@@ -1,0 +1,77 @@
+"""Which figures a study gets: decides by its axes, reads the store, writes PNG beside it."""
+
+from pathlib import Path
+
+import numpy as np
+
+from orchestration.errors import UsageError
+from orchestration.scenario import Scenario
+from orchestration.studies import figures, sensitivity
+from orchestration.studies.axes import Axis, unit_points
+from orchestration.studies.limit import Limit, radius
+from orchestration.studies.linear import HoverLoop
+from orchestration.studies.store import METRICS
+from orchestration.studies.study import Study
+from orchestration.studies.sweep import store_path
+from orchestration.studies.table import frame
+
+
+def draw_study(study: Study, folder: Path | None, metric: str) -> list[Path]:
+    """Draw what is in the store of `study`; the paths of the figures and tables.
+
+    Raises `UsageError` for a metric that does not exist, or axes that no figure here is for.
+    """
+    if metric not in METRICS:
+        raise UsageError(f"--metric {metric}: expected one of {', '.join(METRICS)}")
+    path = store_path(study.name, folder)
+    table = frame(path)
+    if study.method in sensitivity.METHODS and any(axis.values is None for axis in study.axes):
+        indices = indices_of(study, table[metric].to_numpy(float), metric)
+        listed = sensitivity.write(indices, path.parent / f"sensitivity_{metric}.csv")
+        return [listed, figures.save(figures.sensitivity_bars(indices, metric), listed.with_suffix(".png"))]
+    axes = tuple(axis for axis in study.axes if _is_numeric(axis))
+    if len(axes) != len(study.axes):
+        raise UsageError(f"{study.name}: expected axes of numbers to draw")
+    if len(axes) > 2:
+        return [figures.save(figures.scatter(table, axes, metric), path.parent / f"{metric}.png")]
+    written = [figures.save(figures.lines(table, axes, metric), path.parent / f"{metric}.png")]
+    if len(axes) == 2 and all(axis.values is not None for axis in axes):
+        written.append(figures.save(figures.heat_map(table, axes, metric), path.parent / f"{metric}_map.png"))
+    return written
+
+
+def draw_limit(scenario: Scenario, found: Limit, folder: Path) -> Path:
+    """Draw the spectral radius over the period or the delay, with both limits; the path of the figure.
+
+    Raises `UsageError` if linear theory does not apply.
+    """
+    if found.of not in ("period", "delay"):
+        raise UsageError(f"--out: expected --of period or delay to draw the spectral radius over, got {found.of}")
+    ends = [limit for limit in (found.local_limit, found.large_signal_limit) if limit is not None]
+    values = np.linspace(0.001, 1.3 * max(ends, default=0.1), 200)
+    loop = HoverLoop.of(scenario)
+    figure = figures.spectral_radius(
+        found.of,
+        values,
+        np.array([radius(loop, scenario, found.of, value) for value in values]),
+        local_limit=found.local_limit,
+        large_signal_limit=found.large_signal_limit,
+    )
+    return figures.save(figure, folder / f"spectral_radius_{found.of}.png")
+
+
+def indices_of(study: Study, values: np.ndarray, metric: str) -> list[sensitivity.Index]:
+    """The sensitivity indices of a metric, with a value for each run of `study`, shape (n,)."""
+    sampled = [axis for axis in study.axes if axis.values is None]
+    if len(sampled) != len(study.axes):
+        raise UsageError(f"{study.name}: expected every axis to be a range, for sensitivity")
+    if study.method not in sensitivity.METHODS:
+        raise UsageError(f"{study.name}: design.method = {study.method}, expected morris or saltelli")
+    design = unit_points(study.method, len(sampled), study.samples, study.design_seed)
+    if len(values) != len(design):
+        raise UsageError(f"{study.name}: {len(values)} of {len(design)} runs are there, expected all")
+    return sensitivity.analyse(study.method, [axis.name for axis in sampled], design, values, metric)
+
+
+def _is_numeric(axis: Axis) -> bool:
+    return axis.values is None or all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in axis.values)

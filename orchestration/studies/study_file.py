@@ -1,0 +1,129 @@
+"""Reads study files."""
+
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pydantic
+
+from orchestration.errors import UsageError
+from orchestration.scenario import Scenario
+from orchestration.scenario_file import first_problem, load_scenario, scenario_from_tables
+from orchestration.studies.axes import Axis, Method, Scale, Value, span
+from orchestration.studies.study import Study, changed
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+_FORBID: dict[str, str] = {"extra": "forbid"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class AxisTable:
+    """`[[axes]]`: a target or several, and a list, a range with a number, or a range to sample."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
+
+    name: str
+    sets: list[str] | None = None
+    multiplies: list[str] | None = None
+    values: list[Value] | None = None
+    start: float | None = None
+    stop: float | None = None
+    number: int | None = None
+    scale: Scale = "linear"
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignTable:
+    """`[design]`: how axes without values are sampled."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
+
+    method: Method = "sobol"
+    samples: int = 0
+    seed: int = 0
+    vary_seed: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyFile:
+    """The file: the base as a scenario's tables or the path of one, axes, design."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
+
+    name: str | None = None
+    scenario: str | None = None
+    base: dict[str, Any] = field(default_factory=dict)
+    axes: list[AxisTable] = field(default_factory=list)
+    design: DesignTable = field(default_factory=DesignTable)
+    keep_signals: list[int] | bool = False
+
+
+def load_study(path: str | Path) -> Study:
+    """Read a study file; paths in it are relative to its folder.
+
+    Raises `UsageError` for a file that cannot be read, a key that does not exist (naming those that do) or a
+    value that cannot be.
+    """
+    path = Path(path)
+    try:
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+        return _study(tables, path)
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(f"{path}: expected a readable study file: {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise UsageError(f"{path}: expected TOML: {error}") from error
+    except UsageError as error:
+        raise UsageError(f"{path}: {error}") from error
+
+
+def _study(tables: dict[str, Any], path: Path) -> Study:
+    try:
+        file = pydantic.TypeAdapter(StudyFile).validate_python(tables)
+    except pydantic.ValidationError as error:
+        raise UsageError(first_problem(error, StudyFile)) from error
+    if file.scenario is not None and file.base:
+        raise UsageError("scenario and base: expected one of them")
+    base = load_scenario(path.parent / file.scenario) if file.scenario else scenario_from_tables(file.base, path.parent)
+    study = Study(
+        name=file.name or path.stem,
+        base=base,
+        axes=tuple(_axis(table, base) for table in file.axes),
+        method=file.design.method,
+        samples=file.design.samples,
+        design_seed=file.design.seed,
+        vary_seed=file.design.vary_seed,
+        keep_signals=file.keep_signals if isinstance(file.keep_signals, bool) else tuple(file.keep_signals),
+    )
+    if not study.points:
+        raise UsageError("axes: expected at least one point")
+    return study
+
+
+def _axis(table: AxisTable, base: Scenario) -> Axis:
+    if table.sets is not None and table.multiplies is not None:
+        raise UsageError(f"axis {table.name}: expected sets or multiplies, not both")
+    targets = tuple(table.multiplies or table.sets or [table.name])
+    for target in targets:
+        if not target.startswith(("controller.", "plant.")):
+            changed(base, {target: getattr(base.timing, target.partition(".")[2], 0)})  # says which names there are
+    ranged = table.start is not None and table.stop is not None
+    if (table.values is None) != ranged or (table.values is not None and table.number is not None):
+        raise UsageError(f"axis {table.name}: expected values, or start and stop, with number or to be sampled")
+    values: tuple[Value, ...] | None = None if table.values is None else tuple(table.values)
+    low, high = table.start or 0.0, 1.0 if table.stop is None else table.stop
+    if table.number is not None:
+        values = span(table.name, low, high, table.number, table.scale)
+    return Axis(
+        name=table.name,
+        targets=targets,
+        multiplies=table.multiplies is not None,
+        values=values,
+        low=low,
+        high=high,
+        scale=table.scale,
+    )

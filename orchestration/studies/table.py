@@ -1,0 +1,57 @@
+"""The rows of a study as tables for analysis."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from orchestration.errors import UsageError
+from orchestration.studies.store import METRICS, open_for_reading
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+
+def frame(path: Path) -> "pd.DataFrame":
+    """All rows sorted by design index: settings by axis, metrics, seed, status, duration, GUIDs, versions."""
+    import pandas as pd
+
+    with open_for_reading(path) as opened:
+        about = opened.about()
+        rows = list(opened.rows())
+    axes = json.loads(about["axes"])
+    settings = pd.DataFrame([row.pop("settings") for row in rows], columns=axes)
+    table = pd.DataFrame(rows, columns=["design_index", "key", "status", "message", "seed", "duration", *METRICS])
+    table["diverged"] = table["diverged"].astype("boolean")
+    for name in ("steps", "design_index", "seed"):
+        table[name] = table[name].astype("Int64")
+    settings = settings.drop(columns=[name for name in settings if name in table])  # an axis may be the seed
+    table = pd.concat([table[["design_index"]], settings, table.drop(columns="design_index")], axis=1)
+    for kind, prefix in (("guids", "guid"), ("versions", "version")):
+        for name, value in json.loads(about[kind]).items():
+            table[f"{prefix}.{name}"] = value
+    return table
+
+
+def dataset(path: Path) -> "xr.Dataset":
+    """The metrics over the axes of a grid; raises `UsageError` if some axis is sampled."""
+    import xarray as xr
+
+    with open_for_reading(path) as opened:
+        grid = json.loads(opened.about()["grid"])
+    if grid is None:
+        raise UsageError(f"{path}: expected a study whose axes all list their values, to make a grid of it")
+    table = frame(path).set_index(list(grid))[[*METRICS, "seed", "duration"]]
+    table = table.astype(float)
+    cube: xr.Dataset = xr.Dataset.from_dataframe(table).reindex(grid)
+    return cube
+
+
+def export(path: Path, folder: Path) -> list[Path]:
+    """Write `runs.parquet` and `runs.csv`, sorted by design index; their paths."""
+    table = frame(path)
+    folder.mkdir(parents=True, exist_ok=True)
+    written = [folder / "runs.parquet", folder / "runs.csv"]
+    table.to_parquet(written[0], index=False)
+    table.to_csv(written[1], index=False)
+    return written
