@@ -18,8 +18,9 @@ test: .venv/.test
 	$(BIN)/lint-imports
 	$(BIN)/pytest
 
-bench: .venv/.base
+bench: .venv/.test
 	$(BIN)/python -m benchmarks.bench
+	$(BIN)/python -m benchmarks.bench_studies
 
 figures: .venv/.base
 	$(BIN)/python docs/make_figures.py

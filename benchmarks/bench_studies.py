@@ -1,0 +1,62 @@
+"""What a study costs beside its flights: run as part of `make bench`. Takes some minutes."""
+
+import dataclasses
+import statistics
+import tempfile
+import time
+from pathlib import Path
+
+from orchestration.scenario import Scenario
+from orchestration.studies.axes import Axis
+from orchestration.studies.study import Study, locate_fmus
+from orchestration.studies.sweep import sweep
+from orchestration.studies.worker import HANGAR, Task
+
+RUNS, SECONDS = 200, 10.0
+"""of the study that two workers are compared on"""
+MANY = 2000
+"""runs over which memory is watched"""
+
+
+def runs_per_second(workers: int) -> float:
+    """Of a study of `RUNS` runs of `SECONDS` seconds."""
+    axis = Axis(name="period", targets=("timing.period",), low=0.005, high=0.03)
+    study = Study(name="bench", base=Scenario(stop_time=SECONDS), axes=(axis,), method="random", samples=RUNS)
+    with tempfile.TemporaryDirectory() as folder:
+        start = time.perf_counter()
+        sweep(study, folder=Path(folder), workers=workers)
+        return RUNS / (time.perf_counter() - start)
+
+
+def many_short_runs() -> tuple[float, float]:
+    """Median time of a run of one plant step [ms], FMUs loaded, and growth of memory over the last half [KiB]."""
+    scenario = Scenario(stop_time=0.001)
+    fmus = locate_fmus(scenario)
+    scenario = scenario.with_fmus(plant=fmus.plant, controller=fmus.controller)
+    task = Task(index=0, key="", settings={}, scenario=scenario, keep_signals=False)
+    durations, memory = [], []
+    for i in range(MANY):
+        durations.append(HANGAR.fly(dataclasses.replace(task, index=i)).row.duration)
+        memory.append(resident())
+    return statistics.median(durations) * 1e3, memory[-1] - memory[MANY // 2]
+
+
+def resident() -> float:
+    """Memory of this process [KiB], on Linux."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * 4.0
+
+
+def main() -> None:
+    """Print the figures."""
+    overhead, growth = many_short_runs()
+    print(f"overhead a run, FMUs loaded (one step of 1 ms)  {overhead:8.2f} ms   aim: under 20")
+    print(f"growth of memory from run {MANY // 2} to {MANY}          {growth:8.0f} KiB")
+    one, two = runs_per_second(1), runs_per_second(2)
+    print(f"{RUNS} runs of {SECONDS:g} s, one worker                {one:8.2f} runs/s")
+    print(
+        f"{RUNS} runs of {SECONDS:g} s, two workers               {two:8.2f} runs/s   {two / one:.2f} times; aim: 1.8"
+    )
+
+
+if __name__ == "__main__":
+    main()
