@@ -57,10 +57,13 @@ class DivergenceMessage(LogMsg):  # type: ignore[misc]
 
     @property
     def msg(self) -> str:
-        """The text; catching an exception clears the pending one, under which a Python logger would fail."""
+        """The text; catching an exception clears the pending one, under which a Python logger would fail.
+
+        What is caught is a SystemError: under a pending exception, not even another can be made.
+        """
         try:
             raise LookupError
-        except LookupError:
+        except BaseException:
             return self._text
 
 

@@ -109,7 +109,6 @@ def source_hash(target: Target) -> str:
         digest.update(f"{name}\0{text}\0".encode())
     for name, content in _binaries(target.model).items():
         digest.update(name.encode() + b"\0" + hashlib.sha256(content).digest())
-    digest.update(os.environ.get("SOURCE_DATE_EPOCH", "").encode())
     return digest.hexdigest()
 
 
@@ -215,8 +214,17 @@ def _is_module(package: str, name: str) -> bool:
 
 def _renamed(text: str, bundle: str, own: frozenset[str]) -> str:
     """The source with its imports of bundled packages going to the bundle."""
-    names = "|".join(sorted(own))
-    return re.sub(rf"^(\s*from )({names})\b", rf"\1{bundle}.\2", text, flags=re.MULTILINE)
+    lines = text.encode().splitlines(keepends=True)
+    imports = [
+        node
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.ImportFrom) and node.level == 0 and (node.module or "").partition(".")[0] in own
+    ]
+    for node in sorted(imports, key=lambda node: -node.col_offset):  # from the right, so that columns stay true
+        line, column = lines[node.lineno - 1], node.col_offset
+        renamed = re.sub(rb"from\s+", f"from {bundle}.".encode(), line[column:], count=1)
+        lines[node.lineno - 1] = line[:column] + renamed
+    return b"".join(lines).decode()
 
 
 def _binaries(model: str) -> dict[str, bytes]:

@@ -7,6 +7,7 @@ readable message.
 
 import enum
 import functools
+import json
 import math
 import sys
 from abc import abstractmethod
@@ -297,7 +298,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     @guarded
     def _set_fmu_state(self, state: State) -> None:
         mine = (type(self).__name__, len(self._reals))
-        given = (state["model"], len(state["reals"]))
+        given = (state.get("model"), len(state.get("reals", ())))
         require(given == mine, "FMU state (model, number of Reals)", given, f"{mine}")
         self._reals[:] = state["reals"]
         self._others.update(state["others"])
@@ -309,6 +310,15 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         if state["internal"] is not None:
             self.read_parameters()
             self.restore(state["internal"])
+
+    @staticmethod
+    def _fmu_state_from_bytes(content: bytes) -> State:
+        """Never raises: pythonfmu could not free the class after it; `_set_fmu_state` refuses what is no state."""
+        try:
+            state = json.loads(content.decode("utf-8"))
+        except ValueError:
+            state = None
+        return state if isinstance(state, dict) else {}
 
     def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
         """The model description; called when the FMU is built."""

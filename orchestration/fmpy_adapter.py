@@ -84,18 +84,15 @@ class FmuSimulator:
     def save(self) -> bytes:
         """The whole state, serialised."""
         state = self._call("getFMUstate")
-        try:
-            return bytes(self._call("serializeFMUstate", state))
-        finally:
-            self._call("freeFMUstate", state)
+        content = bytes(self._call("serializeFMUstate", state))
+        self._call("freeFMUstate", state)
+        return content
 
     def restore(self, state: bytes) -> None:
         """Put back what `save` gave."""
         handle = self._call("deSerializeFMUstate", state)
-        try:
-            self._call("setFMUstate", handle)
-        finally:
-            self._call("freeFMUstate", handle)
+        self._call("setFMUstate", handle)
+        self._call("freeFMUstate", handle)
 
     def close(self) -> None:
         """Free the instance and what was unpacked for it."""

@@ -1,13 +1,11 @@
 """An FMU driven by plain FMI calls through fmpy, without the project's own adapter in between."""
 
-import ctypes
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import fmpy
-import fmpy.logging
 from fmpy import fmi2
 
 
@@ -97,14 +95,14 @@ class Instance:
         self.fmu.freeFMUstate(state)
 
     def _collecting(self) -> fmi2.fmi2CallbackFunctions:
+        # Not through fmpy's proxy, which would hand the messages of all instances to the last logger made.
         def log(environment: Any, instance: bytes, status: int, category: bytes | None, message: bytes) -> None:
-            self.messages.append(Message(status, category, message.decode()))
+            self.messages.append(Message(status, category, message.decode().replace("%%", "%")))
 
         callbacks = fmi2.fmi2CallbackFunctions()
         callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(log)
         callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
         callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
-        fmpy.logging.addLoggerProxy(ctypes.byref(callbacks))
         return callbacks
 
 

@@ -30,7 +30,7 @@ def row(
     """The rows of a scalar, or of a vector with these axes."""
     causality, variability = kind.split()
     names = [f"{name}.{axis}" for axis in axes] or [name]
-    values = list(starts) or [start] * len(names)
+    values: list[float | bool | None] = [*starts] or [start] * len(names)
     for scalar, value in zip(names, values, strict=True):
         yield Row(scalar, causality, variability, type, unit, value)
 

@@ -15,7 +15,7 @@ def run(
 ) -> subprocess.CompletedProcess[str]:
     """A program to its end, whatever that is; `environment` is added to this process's own."""
     return subprocess.run(
-        arguments, cwd=cwd, env={**os.environ, **(environment or {})}, capture_output=True, text=True, timeout=60
+        arguments, cwd=cwd, env={**os.environ, **(environment or {})}, capture_output=True, text=True, timeout=120
     )
 
 

@@ -153,9 +153,8 @@ def test_declared_starts_are_what_reset_restores(instance: Instance) -> None:
 
 def test_no_output_is_declared_to_follow_an_input_directly(description: ModelDescription) -> None:
     outputs = [v.name for v in description.modelVariables if v.causality == "output"]
-    assert {unknown.variable.name: unknown.dependencies for unknown in description.outputs} == dict.fromkeys(
-        outputs, []
-    )
+    declared = {unknown.variable.name: unknown.dependencies for unknown in description.outputs}
+    assert declared == {name: [] for name in outputs}
 
 
 def test_declared_initial_dependencies_are_all_inputs_of_the_controller_and_none_of_the_plant(
@@ -185,14 +184,14 @@ def test_at_a_communication_point_no_output_moves_with_an_input(steps: int, inst
     for k in range(steps):
         instance.step(k * 0.01, 0.01)
     moved = dict(perturbed(instance))
-    assert moved == dict.fromkeys(instance.names("input"), [])
+    assert moved == {name: [] for name in instance.names("input")}
 
 
 def test_in_initialisation_mode_the_outputs_of_the_plant_move_with_no_input(built: dict[str, Path]) -> None:
     with Instance(built["QuadrotorPlant"]) as plant:
         plant.fmu.setupExperiment(startTime=0.0)
         plant.fmu.enterInitializationMode()
-        assert dict(perturbed(plant)) == dict.fromkeys(plant.names("input"), [])
+        assert dict(perturbed(plant)) == {name: [] for name in plant.names("input")}
 
 
 def test_in_initialisation_mode_the_command_moves_with_every_input(built: dict[str, Path]) -> None:

@@ -142,12 +142,27 @@ def test_a_sample_that_is_pending_happens_once_when_due(built: dict[str, Path]) 
 
 
 def test_a_warning_is_not_repeated_after_a_restore(built: dict[str, Path]) -> None:
-    with Instance(built["UnifiedController"]) as controller:
+    with Instance(built["UnifiedController"]) as controller, Instance(built["UnifiedController"]) as other:
         controller.initialise({"quaternion.w": 0.0})  # a zero quaternion: no measurement
         assert len([m for m in controller.messages if "no measurement" in m.text]) == 1
-        controller.restore(controller.save())
-        controller.step(0.0, 0.01)
-        assert len([m for m in controller.messages if "no measurement" in m.text]) == 1
+        other.restore(controller.save())
+        other.step(0.0, 0.01)
+        assert other.messages == []
+
+
+def test_a_parameter_that_waits_to_be_refused_is_refused_after_a_restore(built: dict[str, Path]) -> None:
+    with Instance(built["UnifiedController"]) as controller, Instance(built["UnifiedController"]) as other:
+        controller.initialise({})
+        controller.set({"boundary_layer": -1.0})  # checked when the next step begins
+        other.restore(controller.save())
+        with pytest.raises(FMICallException):
+            other.step(0.0, 0.01)
+        assert "boundary_layer = -1.0: expected" in other.messages[-1].text
+
+
+def test_bytes_that_are_no_state_are_refused_and_leave_an_fmu_that_can_be_freed(built: dict[str, Path]) -> None:
+    for fmu in built.values():
+        assert run_script("restore_garbage", fmu) == {"refused": 20, "revived": 20}
 
 
 def test_a_changed_tunable_parameter_is_in_the_state(built: dict[str, Path]) -> None:

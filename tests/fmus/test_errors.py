@@ -1,0 +1,339 @@
+"""Bad input: every kind fails with one line that names the variable, its value and what was expected."""
+
+import json
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from fmpy.fmi1 import FMICallException
+
+from orchestration.errors import SimulatorError
+from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.wiring import MODELS
+from tests.fmus.instance import Instance
+from tests.fmus.process import run_script
+
+PLANT, CONTROLLER = "QuadrotorPlant", "UnifiedController"
+Values = dict[str, float | bool]
+Make = Callable[[str], FmuSimulator]
+
+
+@pytest.fixture
+def make(built: dict[str, Path]) -> Iterator[Make]:
+    """Makes simulators that are closed when the test ends."""
+    made: list[FmuSimulator] = []
+
+    def make(model: str) -> FmuSimulator:
+        made.append(FmuSimulator(built[model], "it"))
+        return made[-1]
+
+    yield make
+    for simulator in made:
+        simulator.close()
+
+
+def initialise(simulator: FmuSimulator, values: Values) -> None:
+    for name, value in values.items():
+        simulator.set(name, value)
+    simulator.enter_initialization(0.0, 1.0)
+    simulator.exit_initialization()
+
+
+def refusal(call: Callable[[], object]) -> SimulatorError:
+    with pytest.raises(SimulatorError) as raised:
+        call()
+    return raised.value
+
+
+def assert_readable(error: SimulatorError, model: str, function: str, message: str) -> None:
+    """One line in the FMU's words, and its traceback apart from it."""
+    assert str(error).startswith(f"it ({model}): {function}: {message}")
+    assert "\n" not in str(error)
+    assert error.details.startswith("Traceback (most recent call last):")
+    assert message in error.details.splitlines()[-1]
+
+
+# -- parameters -----------------------------------------------------------------------------------------
+
+
+class Bad(NamedTuple):
+    """Start values that are refused, and the words."""
+
+    model: str
+    values: Values
+    message: str
+
+    @property
+    def label(self) -> str:
+        return f"{self.model}-{','.join(f'{name}={value}' for name, value in self.values.items())}"
+
+
+POSITIVE = "expected a finite value > 0"
+NOT_NEGATIVE = "expected a finite value >= 0"
+DEFINITE = "expected a positive definite matrix"
+
+BAD_PARAMETERS = [
+    *(Bad(model, {"mass": 0.0}, f"mass = 0.0: {POSITIVE}") for model in MODELS),
+    *(Bad(model, {"mass": -1.5}, f"mass = -1.5: {POSITIVE}") for model in MODELS),
+    *(Bad(model, {"gravity": -9.81}, f"gravity = -9.81: {NOT_NEGATIVE}") for model in MODELS),
+    *(Bad(model, {"inertia.xx": 0.0}, "inertia.{xx,yy,zz,xy,xz,yz} = xx 0, yy 1") for model in MODELS),
+    *(Bad(model, {"inertia.yy": -1.0}, "inertia.{xx,yy,zz,xy,xz,yz} = xx 1, yy -1") for model in MODELS),
+    *(Bad(model, {"inertia.xy": 1.0}, "inertia.{xx,yy,zz,xy,xz,yz} = xx 1, yy 1, zz 1, xy 1") for model in MODELS),
+    Bad(
+        PLANT,
+        {"inertia.xy": 0.8, "inertia.xz": 0.8, "inertia.yz": -0.8},  # every 2x2 minor is positive
+        f"inertia.{{xx,yy,zz,xy,xz,yz}} = xx 1, yy 1, zz 1, xy 0.8, xz 0.8, yz -0.8: {DEFINITE}",
+    ),
+    Bad(PLANT, {"actuator_time_constant": -0.1}, f"actuator_time_constant = -0.1: {NOT_NEGATIVE}"),
+    Bad(PLANT, {"thrust_max": -1.0}, f"thrust_max = -1.0: {NOT_NEGATIVE}"),
+    Bad(PLANT, {"torque_max": -1.0}, f"torque_max = -1.0: {NOT_NEGATIVE}"),
+    Bad(PLANT, {"max_internal_step": 0.0}, f"max_internal_step = 0.0: {POSITIVE}"),
+    Bad(
+        PLANT,
+        {f"initial.quaternion.{axis}": 0.0 for axis in "xyzw"},
+        "initial.quaternion = (0.0, 0.0, 0.0, 0.0): expected a quaternion that is not zero",
+    ),
+    Bad(CONTROLLER, {"boundary_layer": 0.0}, f"boundary_layer = 0.0: {POSITIVE}"),
+    Bad(CONTROLLER, {"boundary_layer": -0.001}, f"boundary_layer = -0.001: {POSITIVE}"),
+    Bad(CONTROLLER, {"surface_exponent": 0.0}, f"surface_exponent = 0.0: {POSITIVE} and <= 1"),
+    Bad(CONTROLLER, {"surface_exponent": 1.5}, f"surface_exponent = 1.5: {POSITIVE} and <= 1"),
+    Bad(CONTROLLER, {"sample_period": -0.01}, f"sample_period = -0.01: {NOT_NEGATIVE}"),
+    Bad(CONTROLLER, {"sample_offset": -0.01}, f"sample_offset = -0.01: {NOT_NEGATIVE}"),
+    Bad(CONTROLLER, {"gain.attitude": 0.0}, f"gain.attitude = 0.0: {POSITIVE}"),
+    Bad(CONTROLLER, {"gain.translation.y": -2.0}, f"gain.translation.y = -2.0: {NOT_NEGATIVE}"),
+]
+
+
+@pytest.mark.parametrize("bad", BAD_PARAMETERS, ids=lambda bad: bad.label)
+def test_a_parameter_out_of_range_fails_initialisation(bad: Bad, make: Make) -> None:
+    error = refusal(lambda: initialise(make(bad.model), bad.values))
+    assert_readable(error, bad.model, "fmi2ExitInitializationMode", bad.message)
+    assert not error.divergence
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_matrix_that_is_not_positive_definite_is_called_so(model: str, make: Make) -> None:
+    error = refusal(lambda: initialise(make(model), {"inertia.zz": -1.0}))
+    assert str(error).endswith(f"zz -1, xy 0, xz 0, yz 0: {DEFINITE}")
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_parameters_may_pass_through_what_is_not_allowed_together(order: int, make: Make) -> None:
+    """An inertia that is only positive definite once all entries are set, in any order."""
+    entries: Values = {"inertia.xy": 2.0, "inertia.xx": 3.0, "inertia.yy": 3.0}
+    initialise(make(PLANT), dict(list(entries.items())[::order]))
+
+
+def test_a_tunable_parameter_out_of_range_fails_the_next_step(make: Make) -> None:
+    controller = make(CONTROLLER)
+    initialise(controller, {})
+    controller.step(0.0, 0.01)
+    controller.set("boundary_layer", -1.0)
+    error = refusal(lambda: controller.step(0.01, 0.01))
+    assert_readable(error, CONTROLLER, "fmi2DoStep", f"boundary_layer = -1.0: {POSITIVE}")
+    assert not error.divergence
+
+
+# -- values that are not finite -------------------------------------------------------------------------
+
+NOT_FINITE = [
+    (PLANT, "thrust"),
+    (PLANT, "external_force.z"),
+    (CONTROLLER, "position.x"),
+    (CONTROLLER, "quaternion.w"),
+    (CONTROLLER, "reference.snap.z"),
+]
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize(("model", "name"), [*NOT_FINITE, (PLANT, "mass"), (CONTROLLER, "gain.eta")])
+def test_a_start_value_that_is_not_finite_is_refused(model: str, name: str, value: float, make: Make) -> None:
+    simulator = make(model)
+    error = refusal(lambda: simulator.set(name, value))
+    assert_readable(error, model, "fmi2SetReal", f"{name} = {value}: expected a finite value")
+    assert not error.divergence
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize(("model", "name"), NOT_FINITE)
+def test_an_input_that_is_not_finite_is_refused_between_steps(model: str, name: str, value: float, make: Make) -> None:
+    simulator = make(model)
+    names = simulator.names("input")
+    inputs = np.array([float(simulator.get(name)) for name in names])
+    write = simulator.writer(names, inputs)
+    initialise(simulator, {})
+    write()
+    simulator.step(0.0, 0.01)
+    inputs[names.index(name)] = value
+    error = refusal(write)
+    assert_readable(error, model, "fmi2SetReal", f"{name} = {value}: expected a finite value")
+    assert not error.divergence
+
+
+# -- steps ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    ("t", "h", "message"),
+    [
+        (0.0, -0.01, "communicationStepSize = -0.01: expected a positive number of seconds"),
+        (0.0, 0.0, "communicationStepSize = 0.0: expected a positive number of seconds"),
+        (0.0, math.nan, "communicationStepSize = nan: expected a positive number of seconds"),
+        (0.0, math.inf, "communicationStepSize = inf: expected a positive number of seconds"),
+        (math.nan, 0.01, "currentCommunicationPoint = nan: expected a finite time"),
+    ],
+)
+def test_a_step_that_leads_nowhere_is_refused(model: str, t: float, h: float, message: str, make: Make) -> None:
+    simulator = make(model)
+    initialise(simulator, {})
+    error = refusal(lambda: simulator.step(t, h))
+    assert_readable(error, model, "fmi2DoStep", message)
+    assert not error.divergence
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_step_before_initialisation_is_refused(model: str, make: Make) -> None:
+    simulator = make(model)
+    error = refusal(lambda: simulator.step(0.0, 0.01))
+    assert_readable(error, model, "fmi2DoStep", "fmi2DoStep in phase instantiated: expected phase stepping")
+
+
+@pytest.mark.parametrize(
+    ("model", "name", "message"),
+    [
+        (PLANT, "mass", "mass: a fixed parameter cannot be set after initialisation"),
+        (PLANT, "position.x", "position.x: a variable with causality output cannot be set"),
+        (CONTROLLER, "sample_period", "sample_period: a fixed parameter cannot be set after initialisation"),
+        (CONTROLLER, "energy", "energy: a variable with causality local cannot be set"),
+    ],
+)
+def test_what_is_not_open_to_change_is_refused(model: str, name: str, message: str, make: Make) -> None:
+    simulator = make(model)
+    initialise(simulator, {})
+    assert_readable(refusal(lambda: simulator.set(name, 1.0)), model, "fmi2SetReal", message)
+
+
+# -- divergence -----------------------------------------------------------------------------------------
+
+FREE_FALL: Values = {"use_reference_inputs": True, "reference.acceleration.z": 20.0}
+"""A wanted acceleration of more than gravity downwards: n + g - F_z is 0 and (12) has no solution."""
+
+
+def test_a_virtual_control_without_attitude_is_divergence_at_initialisation(make: Make) -> None:
+    error = refusal(lambda: initialise(make(CONTROLLER), FREE_FALL))
+    assert_readable(error, CONTROLLER, "fmi2ExitInitializationMode", "virtual control F = (")
+    assert "20.0) m/s2: expected n = |g z - F| and n + g - F.z of at least 1e-09" in str(error)
+    assert error.divergence
+
+
+def test_a_virtual_control_that_cancels_gravity_is_divergence(make: Make) -> None:
+    values: Values = {**FREE_FALL, "reference.acceleration.z": 9.81}  # n = 0
+    error = refusal(lambda: initialise(make(CONTROLLER), values))
+    assert "virtual control F = (" in str(error)
+    assert error.divergence
+
+
+def test_a_virtual_control_without_attitude_is_divergence_in_a_step(make: Make) -> None:
+    controller = make(CONTROLLER)
+    initialise(controller, {"use_reference_inputs": True})
+    controller.step(0.0, 0.01)
+    controller.set("reference.acceleration.z", 20.0)
+    error = refusal(lambda: controller.step(0.01, 0.01))
+    assert_readable(error, CONTROLLER, "fmi2DoStep", "virtual control F = (")
+    assert error.divergence
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"position.x": 1.0, "velocity.x": 1e200},
+        {"angular_velocity.x": 1e200, "angular_velocity.z": 1e200, "inertia.xx": 2.0},
+    ],
+)
+def test_a_command_that_no_float_can_hold_is_divergence(values: Values, make: Make) -> None:
+    error = refusal(lambda: initialise(make(CONTROLLER), values))
+    assert error.divergence
+    assert "expected" in str(error)
+    assert "\n" not in str(error)
+
+
+@pytest.mark.parametrize(
+    ("start", "inputs"),
+    [
+        ({"mass": 1e-3}, {"external_force.x": 1e308}),
+        ({"thrust_max": 1e308, "mass": 1e-3}, {"thrust": 1e308}),
+        ({"torque_max": 1e308}, {"torque.x": 1e308}),
+        ({"initial.angular_velocity.y": 1e200}, {}),
+    ],
+)
+def test_a_plant_state_that_overflows_is_divergence(start: Values, inputs: Values, make: Make) -> None:
+    plant = make(PLANT)
+    initialise(plant, start)
+    for name, value in inputs.items():
+        plant.set(name, value)
+
+    def fly() -> None:
+        for k in range(5):
+            plant.step(0.01 * k, 0.01)
+
+    error = refusal(fly)
+    assert str(error).startswith(f"it ({PLANT}): fmi2DoStep: ")
+    assert "expected" in str(error)
+    assert "finite value" in str(error)
+    assert "\n" not in str(error)
+    assert "Traceback" in error.details
+    assert error.divergence
+
+
+# -- text and aftermath ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("text", ["100 %", "%s%n%d", "%%", "50%% of %p"])
+def test_percent_signs_in_a_message_survive(text: str, make: Make) -> None:
+    plant = make(PLANT)
+    state = json.dumps({"model": text, "reals": []}).encode()
+    handle = plant._call("deSerializeFMUstate", state)
+    error = refusal(lambda: plant._call("setFMUstate", handle))
+    assert f"FMU state (model, number of Reals) = ('{text}', 0): expected ('{PLANT}', " in str(error)
+    assert f"('{text}', 0)" in error.details
+
+
+def test_percent_signs_survive_the_format_of_fmpys_own_logger(
+    built: dict[str, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    state = json.dumps({"model": "100 %s%n %d", "reals": []}).encode()
+    with Instance(built[PLANT], default_logger=True) as plant, pytest.raises(FMICallException):
+        plant.restore(state)
+    assert "FMU state (model, number of Reals) = ('100 %s%n %d', 0): expected" in capsys.readouterr().out
+
+
+def test_a_failed_fmu_is_not_called_again(make: Make) -> None:
+    plant = make(PLANT)
+    refusal(lambda: plant.set("mass", math.nan))
+    error = refusal(lambda: plant.set("mass", 1.0))
+    assert str(error) == "it: the FMU has failed and is not called again"
+    plant.close()
+    plant.close()
+
+
+def test_a_failure_does_not_disturb_another_instance(make: Make) -> None:
+    failing, healthy = make(CONTROLLER), make(CONTROLLER)
+    initialise(healthy, {})
+    healthy.step(0.0, 0.01)
+    error = refusal(lambda: initialise(failing, FREE_FALL))
+    assert_readable(error, CONTROLLER, "fmi2ExitInitializationMode", "virtual control F = (")  # its own words
+    healthy.step(0.01, 0.01)
+    assert healthy.get("sample_count") == 2
+
+
+@pytest.mark.parametrize("logger", ["own", "default"])
+@pytest.mark.parametrize("model", MODELS)
+def test_calls_after_a_fatal_status_do_not_crash_and_reset_revives(
+    model: str, logger: str, built: dict[str, Path]
+) -> None:
+    result = run_script("calls_after_failure", built[model], logger)
+    assert result == {"repetitions": 60, "failures as expected": True, "revived as new": True}

@@ -1,0 +1,99 @@
+"""Several FMUs, instances and versions in one process: each is alone with its own code."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from orchestration.wiring import MODELS
+from tests.fmus.expected import law_command
+from tests.fmus.flights import FLIGHTS
+from tests.fmus.instance import Instance
+from tests.fmus.process import run_script
+from tests.fmus.source_tree import build, copy_sources, replace
+
+KILOBYTES_PER_INSTANCE = 16.0
+"""What an instance may leave behind: pythonfmu leaks about 5 kB: the class that it makes for each."""
+
+
+@pytest.fixture(scope="module")
+def alone(built: dict[str, Path]) -> dict[str, list[list[str]]]:
+    """Each flight with no other instance in the process."""
+    flights = {}
+    for name, flight in FLIGHTS.items():
+        with Instance(built[flight.model]) as instance:
+            flight.begin(instance)
+            flights[name] = flight.fly(instance, 0, 25)
+    return flights
+
+
+@pytest.mark.parametrize("unpacked", ["shared", "apart"])
+def test_two_instances_of_both_fmus_at_once_fly_as_if_alone(
+    unpacked: str, built: dict[str, Path], alone: dict[str, list[list[str]]]
+) -> None:
+    together = run_script("at_once", built["QuadrotorPlant"], built["UnifiedController"], unpacked)
+    assert together == alone
+    assert alone["plant"][-1] != alone["plant with lag and wind"][-1]  # or the instances could not be told apart
+    assert alone["controller"][-1] != alone["controller between samples"][-1]
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="memory is read from /proc, which is Linux's")
+@pytest.mark.parametrize("model", MODELS)
+def test_instances_one_after_another_leave_path_and_memory_as_they_were(model: str, built: dict[str, Path]) -> None:
+    result = run_script("many_instances", built[model], "50", "10")
+    assert result["path kept"]
+    assert result["different flights"] == 1
+    assert (result["slaves seen at most"], result["slaves left"]) == (1, 0)
+    assert result["references lost"] == 0
+    assert result["growth per instance in kB"] < KILOBYTES_PER_INSTANCE
+
+
+THRUST = "thrust = model.mass * n  #"
+
+
+def changed_controller(folder: Path, factor: str) -> Path:
+    """A controller whose law commands `factor` times the thrust."""
+    sources = copy_sources(folder / "sources")
+    replace(sources / "controller_fmu" / "law.py", THRUST, f"thrust = {factor} * model.mass * n  #")
+    return build(sources, folder, "UnifiedController")
+
+
+@pytest.fixture(scope="module")
+def versions(built: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> dict[float, Path]:
+    """Three builds of the controller, by the factor on the thrust of their law."""
+    others = {factor: changed_controller(tmp_path_factory.mktemp("version"), str(factor)) for factor in (2.0, 3.0)}
+    return {1.0: built["UnifiedController"], **others}
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Packages with the names of the project and of pythonfmu, of content that would stop any FMU."""
+    folder = tmp_path_factory.mktemp("installed")
+    for package in ("fmu_kit", "controller_fmu", "plant_fmu", "pythonfmu"):
+        (folder / package).mkdir()
+        (folder / package / "__init__.py").touch()
+    (folder / "controller_fmu" / "law.py").write_text("def evaluate(*arguments):\n    raise SystemExit('wrong law')\n")
+    (folder / "controller_fmu" / "slave.py").write_text("class UnifiedController:\n    pass\n")
+    return folder
+
+
+@pytest.mark.parametrize("imported", ["before", "after"])
+@pytest.mark.parametrize("order", [(1.0, 2.0), (2.0, 1.0), (3.0, 2.0, 1.0, 2.0)], ids=str)
+def test_each_version_runs_its_own_law(
+    order: tuple[float, ...], imported: str, versions: dict[float, Path], installed: Path
+) -> None:
+    result = run_script("two_versions", installed, imported, *(versions[factor] for factor in order))
+    thrust, *torque = law_command(0.02)
+    for factor, command in zip(order, result["commands"], strict=True):
+        assert command == pytest.approx([factor * thrust, *torque], rel=1e-12)
+    assert result["installed is the user's"]
+
+
+def test_a_module_of_the_entrys_name_in_the_working_directory_is_not_used(
+    built: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("UnifiedController", "slave", "law", "algebra"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('wrong module')\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with Instance(built["UnifiedController"]) as controller:
+        controller.initialise({})
