@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -32,7 +33,7 @@ def derivative(f: Callable[[float], Vec3], t: float, h: float) -> Vec3:
     ) / (60.0 * h)
 
 
-@pytest.mark.parametrize(("quantity", "rate"), list(zip(DERIVATIVES, DERIVATIVES[1:])))
+@pytest.mark.parametrize(("quantity", "rate"), list(pairwise(DERIVATIVES)))
 @given(trajectory=trajectories, t=times)
 def test_each_derivative_is_the_rate_of_the_one_before(
     quantity: str, rate: str, trajectory: Trajectory, t: float

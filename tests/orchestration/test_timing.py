@@ -109,6 +109,13 @@ def test_instants_do_not_drift_however_far_they_are(offset: Fraction, period: Fr
     assert Grid(offset, period)[k] == round(offset + k * period)
 
 
+@given(st.integers(0, 10**9), st.integers(1, 10**9), st.integers(0, 10**9))
+def test_an_instant_between_two_nanoseconds_is_at_the_even_one(offset: int, period: int, k: int) -> None:
+    doubled = offset + k * period
+    lower = doubled // 2
+    assert Grid(Fraction(offset, 2), Fraction(period, 2))[k] == lower + (doubled % 2 and lower % 2)
+
+
 @given(cases())
 def test_samples_are_numbered_from_zero_and_know_the_next(case: Case) -> None:
     samples = samples_of(case)

@@ -1,0 +1,662 @@
+"""The controller FMU from inside: the calls that a master makes, and what interface and errors promise."""
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pythonfmu.enums import Fmi2Status
+
+from controller_fmu.interface import UNIFIED
+from controller_fmu.law import Gains, Measurement, Model, evaluate
+from controller_fmu.slave import UnifiedController
+from fmu_kit.algebra import ZERO, Inertia, Quaternion, Vec3
+from fmu_kit.failure import Failure
+from fmu_kit.trajectory import Reference, Trajectory
+
+COMMAND = ("thrust", "torque.x", "torque.y", "torque.z")
+PAPER_ATTITUDE = Quaternion.from_xyzw(0.1699, 0.3058, 0.1699, 0.9212).normalised()
+
+
+def put(slave: UnifiedController, values: Mapping[str, float]) -> None:
+    for name, value in values.items():
+        slave.set_real([slave._index[name]], [value])
+
+
+def get(slave: UnifiedController, *names: str) -> list[float]:
+    return slave.get_real([slave._index[name] for name in names])
+
+
+def count(slave: UnifiedController) -> int:
+    return slave.get_integer([slave._index["sample_count"]])[0]
+
+
+def command(slave: UnifiedController) -> list[float]:
+    return get(slave, *COMMAND)
+
+
+def vector(name: str, v: Vec3) -> dict[str, float]:
+    return {f"{name}.{axis}": value for axis, value in zip("xyz", v)}
+
+
+def quaternion(name: str, Q: Quaternion) -> dict[str, float]:
+    return {f"{name}.{axis}": value for axis, value in zip("xyzw", Q)}
+
+
+def measured(k: int) -> dict[str, float]:
+    """Some motion, another for each `k`."""
+    Q = Quaternion.from_xyzw(0.1 * math.sin(k), 0.1 * math.cos(k), 0.05, 1.0).normalised()
+    return {
+        **vector("position", Vec3(0.1 * k, 0.3, 2.0 - 0.1 * k)),
+        **vector("velocity", Vec3(0.5, 0.4 - 0.1 * k, 0.1)),
+        **quaternion("quaternion", Q),
+        **vector("angular_velocity", Vec3(0.1, -0.02 * k, 0.05)),
+    }
+
+
+def instance(values: Mapping[str, float] | None = None, *, follow_inputs: bool = False) -> UnifiedController:
+    slave = UnifiedController(instance_name="c")
+    put(slave, values or {})
+    if follow_inputs:
+        slave.set_boolean([slave._index["use_reference_inputs"]], [True])
+    return slave
+
+
+def started(
+    values: Mapping[str, float] | None = None, *, start: float = 0.0, follow_inputs: bool = False
+) -> UnifiedController:
+    """A controller after initialisation."""
+    slave = instance(values, follow_inputs=follow_inputs)
+    slave.setup_experiment(start)
+    slave.enter_initialization_mode()
+    slave.exit_initialization_mode()
+    return slave
+
+
+def law(values: Mapping[str, float], t: float, gains: Gains | None = None, model: Model | None = None) -> list[float]:
+    """The command of the law for these inputs at `t`, on the built-in trajectory."""
+    P, V, omega = (
+        Vec3(*(values[f"{name}.{a}"] for a in "xyz")) for name in ("position", "velocity", "angular_velocity")
+    )
+    Q = Quaternion.from_xyzw(*(values[f"quaternion.{a}"] for a in "xyzw")).normalised()
+    now = evaluate(Measurement(P, V, Q, omega), Trajectory().at(t), gains or Gains(), model or Model())
+    return [now.thrust, *now.torque]
+
+
+def close(values: list[float]) -> Any:
+    """Equal to rounding: normalising a unit quaternion again may change its last digit."""
+    return pytest.approx(values, rel=1e-12, abs=1e-12)
+
+
+def assert_fails(call: Callable[[], object], *words: str) -> None:
+    with pytest.raises(Failure) as caught:
+        call()
+    for word in words:
+        assert word in repr(caught.value)
+
+
+def warnings(slave: UnifiedController) -> list[str]:
+    assert {message.status for message in slave.log_queue} <= {Fmi2Status.warning}
+    return [message.msg for message in slave.log_queue]
+
+
+# -- samples ------------------------------------------------------------------------------------------------
+
+
+def test_outputs_after_initialisation_are_the_command_for_the_initial_inputs_at_the_start_time() -> None:
+    slave = started(measured(3), start=4.0)
+    assert command(slave) == close(law(measured(3), 4.0))
+    assert count(slave) == 0
+
+
+def test_initial_outputs_of_the_defaults_are_those_of_a_hover_at_the_origin() -> None:
+    values = {**vector("position", ZERO), **vector("velocity", ZERO), **vector("angular_velocity", ZERO)}
+    hover = {**values, **quaternion("quaternion", Quaternion.from_xyzw(0.0, 0.0, 0.0, 1.0))}
+    assert command(started()) == close(law(hover, 0.0))
+
+
+def test_outputs_can_be_read_in_initialisation_mode_and_follow_the_inputs() -> None:
+    slave = instance(measured(1))
+    slave.setup_experiment(0.0)
+    slave.enter_initialization_mode()
+    assert command(slave) == close(law(measured(1), 0.0))
+    put(slave, measured(2))
+    assert command(slave) == close(law(measured(2), 0.0))
+    put(slave, measured(3))
+    slave.exit_initialization_mode()
+    assert command(slave) == close(law(measured(3), 0.0))
+
+
+def test_due_sample_evaluates_the_law_at_the_start_of_the_step() -> None:
+    slave = started(measured(0))
+    for k in range(5):
+        put(slave, measured(k))
+        assert slave.do_step(0.01 * k, 0.01) is True
+        assert command(slave) == close(law(measured(k), 0.01 * k))
+        assert count(slave) == k + 1
+
+
+def test_command_is_held_between_samples() -> None:
+    slave = started({**measured(0), "sample_period": 0.01})
+    for k in range(30):
+        put(slave, measured(k))
+        slave.do_step(0.002 * k, 0.002)
+        assert command(slave) == close(law(measured(k - k % 5), 0.002 * (k - k % 5)))
+    assert count(slave) == 6
+
+
+def test_no_output_moves_with_an_input_without_a_step() -> None:
+    slave = started(measured(0))
+    slave.do_step(0.0, 0.01)
+    before = list(slave._reals)
+    held = command(slave)
+    put(slave, measured(7))
+    assert command(slave) == held
+    changed = {UNIFIED[i].causality for i, (a, b) in enumerate(zip(before, slave._reals)) if a != b}
+    assert changed == {"input"}
+
+
+def test_first_command_is_held_before_the_offset() -> None:
+    slave = started({**measured(0), "sample_offset": 0.005})
+    for k in range(5):
+        put(slave, measured(k + 1))
+        slave.do_step(0.001 * k, 0.001)
+        assert command(slave) == close(law(measured(0), 0.0))
+        assert count(slave) == 0
+    put(slave, measured(9))
+    slave.do_step(0.005, 0.001)
+    assert command(slave) == close(law(measured(9), 0.005))
+    assert count(slave) == 1
+
+
+def test_period_of_zero_samples_at_every_communication_point() -> None:
+    slave = started({"sample_period": 0.0})
+    for k, t in enumerate([0.0, 0.001, 0.5]):
+        put(slave, measured(k))
+        slave.do_step(t, 0.001)
+        assert command(slave) == close(law(measured(k), t))
+    assert count(slave) == 3
+    assert warnings(slave) == []
+
+
+def test_step_longer_than_the_period_takes_one_sample_and_warns_once() -> None:
+    slave = started({"sample_period": 0.01})
+    for k in range(4):
+        slave.do_step(0.025 * k, 0.025)
+    assert count(slave) == 4
+    assert warnings(slave) == ["communication step 0.025 s is longer than sample_period 0.01 s: one sample a step"]
+
+
+@pytest.mark.parametrize("step", [0.01, 0.01 * (1.0 + 1e-9), 0.002])
+def test_step_no_longer_than_the_period_does_not_warn(step: float) -> None:
+    slave = started({"sample_period": 0.01})
+    for k in range(4):
+        slave.do_step(k * step, step)
+    assert warnings(slave) == []
+
+
+def test_time_added_up_by_the_master_drifts_through_no_sample() -> None:
+    slave, t = started({"sample_period": 0.01}), 0.0
+    for _ in range(3000):
+        slave.do_step(t, 0.001)
+        t += 0.001
+    assert count(slave) == 300
+    slave.do_step(t, 1e-13)
+    slave.do_step(t + 1e-13, 0.001)
+    assert count(slave) == 301
+
+
+# -- measurement ----------------------------------------------------------------------------------------------
+
+NOTHING = dict.fromkeys(measured(0), 0.0)
+
+
+def test_zero_quaternion_commands_hover_with_one_warning() -> None:
+    slave = started({**NOTHING, "mass": 1.3, "gravity": 9.7})
+    assert command(slave) == close([1.3 * 9.7, 0.0, 0.0, 0.0])
+    for k in range(3):
+        slave.do_step(0.01 * k, 0.01)
+        assert command(slave) == close([1.3 * 9.7, 0.0, 0.0, 0.0])
+    assert len(warnings(slave)) == 1
+    assert "quaternion = (0, 0, 0, 0): no measurement" in warnings(slave)[0]
+
+
+def test_measurement_that_arrives_later_ends_the_hover() -> None:
+    slave = started(NOTHING)
+    put(slave, measured(1))
+    slave.do_step(0.0, 0.01)
+    assert command(slave) == close(law(measured(1), 0.0))
+
+
+def test_measurement_that_is_lost_returns_to_hover() -> None:
+    slave = started(measured(1))
+    put(slave, NOTHING)
+    slave.do_step(0.0, 0.01)
+    assert command(slave) == close([9.81, 0.0, 0.0, 0.0])
+    assert len(warnings(slave)) == 1
+
+
+@given(st.floats(-100.0, 100.0).map(lambda exponent: 10.0**exponent))
+def test_quaternion_is_normalised_before_use(length: float) -> None:
+    Q = PAPER_ATTITUDE
+    values = {**measured(0), **quaternion("quaternion", Quaternion(length * Q.vector, length * Q.scalar))}
+    slave = started(values)
+    assert command(slave) == close(law(values, 0.0))
+    slave.do_step(0.0, 0.01)
+    assert command(slave) == close(law(values, 0.0))
+    assert warnings(slave) == []
+
+
+def test_quaternion_too_short_or_too_long_to_be_measured_is_refused() -> None:
+    for size in (1e-200, 1e200):
+        slave = instance({**measured(0), **quaternion("quaternion", Quaternion(ZERO, size))})
+        slave.setup_experiment(0.0)
+        slave.enter_initialization_mode()
+        assert_fails(slave.exit_initialization_mode, "quaternion", repr(size), "expected")
+
+
+def test_reference_inputs_are_followed_when_asked_for() -> None:
+    target = {
+        **vector("reference.position", Vec3(0.3, -0.2, 1.5)),
+        **vector("reference.velocity", Vec3(0.1, 0.2, -0.3)),
+        **vector("reference.acceleration", Vec3(0.4, -0.5, 0.6)),
+        **vector("reference.jerk", Vec3(-0.7, 0.8, 0.9)),
+        **vector("reference.snap", Vec3(1.0, -1.1, 1.2)),
+    }
+    slave = started({**measured(2), **target}, follow_inputs=True)
+    slave.do_step(0.0, 0.01)
+    state = Measurement(
+        *(Vec3(*(measured(2)[f"{name}.{a}"] for a in "xyz")) for name in ("position", "velocity")),
+        Quaternion.from_xyzw(*(measured(2)[f"quaternion.{a}"] for a in "xyzw")),
+        Vec3(*(measured(2)[f"angular_velocity.{a}"] for a in "xyz")),
+    )
+    reference = Reference(
+        position=Vec3(0.3, -0.2, 1.5),
+        velocity=Vec3(0.1, 0.2, -0.3),
+        acceleration=Vec3(0.4, -0.5, 0.6),
+        jerk=Vec3(-0.7, 0.8, 0.9),
+        snap=Vec3(1.0, -1.1, 1.2),
+    )
+    now = evaluate(state, reference, Gains(), Model())
+    assert command(slave) == close([now.thrust, *now.torque])
+
+
+def test_reference_inputs_are_ignored_by_default() -> None:
+    slave = started({**measured(2), **vector("reference.position", Vec3(7.0, 8.0, 9.0))})
+    slave.do_step(0.0, 0.01)
+    assert command(slave) == close(law(measured(2), 0.0))
+
+
+def test_locals_show_the_last_sample() -> None:
+    slave = started(measured(0), start=3.0)
+    put(slave, measured(4))
+    slave.do_step(3.0, 0.01)
+    values = measured(4)
+    state = Measurement(
+        *(Vec3(*(values[f"{name}.{a}"] for a in "xyz")) for name in ("position", "velocity")),
+        Quaternion.from_xyzw(*(values[f"quaternion.{a}"] for a in "xyzw")),
+        Vec3(*(values[f"angular_velocity.{a}"] for a in "xyz")),
+    )
+    now = evaluate(state, Trajectory().at(3.0), Gains(), Model())
+    for name in ("position_error", "velocity_error", "angular_velocity_error", "sliding", "theta"):
+        assert get(slave, *(f"{name}.{a}" for a in "xyz")) == close(list(getattr(now, name)))
+    for name in ("desired_quaternion", "attitude_error"):
+        assert get(slave, *(f"{name}.{a}" for a in "xyzw")) == close(list(getattr(now, name)))
+    assert get(slave, *(f"desired_angular_velocity.{a}" for a in "xyz")) == close(list(now.desired_angular_velocity))
+    assert get(slave, "energy") == close([now.energy])
+
+
+# -- parameters -----------------------------------------------------------------------------------------------
+
+PARAMETERS = {
+    "mass": 1.3,
+    "gravity": 9.7,
+    "inertia.xx": 0.08,
+    "inertia.yy": 0.09,
+    "inertia.zz": 0.14,
+    "inertia.xy": 0.05,
+    "inertia.xz": -0.02,
+    "inertia.yz": 0.03,
+    "gain.translation.x": 2.1,
+    "gain.translation.y": 1.5,
+    "gain.translation.z": 3.0,
+    "gain.disturbance": 0.4,
+    "gain.surface": 3.0,
+    "gain.eta": 10.0,
+    "gain.theta": 12.0,
+    "gain.attitude": 8.0,
+    "surface_exponent": 0.8,
+    "boundary_layer": 0.002,
+    "coupling": 0.5,
+}
+GAINS = Gains(
+    k_t=Vec3(2.1, 1.5, 3.0), beta=0.4, k_s=3.0, beta_t=0.8, epsilon=0.002, k_eta=10.0, k_theta=12.0, k_q=8.0, kappa=0.5
+)
+MODEL = Model(mass=1.3, inertia=Inertia(xx=0.08, yy=0.09, zz=0.14, xy=0.05, xz=-0.02, yz=0.03), gravity=9.7)
+
+
+def test_every_parameter_reaches_its_place_in_the_law() -> None:
+    slave = started({**measured(1), **PARAMETERS})
+    slave.do_step(0.0, 0.01)
+    assert command(slave) == close(law(measured(1), 0.0, GAINS, MODEL))
+
+
+@given(st.permutations(list(PARAMETERS)))
+def test_parameters_may_be_set_in_any_order(order: list[str]) -> None:
+    """On the way, the inertia is not positive definite."""
+    slave = instance(measured(1))
+    slave.setup_experiment(0.0)
+    put(slave, {name: PARAMETERS[name] for name in order[:7]})
+    slave.enter_initialization_mode()
+    put(slave, {name: PARAMETERS[name] for name in order[7:]})
+    slave.exit_initialization_mode()
+    assert command(slave) == close(law(measured(1), 0.0, GAINS, MODEL))
+
+
+def test_parameters_of_the_trajectory_move_the_reference() -> None:
+    names = ("amplitude_x", "amplitude_y", "frequency", "start_z", "rate_z")
+    values = dict(zip(names, (3.0, -2.0, 0.4, 1.0, -0.2)))
+    slave = started({**measured(1), **{f"trajectory.{name}": value for name, value in values.items()}}, start=2.0)
+    expected = Vec3(0.1, 0.3, 1.9) - Trajectory(**values).position(2.0)
+    assert get(slave, "position_error.x", "position_error.y", "position_error.z") == close(list(expected))
+
+
+OUT_OF_RANGE = [
+    ("mass", 0.0, "> 0"),
+    ("mass", -1.0, "> 0"),
+    ("gravity", -9.81, ">= 0"),
+    ("inertia.xx", -1.0, "a positive definite matrix"),
+    ("inertia.yy", 0.0, "a positive definite matrix"),
+    ("inertia.zz", -0.5, "a positive definite matrix"),
+    ("inertia.xy", 1.5, "a positive definite matrix"),
+    ("inertia.xz", -1.0, "a positive definite matrix"),
+    ("inertia.yz", 2.0, "a positive definite matrix"),
+    ("sample_period", -0.01, ">= 0"),
+    ("sample_offset", -0.001, ">= 0"),
+    ("gain.translation.x", -2.0, ">= 0"),
+    ("gain.translation.y", -0.1, ">= 0"),
+    ("gain.translation.z", -1e-9, ">= 0"),
+    ("gain.disturbance", -0.99, ">= 0"),
+    ("gain.surface", -5.0, ">= 0"),
+    ("gain.eta", -15.0, ">= 0"),
+    ("gain.theta", -15.0, ">= 0"),
+    ("gain.attitude", 0.0, "> 0"),
+    ("gain.attitude", -15.0, "> 0"),
+    ("surface_exponent", 0.0, "> 0 and <= 1"),
+    ("surface_exponent", 1.01, "> 0 and <= 1"),
+    ("surface_exponent", -0.5, "> 0 and <= 1"),
+    ("boundary_layer", 0.0, "> 0"),
+    ("boundary_layer", -0.001, "> 0"),
+]
+
+
+def named(name: str, value: float) -> tuple[str, str]:
+    """How a message names a variable and its value; an inertia is shown whole."""
+    group, _, entry = name.partition(".")
+    return (group, f"{entry} {value:g}") if group == "inertia" else (f"{name} = {value}", str(value))
+
+
+@pytest.mark.parametrize(("name", "value", "expected"), OUT_OF_RANGE)
+def test_parameter_out_of_range_is_refused_when_initialisation_ends(name: str, value: float, expected: str) -> None:
+    slave = instance({name: value})
+    slave.setup_experiment(0.0)
+    slave.enter_initialization_mode()
+    assert_fails(slave.exit_initialization_mode, *named(name, value), "expected", expected)
+
+
+TUNABLE = [v.name for v in UNIFIED if v.variability == "tunable"]
+
+
+@pytest.mark.parametrize(("name", "value", "expected"), [case for case in OUT_OF_RANGE if case[0] in TUNABLE])
+def test_tunable_parameter_out_of_range_is_refused_at_the_next_step(name: str, value: float, expected: str) -> None:
+    slave = started()
+    slave.do_step(0.0, 0.01)
+    put(slave, {name: value})
+    assert_fails(lambda: slave.do_step(0.01, 0.01), *named(name, value), "expected", expected)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("name", [v.name for v in UNIFIED if v.causality == "parameter" and v.type == "Real"])
+def test_parameter_that_is_not_finite_is_refused(name: str, value: float) -> None:
+    assert_fails(lambda: put(instance(), {name: value}), f"{name} = {value}", "expected a finite value")
+
+
+@pytest.mark.parametrize("name", [v.name for v in UNIFIED if v.causality == "parameter" and v.variability == "fixed"])
+def test_fixed_parameter_cannot_be_set_after_initialisation(name: str) -> None:
+    slave = started()
+    index = slave._index[name]
+    set_value = slave.set_boolean if UNIFIED[index].type == "Boolean" else slave.set_real
+    assert_fails(lambda: set_value([index], [1]), name, "a fixed parameter cannot be set after initialisation")
+
+
+def test_tunable_parameters_take_effect_at_the_next_sample() -> None:
+    tunable = {name: value for name, value in PARAMETERS.items() if name in TUNABLE}
+    assert sorted(tunable) == sorted(TUNABLE)
+    slave = started(measured(1))
+    slave.do_step(0.0, 0.005)
+    put(slave, tunable)
+    assert command(slave) == close(law(measured(1), 0.0))
+    slave.do_step(0.005, 0.005)
+    assert command(slave) == close(law(measured(1), 0.0))
+    slave.do_step(0.01, 0.005)
+    assert command(slave) == close(law(measured(1), 0.01, GAINS))
+
+
+# -- misuse ---------------------------------------------------------------------------------------------------
+
+INPUTS = [v.name for v in UNIFIED if v.causality == "input"]
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("name", INPUTS)
+def test_input_that_is_not_finite_is_refused(name: str, value: float) -> None:
+    assert_fails(lambda: put(started(), {name: value}), f"{name} = {value}", "expected a finite value")
+
+
+def test_value_that_is_not_finite_is_named_among_many() -> None:
+    slave = started()
+    indices, values = [slave._index[name] for name in INPUTS], [1.0] * len(INPUTS)
+    values[5] = math.nan
+    assert_fails(lambda: slave.set_real(indices, values), f"{INPUTS[5]} = nan")
+
+
+def test_large_inputs_whose_sum_overflows_are_inputs_like_others() -> None:
+    slave = started(follow_inputs=True)
+    names = ("reference.snap.x", "reference.snap.y")
+    slave.set_real([slave._index[name] for name in names], [1.7e308, 1.7e308])
+    assert get(slave, *names) == [1.7e308, 1.7e308]
+
+
+@pytest.mark.parametrize("name", [v.name for v in UNIFIED if v.causality in ("output", "local") and v.type == "Real"])
+def test_outputs_and_locals_cannot_be_set(name: str) -> None:
+    causality = next(v.causality for v in UNIFIED if v.name == name)
+    expected = (name, f"causality {causality} cannot be set")
+    assert_fails(lambda: put(instance(), {name: 1.0}), *expected)
+    assert_fails(lambda: put(started(), {name: 1.0}), *expected)
+
+
+def test_sample_count_cannot_be_set() -> None:
+    slave = started()
+    assert_fails(lambda: slave.set_integer([slave._index["sample_count"]], [3]), "sample_count", "cannot be set")
+
+
+def test_step_before_initialisation_is_refused() -> None:
+    assert_fails(lambda: instance().do_step(0.0, 0.01), "fmi2DoStep", "phase instantiated", "expected phase stepping")
+    slave = instance()
+    slave.setup_experiment(0.0)
+    slave.enter_initialization_mode()
+    assert_fails(lambda: slave.do_step(0.0, 0.01), "fmi2DoStep", "phase initialization")
+
+
+def test_step_after_termination_is_refused() -> None:
+    slave = started()
+    slave.terminate()
+    assert_fails(lambda: slave.do_step(0.0, 0.01), "fmi2DoStep", "phase terminated")
+
+
+def test_initialisation_goes_its_way_once() -> None:
+    assert_fails(instance().exit_initialization_mode, "fmi2ExitInitializationMode", "expected phase initialization")
+    assert_fails(started().enter_initialization_mode, "fmi2EnterInitializationMode", "expected phase instantiated")
+    assert_fails(lambda: started().setup_experiment(0.0), "fmi2SetupExperiment", "expected phase instantiated")
+
+
+@pytest.mark.parametrize("h", [0.0, -0.01, math.nan, math.inf])
+def test_communication_step_that_is_not_positive_is_refused(h: float) -> None:
+    assert_fails(lambda: started().do_step(0.0, h), f"communicationStepSize = {h}", "expected a positive")
+
+
+@pytest.mark.parametrize("t", [math.nan, math.inf])
+def test_time_that_is_not_finite_is_refused(t: float) -> None:
+    assert_fails(lambda: started().do_step(t, 0.01), f"currentCommunicationPoint = {t}", "expected a finite time")
+    assert_fails(lambda: instance().setup_experiment(t), f"startTime = {t}", "expected a finite time")
+
+
+def test_value_reference_of_another_type_is_refused() -> None:
+    slave = started()
+    real, integer = slave._index["thrust"], slave._index["sample_count"]
+    assert_fails(lambda: slave.get_real([integer]), f"[{integer}]", "Real variable")
+    assert_fails(lambda: slave.get_integer([real]), f"[{real}]", "Integer variable")
+    assert_fails(lambda: slave.get_boolean([real]), "Boolean variable")
+    assert_fails(lambda: slave.set_boolean([real], [True]), "Boolean variable")
+    assert_fails(lambda: slave.get_string([real]), "String variable", "none")
+    assert_fails(lambda: slave.set_string([real], ["x"]), "String variable", "none")
+    assert_fails(lambda: slave.set_real([len(UNIFIED)], [1.0]), f"[{len(UNIFIED)}]", "Real variable")
+
+
+def test_virtual_control_without_a_desired_attitude_fails_as_a_divergence() -> None:
+    slave = started(follow_inputs=True)
+    put(slave, {"reference.acceleration.z": 20.0})
+    assert_fails(lambda: slave.do_step(0.0, 0.01), "virtual control", "20.0", "expected")
+    assert [message.category for message in slave.log_queue] == ["divergence"]
+    assert "virtual control" in slave.log_queue[0].msg
+
+
+def test_command_that_leaves_the_range_of_floats_fails_as_a_divergence() -> None:
+    slave = started()
+    put(slave, {"angular_velocity.x": 1e200, "angular_velocity.y": 1e200})
+    assert_fails(lambda: slave.do_step(0.0, 0.01), "expected a finite value")
+    assert [message.category for message in slave.log_queue] == ["divergence"]
+
+
+def test_instance_that_failed_makes_no_more_steps() -> None:
+    slave = started()
+    assert_fails(lambda: slave.do_step(0.0, 0.0), "communicationStepSize")
+    assert_fails(lambda: slave.do_step(0.0, 0.01), "phase failed")
+
+
+def test_failure_can_be_logged_as_a_printf_format() -> None:
+    assert "100 %%s" in repr(started()._failed(ValueError("100 %s")))
+
+
+# -- state ----------------------------------------------------------------------------------------------------
+
+
+def fly(slave: UnifiedController, steps: range) -> list[list[float]]:
+    """All Reals after each of the steps of 4 ms, with other inputs for each."""
+    history = []
+    for k in steps:
+        put(slave, measured(k % 13))
+        if k == 20:
+            put(slave, {"gain.surface": 4.0})
+        slave.do_step(0.004 * k, 0.004)
+        history.append([*slave._reals, count(slave)])
+    return history
+
+
+def as_bytes(slave: UnifiedController) -> bytes:
+    return slave._fmu_state_to_bytes(slave._get_fmu_state())
+
+
+@pytest.mark.parametrize("saved_after", [0, 1, 3, 7, 20, 21])
+def test_restored_controller_flies_on_bit_by_bit(saved_after: int) -> None:
+    """The period of 10 ms is no multiple of the step: there is always a sample pending."""
+    slave = started({**measured(0), **PARAMETERS, "sample_offset": 0.003})
+    fly(slave, range(saved_after))
+    saved = as_bytes(slave)
+    expected = fly(slave, range(saved_after, 40))
+    assert slave._fmu_state_from_bytes(saved) == json.loads(saved)
+
+    slave._set_fmu_state(slave._fmu_state_from_bytes(saved))
+    assert fly(slave, range(saved_after, 40)) == expected
+
+    other = UnifiedController(instance_name="other")
+    other._set_fmu_state(other._fmu_state_from_bytes(saved))
+    assert fly(other, range(saved_after, 40)) == expected
+
+
+def test_saved_state_does_not_follow_the_instance() -> None:
+    slave = started(measured(0))
+    state = slave._get_fmu_state()
+    before = json.dumps(state)
+    fly(slave, range(5))
+    slave._set_fmu_state(state)
+    fly(slave, range(5))
+    assert json.dumps(state) == before
+
+
+def test_restored_state_is_the_saved_state() -> None:
+    slave = started({**measured(0), **PARAMETERS})
+    fly(slave, range(7))
+    other = UnifiedController(instance_name="other")
+    other._set_fmu_state(json.loads(as_bytes(slave)))
+    assert as_bytes(other) == as_bytes(slave)
+
+
+def test_tunable_parameter_that_was_set_but_not_used_is_part_of_the_state() -> None:
+    slave = started(measured(0))
+    put(slave, {"gain.surface": 4.0, "gain.eta": 7.0})
+    other = UnifiedController(instance_name="other")
+    other._set_fmu_state(json.loads(as_bytes(slave)))
+    other.do_step(0.0, 0.01)
+    assert command(other) == close(law(measured(0), 0.0, Gains(k_s=4.0, k_eta=7.0)))
+
+
+def test_tunable_parameter_out_of_range_is_still_checked_after_a_restore() -> None:
+    slave = started()
+    put(slave, {"gain.surface": -4.0})
+    other = UnifiedController(instance_name="other")
+    other._set_fmu_state(json.loads(as_bytes(slave)))
+    assert_fails(lambda: other.do_step(0.0, 0.01), "gain.surface = -4.0")
+
+
+def test_state_saved_in_initialisation_mode_goes_on_from_there() -> None:
+    slave = instance(measured(1), follow_inputs=False)
+    slave.setup_experiment(2.0)
+    slave.enter_initialization_mode()
+    other = started(measured(5))
+    other._set_fmu_state(json.loads(as_bytes(slave)))
+    other.exit_initialization_mode()
+    assert command(other) == close(law(measured(1), 2.0))
+
+
+def test_restore_after_a_refused_step_recovers() -> None:
+    """What a master that rolls back needs."""
+    slave = started(measured(0))
+    saved = as_bytes(slave)
+    assert_fails(lambda: slave.do_step(0.0, -1.0), "communicationStepSize")
+    slave._set_fmu_state(json.loads(saved))
+    slave.do_step(0.0, 0.01)
+    assert command(slave) == close(law(measured(0), 0.0))
+
+
+def test_warning_is_not_repeated_after_a_restore() -> None:
+    slave = started(NOTHING)
+    slave._set_fmu_state(json.loads(as_bytes(slave)))
+    slave.do_step(0.0, 0.01)
+    assert len(warnings(slave)) == 1
+
+
+def test_state_of_another_model_is_refused() -> None:
+    state = {**started()._get_fmu_state(), "model": "SomethingElse"}
+    assert_fails(lambda: started()._set_fmu_state(state), "SomethingElse", "expected", "UnifiedController")
+
+
+def test_instances_do_not_share_values() -> None:
+    first, second = started(measured(0)), started(measured(0))
+    put(first, measured(5))
+    first.do_step(0.0, 0.01)
+    assert command(second) == close(law(measured(0), 0.0))
+    assert count(second) == 0

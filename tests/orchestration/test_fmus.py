@@ -1,0 +1,114 @@
+"""Where FMUs are found, and when they are built."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import platformdirs
+import pytest
+
+from orchestration import QuadcosimError, UsageError, fmus
+from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.wiring import MODELS
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder that the package takes for the one that it lies in; its cache is beside it."""
+    root = tmp_path / "project"
+    (root / "orchestration").mkdir(parents=True)
+    monkeypatch.setattr(fmus, "__file__", str(root / "orchestration" / "fmus.py"))
+    monkeypatch.setattr(platformdirs, "user_cache_dir", lambda name: str(tmp_path / "cache" / name))
+    return root
+
+
+def with_fmus_folder(project: Path) -> Path:
+    (project / "pyproject.toml").touch()
+    (project / "fmus").mkdir()
+    return project / "fmus"
+
+
+# -- the folder -------------------------------------------------------------------------------------------
+
+
+def test_a_project_has_its_own_folder(project: Path) -> None:
+    folder = with_fmus_folder(project)
+    assert fmus.default_folder() == folder
+
+
+def test_an_installed_package_uses_the_cache(project: Path, tmp_path: Path) -> None:
+    assert fmus.default_folder() == tmp_path / "cache" / "quadcosim" / "fmus"
+    (project / "fmus").mkdir()  # some folder of that name, but no project
+    assert fmus.default_folder() == tmp_path / "cache" / "quadcosim" / "fmus"
+
+
+def test_a_folder_that_cannot_be_written_is_not_used(
+    project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = with_fmus_folder(project)
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != folder)  # root may write anywhere
+    assert fmus.default_folder() == tmp_path / "cache" / "quadcosim" / "fmus"
+
+
+def test_an_fmu_is_built_into_the_cache_and_loads_from_there(project: Path, tmp_path: Path) -> None:
+    path = fmus.locate("QuadrotorPlant")
+    assert path == tmp_path / "cache" / "quadcosim" / "fmus" / "QuadrotorPlant.fmu"
+    with FmuSimulator(path, "plant") as plant:
+        assert plant.description.modelName == "QuadrotorPlant"
+
+
+# -- finding and building ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["Unified", "", "QuadrotorPlant.fmu", "nowhere/UnifiedController.fmu", "README.md"])
+def test_a_name_that_there_is_none_of_is_refused_with_the_names_there_are(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "README.md").touch()
+    with pytest.raises(UsageError) as refused:
+        fmus.locate(name)
+    assert str(refused.value).startswith(f"fmu = {name}: expected ")
+    assert all(model in str(refused.value) for model in MODELS)
+    assert ".fmu" in str(refused.value)
+
+
+def test_a_path_is_taken_as_it_is(built: dict[str, Path]) -> None:
+    path = str(built["QuadrotorPlant"])
+    assert fmus.locate(path) == Path(path)
+
+
+def test_a_missing_fmu_is_built_and_announced_once(project: Path) -> None:
+    folder, heard = with_fmus_folder(project), []
+    for _ in range(2):
+        assert fmus.locate("UnifiedController", heard.append) == folder / "UnifiedController.fmu"
+    assert len(heard) == 1
+    assert heard[0] == f"building {folder / 'UnifiedController.fmu'}"
+    assert [path.name for path in folder.iterdir()] == ["UnifiedController.fmu"]
+
+
+@pytest.mark.parametrize("content", [b"", b"no archive", None])
+def test_an_fmu_that_is_not_of_these_sources_is_built_anew(
+    project: Path, built: dict[str, Path], content: bytes | None
+) -> None:
+    """None: another FMU under this name, which carries another hash."""
+    path = with_fmus_folder(project) / "QuadrotorPlant.fmu"
+    path.write_bytes(built["UnifiedController"].read_bytes() if content is None else content)
+    assert fmus.out_of_date(["QuadrotorPlant"], path.parent) == ["QuadrotorPlant"]
+    fmus.locate("QuadrotorPlant")
+    assert fmus.out_of_date(["QuadrotorPlant"], path.parent) == []
+    assert path.read_bytes() == built["QuadrotorPlant"].read_bytes()
+
+
+def test_modification_times_do_not_matter(project: Path, built: dict[str, Path]) -> None:
+    path = with_fmus_folder(project) / "QuadrotorPlant.fmu"
+    path.write_bytes(built["QuadrotorPlant"].read_bytes())
+    os.utime(path, (0, 0))
+    assert fmus.out_of_date(["QuadrotorPlant"], path.parent) == []
+
+
+def test_a_build_that_fails_says_why_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    done = subprocess.CompletedProcess([], 1, stdout="", stderr="Traceback …\ncontroller_fmu/law.py:3: imports numpy\n")
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: done)
+    with pytest.raises(QuadcosimError, match=r"failed: controller_fmu/law.py:3: imports numpy$"):
+        fmus.build(["UnifiedController"], tmp_path)

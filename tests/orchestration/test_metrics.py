@@ -1,0 +1,212 @@
+"""Each metric against a signal of which it is known in closed form, or against another way to compute it."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from orchestration import metrics
+from orchestration.wiring import COMMAND, POSITION
+
+Array = npt.NDArray[np.float64]
+
+TIME = np.linspace(0.0, 3.0, 3001)
+
+
+def measured(
+    error: Array | float = 0.0,
+    *,
+    t: Array = TIME,
+    command: dict[str, Array] | None = None,
+    sampled: Array | None = None,
+    thrust_max: float = math.inf,
+    torque_max: float = math.inf,
+    **controller: Array,
+) -> metrics.Metrics:
+    """The metrics of a flight whose position error has this norm, spread over the axes as 2:-3:6."""
+    zero = np.zeros(len(t))
+    desired = np.column_stack([zero + 1.0, zero - 2.0, 0.1 * t])
+    position = desired + np.outer(zero + error, np.array([2.0, -3.0, 6.0]) / 7.0)
+    signals = {
+        "time": t,
+        **{f"plant.{name}": position[:, i] for i, name in enumerate(POSITION)},
+        **{f"plant.{name}": (command or {}).get(name, zero) for name in COMMAND},
+        **{f"controller.{name}": values for name, values in controller.items()},
+    }
+    marks = np.ones(len(t), dtype=bool) if sampled is None else sampled.astype(bool)
+    return metrics.compute(signals, desired, marks, thrust_max=thrust_max, torque_max=torque_max)
+
+
+# -- position ---------------------------------------------------------------------------------------------
+
+
+def test_a_constant_error_is_its_own_rmse_and_bound() -> None:
+    m = measured(0.2)
+    assert m["position_rmse"] == pytest.approx(0.2)
+    assert m["position_max"] == pytest.approx(0.2)
+    assert m["ultimate_bound"] == pytest.approx(0.2)
+    assert m["position_iae"] == pytest.approx(0.6)
+    assert m["position_itae"] == pytest.approx(0.2 * 3.0**2 / 2)
+
+
+def test_a_rising_error_has_the_integrals_of_a_line() -> None:
+    m = measured(2.0 * TIME)
+    assert m["position_rmse"] == pytest.approx(math.sqrt(4.0 * 3.0**3 / 3 / 3.0), rel=1e-6)
+    assert m["position_iae"] == pytest.approx(9.0)
+    assert m["position_itae"] == pytest.approx(2.0 * 3.0**3 / 3, rel=1e-6)
+    assert m["position_max"] == pytest.approx(6.0)
+
+
+def test_a_decaying_error_has_the_integrals_of_an_exponential() -> None:
+    m = measured(np.exp(-TIME))
+    end = math.exp(-3.0)
+    assert m["position_iae"] == pytest.approx(1.0 - end, rel=1e-6)
+    assert m["position_itae"] == pytest.approx(1.0 - end * 4.0, rel=1e-6)
+    assert m["position_rmse"] == pytest.approx(math.sqrt((1.0 - end**2) / 2.0 / 3.0), rel=1e-6)
+    assert m["position_max"] == pytest.approx(1.0)
+    assert m["ultimate_bound"] == pytest.approx(math.exp(-2.0), rel=1e-3)
+    assert m["settling_time"] == pytest.approx(math.log(1.0 / 0.05), abs=1e-3)
+
+
+uneven = arrays(np.float64, st.integers(2, 30), elements=st.floats(1e-3, 1.0)).map(np.cumsum)
+
+
+@given(uneven, st.data())
+def test_integrals_are_the_trapezoid_rule_on_any_rows(t: Array, data: st.DataObject) -> None:
+    e = data.draw(arrays(np.float64, len(t), elements=st.floats(0.0, 10.0)))
+    m, span = measured(e, t=t), t[-1] - t[0]
+    slices = list(zip(t, t[1:], e, e[1:], strict=False))
+    assert m["position_iae"] == pytest.approx(sum((b - a) * (x + y) / 2 for a, b, x, y in slices), abs=1e-12)
+    assert m["position_itae"] == pytest.approx(sum((b - a) * (a * x + b * y) / 2 for a, b, x, y in slices), abs=1e-12)
+    squares = sum((b - a) * (x * x + y * y) / 2 for a, b, x, y in slices)
+    assert m["position_rmse"] == pytest.approx(math.sqrt(squares / span), abs=1e-7)
+
+
+@pytest.mark.parametrize("fault", [0.06, 1.0])
+def test_the_ultimate_bound_is_the_largest_error_of_the_last_third(fault: float) -> None:
+    bump = np.where(np.abs(TIME - 2.0005) < 1e-3, fault, 0.01)
+    assert measured(bump)["ultimate_bound"] == pytest.approx(fault)
+    early = np.where(np.abs(TIME - 1.99) < 1e-3, fault, 0.01)
+    assert measured(early)["ultimate_bound"] == pytest.approx(0.01)
+
+
+# -- settling ---------------------------------------------------------------------------------------------
+
+
+def test_an_error_that_stays_small_settles_at_the_start() -> None:
+    assert measured(0.049)["settling_time"] == 0.0
+
+
+def test_an_error_that_is_large_at_the_end_never_settles() -> None:
+    assert measured(0.051)["settling_time"] is None
+    assert measured(np.where(TIME > 2.9995, 0.06, 0.0))["settling_time"] is None
+
+
+def test_an_error_that_comes_back_settles_after_the_last_time() -> None:
+    bump = np.where((TIME >= 1.0) & (TIME <= 1.5), 0.2, 0.0)
+    assert measured(bump)["settling_time"] == pytest.approx(1.501)
+
+
+def test_an_error_of_exactly_the_tolerance_is_settled() -> None:
+    assert metrics._settling_time(np.array([0.0, 1.0, 2.0]), np.array([1.0, 0.05, 0.05])) == 1.0
+
+
+# -- attitude and energy, at samples ----------------------------------------------------------------------
+
+
+def test_the_attitude_error_is_the_angle_of_the_rotation_at_samples() -> None:
+    angle = np.array([0.3, 3.0, 0.4, 3.0, 0.0])
+    scalar = np.cos(angle / 2) * np.array([1, 1, -1, 1, 1])  # q and -q are one attitude
+    m = measured(t=np.arange(5.0), sampled=np.array([1, 0, 1, 0, 1]), **{"attitude_error.w": scalar})
+    assert m["attitude_error_max"] == pytest.approx(0.4)
+    assert m["attitude_error_rmse"] == pytest.approx(math.sqrt((0.09 + 0.16) / 3))
+
+
+def test_a_scalar_part_that_rounding_made_too_large_is_no_error() -> None:
+    m = measured(t=np.arange(2.0), **{"attitude_error.w": np.array([1.0 + 1e-15, -1.0 - 1e-15])})
+    assert (m["attitude_error_rmse"], m["attitude_error_max"]) == (0.0, 0.0)
+
+
+def test_energy_growth_is_counted_from_sample_to_sample() -> None:
+    energy = np.array([5.0, 9.0, 4.0, 0.0, 4.5, 9.0, 4.5, 0.0, 3.0, 0.0])  # at samples: 5 4 4.5 4.5 3
+    m = measured(t=np.arange(10.0), sampled=np.arange(10) % 2 == 0, energy=energy)
+    assert m["energy_growth_share"] == pytest.approx(1 / 5)
+
+
+def test_what_is_taken_at_samples_is_none_without_any() -> None:
+    values = np.ones(3)
+    without_samples = measured(t=np.arange(3.0), sampled=np.zeros(3), energy=values, **{"attitude_error.w": values})
+    without_signals = measured(t=np.arange(3.0))
+    for m in (without_samples, without_signals):
+        assert m["attitude_error_rmse"] is m["attitude_error_max"] is m["energy_growth_share"] is None
+
+
+# -- commands ---------------------------------------------------------------------------------------------
+
+
+def test_control_effort_is_the_integral_of_the_squares() -> None:
+    sine = {
+        "thrust": 2.0 + 0.0 * TIME,
+        "torque.x": np.sin(TIME),
+        "torque.y": np.cos(TIME),
+        "torque.z": 2.0 + 0.0 * TIME,
+    }
+    m = measured(command=sine)
+    assert m["control_effort.thrust"] == pytest.approx(12.0)
+    assert m["control_effort.torque"] == pytest.approx(5.0 * 3.0)
+
+
+def test_total_variation_is_the_sum_of_all_changes() -> None:
+    t = np.arange(5.0)
+    command = {
+        "thrust": np.array([1.0, 3.0, 3.0, 2.0, 2.5]),
+        "torque.x": np.array([0.0, -1.0, 0.0, 0.0, 0.0]),
+        "torque.z": np.array([0.0, 0.0, 0.0, 4.0, 4.0]),
+    }
+    m = measured(t=t, command=command)
+    assert m["total_variation.thrust"] == pytest.approx(2.0 + 1.0 + 0.5)
+    assert m["total_variation.torque"] == pytest.approx(2.0 + 4.0)
+
+
+Limited = Callable[[Array], dict[str, Array]]
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        lambda active: {"thrust": np.where(active, 21.0, 20.0)},
+        lambda active: {"thrust": np.where(active, -0.1, 0.0)},
+        lambda active: {"torque.x": np.where(active, 3.1, 3.0)},
+        lambda active: {"torque.y": np.where(active, -3.1, -3.0)},
+        lambda active: {"torque.z": np.where(active, 9.0, 0.0), "thrust": np.where(active, 30.0, 1.0)},
+    ],
+    ids=["thrust above", "thrust below", "torque above", "torque below", "both"],
+)
+def test_saturation_is_the_share_of_time_beyond_a_limit(command: Limited) -> None:
+    t = np.array([0.0, 1.0, 1.5, 4.0, 5.0])
+    active = np.array([False, True, False, True, True])  # each until the next row: 0.5 s and 1 s of 5 s
+    m = measured(t=t, command=command(active), thrust_max=20.0, torque_max=3.0)
+    assert m["saturation_share"] == pytest.approx(1.5 / 5.0)
+
+
+def test_a_command_at_its_limit_is_not_beyond_it() -> None:
+    command: dict[str, Any] = {"thrust": np.where(TIME < 1.0, 0.0, 20.0), "torque.x": np.where(TIME < 2.0, -3.0, 3.0)}
+    assert measured(command=command, thrust_max=20.0, torque_max=3.0)["saturation_share"] == 0.0
+
+
+def test_a_run_of_one_row_has_finite_metrics() -> None:
+    m = measured(0.7, t=np.array([0.0]), energy=np.array([1.0]), **{"attitude_error.w": np.array([1.0])})
+    assert (m["position_rmse"], m["position_max"], m["ultimate_bound"]) == (pytest.approx(0.7),) * 3
+    assert (m["position_iae"], m["saturation_share"], m["settling_time"]) == (0.0, 0.0, None)
+    assert all(value is None or math.isfinite(value) for value in m.values())
+
+
+def test_metrics_are_plain_numbers_of_python() -> None:
+    m = measured(0.1, energy=TIME, **{"attitude_error.w": np.ones(len(TIME))})
+    assert {type(value) for value in m.values()} <= {float, int, bool, type(None)}

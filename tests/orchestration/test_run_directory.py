@@ -1,0 +1,250 @@
+"""A run's directory: complete or not there, whatever happens while it is written."""
+
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+import orchestration
+from orchestration import Result, Scenario, Timing, UsageError, load_run, plots, save_run
+
+FILES = {"signals.parquet", "events.parquet", "metrics.json", "scenario.toml"}
+FIGURES = {"path.png", "errors.png", "commands.png", "energy.png"}
+
+
+@pytest.fixture(scope="module")
+def result() -> Result:
+    timing = Timing(delay=0.003, measurement_loss=0.2, command_loss=0.2, noise={"position": 0.01})
+    return orchestration.run(Scenario(stop_time=0.3, timing=timing).with_changes(parameters={"plant.mass": 1.1}))
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return tmp_path / "results" / "run"
+
+
+def looks_whole(folder: Path) -> bool:
+    """Whether someone who looks for results would take `folder` for a run."""
+    return not folder.name.startswith(".") and any((folder / name).exists() for name in FILES)
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+# -- writing and reading ----------------------------------------------------------------------------------
+
+
+def test_a_directory_has_all_files(result: Result, folder: Path) -> None:
+    assert save_run(result, folder) == folder
+    assert {path.name for path in folder.iterdir()} >= FILES | FIGURES
+    assert list(folder.parent.iterdir()) == [folder]
+
+
+def test_figures_can_be_left_out(result: Result, folder: Path) -> None:
+    save_run(result, folder, figures=False)
+    names = {path.name for path in folder.iterdir()}
+    assert names >= FILES
+    assert not names & FIGURES
+
+
+def test_a_run_read_back_is_the_run_written(result: Result, folder: Path) -> None:
+    again = load_run(save_run(result, folder, figures=False))
+    assert again.columns == result.columns
+    assert again.rows.tobytes() == result.rows.tobytes()
+    assert again.desired.tobytes() == result.desired.tobytes()
+    assert again.events == result.events
+    assert again.metrics == result.metrics
+    assert again.scenario == result.scenario
+    assert again.provenance == result.provenance
+    assert (again.divergence, again.warnings) == (result.divergence, result.warnings)
+
+
+def test_a_diverged_run_is_read_back_with_its_reason(folder: Path) -> None:
+    diverged = orchestration.run(Scenario(stop_time=2.0, timing=Timing(period=0.3)))
+    again = load_run(save_run(diverged, folder))
+    assert again.divergence == diverged.divergence
+    assert again.metrics["diverged"] is True
+    assert {path.name for path in folder.iterdir()} >= FIGURES
+
+
+def test_signals_are_named_columns_of_doubles(result: Result, folder: Path) -> None:
+    table = pq.read_table(save_run(result, folder, figures=False) / "signals.parquet")
+    assert table.column_names[0] == "time"
+    assert {"plant.position.x", "plant.thrust", "controller.thrust", "controller.energy"} <= set(table.column_names)
+    assert {str(column.type) for column in table.schema} == {"double"}
+    assert table["plant.position.x"].to_numpy().tolist() == result.signals["plant.position.x"].tolist()
+
+
+def test_events_tell_what_happened_when(result: Result, folder: Path) -> None:
+    rows = pq.read_table(save_run(result, folder, figures=False) / "events.parquet").to_pylist()
+    assert {row["event"] for row in rows} == {"sampled", "sent", "arrived", "lost"}
+    assert {row["what"] for row in rows} == {"measurement", "command"}
+    assert [row["time"] for row in rows] == [event.time / 1e9 for event in result.events]
+
+
+def test_metrics_are_standard_json(result: Result, folder: Path) -> None:
+    def refuse(constant: str) -> None:
+        raise AssertionError(f"{constant} is no JSON")
+
+    text = (save_run(result, folder, figures=False) / "metrics.json").read_text()
+    assert json.loads(text, parse_constant=refuse) == result.metrics
+
+
+def test_the_scenario_in_the_directory_flies_to_the_same_bits(result: Result, folder: Path) -> None:
+    scenario = orchestration.load_scenario(save_run(result, folder, figures=False) / "scenario.toml")
+    assert orchestration.run(scenario).rows.tobytes() == result.rows.tobytes()
+
+
+def test_figures_are_pictures_with_something_on_them(result: Result, tmp_path: Path) -> None:
+    written = plots.draw(result, tmp_path, (0.1, 0.2))
+    assert {path.name for path in written} == FIGURES
+    for path in written:
+        assert path.read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
+        picture = matplotlib.image.imread(path)
+        assert min(picture.shape[:2]) > 200
+        assert len(np.unique(picture[..., 0])) > 20  # shades of the lines' edges
+
+
+@pytest.mark.parametrize("window", [(0.1, 0.2), (5.0, 6.0)])
+def test_the_commands_are_zoomed_on_the_window(result: Result, window: tuple[float, float]) -> None:
+    whole, zoom, *_ = plots.commands(result, window).axes
+    assert zoom.get_xlim() == window
+    assert whole.get_xlim() == pytest.approx((0.0, 0.3))
+
+
+def test_a_run_without_samples_can_be_drawn(tmp_path: Path) -> None:
+    without = orchestration.run(Scenario(stop_time=0.05, timing=Timing(offset=1.0)))
+    assert {path.name for path in plots.draw(without, tmp_path)} == FIGURES
+
+
+# -- replacing --------------------------------------------------------------------------------------------
+
+
+def test_an_earlier_run_is_replaced_whole(result: Result, folder: Path) -> None:
+    save_run(result, folder)
+    other = orchestration.run(Scenario(stop_time=0.1))
+    save_run(other, folder, figures=False)
+    assert load_run(folder).rows.tobytes() == other.rows.tobytes()
+    assert not FIGURES & {path.name for path in folder.iterdir()}
+    assert list(folder.parent.iterdir()) == [folder]
+
+
+def test_an_empty_directory_is_taken(result: Result, folder: Path) -> None:
+    folder.mkdir(parents=True)
+    save_run(result, folder, figures=False)
+    assert load_run(folder).metrics == result.metrics
+
+
+def test_a_directory_of_something_else_is_left_alone(result: Result, folder: Path) -> None:
+    folder.mkdir(parents=True)
+    (folder / "thesis.tex").write_text("years of work")
+    with pytest.raises(UsageError, match="expected a new or empty directory, or that of an earlier run"):
+        save_run(result, folder)
+    assert contents(folder) == {"thesis.tex": b"years of work"}
+    assert list(folder.parent.iterdir()) == [folder]
+
+
+def test_a_file_is_left_alone(result: Result, folder: Path) -> None:
+    folder.parent.mkdir()
+    folder.write_text("years of work")
+    with pytest.raises(UsageError, match="expected a new or empty directory"):
+        save_run(result, folder)
+    assert folder.read_text() == "years of work"
+
+
+@pytest.mark.parametrize("name", sorted(FILES))
+def test_a_directory_that_lacks_a_file_is_no_run(result: Result, folder: Path, name: str) -> None:
+    (save_run(result, folder, figures=False) / name).unlink()
+    with pytest.raises(UsageError, match=f"expected the directory of a run; it has no {name}"):
+        load_run(folder)
+
+
+def test_what_is_not_there_is_no_run(folder: Path) -> None:
+    with pytest.raises(UsageError, match="expected the directory of a run"):
+        load_run(folder)
+
+
+# -- when writing does not end well -----------------------------------------------------------------------
+
+
+@pytest.fixture(params=["tables.write_signals", "tables.write_events", "plots.draw"])
+def failing(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """One of the steps of writing fails as on a full disk."""
+
+    def fail(*_: object) -> None:
+        raise OSError("no space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(f"orchestration.{request.param}", fail)
+        yield
+
+
+@pytest.mark.usefixtures("failing")
+def test_a_failure_while_writing_leaves_nothing(result: Result, folder: Path) -> None:
+    with pytest.raises(OSError, match="no space left"):
+        save_run(result, folder)
+    assert list(folder.parent.iterdir()) == []
+
+
+def test_a_failure_while_writing_leaves_the_earlier_run(
+    result: Result, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = contents(save_run(result, folder, figures=False))
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(plots, "draw", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        save_run(orchestration.run(Scenario(stop_time=0.05)), folder)
+    assert contents(folder) == before
+    assert list(folder.parent.iterdir()) == [folder]
+
+
+WRITER = """
+import sys, time
+import orchestration
+from orchestration import plots
+
+def wait(*_):
+    print("writing", flush=True)
+    time.sleep(60)
+
+plots.draw = wait
+orchestration.save_run(orchestration.run(orchestration.Scenario(stop_time=0.05)), sys.argv[1])
+"""
+
+
+def kill_while_writing(folder: Path) -> None:
+    """Start to write a run in another process, and kill that when all but the figures is on disk."""
+    with subprocess.Popen([sys.executable, "-c", WRITER, str(folder)], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        process.kill()
+    assert line == "writing\n"
+    assert process.returncode == (-signal.SIGKILL if sys.platform != "win32" else 1)
+
+
+def test_a_killed_process_leaves_no_directory_that_looks_whole(folder: Path) -> None:
+    kill_while_writing(folder)
+    assert not folder.exists()
+    left = list(folder.parent.iterdir())
+    assert left  # it was in the middle of writing
+    assert not any(looks_whole(path) for path in left)
+
+
+def test_a_killed_process_leaves_the_earlier_run_as_it_was(result: Result, folder: Path) -> None:
+    before = contents(save_run(result, folder, figures=False))
+    kill_while_writing(folder)
+    assert contents(folder) == before
+    assert [path for path in folder.parent.iterdir() if looks_whole(path)] == [folder]
+    save_run(result, folder, figures=False)  # what is left over is not in the way
+    assert load_run(folder).events == result.events

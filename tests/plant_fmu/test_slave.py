@@ -1,0 +1,480 @@
+"""The plant FMU from inside: the calls that a master makes, and what interface and errors promise."""
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import plant_fmu.slave
+from fmu_kit.algebra import ZERO, Inertia, Quaternion, Vec3
+from fmu_kit.failure import Failure
+from plant_fmu.dynamics import Body, RigidState, Wrench, derivative
+from plant_fmu.integrator import rk4_step
+from plant_fmu.interface import QUADROTOR
+from plant_fmu.slave import QuadrotorPlant
+
+POSITION = ("position.x", "position.y", "position.z")
+VELOCITY = ("velocity.x", "velocity.y", "velocity.z")
+QUATERNION = ("quaternion.x", "quaternion.y", "quaternion.z", "quaternion.w")
+SPIN = ("angular_velocity.x", "angular_velocity.y", "angular_velocity.z")
+MOTION = (*POSITION, *VELOCITY, *QUATERNION, *SPIN)
+
+NO_WIND = {"wind.amplitude.x": 0.0, "wind.amplitude.y": 0.0, "wind.amplitude.z": 0.0}
+LEVEL = {
+    "initial.quaternion.x": 0.0,
+    "initial.quaternion.y": 0.0,
+    "initial.quaternion.z": 0.0,
+    "initial.quaternion.w": 1.0,
+}
+BODY = {
+    "mass": 1.3,
+    "gravity": 9.7,
+    "inertia.xx": 0.8,
+    "inertia.yy": 0.9,
+    "inertia.zz": 1.4,
+    "inertia.xy": 0.05,
+    "inertia.xz": -0.02,
+    "inertia.yz": 0.03,
+}
+MOVING = {
+    "initial.position.x": 1.0,
+    "initial.position.y": -2.0,
+    "initial.position.z": 3.0,
+    "initial.velocity.x": 0.1,
+    "initial.velocity.y": 0.2,
+    "initial.velocity.z": -0.3,
+    "initial.angular_velocity.x": 0.4,
+    "initial.angular_velocity.y": -0.5,
+    "initial.angular_velocity.z": 0.6,
+}
+
+
+def put(slave: QuadrotorPlant, values: Mapping[str, float]) -> None:
+    for name, value in values.items():
+        slave.set_real([slave._index[name]], [value])
+
+
+def get(slave: QuadrotorPlant, *names: str) -> list[float]:
+    return slave.get_real([slave._index[name] for name in names])
+
+
+def instance(values: Mapping[str, float] | None = None) -> QuadrotorPlant:
+    slave = QuadrotorPlant(instance_name="p")
+    put(slave, values or {})
+    return slave
+
+
+def started(values: Mapping[str, float] | None = None, *, start: float = 0.0) -> QuadrotorPlant:
+    """A plant after initialisation."""
+    slave = instance(values)
+    slave.setup_experiment(start)
+    slave.enter_initialization_mode()
+    slave.exit_initialization_mode()
+    return slave
+
+
+def fly(slave: QuadrotorPlant, h: float, count: int, start: float = 0.0) -> None:
+    for k in range(count):
+        assert slave.do_step(start + k * h, h) is True
+
+
+def close(values: list[float], tolerance: float = 1e-12) -> Any:
+    return pytest.approx(values, rel=0.0, abs=tolerance)
+
+
+def assert_fails(call: Callable[[], object], *words: str) -> None:
+    with pytest.raises(Failure) as caught:
+        call()
+    for word in words:
+        assert word in repr(caught.value)
+
+
+# -- motion -------------------------------------------------------------------------------------------------
+
+
+def test_defaults_start_at_the_initial_state_of_the_paper() -> None:
+    slave = started()
+    length = math.sqrt(0.1699**2 + 0.3058**2 + 0.1699**2 + 0.9212**2)
+    assert get(slave, *POSITION, *VELOCITY, *SPIN) == [0.0] * 9
+    assert get(slave, *QUATERNION) == close([0.1699 / length, 0.3058 / length, 0.1699 / length, 0.9212 / length])
+    assert get(slave, "thrust") == [9.81]
+
+
+def test_initial_state_is_where_it_was_set() -> None:
+    assert get(started(MOVING), *POSITION, *VELOCITY, *SPIN) == list(MOVING.values())
+
+
+@given(st.floats(-100.0, 100.0).map(lambda exponent: 10.0**exponent))
+def test_initial_quaternion_is_normalised(length: float) -> None:
+    values = {"x": 0.1 * length, "y": -0.5 * length, "z": 0.5 * length, "w": 0.7 * length}
+    slave = started({f"initial.quaternion.{axis}": value for axis, value in values.items()})
+    assert get(slave, *QUATERNION) == close([0.1, -0.5, 0.5, 0.7])
+
+
+def test_hover_stays_for_half_a_minute() -> None:
+    slave = started({**BODY, **LEVEL, **NO_WIND, "initial.position.z": -2.0, "thrust": 1.3 * 9.7})
+    fly(slave, 0.01, 3000)
+    assert get(slave, *MOTION) == close([0.0, 0.0, -2.0, *[0.0] * 6, 1.0, 0.0, 0.0, 0.0])
+
+
+def test_free_fall_is_exact() -> None:
+    slave = started({**NO_WIND, "thrust": 0.0})
+    fly(slave, 0.01, 200)
+    assert get(slave, *POSITION, *VELOCITY) == close([0.0, 0.0, 0.5 * 9.81 * 4.0, 0.0, 0.0, 9.81 * 2.0], 1e-11)
+
+
+def test_step_is_the_runge_kutta_method_on_the_rigid_body() -> None:
+    slave = started({**BODY, **MOVING, **NO_WIND, "max_internal_step": 0.01})
+    put(slave, {"thrust": 12.0, "torque.x": 0.1, "torque.y": -0.2, "torque.z": 0.3, "external_force.y": 0.4})
+    state = RigidState(
+        Vec3(1.0, -2.0, 3.0),
+        Vec3(0.1, 0.2, -0.3),
+        Quaternion.from_xyzw(0.1699, 0.3058, 0.1699, 0.9212).normalised(),
+        Vec3(0.4, -0.5, 0.6),
+    )
+    body = Body(mass=1.3, inertia=Inertia(xx=0.8, yy=0.9, zz=1.4, xy=0.05, xz=-0.02, yz=0.03), gravity=9.7)
+    wrench, force = Wrench(12.0, Vec3(0.1, -0.2, 0.3)), Vec3(0.0, 0.4, 0.0)
+    for k in range(20):
+        slave.do_step(0.01 * k, 0.01)
+        state = rk4_step(lambda t, x: derivative(x, wrench, force, body), 0.0, state, 0.01).normalised()
+    expected = [*state.position, *state.velocity, *state.quaternion, *state.angular_velocity]
+    assert get(slave, *MOTION) == close(expected, 1e-14)
+
+
+def test_quaternion_keeps_its_length() -> None:
+    slave = started({**MOVING, "torque.x": 1.0})
+    fly(slave, 0.05, 200)
+    assert sum(x * x for x in get(slave, *QUATERNION)) == pytest.approx(1.0, abs=1e-15)
+
+
+def test_wind_pushes_as_its_integral_says() -> None:
+    """v = a / (m w) sin wt, of a level body that hovers otherwise."""
+    slave = started(
+        {
+            **BODY,
+            **LEVEL,
+            "thrust": 1.3 * 9.7,
+            "wind.amplitude.x": 0.5,
+            "wind.amplitude.y": -0.2,
+            "wind.amplitude.z": 0.1,
+            "wind.frequency": 2.0,
+        }
+    )
+    fly(slave, 0.01, 300)
+    factor = math.sin(6.0) / (1.3 * 2.0)
+    assert get(slave, *VELOCITY) == close([0.5 * factor, -0.2 * factor, 0.1 * factor], 1e-11)
+    assert get(slave, "wind.force.x", "wind.force.y") == close([0.5 * math.cos(6.0), -0.2 * math.cos(6.0)])
+
+
+def test_wind_blows_at_the_masters_time() -> None:
+    """A start later than zero finds another phase of the wind."""
+    assert get(started(start=7.0), "wind.force.x", "wind.force.z") == close([0.01 * math.cos(0.7)] * 2)
+
+
+def test_external_force_adds_to_the_wind() -> None:
+    slave = started({**LEVEL, "external_force.x": 0.3, "external_force.z": -0.1, "wind.frequency": 0.0})
+    assert get(slave, "acceleration.x", "acceleration.y", "acceleration.z") == close([0.31, 0.01, -0.09])
+    assert get(slave, "wind.force.x", "wind.force.y", "wind.force.z") == [0.01] * 3
+    fly(slave, 0.01, 100)
+    assert get(slave, *VELOCITY) == close([0.31, 0.01, -0.09])
+
+
+def test_tunable_wind_takes_effect_at_the_next_step() -> None:
+    slave = started({**LEVEL, **NO_WIND})
+    fly(slave, 0.01, 100)
+    put(slave, {"wind.amplitude.x": 1.0, "wind.frequency": 0.0})
+    assert get(slave, *VELOCITY, "wind.force.x") == close([0.0] * 4)
+    fly(slave, 0.01, 100, start=1.0)
+    assert get(slave, "velocity.x", "position.x", "wind.force.x") == close([1.0, 0.5, 1.0])
+
+
+def test_tilt_is_that_of_the_attitude() -> None:
+    slave = started({**LEVEL, "initial.quaternion.x": math.sin(0.2), "initial.quaternion.w": math.cos(0.2)})
+    assert get(slave, "tilt") == close([0.4])
+    assert get(started(LEVEL), "tilt") == [0.0]
+
+
+def test_no_output_moves_with_an_input_without_a_step() -> None:
+    slave = started()
+    fly(slave, 0.01, 3)
+    before = list(slave._reals)
+    put(slave, {"thrust": 20.0, "torque.x": 3.0, "external_force.z": -1.0})
+    get(slave, *MOTION)
+    changed = {QUADROTOR[i].causality for i, (a, b) in enumerate(zip(before, slave._reals)) if a != b}
+    assert changed == {"input"}
+
+
+def test_initial_outputs_depend_on_no_input() -> None:
+    inputs = {"thrust": 20.0, "torque.x": 3.0, "external_force.z": -1.0}
+    assert get(started({**MOVING, **inputs}), *MOTION) == get(started(MOVING), *MOTION)
+
+
+# -- internal steps -----------------------------------------------------------------------------------------
+
+
+def test_step_of_20_ms_is_ten_steps_of_2_ms() -> None:
+    """Both go through the same internal grid; only the rounding of times differs."""
+    values = {**BODY, **MOVING, "actuator_time_constant": 0.03, "thrust": 3.0}
+    whole, parts = started(values), started(values)
+    for slave in (whole, parts):
+        put(slave, {"thrust": 15.0, "torque.x": 0.5, "torque.z": -0.1})
+    fly(whole, 0.02, 50)
+    fly(parts, 0.002, 500)
+    assert get(whole, *MOTION) == close(get(parts, *MOTION), 1e-13)
+
+
+@pytest.mark.parametrize(
+    ("h", "largest", "count"),
+    [(0.01, 0.002, 5), (0.001, 0.002, 1), (0.0101, 0.002, 6), (0.02, 0.02, 1), (0.03, 0.01, 3), (1e-13, 0.002, 1)],
+)
+def test_step_is_covered_by_equal_internal_steps(
+    h: float, largest: float, count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken = []
+
+    def counting(f: Any, t: float, x: RigidState, internal: float) -> RigidState:
+        taken.append((t, internal))
+        return rk4_step(f, t, x, internal)
+
+    monkeypatch.setattr(plant_fmu.slave, "rk4_step", counting)
+    started({"max_internal_step": largest}).do_step(3.0, h)
+    assert taken == [(pytest.approx(3.0 + i * h / count, rel=1e-15), h / count) for i in range(count)]
+
+
+# -- actuators ------------------------------------------------------------------------------------------------
+
+
+def thrust_of(slave: QuadrotorPlant) -> float:
+    """What the propellers exert on a level body of 1 kg without wind, as its acceleration shows it."""
+    return 9.81 - get(slave, "acceleration.z")[0]
+
+
+def test_thrust_is_limited_from_both_sides() -> None:
+    slave = started({**LEVEL, **NO_WIND, "thrust_max": 15.0, "thrust": 20.0})
+    assert thrust_of(slave) == pytest.approx(15.0, abs=1e-13)
+    put(slave, {"thrust": -3.0})
+    slave.do_step(0.0, 0.01)
+    assert thrust_of(slave) == pytest.approx(0.0, abs=1e-13)
+    assert get(slave, "velocity.z") == close([0.0981])
+
+
+def test_each_torque_is_limited_from_both_sides() -> None:
+    slave = started({**LEVEL, "torque_max": 0.5})
+    for torque, expected in ((("torque.x", 3.0), 0.005), (("torque.x", -3.0), 0.0), (("torque.x", 0.1), 0.001)):
+        put(slave, dict([torque]))
+        slave.do_step(0.0, 0.01)
+        assert get(slave, "angular_velocity.x") == close([expected])
+
+
+def test_lag_is_the_exact_exponential_and_starts_at_the_limited_initial_command() -> None:
+    slave = started({**LEVEL, **NO_WIND, "actuator_time_constant": 0.05, "thrust_max": 15.0, "thrust": 40.0})
+    assert thrust_of(slave) == pytest.approx(15.0, abs=1e-13)
+    put(slave, {"thrust": 5.0})
+    for k in range(10):
+        slave.do_step(0.01 * k, 0.01)
+        left = math.exp(-0.01 * (k + 1) / 0.05)
+        assert thrust_of(slave) == pytest.approx(5.0 + 10.0 * left, abs=1e-12)
+    fallen = 9.81 * 0.1 - 5.0 * 0.1 - 10.0 * 0.05 * (1.0 - math.exp(-2.0))
+    assert get(slave, "velocity.z") == close([fallen], 1e-9)
+
+
+def test_torques_lag_as_the_thrust_does() -> None:
+    """With J = 1 and a spin about one axis only, angular velocity is the integral of the torque."""
+    slave = started({**LEVEL, "actuator_time_constant": 0.05, "torque.x": 1.0})
+    put(slave, {"torque.x": -1.0})
+    fly(slave, 0.01, 20)
+    expected = -0.2 + 2.0 * 0.05 * (1.0 - math.exp(-4.0))
+    assert get(slave, "angular_velocity.x") == close([expected], 1e-8)
+
+
+def test_limits_act_before_the_lag() -> None:
+    """A lag of the unlimited command would reach the limit almost at once."""
+    slave = started({**LEVEL, **NO_WIND, "actuator_time_constant": 0.1, "thrust_max": 20.0, "thrust": 0.0})
+    put(slave, {"thrust": 1e6})
+    slave.do_step(0.0, 0.01)
+    assert thrust_of(slave) == pytest.approx(20.0 * (1.0 - math.exp(-0.1)), abs=1e-12)
+
+
+@pytest.mark.parametrize("time_constant", [1e-4, 1e-9, 5e-324])
+def test_time_constant_much_smaller_than_the_step_stays_stable(time_constant: float) -> None:
+    slave = started({**LEVEL, **NO_WIND, "actuator_time_constant": time_constant, "thrust": 0.0})
+    put(slave, {"thrust": 9.81})
+    fly(slave, 0.02, 100)
+    assert thrust_of(slave) == pytest.approx(9.81, abs=1e-13)
+    assert 0.0 <= get(slave, "velocity.z")[0] < 0.01
+    put(slave, {"thrust": 9.81, "torque.x": 1.0})
+    fly(slave, 0.02, 50, start=2.0)
+    assert get(slave, "angular_velocity.x")[0] == pytest.approx(1.0, abs=1e-3)
+
+
+# -- parameters and misuse ------------------------------------------------------------------------------------
+
+OUT_OF_RANGE = [
+    ("mass", 0.0, "> 0"),
+    ("mass", -1.3, "> 0"),
+    ("gravity", -9.81, ">= 0"),
+    ("inertia.xx", -1.0, "a positive definite matrix"),
+    ("inertia.yy", 0.0, "a positive definite matrix"),
+    ("inertia.zz", -0.5, "a positive definite matrix"),
+    ("inertia.xy", 1.5, "a positive definite matrix"),
+    ("inertia.xz", -1.0, "a positive definite matrix"),
+    ("inertia.yz", 2.0, "a positive definite matrix"),
+    ("thrust_max", -1.0, ">= 0"),
+    ("torque_max", -0.1, ">= 0"),
+    ("actuator_time_constant", -0.01, ">= 0"),
+    ("max_internal_step", 0.0, "> 0"),
+    ("max_internal_step", -0.002, "> 0"),
+]
+
+
+def named(name: str, value: float) -> tuple[str, str]:
+    """How a message names a variable and its value; an inertia is shown whole."""
+    group, _, entry = name.partition(".")
+    return (group, f"{entry} {value:g}") if group == "inertia" else (f"{name} = {value}", str(value))
+
+
+@pytest.mark.parametrize(("name", "value", "expected"), OUT_OF_RANGE)
+def test_parameter_out_of_range_is_refused_when_initialisation_ends(name: str, value: float, expected: str) -> None:
+    slave = instance({name: value})
+    slave.setup_experiment(0.0)
+    slave.enter_initialization_mode()
+    assert_fails(slave.exit_initialization_mode, *named(name, value), "expected", expected)
+
+
+def test_zero_initial_quaternion_is_refused() -> None:
+    slave = instance({**LEVEL, "initial.quaternion.w": 0.0})
+    slave.setup_experiment(0.0)
+    slave.enter_initialization_mode()
+    assert_fails(slave.exit_initialization_mode, "initial.quaternion = (0.0, 0.0, 0.0, 0.0)", "expected", "not zero")
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize(
+    "name", [v.name for v in QUADROTOR if v.causality in ("input", "parameter") and v.type == "Real"]
+)
+def test_value_that_is_not_finite_is_refused(name: str, value: float) -> None:
+    assert_fails(lambda: put(instance(), {name: value}), f"{name} = {value}", "expected a finite value")
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("name", [v.name for v in QUADROTOR if v.causality == "input"])
+def test_input_that_is_not_finite_is_refused_between_steps(name: str, value: float) -> None:
+    assert_fails(lambda: put(started(), {name: value}), f"{name} = {value}", "expected a finite value")
+
+
+@pytest.mark.parametrize("name", [v.name for v in QUADROTOR if v.variability == "fixed"])
+def test_fixed_parameter_cannot_be_set_after_initialisation(name: str) -> None:
+    assert_fails(lambda: put(started(), {name: 1.0}), name, "a fixed parameter cannot be set after initialisation")
+
+
+@pytest.mark.parametrize("name", [v.name for v in QUADROTOR if v.causality in ("output", "local")])
+def test_outputs_and_locals_cannot_be_set(name: str) -> None:
+    causality = next(v.causality for v in QUADROTOR if v.name == name)
+    assert_fails(lambda: put(instance(), {name: 1.0}), name, f"causality {causality} cannot be set")
+    assert_fails(lambda: put(started(), {name: 1.0}), name, f"causality {causality} cannot be set")
+
+
+@given(st.permutations(list({**BODY, **MOVING})))
+def test_parameters_may_be_set_in_any_order(order: list[str]) -> None:
+    """On the way, the inertia need not be positive definite."""
+    values = {**BODY, **MOVING, "inertia.xx": 8.0, "inertia.yy": 9.0, "inertia.xy": 5.0}
+    slave, sorted_slave = started({name: values[name] for name in order}), started(values)
+    for plant in (slave, sorted_slave):
+        put(plant, {"thrust": 10.0, "torque.x": 1.0})
+        fly(plant, 0.01, 2)
+    assert slave._reals == sorted_slave._reals
+
+
+def test_step_before_initialisation_is_refused() -> None:
+    assert_fails(lambda: instance().do_step(0.0, 0.01), "fmi2DoStep", "phase instantiated", "expected phase stepping")
+    slave = instance()
+    slave.setup_experiment(0.0)
+    slave.enter_initialization_mode()
+    assert_fails(lambda: slave.do_step(0.0, 0.01), "fmi2DoStep", "phase initialization")
+
+
+@pytest.mark.parametrize("h", [0.0, -0.01, math.nan, math.inf])
+def test_communication_step_that_is_not_positive_is_refused(h: float) -> None:
+    assert_fails(lambda: started().do_step(0.0, h), f"communicationStepSize = {h}", "expected a positive")
+
+
+@pytest.mark.parametrize(
+    ("values", "name"),
+    [
+        ({"initial.velocity.y": 1.7e308}, "position.y = inf"),
+        ({"external_force.z": 1.7e308, "initial.velocity.z": 1.7e308}, "position.z = inf"),
+        ({"initial.angular_velocity.x": 1e200, "initial.angular_velocity.y": 1e200}, "expected a finite value"),
+        ({"torque_max": 1.7e308, "torque.x": 1.7e308}, "expected a finite value"),
+    ],
+)
+def test_state_that_stops_being_finite_is_named_as_a_divergence(values: dict[str, float], name: str) -> None:
+    slave = started({**values, "max_internal_step": 2.0, **NO_WIND})
+    assert_fails(lambda: fly(slave, 2.0, 3), name, "expected")
+    assert [message.category for message in slave.log_queue] == ["divergence"]
+
+
+# -- state ----------------------------------------------------------------------------------------------------
+
+
+def history(slave: QuadrotorPlant, steps: range) -> list[list[float]]:
+    """All variables after each of the steps, with other commands for each."""
+    result = []
+    for k in steps:
+        put(slave, {"thrust": 10.0 + 3.0 * math.sin(k), "torque.x": 0.1 * math.cos(k), "external_force.y": 0.01 * k})
+        if k == 8:
+            put(slave, {"wind.amplitude.x": 0.2})
+        slave.do_step(0.007 * k, 0.007)
+        result.append(list(slave._reals))
+    return result
+
+
+@pytest.mark.parametrize("saved_after", [0, 1, 5, 9])
+def test_restored_plant_flies_on_bit_by_bit(saved_after: int) -> None:
+    """The lag is in the middle of its transient, and the last command was not the initial one."""
+    slave = started({**BODY, **MOVING, "actuator_time_constant": 0.04, "thrust_max": 12.0})
+    history(slave, range(saved_after))
+    saved = slave._fmu_state_to_bytes(slave._get_fmu_state())
+    expected = history(slave, range(saved_after, 20))
+
+    slave._set_fmu_state(slave._fmu_state_from_bytes(saved))
+    assert history(slave, range(saved_after, 20)) == expected
+
+    other = QuadrotorPlant(instance_name="other")
+    other._set_fmu_state(json.loads(saved))
+    assert other._fmu_state_to_bytes(other._get_fmu_state()) == saved
+    assert history(other, range(saved_after, 20)) == expected
+
+
+def test_wind_that_was_set_but_not_used_is_part_of_the_state() -> None:
+    slave = started({**LEVEL, **NO_WIND})
+    put(slave, {"wind.amplitude.x": 1.0, "wind.frequency": 0.0})
+    other = QuadrotorPlant(instance_name="other")
+    other._set_fmu_state(json.loads(json.dumps(slave._get_fmu_state())))
+    fly(other, 0.01, 100)
+    assert get(other, "velocity.x") == close([1.0])
+
+
+def test_saved_state_does_not_follow_the_instance() -> None:
+    slave = started(MOVING)
+    state = slave._get_fmu_state()
+    before = json.dumps(state)
+    fly(slave, 0.01, 3)
+    assert json.dumps(state) == before
+    slave._set_fmu_state(state)
+    fly(slave, 0.01, 3)
+    assert json.dumps(state) == before
+
+
+def test_state_of_a_controller_is_refused() -> None:
+    state = {**started()._get_fmu_state(), "model": "UnifiedController"}
+    assert_fails(lambda: started()._set_fmu_state(state), "UnifiedController", "expected", "QuadrotorPlant")
+
+
+def test_instances_do_not_share_values() -> None:
+    first, second = started(LEVEL), started(LEVEL)
+    fly(first, 0.01, 5)
+    assert get(second, *POSITION, *VELOCITY, *SPIN) == [*ZERO, *ZERO, *ZERO]
