@@ -176,8 +176,10 @@ def main(arguments: list[str] | None = None) -> None:
     given = sys.argv[1:] if arguments is None else arguments
     debug = "--debug" in given
     try:
-        app([argument for argument in given if argument != "--debug"])
-    except KeyboardInterrupt:
+        arguments = [argument for argument in given if argument != "--debug"]
+        code = app(arguments or ["--help"], standalone_mode=False)
+        sys.exit(code if arguments else 2)
+    except (KeyboardInterrupt, typer.Abort):
         _say("quadcosim: interrupted")
         sys.exit(130)
     except Exception as error:
@@ -189,8 +191,12 @@ def _fail(error: Exception, debug: bool) -> None:
         traceback.print_exc()
         if isinstance(error, SimulatorError) and error.details:
             _say(f"in the FMU:\n{error.details}")
+    describe = getattr(error, "format_message", None)  # of a usage error that the parser finds
     if isinstance(error, QuadcosimError):
         _say(f"quadcosim: {error}")
+    elif describe is not None:
+        _say(f"quadcosim: {describe()} (--help lists what there is)")
+        sys.exit(2)
     elif isinstance(error, ModuleNotFoundError) and error.name in STUDY_PACKAGES:
         _say(f"quadcosim: {error.name} is not installed; studies need: pip install 'quadcosim[studies]'")
     else:

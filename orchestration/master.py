@@ -100,7 +100,7 @@ class Master:
         """The first exchange: never lost, late or noisy; its command is held until the first arrival."""
         try:
             self._exchange_first()
-        except SimulatorError as error:
+        except (_Diverged, SimulatorError) as error:
             self._diverged(error)
 
     def _exchange_first(self) -> None:
@@ -108,6 +108,7 @@ class Master:
         self._plant.enter_initialization(0.0, stop)
         self._controller.enter_initialization(0.0, stop)
         self._read_plant()
+        self._check(0.0)
         self._received[:] = self.board.measured
         self._write_measurement()
         self._write_reference(0.0)
@@ -161,7 +162,7 @@ class Master:
             "received": self._received.tobytes(),
             "in_flight": [(index, command.tolist()) for index, command in self._in_flight.items()],
             "applied": [(time, command.tolist()) for time, command in self._applied],
-            "events": self.events,
+            "events": list(self.events),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -188,9 +189,11 @@ class Master:
 
     def _check(self, t: float) -> None:
         """Divergence is noticed before any value is passed on."""
-        x, y, z = self.board.measured[:3].tolist()
+        measured = self.board.measured.tolist()
+        if not math.isfinite(sum(measured)):
+            _expect_finite(MEASUREMENT, measured, t)
+        x, y, z, *_, wx, wy, wz = measured
         x_d, y_d, z_d = self._reference.position(t)
-        wx, wy, wz = self.board.measured[10:].tolist()
         distance, speed = math.hypot(x - x_d, y - y_d, z - z_d), math.hypot(wx, wy, wz)
         if not distance <= FARTHEST:
             raise _Diverged(f"position error {distance:g} m at t = {t:g} s, expected at most {FARTHEST:g} m")
@@ -215,21 +218,24 @@ class Master:
         start_s = time / NANOSECONDS
         self._controller.step(ratio * start_s, ratio * ((min(end, self._clock.stop) - time) / NANOSECONDS))
         self._read_controller()
+        command = self.board.computed.tolist()
+        if not math.isfinite(sum(command)):
+            _expect_finite(COMMAND, command, start_s)
         if sample is None:
             return
-        self.events.append((sample.sent, "sent", "command", sample.k))
-        if sample.arrival is None:
-            self.events.append((sample.sent, "lost", "command", sample.k))
-        else:
+        if sample.sent <= self._clock.stop:
+            self.events.append((sample.sent, "sent", "command", sample.k))
+            if sample.arrival is None:
+                self.events.append((sample.sent, "lost", "command", sample.k))
+        if sample.arrival is not None:
             self._in_flight[sample.k] = self.board.computed.copy()
 
     def _sense(self, time: int, sample: Sample) -> None:
         self.events.append((time, "sampled", "measurement", sample.k))
         if sample.measurement_lost:
             self.events.append((time, "lost", "measurement", sample.k))
-        else:
-            self._sensors.receive(self.board.measured, self._received)
-            self._write_measurement()
+        self._sensors.receive(self.board.measured, self._received, lost=sample.measurement_lost)
+        self._write_measurement()
         self._write_reference(time / NANOSECONDS)
 
     def _arrive(self, time: int, samples: Sequence[int]) -> None:
@@ -272,6 +278,12 @@ class Master:
             write()
 
         return feed
+
+
+def _expect_finite(names: Sequence[str], values: Sequence[float], t: float) -> None:
+    for name, value in zip(names, values, strict=True):
+        if not math.isfinite(value):
+            raise _Diverged(f"{name} = {value} at t = {t:g} s, expected a finite value")
 
 
 class _Diverged(Exception):

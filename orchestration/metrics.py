@@ -26,8 +26,21 @@ def compute(
     """The metrics of `signals` (arrays of shape (n,) by column) against the `desired` positions (n, 3) [m].
 
     `sampled` marks the rows at which the controller sampled; limits are the plant's, in N and N·m.
-    Integrals are by the trapezoid rule over the rows. What is taken at samples is None without any.
+    Commands are as applied to the plant, before its limits. Integrals are by the trapezoid rule over the rows.
+    What is taken at samples is None without any; so is what no float holds.
     """
+    with np.errstate(over="ignore"):  # a diverging run may end in squares that no float holds
+        found = _compute(signals, desired, sampled, thrust_max, torque_max)
+    return {name: None if isinstance(v, float) and not math.isfinite(v) else v for name, v in found.items()}
+
+
+def _compute(
+    signals: Mapping[str, Floats],
+    desired: Floats,
+    sampled: npt.NDArray[np.bool_],
+    thrust_max: float,
+    torque_max: float,
+) -> Metrics:
     t = signals["time"]
     e = position_error(signals, desired)
     thrust, *torque = (signals[f"plant.{name}"] for name in COMMAND)

@@ -9,12 +9,11 @@ import numpy as np
 from orchestration.errors import UsageError
 from orchestration.flight import Announce, Flight, Progress, prepared, provenance
 from orchestration.result import Result
-from orchestration.run_directory import SCENARIO, replaced_folder
+from orchestration.run_directory import SCENARIO, STATE, replaced_folder
 from orchestration.scenario import Scenario
 from orchestration.scenario_file import load_scenario
 from orchestration.timing import nanoseconds
 
-STATE = "paused.npz"
 _ARRAYS = ("plant", "controller", "row", "rows", "received")
 """Parts of a master's state that are bytes; the rest is JSON."""
 

@@ -1,6 +1,6 @@
 """Figures of one run: the path, the errors, the commands with what happened when, the energy."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 import matplotlib
@@ -26,21 +26,24 @@ STYLE = {
 }
 BLUE, ORANGE, GREEN, RED, GREY = "#1f6f9f", "#e0812b", "#2f8f5b", "#b5323e", "#8a8a8a"
 
+FIGURES = ("path", "errors", "commands", "energy")
+"""The figures of a run, in the order in which they are drawn."""
+
 Window = tuple[float, float]
 """A span of time [s]."""
 
 
 def draw(result: Result, folder: Path, window: Window | None = None) -> list[Path]:
     """Write the figures of a run as PNG; `window` is what the commands are zoomed on. Returns their paths."""
-    figures: Mapping[str, Callable[[], Figure]] = {
-        "path": lambda: path(result),
-        "errors": lambda: errors(result),
-        "commands": lambda: commands(result, window),
-        "energy": lambda: energy(result),
-    }
+    makers: tuple[Callable[[], Figure], ...] = (
+        lambda: path(result),
+        lambda: errors(result),
+        lambda: commands(result, window),
+        lambda: energy(result),
+    )
     written = []
     with matplotlib.rc_context(STYLE):
-        for name, make in figures.items():
+        for name, make in zip(FIGURES, makers, strict=True):
             target = folder / f"{name}.png"
             make().savefig(target)
             written.append(target)

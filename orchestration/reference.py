@@ -85,12 +85,13 @@ def _read_table(path: Path) -> tuple[Floats, Floats]:
     missing = [name for name in ("time", *REFERENCE) if name not in header]
     if missing:
         raise UsageError(f"{path}: no column {', '.join(missing)}; expected time, {', '.join(REFERENCE)}")
+    body = [row for row in rows[1:] if row]
+    if len(body) < 2 or any(len(row) != len(header) for row in body):
+        raise UsageError(f"{path}: expected at least two rows, each of {len(header)} numbers")
     try:
-        table = np.array([[float(cell) for cell in row] for row in rows[1:] if row])
+        table = np.array([[float(cell) for cell in row] for row in body])
     except ValueError as error:
         raise UsageError(f"{path}: expected numbers only: {error}") from error
-    if table.ndim != 2 or len(table) < 2 or table.shape[1] != len(header):
-        raise UsageError(f"{path}: expected at least two rows of {len(header)} numbers")
     if not np.isfinite(table).all():
         raise UsageError(f"{path}: expected finite numbers only")
     time = table[:, header.index("time")].copy()

@@ -15,6 +15,8 @@ from orchestration.scenario_file import load_scenario
 
 SIGNALS, EVENTS = "signals.parquet", "events.parquet"
 METRICS, SCENARIO, PROVENANCE = "metrics.json", "scenario.toml", "provenance.json"
+STATE = "paused.npz"
+"""of a run that has been paused"""
 
 
 def save_run(result: Result, folder: str | Path, *, figures: bool = True) -> Path:
@@ -58,8 +60,12 @@ def load_run(folder: str | Path) -> Result:
 @contextmanager
 def replaced_folder(folder: Path) -> Iterator[Path]:
     """A new folder beside `folder` that takes its place when all went well, and vanishes if not."""
-    if folder.exists() and not (folder.is_dir() and (_is_run(folder) or not any(folder.iterdir()))):
-        raise UsageError(f"{folder}: expected a new or empty directory, or that of an earlier run")
+    if folder.exists() and not _is_replaceable(folder):
+        raise UsageError(
+            f"{folder}: expected a new or empty directory, or that of an earlier run with nothing else in it"
+        )
+    if folder.resolve() == Path.cwd():
+        raise UsageError(f"{folder}: expected another directory than the one you are in")
     folder.parent.mkdir(parents=True, exist_ok=True)
     partial = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".partial", dir=folder.parent))
     try:
@@ -77,5 +83,6 @@ def replaced_folder(folder: Path) -> Iterator[Path]:
         raise
 
 
-def _is_run(folder: Path) -> bool:
-    return (folder / SCENARIO).is_file()
+def _is_replaceable(folder: Path) -> bool:
+    known = {SIGNALS, EVENTS, METRICS, SCENARIO, PROVENANCE, STATE, *(f"{name}.png" for name in plots.FIGURES)}
+    return folder.is_dir() and all(path.name in known and path.is_file() for path in folder.iterdir())

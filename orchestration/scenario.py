@@ -81,6 +81,8 @@ class Scenario:
 
         Raises `UsageError` for a key that does not exist.
         """
+        _expect_keys("", fields, Scenario)
+        _expect_keys("timing.", timing or {}, Timing)
         changed = dataclasses.replace(self, **fields)
         if timing:
             changed = dataclasses.replace(changed, timing=dataclasses.replace(self.timing, **dict(timing)))
@@ -124,6 +126,13 @@ class Scenario:
         if record:
             tables["record"] = record
         return tomli_w.dumps(tables)
+
+
+def _expect_keys(prefix: str, given: Mapping[str, Any], table: type) -> None:
+    known = [f.name for f in dataclasses.fields(table)]
+    for key in given:
+        if key not in known:
+            raise UsageError(f"{prefix}{key}: no such key; expected one of {', '.join(known)}")
 
 
 def _table(choice: FmuChoice) -> dict[str, Any]:

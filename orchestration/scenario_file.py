@@ -1,6 +1,7 @@
 """Reads scenario files: keys and types are checked here, values where they mean something."""
 
 import dataclasses
+import json
 import sys
 import typing
 from collections.abc import Iterator, Mapping
@@ -105,7 +106,7 @@ def _flattened(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str
 def _parse(tables: dict[str, Any]) -> ScenarioFile:
     """The typed form of a TOML document; raises `UsageError` in one line for the first thing wrong."""
     try:
-        return pydantic.TypeAdapter(ScenarioFile).validate_python(tables)
+        return pydantic.TypeAdapter(ScenarioFile).validate_json(json.dumps(tables, default=str), strict=True)
     except pydantic.ValidationError as error:
         raise UsageError(first_problem(error, ScenarioFile)) from error
 

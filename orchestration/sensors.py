@@ -21,11 +21,14 @@ class Sensors:
         self._noise: Floats = np.zeros(len(names))
         self._stream = stream
 
-    def receive(self, true: Floats, received: Floats) -> None:
-        """Write what arrives of `true` into `received`; both have one value a measurement."""
-        received[:] = true
-        if self._noisy:  # one number for each measurement, so that noise on one does not shift another's
+    def receive(self, true: Floats, received: Floats, *, lost: bool = False) -> None:
+        """Write what arrives of `true` into `received`, nothing if it is `lost`; one value a measurement."""
+        if self._noisy:  # drawn for each measurement of each sample, so that nothing shifts another's numbers
             self._stream.standard_normal(out=self._noise)
+        if lost:
+            return
+        received[:] = true
+        if self._noisy:
             self._noise *= self._sigma
             received += self._noise
         if len(self._rounded):

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from fractions import Fraction
 from statistics import NormalDist
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -71,11 +71,17 @@ class Timing:
     """quantum by measurement name"""
 
     def __post_init__(self) -> None:
+        for name, choices in _CHOICES.items():
+            _require(getattr(self, name) in choices, name, getattr(self, name), f"one of {', '.join(choices)}")
+        for name in _NUMBERS:
+            value = getattr(self, name)
+            _require(isinstance(value, (int, float)) and not isinstance(value, bool), name, value, "a number")
         for name in ("period", "plant_interval", "clock_ratio"):
             value = getattr(self, name)
             _require(math.isfinite(value) and value > 0.0, name, value, "a positive number")
-        for name in ("period", "plant_interval"):
-            _require(nanoseconds(getattr(self, name)) >= 1, name, getattr(self, name), "at least a nanosecond")
+        for name, ratio in (("period", self.clock_ratio), ("plant_interval", 1.0)):
+            value = getattr(self, name)
+            _require(exact_nanoseconds(value) >= Fraction(repr(float(ratio))), name, value, "at least a nanosecond")
         for name in ("offset", "delay", "delay_jitter", "jitter"):
             value = getattr(self, name)
             _require(math.isfinite(value) and value >= 0.0, name, value, "zero or a positive number of seconds")
@@ -92,7 +98,10 @@ class Timing:
     def _check_bursts(self) -> None:
         if self.burst_length is None:
             return
-        _require(self.burst_length >= 1.0, "burst_length", self.burst_length, "at least 1 loss")
+        length = self.burst_length
+        _require(
+            isinstance(length, (int, float)) and 1.0 <= length < math.inf, "burst_length", length, "at least 1 loss"
+        )
         for name in ("measurement_loss", "command_loss"):
             loss = getattr(self, name)
             possible = self.burst_length / (self.burst_length + 1.0)
@@ -116,6 +125,18 @@ class Timing:
         return not (
             self.jitter or self.delay_jitter or self.measurement_loss or self.command_loss or any(self.noise.values())
         )
+
+
+_CHOICES: dict[str, tuple[str, ...]] = {
+    "order": get_args(Order),
+    "hold": get_args(Hold),
+    "clock": get_args(ClockSource),
+    "jitter_distribution": get_args(Distribution),
+}
+_NUMBERS = (
+    "period", "offset", "plant_interval", "delay", "delay_jitter", "jitter", "measurement_loss", "command_loss",
+    "clock_ratio",
+)  # fmt: skip
 
 
 def _require(condition: bool, name: str, value: object, expected: str) -> None:
@@ -205,7 +226,7 @@ class Clock(Iterator[Instant]):
         self._timing = timing
         self._streams = streams
         self.stop = nanoseconds(stop_time)
-        ratio = Fraction(repr(timing.clock_ratio))
+        ratio = Fraction(repr(float(timing.clock_ratio)))
         self._samples = Grid(exact_nanoseconds(timing.offset) / ratio, exact_nanoseconds(timing.period) / ratio)
         self._points = Grid(Fraction(0), exact_nanoseconds(timing.plant_interval))
         self._delay = nanoseconds(timing.delay)

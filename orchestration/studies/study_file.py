@@ -1,5 +1,6 @@
 """Reads study files."""
 
+import json
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -83,7 +84,7 @@ def load_study(path: str | Path) -> Study:
 
 def _study(tables: dict[str, Any], path: Path) -> Study:
     try:
-        file = pydantic.TypeAdapter(StudyFile).validate_python(tables)
+        file = pydantic.TypeAdapter(StudyFile).validate_json(json.dumps(tables, default=str), strict=True)
     except pydantic.ValidationError as error:
         raise UsageError(first_problem(error, StudyFile)) from error
     if file.scenario is not None and file.base:

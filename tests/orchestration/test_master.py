@@ -265,14 +265,14 @@ def test_every_sample_is_sent_and_then_arrives_or_is_lost_or_is_still_on_its_way
     flown = Flown(timing, periods * timing.period, Still())
     stop = flown.nanoseconds()[-1]
     sampled = {event.sample for event in flown.events("sampled")}
-    assert {event.sample for event in flown.events("sent")} == sampled
+    sent = {event.sample: event.time for event in flown.events("sent")}
+    assert sampled - sent.keys() <= {max(sampled, default=0)}  # in Jacobi order the last may go out after the end
     lost = {event.sample for event in flown.events("lost", "command")}
     arrived = {event.sample for event in flown.events("arrived")}
     assert not lost & arrived
     assert lost | arrived <= sampled
     late = timing.delay + timing.delay_jitter + 2 * timing.period / timing.clock_ratio + timing.jitter
-    sent = {event.sample: event.time for event in flown.events("sent")}
-    assert all(sent[k] >= stop - late * 1e9 for k in sampled - lost - arrived)
+    assert all(sent[k] >= stop - late * 1e9 for k in sent.keys() - lost - arrived)
 
 
 def test_events_name_what_they_are_about() -> None:
@@ -306,7 +306,7 @@ def test_leaving_the_region_ends_the_run_with_its_time(sudden: dict[str, float])
     flown = Flown(Timing(period=0.01), 0.1, plant)
     assert flown.over is True
     assert flown.master.divergence_time == 12 * MS
-    assert "expected at most" in str(flown.master.divergence)
+    assert "expected a" in str(flown.master.divergence)
     assert flown.nanoseconds() == [k * MS for k in range(12)]  # what diverged is not recorded
     assert np.isfinite(flown.master.rows()).all()
     assert flown.plant.steps()[-1] == (0.011, 0.001)

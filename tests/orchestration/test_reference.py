@@ -81,7 +81,7 @@ def test_a_table_that_does_not_cover_the_run_is_refused(tmp_path: Path, times: t
     assert "expected 0 to stop_time = 2 s" in refused(tmp_path, *map(row, times))
 
 
-@pytest.mark.parametrize("cell", ["fast", "", "1,0", "0x10"])
+@pytest.mark.parametrize("cell", ["fast", "", "0x10"])
 def test_what_is_no_number_is_refused(tmp_path: Path, cell: str) -> None:
     assert "expected numbers only" in refused(tmp_path, row(0.0), row(1.0, cell), row(2.0))
 
@@ -98,7 +98,7 @@ def test_fewer_than_two_rows_are_refused(tmp_path: Path, rows: tuple[float, ...]
 
 def test_rows_of_another_length_are_refused(tmp_path: Path) -> None:
     refused(tmp_path, row(0.0), row(1.0) + ",3.0", row(2.0))
-    assert "expected at least two rows of 16 numbers" in refused(tmp_path, *(row(t) + ",1.0" for t in (0.0, 2.0)))
+    assert "expected at least two rows, each of 16 numbers" in refused(tmp_path, *(row(t) + ",1.0" for t in (0.0, 2.0)))
 
 
 def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path) -> None:

@@ -217,7 +217,7 @@ def test_an_unknown_key_of_a_table_is_refused_with_those_there_are(
         ("[controller]\nfmu = 3", "controller.fmu = 3"),
         ('[controller]\nmass = "heavy"', "controller.mass = 'heavy'"),
         ("[plant]\nmass = [1.0]", "plant.mass = [1.0]"),
-        ("[plant]\nmass = 2020-01-01", "plant.mass = datetime.date(2020, 1, 1)"),
+        ("[plant]\nmass = 2020-01-01", "plant.mass = '2020-01-01'"),
         ("[reference]\nfile = 3", "reference.file = 3"),
         ("[record]\nplant = 3", "record.plant = 3"),
     ],
