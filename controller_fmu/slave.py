@@ -1,13 +1,15 @@
 """The controller as an FMU: reads the inputs, evaluates the law, holds the command."""
 
-import math
-
 from controller_fmu.interface import UNIFIED
 from controller_fmu.law import Evaluation, Gains, Measurement, Model, evaluate
 from controller_fmu.sample_clock import SampleClock
 from fmu_kit.errors import require, require_finite_state
 from fmu_kit.slave import Slave, State
 from fmu_kit.trajectory import Reference, Trajectory
+
+SHORTEST_PERIOD = 1e-9
+"""[s]; sample times further apart than a nanosecond stay distinct floats for days"""
+_RESULTS = ("thrust", "torque.x", "torque.y", "torque.z", "energy")
 
 
 class UnifiedController(Slave):
@@ -37,6 +39,10 @@ class UnifiedController(Slave):
             frequency=self.real("trajectory.frequency"),
             start_z=self.real("trajectory.start_z"),
             rate_z=self.real("trajectory.rate_z"),
+        )
+        period = self.real("sample_period")
+        require(
+            period == 0.0 or period >= SHORTEST_PERIOD, "sample_period", period, f"0 or at least {SHORTEST_PERIOD} s"
         )
         self._use_reference_inputs = self.boolean("use_reference_inputs")
 
@@ -70,19 +76,14 @@ class UnifiedController(Slave):
         if not any(quaternion):
             self._hover()
             return
-        length = quaternion.norm()
-        require(0.0 < length < math.inf, "quaternion", quaternion, "a length that a float can hold")
         measurement = Measurement(
             self.vec3("position"),
             self.vec3("velocity"),
-            quaternion / length,
+            quaternion.unit(),
             self.vec3("angular_velocity"),
         )
         evaluation = evaluate(measurement, self._reference(t), self._gains, self._model)
-        torque = evaluation.torque
-        require_finite_state(
-            ("thrust", "torque.x", "torque.y", "torque.z"), (evaluation.thrust, torque.x, torque.y, torque.z)
-        )
+        require_finite_state(_RESULTS, (evaluation.thrust, *evaluation.torque, evaluation.energy))
         self._write(evaluation)
 
     def _reference(self, t: float) -> Reference:

@@ -166,6 +166,13 @@ class Quaternion:
         length = self.norm(ops)
         return Quaternion(self.vector / length, self.scalar / length)
 
+    def unit(self) -> Quaternion:
+        """The unit quaternion in this direction, for any floats that are not all zero, however small or large."""
+        if not 1e-100 < self.norm() < 1e100:  # its square may not be a float
+            largest = max(map(abs, self))
+            return Quaternion(self.vector / largest, self.scalar / largest).normalised()
+        return self.normalised()
+
     def __iter__(self) -> Iterator[Scalar]:
         return iter((self.vector.x, self.vector.y, self.vector.z, self.scalar))
 

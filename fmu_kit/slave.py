@@ -101,6 +101,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             i: int(v) for i, v in enumerate(starts) if i >= self._real_count
         }  # Integers and Booleans by value reference
         self._phase = Phase.INSTANTIATED
+        self._initialised = False
         self._start_time = 0.0
         self._stale = True  # values were set that initialise() or step() has not seen yet
         self._quickly_settable: frozenset[int] = frozenset()
@@ -206,6 +207,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._expect(Phase.INITIALIZATION, "fmi2ExitInitializationMode")
         self._initialise()
         self._phase = Phase.STEPPING
+        self._initialised = True
         self._quickly_settable = self._inputs
 
     @guarded
@@ -292,7 +294,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             "start_time": self._start_time,
             "stale": self._stale,
             "warned": list(self._warned),
-            "internal": self.internal_state() if self._phase >= Phase.STEPPING else None,
+            "internal": self.internal_state() if self._initialised else None,
         }
 
     @guarded
@@ -307,7 +309,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._stale = state["stale"]
         self._warned = list(state["warned"])
         self._quickly_settable = self._inputs if self._phase is Phase.STEPPING else frozenset()
-        if state["internal"] is not None:
+        self._initialised = state["internal"] is not None
+        if self._initialised:
             self.read_parameters()
             self.restore(state["internal"])
 

@@ -33,12 +33,11 @@ class QuadrotorPlant(Slave):
     def initialise(self, t: float) -> None:
         """Start at the initial state, the actuators at the limited initial command."""
         quaternion = self.quaternion("initial.quaternion")
-        length = quaternion.norm()
-        require(0.0 < length < math.inf, "initial.quaternion", tuple(quaternion), "a quaternion that is not zero")
+        require(any(quaternion), "initial.quaternion", tuple(quaternion), "a quaternion that is not zero")
         self._state = RigidState(
             self.vec3("initial.position"),
             self.vec3("initial.velocity"),
-            quaternion / length,
+            quaternion.unit(),
             self.vec3("initial.angular_velocity"),
         )
         self._wrench = self._actuators.limited(self._command())

@@ -431,6 +431,7 @@ def at_rest(acceleration: Vec3) -> tuple[Measurement, Reference]:
     [
         Vec3(0.0, 0.0, 9.81),
         Vec3(0.0, 0.0, 9.81 - 1e-10),
+        Vec3(0.0, 0.0, 9.81 - 8e-10),  # n is too small, n + g - F_z is not
         Vec3(0.0, 0.0, 12.5),
         Vec3(1e-6, 0.0, 12.5),
         Vec3(0.0, -1e-6, 12.5),

@@ -417,6 +417,13 @@ def test_state_that_stops_being_finite_is_named_as_a_divergence(values: dict[str
     assert [message.category for message in slave.log_queue] == ["divergence"]
 
 
+def test_float_that_leaves_its_range_on_the_way_is_a_divergence_at_a_time() -> None:
+    """The phase of this wind overflows, and the standard library has no cosine of infinity."""
+    slave = started({"wind.frequency": 1e308})
+    assert_fails(lambda: slave.do_step(100.0, 0.01), "at t = 100.0", "expected finite values")
+    assert [message.category for message in slave.log_queue] == ["divergence"]
+
+
 # -- state ----------------------------------------------------------------------------------------------------
 
 
