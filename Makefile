@@ -1,10 +1,10 @@
 # make demo: build the FMUs, fly the paper's scenario, draw it. make test: lint and run all tests.
-# make bench: time the loop. Each makes its own environment in .venv first.
+# make bench: time the loop. make figures, make findings: what docs/ shows. Each makes its own environment first.
 PYTHON ?= python3
 BIN := .venv/bin
 export CI
 
-.PHONY: demo test bench figures clean
+.PHONY: demo test bench figures findings clean
 
 demo: .venv/.base
 	$(BIN)/quadcosim build
@@ -33,6 +33,9 @@ figures: .venv/.base
 .venv/.test: pyproject.toml .venv/.base
 	$(BIN)/python -m pip install --quiet --editable ".[test]"
 	touch $@
+
+findings: .venv/.test
+	$(BIN)/python docs/make_findings.py
 
 clean:
 	rm -rf .venv results fmus/*.fmu

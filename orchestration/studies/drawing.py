@@ -28,15 +28,15 @@ def draw_study(study: Study, folder: Path | None, metric: str) -> list[Path]:
     if study.method in sensitivity.METHODS and any(axis.values is None for axis in study.axes):
         indices = indices_of(study, table[metric].to_numpy(float), metric)
         listed = sensitivity.write(indices, path.parent / f"sensitivity_{metric}.csv")
-        return [listed, figures.save(figures.sensitivity_bars(indices, metric), listed.with_suffix(".png"))]
+        return [listed, figures.save(lambda: figures.sensitivity_bars(indices, metric), listed.with_suffix(".png"))]
     axes = tuple(axis for axis in study.axes if _is_numeric(axis))
     if len(axes) != len(study.axes):
         raise UsageError(f"{study.name}: expected axes of numbers to draw")
     if len(axes) > 2:
-        return [figures.save(figures.scatter(table, axes, metric), path.parent / f"{metric}.png")]
-    written = [figures.save(figures.lines(table, axes, metric), path.parent / f"{metric}.png")]
+        return [figures.save(lambda: figures.scatter(table, axes, metric), path.parent / f"{metric}.png")]
+    written = [figures.save(lambda: figures.lines(table, axes, metric), path.parent / f"{metric}.png")]
     if len(axes) == 2 and all(axis.values is not None for axis in axes):
-        written.append(figures.save(figures.heat_map(table, axes, metric), path.parent / f"{metric}_map.png"))
+        written.append(figures.save(lambda: figures.heat_map(table, axes, metric), path.parent / f"{metric}_map.png"))
     return written
 
 
@@ -50,14 +50,17 @@ def draw_limit(scenario: Scenario, found: Limit, folder: Path) -> Path:
     ends = [limit for limit in (found.local_limit, found.large_signal_limit) if limit is not None]
     values = np.linspace(0.001, 1.3 * max(ends, default=0.1), 200)
     loop = HoverLoop.of(scenario)
-    figure = figures.spectral_radius(
-        found.of,
-        values,
-        np.array([radius(loop, scenario, found.of, value) for value in values]),
-        local_limit=found.local_limit,
-        large_signal_limit=found.large_signal_limit,
+    radii = np.array([radius(loop, scenario, found.of, value) for value in values])
+    return figures.save(
+        lambda: figures.spectral_radius(
+            found.of,
+            values,
+            radii,
+            local_limit=found.local_limit,
+            large_signal_limit=found.large_signal_limit,
+        ),
+        folder / f"spectral_radius_{found.of}.png",
     )
-    return figures.save(figure, folder / f"spectral_radius_{found.of}.png")
 
 
 def indices_of(study: Study, values: np.ndarray, metric: str) -> list[sensitivity.Index]:

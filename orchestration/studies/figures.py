@@ -1,6 +1,7 @@
 """Figures of a study: a metric over one or two axes, the spectral radius, sensitivity bars."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,7 +38,10 @@ def lines(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str) -> Figure:
     panel.set(xlabel=_label(x), ylabel=metric, yscale="log", xscale="log" if x.scale == "logarithmic" else "linear")
     if metric == "ultimate_bound":
         panel.axhline(SETTLED, color=RED, linewidth=0.8, linestyle="--", label=f"{SETTLED:g} m: flies below")
-    panel.legend(title=None if len(axes) == 1 else axes[1].name, fontsize=8)
+    handles, labels = panel.get_legend_handles_labels()
+    figure.legend(
+        handles, labels, title=None if len(axes) == 1 else axes[1].name, loc="outside right upper", fontsize=8
+    )
     return figure
 
 
@@ -125,14 +129,17 @@ def flew(table: "pd.DataFrame") -> "pd.Series":
     )
 
 
-def save(figure: Figure, path: Path) -> Path:
-    """Write a figure as PNG in the project's style."""
+def save(make: Callable[[], Figure], path: Path) -> Path:
+    """Make a figure in the project's style and write it as PNG."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with matplotlib.rc_context(STYLE):
-        figure.savefig(path)
+        make().savefig(path)
     return path
 
 
 def _label(axis: Axis) -> str:
-    seconds = all(target.startswith("timing.") and "loss" not in target for target in axis.targets)
+    seconds = all(target in _SECONDS for target in axis.targets)
     return f"{axis.name} [s]" if seconds and not axis.multiplies else axis.name
+
+
+_SECONDS = {f"timing.{key}" for key in ("period", "offset", "plant_interval", "delay", "delay_jitter", "jitter")}

@@ -22,8 +22,9 @@ GAP = 0.1
 
 @dataclass(frozen=True, kw_only=True)
 class Range:
-    """How a quantity is scanned: from `first` in steps to `last`, then bisected to `tolerance`."""
+    """How a quantity is scanned: `before`, then from `first` in steps to `last`; then bisected to `tolerance`."""
 
+    before: tuple[float, ...] = ()
     first: float
     step: float
     last: float
@@ -126,7 +127,7 @@ def range_of(scenario: Scenario, of: str) -> Range:
     """The range in which a quantity of this scenario is looked for."""
     period = scenario.timing.period
     if of == "period":
-        return Range(first=0.005, step=0.005, last=0.5, tolerance=0.0005)
+        return Range(before=(0.001, 0.002, 0.003, 0.004), first=0.005, step=0.005, last=0.5, tolerance=0.0005)
     if of == "delay":
         return Range(first=0.0, step=0.005, last=0.5, tolerance=0.0005)
     if of == "jitter":
@@ -137,7 +138,8 @@ def range_of(scenario: Scenario, of: str) -> Range:
 def local_limit(loop: HoverLoop, scenario: Scenario, of: str) -> float | None:
     """Where the spectral radius first crosses one from below, in period or delay [s]; None: nowhere in the range."""
     span = range_of(scenario, of)
-    fine = [span.first + 0.001 * i for i in range(int((span.last - span.first) / 0.001))]
+    low = min((*span.before, span.first))
+    fine = [low + 0.001 * i for i in range(int((span.last - low) / 0.001))]
     bracket = first_failure(lambda value: radius(loop, scenario, of, value) >= 1.0, fine, 1e-6)
     return bracket[0] if bracket is not None else None
 
@@ -165,7 +167,7 @@ def _local(scenario: Scenario, of: str) -> tuple[float | None, str]:
 
 def _scan(span: Range) -> list[float]:
     count = math.floor((span.last - span.first) / span.step + 1e-9)
-    return [float(f"{span.first + i * span.step:.12g}") for i in range(count + 1)]
+    return [*span.before, *(float(f"{span.first + i * span.step:.12g}") for i in range(count + 1))]
 
 
 def _note(span: Range, bracket: tuple[float | None, float] | None, local: float | None, reason: str) -> str:
