@@ -29,37 +29,27 @@ def compute(
     Commands are as applied to the plant, before its limits. Integrals are by the trapezoid rule over the rows.
     What is taken at samples is None without any; so is what no float holds.
     """
-    with np.errstate(over="ignore"):  # a diverging run may end in squares that no float holds
-        found = _compute(signals, desired, sampled, thrust_max, torque_max)
-    return {name: None if isinstance(v, float) and not math.isfinite(v) else v for name, v in found.items()}
-
-
-def _compute(
-    signals: Mapping[str, Floats],
-    desired: Floats,
-    sampled: npt.NDArray[np.bool_],
-    thrust_max: float,
-    torque_max: float,
-) -> Metrics:
     t = signals["time"]
     e = position_error(signals, desired)
     thrust, *torque = (signals[f"plant.{name}"] for name in COMMAND)
     duration = float(t[-1] - t[0])
     limited = (thrust < 0.0) | (thrust > thrust_max) | (np.abs(torque) > torque_max).any(axis=0)
-    return {
-        "position_rmse": math.sqrt(_integral(e**2, t) / duration) if duration else float(e[0]),
-        "position_iae": _integral(e, t),
-        "position_itae": _integral(t * e, t),
-        "position_max": float(e.max()),
-        "settling_time": _settling_time(t, e),
-        "ultimate_bound": float(e[t >= t[0] + duration * 2.0 / 3.0].max()),
-        **_at_samples(signals, sampled),
-        "control_effort.thrust": _integral(thrust**2, t),
-        "control_effort.torque": _integral(np.square(torque).sum(axis=0), t),
-        "total_variation.thrust": float(np.abs(np.diff(thrust)).sum()),
-        "total_variation.torque": float(np.abs(np.diff(torque)).sum()),
-        "saturation_share": float(np.diff(t)[limited[:-1]].sum() / duration) if duration else 0.0,
-    }
+    with np.errstate(over="ignore"):  # a diverging run may end in squares that no float holds
+        found: Metrics = {
+            "position_rmse": math.sqrt(_integral(e**2, t) / duration) if duration else float(e[0]),
+            "position_iae": _integral(e, t),
+            "position_itae": _integral(t * e, t),
+            "position_max": float(e.max()),
+            "settling_time": _settling_time(t, e),
+            "ultimate_bound": float(e[t >= t[0] + duration * 2.0 / 3.0].max()),
+            **_at_samples(signals, sampled),
+            "control_effort.thrust": _integral(thrust**2, t),
+            "control_effort.torque": _integral(np.square(torque).sum(axis=0), t),
+            "total_variation.thrust": float(np.abs(np.diff(thrust)).sum()),
+            "total_variation.torque": float(np.abs(np.diff(torque)).sum()),
+            "saturation_share": float(np.diff(t)[limited[:-1]].sum() / duration) if duration else 0.0,
+        }
+    return {name: None if isinstance(v, float) and not math.isfinite(v) else v for name, v in found.items()}
 
 
 def position_error(signals: Mapping[str, Floats], desired: Floats) -> Floats:

@@ -1,0 +1,235 @@
+"""What the tests of studies share: short studies, the command as a process, and what goes on in processes."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from orchestration import QuadcosimError, Scenario, Timing
+from orchestration.studies.axes import Axis
+from orchestration.studies.store import Row, open_for_reading
+from orchestration.studies.study import Study, locate_fmus
+from orchestration.studies.sweep import store_path, sweep
+
+SCRIPT = shutil.which("quadcosim", path=str(Path(sys.executable).parent))
+Done = subprocess.CompletedProcess[str]
+
+# Everything random is on: a run that took another seed or an order of its own would show in its bits.
+NOISY = """
+[base]
+stop_time = 0.3
+[base.timing]
+jitter = 0.002
+delay_jitter = 0.003
+measurement_loss = 0.1
+command_loss = 0.1
+noise.position = 0.001
+[[axes]]
+name = "period"
+sets = ["timing.period"]
+values = [0.004, 0.006, 0.01, 0.02]
+[[axes]]
+name = "delay"
+sets = ["timing.delay"]
+values = [0.0, 0.003, 0.012, 0.02]
+[design]
+vary_seed = true
+"""
+RUNS = 16
+
+GRID = """
+[base]
+stop_time = 0.1
+[base.timing]
+plant_interval = 0.005
+[[axes]]
+name = "period"
+sets = ["timing.period"]
+values = [0.02, 0.01]
+[[axes]]
+name = "delay"
+sets = ["timing.delay"]
+values = [0.0, 0.01, 0.005]
+"""
+
+
+def short(stop_time: float = 0.1, **timing: Any) -> Scenario:
+    """The paper's flight, its first moments only, on a coarse grid."""
+    return Scenario(stop_time=stop_time, timing=Timing(**{"plant_interval": 0.005, **timing}))
+
+
+def axis(target: str, *values: Any) -> Axis:
+    """An axis of listed values, named as what it sets."""
+    return Axis(name=target, targets=(target,), values=values)
+
+
+def study(*axes: Axis, base: Scenario | None = None, **fields: Any) -> Study:
+    return Study(name="study", base=base or short(), axes=axes, **fields)
+
+
+def swept(chosen: Study, folder: Path, **options: Any) -> Path:
+    """The store of a study, flown."""
+    return sweep(chosen, folder=folder, **options).path
+
+
+def starts() -> dict[str, float]:
+    return locate_fmus(Scenario()).starts
+
+
+def row(index: int = 0, **fields: Any) -> Row:
+    """A row that was never flown."""
+    given: dict[str, Any] = {
+        "index": index, "key": f"key {index}", "settings": {"timing.period": 0.001 * index}, "seed": index,
+        "metrics": {"position_rmse": 0.5, "diverged": False, "steps": 3}, "message": None, "duration": 0.1,
+    }  # fmt: skip
+    return Row(**{**given, **fields})
+
+
+def bits(path: Path) -> list[dict[str, Any]]:
+    """All columns of all rows but the wall-clock duration, floats by their bits."""
+    with open_for_reading(path) as store:
+        rows = list(store.rows())
+    return [
+        {
+            name: value.hex() if isinstance(value, float) else value
+            for name, value in found.items()
+            if name != "duration"
+        }
+        for found in rows
+    ]
+
+
+def keys(path: Path) -> set[str]:
+    with open_for_reading(path) as store:
+        return {key for key, _ in store.statuses().values()}
+
+
+# -- the command ------------------------------------------------------------------------------------------
+
+
+def start(*arguments: str | Path, cwd: Path) -> "subprocess.Popen[str]":
+    """The installed script in a process of its own."""
+    assert SCRIPT is not None, "expected the script beside this Python: pip install -e ."
+    return subprocess.Popen(
+        [SCRIPT, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8",
+        cwd=cwd, env={**os.environ, "PYTHONIOENCODING": "utf-8", "COLUMNS": "200", "NO_COLOR": "1"},
+    )  # fmt: skip
+
+
+def quadcosim(*arguments: str | Path, cwd: Path, code: int = 0) -> Done:
+    with start(*arguments, cwd=cwd) as process:
+        out, err = process.communicate(timeout=120)
+    assert process.returncode == code, out + err
+    return Done(arguments, process.returncode, out, err)
+
+
+def error_line(done: Done) -> str:
+    """The single line on standard error of a command that fails; nothing on standard output."""
+    assert done.stdout == ""
+    lines = done.stderr.splitlines()
+    assert len(lines) == 1, done.stderr
+    assert lines[0].startswith("quadcosim: ")
+    assert "an error of quadcosim itself" not in lines[0]
+    return lines[0].removeprefix("quadcosim: ")
+
+
+def one_line(error: BaseException) -> str:
+    text = str(error)
+    assert len(text.splitlines()) == 1, text
+    return text
+
+
+# -- processes --------------------------------------------------------------------------------------------
+
+
+def wait_until(condition: Callable[[], bool], seconds: float = 30.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "expected it within half a minute"
+        time.sleep(0.005)
+
+
+def wait_for_rows(path: Path, number: int) -> None:
+    """Until another process has written so many rows into the store."""
+    wait_until(lambda: rows_in(path) >= number)
+
+
+def rows_in(path: Path) -> int:
+    try:
+        with open_for_reading(path) as store:
+            return sum(store.counts().values())
+    except QuadcosimError:  # not made yet
+        return 0
+
+
+def workers_of(parent: int) -> list[int]:
+    """Ids of the worker processes that a coordinator started."""
+    found = []
+    for folder in Path("/proc").iterdir():
+        try:
+            is_child = folder.name.isdigit() and parent_of(folder) == parent
+            if is_child and b"spawn_main" in (folder / "cmdline").read_bytes():
+                found.append(int(folder.name))
+        except OSError:  # has ended meanwhile
+            continue
+    return found
+
+
+def parent_of(folder: Path) -> int:
+    return int((folder / "stat").read_text().rpartition(")")[2].split()[1])
+
+
+def is_running(process: int) -> bool:
+    try:
+        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state != "Z"  # in a container nobody may collect it
+
+
+def kill(process: int) -> None:
+    os.kill(process, signal.SIGKILL)
+
+
+class Cluster:
+    """A dask scheduler and workers with two threads each, as separate processes on loopback."""
+
+    def __init__(self, folder: Path, workers: int) -> None:
+        self._file = folder / "scheduler.json"
+        self._log = (folder / "dask.log").open("w")
+        arguments = ("--port", "0", "--scheduler-file", str(self._file), "--no-dashboard")
+        self.scheduler = self._start("scheduler", *arguments)
+        wait_until(self._file_is_written)
+        self.address: str = json.loads(self._file.read_text())["address"]
+        self.workers = [
+            self._start(
+                "worker", "--scheduler-file", str(self._file), "--nthreads", "2", "--no-nanny", "--no-dashboard"
+            )
+            for _ in range(workers)
+        ]
+
+    def close(self) -> None:
+        for process in (*self.workers, self.scheduler):
+            process.kill()
+            process.wait()
+        self._log.close()
+
+    def _file_is_written(self) -> bool:
+        return self._file.is_file() and self._file.read_text().rstrip().endswith("}")
+
+    def _start(self, *arguments: str) -> "subprocess.Popen[bytes]":
+        command = [sys.executable, "-m", "dask", *arguments, "--host", "127.0.0.1"]
+        return subprocess.Popen(command, stdout=self._log, stderr=self._log, cwd=self._file.parent)
+
+
+def reference_store(folder: Path, text: str = NOISY) -> Path:
+    """The store of a study flown without interruption by one worker, through the command."""
+    (folder / "study.toml").write_text(text)
+    quadcosim("sweep", "study.toml", cwd=folder)
+    return store_path("study", folder / "results" / "study")

@@ -1,0 +1,233 @@
+"""Figures of studies: there, not empty, and what is drawn is what was flown."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import matplotlib.figure
+import numpy as np
+import pandas as pd
+import pytest
+
+from orchestration import UsageError
+from orchestration.studies import figures
+from orchestration.studies.axes import Axis
+from orchestration.studies.drawing import draw_limit, draw_study
+from orchestration.studies.limit import Limit
+from orchestration.studies.sensitivity import Index
+from orchestration.studies.store import open_for_writing
+from orchestration.studies.study import Study
+from orchestration.studies.sweep import store_path
+from tests.studies.common import axis, row, short, study
+
+PERIODS = axis("timing.period", 0.01, 0.02, 0.03, 0.04)
+DELAYS = axis("timing.delay", 0.0, 0.005, 0.01)
+
+
+def invented(folder: Path, chosen: Study) -> Study:
+    """Fills a store with runs that fly below an edge, fail at one place and else diverge."""
+    names = [each.name for each in chosen.axes]
+    rows = []
+    for index, point in enumerate(chosen.points):
+        size = sum(float(value) for value in point.values() if isinstance(value, (int, float)))
+        metrics = {"ultimate_bound": 0.5 * size, "position_rmse": 0.1 + size, "diverged": size > 0.2}
+        failed = index == 2
+        rows.append(row(index, settings=point, metrics=None if failed else metrics, message="no" if failed else None))
+    with open_for_writing(store_path(chosen.name, folder)) as store:
+        about: dict[str, Any] = {"axes": names, "grid": None, "guids": {}, "versions": {}}
+        store.describe({name: json.dumps(value) for name, value in about.items()})
+        store.add(rows)
+    return chosen
+
+
+def expect_picture(path: Path) -> None:
+    """Expect a PNG with more on it than its background."""
+    import matplotlib.image
+
+    pixels = matplotlib.image.imread(path)
+    assert min(pixels.shape[:2]) > 100
+    assert len(np.unique(pixels.reshape(-1, pixels.shape[2]), axis=0)) > 10
+
+
+def table(number: int = 5) -> pd.DataFrame:
+    """A study of one axis in which the last run does not fly."""
+    bounds = [0.01 * (i + 1) for i in range(number)]
+    return pd.DataFrame(
+        {
+            "timing.period": [0.01 * (i + 1) for i in reversed(range(number))],
+            "status": "done",
+            "diverged": pd.array([False] * number, dtype="boolean"),
+            "ultimate_bound": bounds[::-1],
+        }
+    )
+
+
+def lines_of(figure: matplotlib.figure.Figure) -> list[Any]:
+    return list(figure.axes[0].get_lines())
+
+
+# -- of a store -------------------------------------------------------------------------------------------
+
+
+def test_one_axis_is_drawn_as_a_line(tmp_path: Path) -> None:
+    (picture,) = draw_study(invented(tmp_path, study(PERIODS)), tmp_path, "ultimate_bound")
+    assert picture == tmp_path / "ultimate_bound.png"
+    expect_picture(picture)
+
+
+def test_two_axes_are_drawn_as_lines_and_as_a_map(tmp_path: Path) -> None:
+    wide = axis("timing.period", 0.01, 0.05, 0.1, 0.2)  # has runs that fly and runs that do not
+    pictures = draw_study(invented(tmp_path, study(wide, DELAYS)), tmp_path, "position_rmse")
+    assert [picture.name for picture in pictures] == ["position_rmse.png", "position_rmse_map.png"]
+    for picture in pictures:
+        expect_picture(picture)
+
+
+def test_sampled_axes_are_drawn_without_a_map(tmp_path: Path) -> None:
+    sampled = Axis(name="mass", targets=("plant.mass",), low=0.01, high=0.05)
+    chosen = invented(tmp_path, study(sampled, method="random", samples=6))
+    (picture,) = draw_study(chosen, tmp_path, "ultimate_bound")
+    expect_picture(picture)
+
+
+def test_more_axes_are_drawn_as_dots_over_each(tmp_path: Path) -> None:
+    chosen = invented(tmp_path, study(PERIODS, DELAYS, axis("plant.mass", 0.01, 0.02)))
+    (picture,) = draw_study(chosen, tmp_path, "ultimate_bound")
+    assert picture == tmp_path / "ultimate_bound.png"
+    expect_picture(picture)
+
+
+def test_a_metric_that_does_not_exist_is_told_with_those_that_do(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="--metric beauty: expected one of position_rmse, position_iae"):
+        draw_study(invented(tmp_path, study(PERIODS)), tmp_path, "beauty")
+
+
+@pytest.mark.parametrize(
+    "axes",
+    [(axis("timing.order", "jacobi", "gauss-seidel", "jacobi"),),
+     (PERIODS, axis("controller.use_reference_inputs", True, False))],
+)  # fmt: skip
+def test_axes_that_no_figure_is_for_are_told(tmp_path: Path, axes: tuple[Axis, ...]) -> None:
+    with pytest.raises(UsageError, match="study: expected axes of numbers to draw"):
+        draw_study(invented(tmp_path, study(*axes)), tmp_path, "ultimate_bound")
+
+
+def test_a_study_that_was_never_flown_is_told(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="there is no such file"):
+        draw_study(study(PERIODS), tmp_path, "ultimate_bound")
+
+
+# -- what is drawn ----------------------------------------------------------------------------------------
+
+
+def test_what_flies_is_done_not_diverged_and_within_5_cm() -> None:
+    runs = table(4)
+    runs["ultimate_bound"] = [0.049, 0.05, 0.01, np.nan]
+    runs["diverged"] = pd.array([False, False, True, pd.NA], dtype="boolean")
+    assert figures.flew(runs).tolist() == [True, False, False, False]
+    runs["status"] = "failed"
+    assert not figures.flew(runs).any()
+
+
+def test_a_line_goes_through_what_flies_in_order_and_the_rest_is_crossed() -> None:
+    line, crosses, *_ = lines_of(figures.lines(table(), (axis("timing.period", 1),), "ultimate_bound"))
+    assert line.get_xdata().tolist() == pytest.approx([0.01, 0.02, 0.03, 0.04, 0.05])
+    assert np.isnan(line.get_ydata()).tolist() == [False] * 4 + [True]
+    assert crosses.get_xdata().tolist() == pytest.approx([0.05])
+    assert crosses.get_marker() == "x"
+
+
+def test_there_is_a_line_for_each_value_of_the_second_axis() -> None:
+    runs = pd.concat([table().assign(delay=delay) for delay in (0.0, 0.01, 0.02)])
+    second = axis("timing.delay", 0.0, 0.01, 0.02)
+    runs = runs.rename(columns={"delay": "timing.delay"})
+    figure = figures.lines(runs, (axis("timing.period", 1), second), "ultimate_bound")
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()][:3] == ["0", "0.01", "0.02"]
+    assert legend.get_title().get_text() == "timing.delay"
+
+
+def test_the_axes_of_time_have_their_unit_and_the_others_none() -> None:
+    for target, label in (("timing.period", "timing.period [s]"), ("plant.mass", "plant.mass"),
+                          ("timing.loss", "timing.loss")):  # fmt: skip
+        runs = table().rename(columns={"timing.period": target})
+        figure = figures.lines(runs, (axis(target, 1),), "ultimate_bound")
+        assert figure.axes[0].get_xlabel() == label
+
+
+def test_a_map_has_a_cell_for_each_run_and_the_boundary_of_what_flies() -> None:
+    runs = pd.concat([table().assign(**{"timing.delay": delay}) for delay in (0.0, 0.01, 0.02)])
+    figure = figures.heat_map(runs, (axis("timing.period", 1), axis("timing.delay", 1)), "ultimate_bound")
+    mesh, boundary = figure.axes[0].collections
+    values = np.ma.filled(mesh.get_array(), np.nan).reshape(3, 5)
+    assert np.isnan(values).tolist() == [[False] * 4 + [True]] * 3
+    assert values[0, :4] == pytest.approx([0.01, 0.02, 0.03, 0.04])
+    crossings = np.concatenate([path.vertices for path in boundary.get_paths()])
+    assert crossings[:, 0] == pytest.approx(0.045)
+
+
+def test_where_everything_flies_a_map_has_no_boundary() -> None:
+    runs = pd.concat([table(4).assign(**{"timing.delay": delay}) for delay in (0.0, 0.01)])
+    figure = figures.heat_map(runs, (axis("timing.period", 1), axis("timing.delay", 1)), "ultimate_bound")
+    assert len(figure.axes[0].collections) == 1
+
+
+@pytest.mark.parametrize(("local", "large", "marks"), [(0.08, 0.05, 2), (None, 0.05, 1), (0.08, None, 1)])
+def test_the_spectral_radius_is_drawn_with_the_limits_that_there_are(
+    tmp_path: Path, local: float | None, large: float | None, marks: int
+) -> None:
+    periods = np.linspace(0.001, 0.1, 50)
+    figure = figures.spectral_radius("period", periods, 10.0 * periods, local_limit=local, large_signal_limit=large)
+    curve, unit, *limits = lines_of(figure)
+    assert curve.get_xdata() == pytest.approx(periods * 1e3)
+    assert unit.get_ydata() == [1.0, 1.0]
+    assert [line.get_xdata()[0] for line in limits] == [1e3 * limit for limit in (local, large) if limit is not None]
+    assert len(limits) == marks
+    expect_picture(figures.save(lambda: figure, tmp_path / "new" / "radius.png"))
+
+
+def limit(of: str) -> Limit:
+    return Limit(
+        of=of, local_limit=0.08, large_signal_limit=0.05, tolerance=0.001, confidence=None, seeds=1, note=""
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("of", ["period", "delay"])
+def test_a_limit_is_drawn_with_the_radius_that_crosses_one_there(tmp_path: Path, of: str) -> None:
+    picture = draw_limit(short(), limit(of), tmp_path)
+    assert picture == tmp_path / f"spectral_radius_{of}.png"
+    expect_picture(picture)
+
+
+def test_a_limit_that_linear_theory_does_not_have_is_not_drawn(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="expected --of period or delay to draw the spectral radius over, got loss"):
+        draw_limit(short(), limit("loss"), tmp_path)
+
+
+def test_dots_of_many_axes_are_apart_by_what_flies() -> None:
+    runs = table().assign(**{"plant.mass": 1.0, "timing.delay": 0.0})
+    axes = (axis("timing.period", 1), axis("plant.mass", 1), axis("timing.delay", 1))
+    figure = figures.scatter(runs, axes, "ultimate_bound")
+    for panel in figure.axes[:3]:
+        dots, crosses = panel.get_lines()
+        assert (len(dots.get_xdata()), len(crosses.get_xdata())) == (4, 1)
+    assert not figure.axes[3].get_visible()
+
+
+def test_sensitivity_is_drawn_as_bars_with_their_confidence(tmp_path: Path) -> None:
+    indices = [
+        Index(axis=name, kind=kind, value=value, confidence=0.1)
+        for kind, values in (("first", (0.3, 0.4)), ("total", (0.5, 0.6)))
+        for name, value in zip(("a", "b"), values, strict=True)
+    ]
+    figure = figures.sensitivity_bars(indices, "position_rmse")
+    panel = figure.axes[0]
+    assert [bar.get_width() for bar in panel.patches] == [0.3, 0.4, 0.5, 0.6]
+    assert [label.get_text() for label in panel.get_yticklabels()] == ["a", "b"]
+    expect_picture(figures.save(lambda: figure, tmp_path / "bars.png"))
+
+
+def test_figures_are_the_same_bytes_each_time(tmp_path: Path) -> None:
+    chosen = invented(tmp_path, study(PERIODS))
+    pictures = [draw_study(chosen, tmp_path, "ultimate_bound")[0].read_bytes() for _ in range(2)]
+    assert pictures[0] == pictures[1]
