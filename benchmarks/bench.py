@@ -14,11 +14,12 @@ from fmu_kit import packaging
 from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.trajectory import Trajectory
 from orchestration import wiring
+from orchestration.clock import Clock, random_streams
 from orchestration.flight import prepared
 from orchestration.fmpy_adapter import FmuSimulator
 from orchestration.master import Board, Signals
 from orchestration.scenario import FmuChoice, Scenario
-from orchestration.timing import Clock, Timing, random_streams
+from orchestration.timing import Timing
 from plant_fmu.dynamics import Body, RigidState, Wind, Wrench, derivative
 from plant_fmu.integrator import rk4_step
 

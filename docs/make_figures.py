@@ -7,9 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from orchestration import plots
+from orchestration.clock import Clock, random_streams
 from orchestration.flight import run
 from orchestration.scenario import Scenario
-from orchestration.timing import Clock, Timing, random_streams
+from orchestration.timing import Timing
 
 FIGURES = Path(__file__).parent / "figures"
 MILLISECONDS = 1e-6

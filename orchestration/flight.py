@@ -12,6 +12,7 @@ from typing import Any
 
 from fmu_kit.trajectory import Trajectory
 from orchestration import fmus, metrics, wiring
+from orchestration.clock import Clock, random_streams
 from orchestration.errors import UsageError
 from orchestration.fleet import Loader
 from orchestration.fmpy_adapter import FmuSimulator
@@ -20,7 +21,7 @@ from orchestration.reference import BuiltIn, FromFile, ReferencePath
 from orchestration.result import Result, sampled_rows
 from orchestration.scenario import FmuChoice, Parameter, Scenario
 from orchestration.sensors import Sensors
-from orchestration.timing import NANOSECONDS, Clock, random_streams
+from orchestration.timing import NANOSECONDS
 
 Progress = Callable[[float], None]
 """Hears the share of the run that is done."""

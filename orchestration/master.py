@@ -12,11 +12,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from orchestration.clock import Clock, Sample
 from orchestration.errors import SimulatorError
 from orchestration.reference import FromFile, ReferencePath
 from orchestration.sensors import Sensors
 from orchestration.simulator import Floats, Simulator, Transfer
-from orchestration.timing import NANOSECONDS, Clock, Sample, Timing
+from orchestration.timing import NANOSECONDS, Timing
 from orchestration.wiring import COMMAND, MEASUREMENT, REFERENCE
 
 FARTHEST = 100.0

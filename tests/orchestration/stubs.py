@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from orchestration.clock import Clock, random_streams
 from orchestration.errors import SimulatorError
 from orchestration.master import Event, Master, Signals
 from orchestration.reference import ReferencePath
 from orchestration.sensors import Sensors
 from orchestration.simulator import Floats, Simulator, Transfer
-from orchestration.timing import Clock, Timing, random_streams
+from orchestration.timing import Timing
 from orchestration.wiring import COMMAND, MEASUREMENT
 
 Call = tuple[Any, ...]

@@ -6,11 +6,12 @@ from typing import Any
 
 import pytest
 
+from orchestration.clock import Clock, random_streams
 from orchestration.errors import UsageError
 from orchestration.run_directory import replaced_folder
 from orchestration.scenario import Scenario
 from orchestration.scenario_file import load_scenario
-from orchestration.timing import Clock, Timing, random_streams
+from orchestration.timing import Timing
 
 from .stubs import Counting, Flown, Plant, Straying
 

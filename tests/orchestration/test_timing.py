@@ -12,8 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from orchestration.clock import Clock, Grid, Instant, Sample, random_streams
 from orchestration.errors import UsageError
-from orchestration.timing import TIMING_KEYS, Clock, Grid, Instant, Sample, Timing, nanoseconds, random_streams
+from orchestration.timing import TIMING_KEYS, Timing, nanoseconds
 from tests.orchestration.strategies import Case, cases
 
 SECOND = 10**9
