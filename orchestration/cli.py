@@ -192,7 +192,7 @@ def _fail(error: Exception, debug: bool) -> None:
         if isinstance(error, SimulatorError) and error.details:
             _say(f"in the FMU:\n{error.details}")
     describe = getattr(error, "format_message", None)  # of a usage error that the parser finds
-    if isinstance(error, QuadcosimError):
+    if isinstance(error, (QuadcosimError, OSError)):
         _say(f"quadcosim: {error}")
     elif describe is not None:
         _say(f"quadcosim: {describe()} (--help lists what there is)")

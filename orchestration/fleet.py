@@ -1,5 +1,6 @@
 """FMUs loaded once in a process and reset between runs."""
 
+import weakref
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -20,6 +21,8 @@ class Fleet:
 
     def __init__(self) -> None:
         self._instances: dict[tuple[Path, str], FmuSimulator] = {}
+        self.close = weakref.finalize(self, _free, self._instances)
+        """Free all instances; done in any case when the fleet is no longer used or the process ends."""
 
     @contextmanager
     def load(self, path: Path, instance_name: str) -> Iterator[FmuSimulator]:
@@ -38,7 +41,7 @@ class Fleet:
             else:
                 self._instances[key] = fmu
 
-    def close(self) -> None:
-        """Free all instances."""
-        while self._instances:
-            self._instances.popitem()[1].close()
+
+def _free(instances: dict[tuple[Path, str], FmuSimulator]) -> None:
+    while instances:
+        instances.popitem()[1].close()

@@ -49,6 +49,7 @@ class FmuSimulator:
                 instanceName=instance_name,
             )
             self._fmu.instantiate(callbacks=self._callbacks(), loggingOn=True)
+            _release_interpreter_state(self._fmu.dll)
         except Exception as error:
             self.failed = True
             self.close()
@@ -220,3 +221,15 @@ class FmuSimulator:
             divergence=bool(diverged),
             details=details,
         )
+
+
+def _release_interpreter_state(library: ctypes.CDLL) -> None:
+    """Have pythonfmu let go of what it would otherwise free twice when its library is unloaded.
+
+    In pythonfmu 0.7.0 the unloading releases a static pointer after its destructor has run, which now and then
+    corrupts the heap as the process ends. Released before, both do nothing. It holds a thread that initialises
+    Python where the host has not, so a host that is Python has no use for it.
+    """
+    release = getattr(library, "finalizePythonInterpreter", None)
+    if release is not None:
+        release()

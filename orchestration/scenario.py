@@ -61,8 +61,8 @@ class Scenario:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.stop_time) and self.stop_time > 0.0):
             raise UsageError(f"stop_time = {self.stop_time}: expected a positive number of seconds")
-        if self.seed < 0:
-            raise UsageError(f"seed = {self.seed}: expected a whole number, zero or positive")
+        if not 0 <= self.seed < 2**63:
+            raise UsageError(f"seed = {self.seed}: expected a whole number from 0 to 2^63 - 1")
         for name, flag in ((SAMPLE_PERIOD, "--period and --clock"), (SAMPLE_OFFSET, "--offset")):
             if name in self.controller.parameters:
                 raise UsageError(

@@ -98,6 +98,6 @@ def unit_points(method: Method, dimension: int, samples: int, seed: int) -> Floa
 
 def _check_range(name: str, low: float, high: float, scale: Scale) -> None:
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise UsageError(f"axis {name}: from = {low}, to = {high}, expected finite numbers with from < to")
+        raise UsageError(f"axis {name}: start = {low}, stop = {high}, expected finite numbers with start < stop")
     if scale == "logarithmic" and low <= 0.0:
-        raise UsageError(f"axis {name}: from = {low}, expected a positive number on a logarithmic scale")
+        raise UsageError(f"axis {name}: start = {low}, expected a positive number on a logarithmic scale")

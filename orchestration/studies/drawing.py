@@ -6,6 +6,7 @@ import numpy as np
 
 from orchestration.errors import UsageError
 from orchestration.scenario import Scenario
+from orchestration.simulator import Floats
 from orchestration.studies import figures, sensitivity
 from orchestration.studies.axes import Axis, unit_points
 from orchestration.studies.limit import Limit, radius
@@ -48,7 +49,7 @@ def draw_limit(scenario: Scenario, found: Limit, folder: Path) -> Path:
     if found.of not in ("period", "delay"):
         raise UsageError(f"--out: expected --of period or delay to draw the spectral radius over, got {found.of}")
     ends = [limit for limit in (found.local_limit, found.large_signal_limit) if limit is not None]
-    values = np.linspace(0.001, 1.3 * max(ends, default=0.1), 200)
+    values: Floats = np.linspace(0.001, 1.3 * max(ends, default=0.1), 200)
     loop = HoverLoop.of(scenario)
     radii = np.array([radius(loop, scenario, found.of, value) for value in values])
     return figures.save(
@@ -63,7 +64,7 @@ def draw_limit(scenario: Scenario, found: Limit, folder: Path) -> Path:
     )
 
 
-def indices_of(study: Study, values: np.ndarray, metric: str) -> list[sensitivity.Index]:
+def indices_of(study: Study, values: Floats, metric: str) -> list[sensitivity.Index]:
     """The sensitivity indices of a metric, with a value for each run of `study`, shape (n,)."""
     sampled = [axis for axis in study.axes if axis.values is None]
     if len(sampled) != len(study.axes):

@@ -10,7 +10,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack
 from typing import Any
 
-from orchestration.errors import QuadcosimError
+from orchestration.errors import QuadcosimError, UsageError
 from orchestration.scenario import Scenario
 from orchestration.studies.store import Row
 from orchestration.studies.study import Fmus
@@ -28,6 +28,8 @@ class Pool:
     """Flies a few runs at a time for someone who decides by their metrics what to fly next."""
 
     def __init__(self, fmus: Fmus, workers: int) -> None:
+        if workers < 1:
+            raise UsageError(f"--workers {workers}: expected at least 1")
         self._fmus, self._workers = fmus, workers
         self._stack = ExitStack()
         self._executor: ProcessPoolExecutor | None = None
@@ -70,6 +72,8 @@ class Pool:
         try:
             for future in concurrent.futures.as_completed(futures):
                 yield from future.result()
+        except BrokenProcessPool as error:
+            raise QuadcosimError("a worker process died while it flew; start again") from error
         finally:
             for future in futures:
                 future.cancel()
@@ -117,7 +121,13 @@ def run_on_dask(tasks: Sequence[Task], fmus: Fmus, address: str) -> Iterator[lis
         workers = max(1, len(client.scheduler_info()["workers"]))
         waiting = deque(_chunks(tasks, workers))
         submit: Submit = lambda chunk: executor.submit(fly_chunk, chunk, *contents)  # noqa: E731
-        yield from _drain(waiting, {}, submit, 2 * workers)
+        try:
+            yield from _drain(waiting, {}, submit, 2 * workers)
+        except (concurrent.futures.CancelledError, OSError, distributed.KilledWorker) as error:
+            raise QuadcosimError(
+                f"--dask {address}: the scheduler or its workers were lost ({type(error).__name__}); what was flown is "
+                "kept, start the sweep again"
+            ) from error
 
 
 def _drain(

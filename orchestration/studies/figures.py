@@ -35,7 +35,8 @@ def lines(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str) -> Figure:
         panel.plot(at, np.where(fell, np.nan, y), ".-", color=color, label=None if value is None else f"{value:g}")
         panel.plot(at[fell], y[fell], "x", color=color, markersize=5)
     panel.plot([], [], "x", color=GREY, label="does not fly")
-    panel.set(xlabel=_label(x), ylabel=metric, yscale="log", xscale="log" if x.scale == "logarithmic" else "linear")
+    panel.set(xlabel=_label(x), ylabel=metric, yscale=_scale(table[metric]))
+    panel.set_xscale("log" if x.scale == "logarithmic" else "linear")
     if metric == "ultimate_bound":
         panel.axhline(SETTLED, color=RED, linewidth=0.8, linestyle="--", label=f"{SETTLED:g} m: flies below")
     handles, labels = panel.get_legend_handles_labels()
@@ -53,7 +54,8 @@ def scatter(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str) -> Figur
     for panel, axis in zip(panels, axes, strict=False):
         for chosen, marker, color in ((table[~fell], ".", BLUE), (table[fell], "x", RED)):
             panel.plot(chosen[axis.name], chosen[metric], marker, color=color, markersize=4, alpha=0.7)
-        panel.set(xlabel=_label(axis), yscale="log", xscale="log" if axis.scale == "logarithmic" else "linear")
+        panel.set(xlabel=_label(axis), yscale=_scale(table[metric]))
+        panel.set_xscale("log" if axis.scale == "logarithmic" else "linear")
     for panel in panels[len(axes) :]:
         panel.set_visible(False)
     figure.supylabel(metric)
@@ -72,7 +74,8 @@ def heat_map(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str) -> Figu
     figure = Figure(figsize=(8.0, 5.0))
     panel = figure.add_subplot()
     shown = np.where(flying.to_numpy() > 0.5, values.to_numpy(float), np.nan)
-    mesh = panel.pcolormesh(columns, index, shown, norm=LogNorm(), cmap="viridis", shading="nearest")
+    norm = LogNorm() if (shown > 0.0).any() else None
+    mesh = panel.pcolormesh(columns, index, shown, norm=norm, cmap="viridis", shading="nearest")
     figure.colorbar(mesh, ax=panel, label=f"{metric}, where it flies")
     if 0.0 < float(np.nanmean(flying.to_numpy())) < 1.0:
         panel.contour(columns, index, flying.to_numpy(), levels=[0.5], colors=RED, linewidths=1.5)
@@ -94,7 +97,8 @@ def spectral_radius(
             panel.axvline(limit * 1e3, color=color, linestyle="--", label=f"{name} limit {limit * 1e3:.1f} ms")
     panel.set(xlabel=f"{of} [ms]", ylabel="spectral radius about hover")
     panel.margins(x=0)
-    panel.legend()
+    if panel.get_legend_handles_labels()[0]:
+        panel.legend()
     return figure
 
 
@@ -135,6 +139,10 @@ def save(make: Callable[[], Figure], path: Path) -> Path:
     with matplotlib.rc_context(STYLE):
         make().savefig(path)
     return path
+
+
+def _scale(values: "pd.Series") -> str:
+    return "log" if (values.dropna().astype(float) > 0.0).any() else "linear"
 
 
 def _label(axis: Axis) -> str:

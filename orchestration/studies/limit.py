@@ -127,12 +127,16 @@ def range_of(scenario: Scenario, of: str) -> Range:
     """The range in which a quantity of this scenario is looked for."""
     period = scenario.timing.period
     if of == "period":
-        return Range(before=(0.001, 0.002, 0.003, 0.004), first=0.005, step=0.005, last=0.5, tolerance=0.0005)
+        shortest = scenario.timing.jitter * scenario.timing.clock_ratio
+        before = tuple(value for value in (0.001, 0.002, 0.003, 0.004) if value > shortest)
+        first = 0.005 * (math.floor(shortest / 0.005) + 1)
+        return Range(before=before, first=first, step=0.005, last=0.5, tolerance=0.0005)
     if of == "delay":
         return Range(first=0.0, step=0.005, last=0.5, tolerance=0.0005)
     if of == "jitter":
         return Range(first=0.0, step=period / 10.0, last=0.999 * period, tolerance=period / 100.0)
-    return Range(first=0.0, step=0.05, last=1.0, tolerance=0.01, unit="")
+    length = scenario.timing.burst_length
+    return Range(first=0.0, step=0.05, last=1.0 if length is None else length / (length + 1.0), tolerance=0.01, unit="")
 
 
 def local_limit(loop: HoverLoop, scenario: Scenario, of: str) -> float | None:

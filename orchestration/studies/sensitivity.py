@@ -13,6 +13,8 @@ SensitivityMethod = Literal["morris", "saltelli"]
 METHODS: tuple[SensitivityMethod, ...] = ("morris", "saltelli")
 LEVELS = 4
 """of the Morris design"""
+RESAMPLING_SEED = 1
+"""of the confidence intervals; SALib takes 0 for none"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,12 +54,12 @@ def analyse(method: SensitivityMethod, axes: list[str], design: Floats, values: 
     if method == "morris":
         from SALib.analyze.morris import analyze as morris
 
-        found = morris(problem, design, values, num_levels=LEVELS, seed=0)
+        found = morris(problem, design, values, num_levels=LEVELS, seed=RESAMPLING_SEED)
         sigma = [Index(axis=a, kind="sigma", value=float(v), confidence=0.0) for a, v in zip(axes, found["sigma"])]
         return [*_indices(axes, "mu_star", found["mu_star"], found["mu_star_conf"]), *sigma]
     from SALib.analyze.sobol import analyze as sobol
 
-    found = sobol(problem, values, calc_second_order=False, seed=0)
+    found = sobol(problem, values, calc_second_order=False, seed=RESAMPLING_SEED)
     return [
         *_indices(axes, "first", found["S1"], found["S1_conf"]),
         *_indices(axes, "total", found["ST"], found["ST_conf"]),

@@ -123,10 +123,11 @@ def open_for_writing(path: Path) -> Iterator[Store]:
     try:
         with _explained(path):
             connection = sqlite3.connect(path, timeout=10.0)
-            connection.execute("PRAGMA journal_mode=WAL")
-            connection.execute("PRAGMA synchronous=NORMAL")
-            connection.executescript(_SCHEMA)
         with closing(connection):
+            with _explained(path):
+                connection.execute("PRAGMA journal_mode=WAL")
+                connection.execute("PRAGMA synchronous=NORMAL")
+                connection.executescript(_SCHEMA)
             yield Store(path, connection)
             with _explained(path):
                 connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")

@@ -65,32 +65,44 @@ class Study:
         return self.keep_signals if isinstance(self.keep_signals, bool) else index in self.keep_signals
 
 
+def expect_target(target: str) -> None:
+    """Raise `UsageError` naming what an axis can set, unless `target` is among it; FMUs know their own names."""
+    side, _, key = target.partition(".")
+    kind, _, measurement = key.partition(".")
+    if side == "timing":
+        known = bool(measurement) if kind in _BY_MEASUREMENT else key == "loss" or key in TIMING_KEYS
+    else:
+        known = target in ("seed", "stop_time") or (side in ("controller", "plant") and bool(key))
+    if not known:
+        keys = ", ".join(key for key in TIMING_KEYS if key not in _BY_MEASUREMENT)
+        raise UsageError(
+            f"{target}: expected controller.NAME, plant.NAME, seed, stop_time, timing.loss, timing.noise.NAME, "
+            f"timing.quantisation.NAME or timing.KEY with KEY one of {keys}"
+        )
+
+
+_BY_MEASUREMENT = ("noise", "quantisation")
+
+
 def changed(base: Scenario, changes: Mapping[str, Any]) -> Scenario:
     """`base` with other values of `timing.KEY`, `controller.NAME`, `plant.NAME`, `seed` or `stop_time`."""
     timing: dict[str, Any] = {}
     parameters: dict[str, Any] = {}
     top: dict[str, Any] = {}
     for target, value in changes.items():
+        expect_target(target)
         side, _, key = target.partition(".")
         if side == "timing" and key == "loss":
             timing |= {"measurement_loss": value, "command_loss": value}
-        elif side == "timing" and key.partition(".")[0] in ("noise", "quantisation"):
+        elif side == "timing" and key.partition(".")[0] in _BY_MEASUREMENT:
             kind, _, measurement = key.partition(".")
             timing[kind] = {**timing.get(kind, getattr(base.timing, kind)), measurement: value}
-        elif side == "timing" and key in TIMING_KEYS:
+        elif side == "timing":
             timing[key] = value
-        elif side in ("controller", "plant") and key:
+        elif side in ("controller", "plant"):
             parameters[target] = value
-        elif target == "seed":
-            top["seed"] = int(value)
-        elif target == "stop_time":
-            top["stop_time"] = float(value)
         else:
-            raise UsageError(
-                f"{target}: expected controller.NAME, plant.NAME, seed, stop_time, timing.loss, timing.noise.NAME, "
-                "timing.quantisation.NAME or timing.KEY "
-                f"with KEY one of {', '.join(TIMING_KEYS)}"
-            )
+            top[target] = int(value) if target == "seed" else float(value)
     return base.with_changes(timing=timing, parameters=parameters, **top)
 
 
@@ -167,6 +179,7 @@ def fingerprint(study: Study, guids: Mapping[str, str]) -> dict[str, str]:
     file = study.base.reference.file
     parts: dict[str, Any] = {
         "reference": None if file is None else hashlib.sha256(file.read_bytes()).hexdigest(),
+        "axes": [axis.name for axis in study.axes],
         "design": [study.method, study.samples, study.design_seed, study.vary_seed],
         **{f"FMU of the {side}": guid for side, guid in guids.items()},
         **{f"version of {name}": version for name, version in versions().items()},

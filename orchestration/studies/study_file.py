@@ -9,10 +9,9 @@ from typing import Any, ClassVar
 import pydantic
 
 from orchestration.errors import UsageError
-from orchestration.scenario import Scenario
 from orchestration.scenario_file import first_problem, load_scenario, scenario_from_tables
 from orchestration.studies.axes import Axis, Method, Scale, Value, span
-from orchestration.studies.study import Study, changed
+from orchestration.studies.study import Study, expect_target
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -93,7 +92,7 @@ def _study(tables: dict[str, Any], path: Path) -> Study:
     study = Study(
         name=file.name or path.stem,
         base=base,
-        axes=tuple(_axis(table, base) for table in file.axes),
+        axes=tuple(map(_axis, file.axes)),
         method=file.design.method,
         samples=file.design.samples,
         design_seed=file.design.seed,
@@ -105,13 +104,12 @@ def _study(tables: dict[str, Any], path: Path) -> Study:
     return study
 
 
-def _axis(table: AxisTable, base: Scenario) -> Axis:
+def _axis(table: AxisTable) -> Axis:
     if table.sets is not None and table.multiplies is not None:
         raise UsageError(f"axis {table.name}: expected sets or multiplies, not both")
     targets = tuple(table.multiplies or table.sets or [table.name])
     for target in targets:
-        if not target.startswith(("controller.", "plant.")):
-            changed(base, {target: getattr(base.timing, target.partition(".")[2], 0)})  # says which names there are
+        expect_target(target)
     ranged = table.start is not None and table.stop is not None
     if (table.values is None) != ranged or (table.values is not None and table.number is not None):
         raise UsageError(f"axis {table.name}: expected values, or start and stop, with number or to be sampled")

@@ -1,9 +1,11 @@
 """Flies what is missing of a study, and nothing twice."""
 
+import hashlib
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from orchestration.errors import UsageError
 from orchestration.studies import engine, store
@@ -61,7 +63,7 @@ def sweep(
             engine.run_on_dask(tasks, fmus, dask) if dask is not None else engine.run_locally(tasks, fmus, workers)
         )
         for chunk in outcomes:
-            _keep(chunk, opened, path.parent)
+            _keep(chunk, opened)
             done += len(chunk)
             if progress is not None:
                 progress(done, total)
@@ -72,26 +74,38 @@ def sweep(
 def _missing(opened: store.Store, study: Study, fmus: Fmus, retry_failed: bool) -> list[Task]:
     """The runs without a row, or with a failed one that is to be tried again."""
     present = opened.statuses()
-    tasks = []
+    tasks, impossible = [], []
     for index, point in enumerate(study.points):
-        scenario = study.scenario(index, fmus.starts)
+        try:
+            scenario = study.scenario(index, fmus.starts)
+        except UsageError as error:  # a point that cannot be is a run that failed
+            impossible.append(_impossible(index, point, study.base.seed, str(error)))
+            continue
         key = run_key(scenario, fmus.guids)
-        if index in present:
-            stored, status = present[index]
-            if stored == key and not (retry_failed and status == "failed"):
-                continue
-        tasks.append(
-            Task(index=index, key=key, settings=point, scenario=scenario, keep_signals=study.keeps_signals(index))
-        )
+        keeps = study.keeps_signals(index)
+        stored, status = present.get(index, ("", ""))
+        there = stored == key and not (keeps and status == "done" and not _signals_path(opened, index).is_file())
+        if not there or (retry_failed and status == "failed"):
+            tasks.append(Task(index=index, key=key, settings=point, scenario=scenario, keep_signals=keeps))
+    opened.add(row for row in impossible if row.index not in present)
     return tasks
 
 
-def _keep(outcomes: Iterable[Outcome], opened: store.Store, folder: Path) -> None:
+def _impossible(index: int, point: Mapping[str, Any], seed: int, message: str) -> store.Row:
+    key = hashlib.sha256(json.dumps([point, message]).encode()).hexdigest()
+    return store.Row(index=index, key=key, settings=point, seed=seed, metrics=None, message=message, duration=0.0)
+
+
+def _signals_path(opened: store.Store, index: int) -> Path:
+    return opened.path.parent / "signals" / f"{index:06d}.parquet"
+
+
+def _keep(outcomes: Iterable[Outcome], opened: store.Store) -> None:
     """Signals first, then the row, so that a row never lacks what it promises."""
     outcomes = list(outcomes)
     for outcome in outcomes:
         if outcome.signals is not None:
-            target = folder / "signals" / f"{outcome.row.index:06d}.parquet"
+            target = _signals_path(opened, outcome.row.index)
             target.parent.mkdir(exist_ok=True)
             partial = target.with_suffix(".partial")
             partial.write_bytes(outcome.signals)

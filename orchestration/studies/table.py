@@ -18,6 +18,8 @@ def frame(path: Path) -> "pd.DataFrame":
 
     with open_for_reading(path) as opened:
         about = opened.about()
+        if "axes" not in about:
+            raise UsageError(f"{path}: expected the store of a study that has begun")
         rows = list(opened.rows())
     axes = json.loads(about["axes"])
     settings = pd.DataFrame([row.pop("settings") for row in rows], columns=axes)
@@ -41,7 +43,8 @@ def dataset(path: Path) -> "xr.Dataset":
         grid = json.loads(opened.about()["grid"])
     if grid is None:
         raise UsageError(f"{path}: expected a study whose axes all list their values, to make a grid of it")
-    table = frame(path).set_index(list(grid))[[*METRICS, "seed", "duration"]]
+    kept = [name for name in (*METRICS, "seed", "duration") if name not in grid]
+    table = frame(path).set_index(list(grid))[kept]
     table = table.astype(float)
     cube: xr.Dataset = xr.Dataset.from_dataframe(table).reindex(grid)
     return cube

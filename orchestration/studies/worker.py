@@ -3,6 +3,7 @@
 import dataclasses
 import hashlib
 import io
+import multiprocessing.util
 import os
 import tempfile
 import threading
@@ -80,6 +81,12 @@ class Hangar:
                 path.write_bytes(content)
             return path
 
+    def close(self) -> None:
+        """Free the FMUs and what was unpacked for them."""
+        self._fleet.close()
+        if self._folder is not None:
+            self._folder.cleanup()
+
 
 HANGAR = Hangar()
 
@@ -93,6 +100,7 @@ def fly_chunk(tasks: Sequence[Task], plant: bytes, controller: bytes) -> list[Ou
 def prepare_process(plant: Path, controller: Path) -> None:
     """Start of a local worker process: it will not outlive its parent."""
     _CONTENTS["plant"], _CONTENTS["controller"] = plant.read_bytes(), controller.read_bytes()
+    multiprocessing.util.Finalize(HANGAR, HANGAR.close, exitpriority=1)  # worker processes run no atexit
     threading.Thread(target=_end_with_parent, args=(os.getppid(),), daemon=True).start()
 
 

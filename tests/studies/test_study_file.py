@@ -156,7 +156,7 @@ def test_an_unknown_key_is_told_with_those_that_there_are(tmp_path: Path, text: 
 def test_a_target_that_does_not_exist_is_told_with_those_that_there_are(tmp_path: Path, target: str) -> None:
     line = refused(tmp_path, f'[[axes]]\nname = "x"\nsets = ["{target}"]\nvalues = [1]\n')
     assert f"{target}: expected controller.NAME, plant.NAME, seed, stop_time, timing.loss" in line
-    assert ", ".join(TIMING_KEYS) in line
+    assert ", ".join(key for key in TIMING_KEYS if key not in ("noise", "quantisation")) in line
 
 
 @pytest.mark.parametrize(
@@ -193,3 +193,14 @@ def test_a_file_that_is_no_text_is_told(tmp_path: Path) -> None:
     (tmp_path / "study.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(UsageError, match="expected a readable study file"):
         load_study(tmp_path / "study.toml")
+
+
+def test_the_stop_time_may_be_an_axis(tmp_path: Path) -> None:
+    file = tmp_path / "study.toml"
+    file.write_text('[[axes]]\nname = "stop_time"\nvalues = [0.1, 0.2]\n')
+    chosen = load_study(file)
+    assert [chosen.scenario(i, {}).stop_time for i in range(2)] == [0.1, 0.2]
+
+
+def test_noise_without_a_measurement_is_no_target(tmp_path: Path) -> None:
+    assert "timing.noise: expected" in refused(tmp_path, '[[axes]]\nname = "timing.noise"\nvalues = [0.1]\n')

@@ -3,6 +3,8 @@
 import concurrent.futures
 import dataclasses
 import json
+import os
+import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -22,8 +24,10 @@ from orchestration.studies.study_file import load_study
 from orchestration.studies.sweep import store_path, sweep
 from orchestration.studies.worker import Hangar, Outcome, Task
 from tests.studies.common import (
+    GRID,
     NOISY,
     RUNS,
+    SCRIPT,
     Cluster,
     axis,
     bits,
@@ -220,7 +224,7 @@ CHANGES: list[tuple[Study, str]] = [
     (study(PERIODS, base=HEAVY), r"plant.mass was absent, is 1.1"),
     (study(PERIODS, vary_seed=True), r"design was .*false\], is .*true\]"),
     (study(axis("timing.period", 0.01)), r"axis timing.period was .*0.02.*, is "),
-    (study(axis("seed", 1, 2)), r"axis seed was absent, is .*; axis timing.period was .*, is absent"),
+    (study(axis("seed", 1, 2)), r"axes was .*; axis seed was absent, is .*; axis timing.period was .*, is absent"),
 ]
 
 
@@ -304,8 +308,44 @@ def test_signals_of_the_chosen_runs_are_kept_and_are_those_of_a_direct_run(tmp_p
         assert np.array_equal(desired, direct.desired)
 
 
-def test_no_signals_are_kept_unless_told(finished: Path) -> None:
-    assert not (finished / "signals").exists()
+def test_no_signals_are_kept_unless_told(tmp_path: Path) -> None:
+    swept(study(axis("timing.period", 0.01)), tmp_path)
+    assert not (tmp_path / "signals").exists()
+
+
+def test_signals_that_are_asked_for_later_are_flown_for(tmp_path: Path) -> None:
+    chosen = study(axis("timing.period", 0.01, 0.02))
+    swept(chosen, tmp_path)
+    summary = sweep(dataclasses.replace(chosen, keep_signals=(1,)), folder=tmp_path)
+    assert summary.flown == 1
+    assert [path.name for path in (tmp_path / "signals").iterdir()] == ["000001.parquet"]
+
+
+def test_a_point_that_cannot_be_is_a_row_that_says_why(tmp_path: Path) -> None:
+    path = swept(study(axis("timing.jitter", 0.001, 0.02), base=short(period=0.01)), tmp_path)
+    with open_for_reading(path) as opened:
+        rows = list(opened.rows())
+    assert [row["status"] for row in rows] == ["done", "failed"]
+    assert "timing.jitter = 0.02" in rows[1]["message"]
+
+
+def test_axes_in_another_order_are_another_study(tmp_path: Path) -> None:
+    a, b = axis("timing.period", 0.01, 0.02), axis("timing.delay", 0.0, 0.001)
+    swept(study(a, b), tmp_path)
+    with pytest.raises(UsageError, match="axes was"):
+        swept(study(b, a), tmp_path)
+
+
+def test_workers_leave_no_files_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    file = tmp_path / "study.toml"
+    file.write_text(GRID)
+    environment = {**os.environ, "TMPDIR": str(temporary)}
+    subprocess.run(
+        [str(SCRIPT), "sweep", file, "--workers", "2", "--out", tmp_path / "out"], env=environment, check=True
+    )
+    assert [path.name for path in temporary.iterdir() if path.name.startswith(("tmp", "quadcosim"))] == []
 
 
 # -- dask -------------------------------------------------------------------------------------------------

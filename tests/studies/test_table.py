@@ -169,3 +169,8 @@ def test_a_hundred_thousand_rows_open_count_and_export(tmp_path: Path) -> None:
     assert read["position_rmse"].tolist() == [0.001 * i for i in range(number)]
     with csv.open() as lines:
         assert sum(1 for _ in lines) == number + 1
+
+
+def test_a_grid_over_seeds_has_the_seed_as_an_axis(tmp_path: Path) -> None:
+    path = swept(study(axis("seed", 0, 1), axis("timing.period", 0.01, 0.02)), tmp_path)
+    assert dict(dataset(path).sizes) == {"seed": 2, "timing.period": 2}
