@@ -49,7 +49,8 @@ def draw_limit(scenario: Scenario, found: Limit, folder: Path) -> Path:
     if found.of not in ("period", "delay"):
         raise UsageError(f"--out: expected --of period or delay to draw the spectral radius over, got {found.of}")
     ends = [limit for limit in (found.local_limit, found.large_signal_limit) if limit is not None]
-    values: Floats = np.linspace(0.001, 1.3 * max(ends, default=0.1), 200)
+    last = 1.3 * max(ends, default=0.1)
+    values = np.array([0.001 + i / 199.0 * (last - 0.001) for i in range(200)])
     loop = HoverLoop.of(scenario)
     radii = np.array([radius(loop, scenario, found.of, value) for value in values])
     return figures.save(
