@@ -1,5 +1,6 @@
 """Runs tasks in worker processes, here or on a dask cluster, and yields the outcomes as they come."""
 
+import asyncio
 import concurrent.futures
 import dataclasses
 import multiprocessing
@@ -113,7 +114,7 @@ def run_on_dask(tasks: Sequence[Task], fmus: Fmus, address: str) -> Iterator[lis
         try:
             client: Any = stack.enter_context(distributed.Client(address, timeout=10, set_as_default=False))
             client.wait_for_workers(1, timeout=10)
-        except (OSError, TimeoutError, ValueError) as error:
+        except (OSError, TimeoutError, asyncio.TimeoutError, ValueError) as error:  # two of a name before Python 3.11
             raise QuadcosimError(f"--dask {address}: expected a dask scheduler with workers there: {error}") from error
         # The FMUs travel once, by the hash of their content.
         contents = client.scatter([fmus.plant.read_bytes(), fmus.controller.read_bytes()], broadcast=True, hash=True)
