@@ -59,7 +59,7 @@ def load_scenario(path: str | Path) -> Scenario:
 
 def scenario_from_tables(tables: dict[str, Any], folder: Path) -> Scenario:
     """The scenario of a TOML document whose relative paths start at `folder`; raises `UsageError`."""
-    parsed = _parse(_with_preset(tables))
+    parsed = _parse(_expanded(tables))
     file = parsed.reference.file
     return Scenario(
         stop_time=parsed.stop_time,
@@ -72,13 +72,21 @@ def scenario_from_tables(tables: dict[str, Any], folder: Path) -> Scenario:
     )
 
 
-def _with_preset(tables: dict[str, Any]) -> dict[str, Any]:
-    """The tables with the timing of `timing.preset`, if one is named, below what the file says itself."""
+SHORTHANDS = ("loss", "preset")
+"""Keys of `[timing]` that stand for others."""
+
+
+def _expanded(tables: dict[str, Any]) -> dict[str, Any]:
+    """The tables with `timing.preset` and `timing.loss` written out, below what the file says itself."""
     timing = tables.get("timing")
-    if not isinstance(timing, dict) or "preset" not in timing:
+    if not isinstance(timing, dict):
         return tables
-    own = {key: value for key, value in timing.items() if key != "preset"}
-    return {**tables, "timing": {**preset_timing(str(timing["preset"])), **own}}
+    written = {key: value for key, value in timing.items() if key not in SHORTHANDS}
+    if "loss" in timing:
+        written = {"measurement_loss": timing["loss"], "command_loss": timing["loss"], **written}
+    if "preset" in timing:
+        written = {**preset_timing(str(timing["preset"])), **written}
+    return {**tables, "timing": written}
 
 
 def _choice(side: str, table: dict[str, Any], default: str, folder: Path) -> FmuChoice:
@@ -121,7 +129,8 @@ def first_problem(error: pydantic.ValidationError, file: type) -> str:
             if isinstance(part, str):
                 hint = next(f.type for f in dataclasses.fields(table) if f.name == part)
                 table = typing.get_args(hint)[0] if typing.get_origin(hint) is list else hint
-        keys = ", ".join(f.name for f in dataclasses.fields(table))
+        names = [f.name for f in dataclasses.fields(table)] + list(SHORTHANDS if table is Timing else ())
+        keys = ", ".join(names)
         return f"{place}: no such key; expected one of {keys}"
     message = problem["msg"]
     return f"{place} = {problem['input']!r}: {message[:1].lower()}{message[1:]}"

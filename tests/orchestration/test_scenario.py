@@ -296,3 +296,17 @@ def test_changes_are_checked_like_the_values_of_a_file() -> None:
         Scenario().with_changes(timing={"period": -1.0})
     with pytest.raises(UsageError, match="stop_time = 0"):
         Scenario().with_changes(stop_time=0.0)
+
+
+def test_loss_in_a_file_means_both_losses_and_the_particular_one_goes_before_it(tmp_path: Path) -> None:
+    file = tmp_path / "s.toml"
+    file.write_text("[timing]\nloss = 0.2\ncommand_loss = 0.1\n")
+    timing = load_scenario(file).timing
+    assert (timing.measurement_loss, timing.command_loss) == (0.2, 0.1)
+
+
+def test_a_preset_in_a_file_is_the_timing_of_that_stack_below_what_the_file_says(tmp_path: Path) -> None:
+    file = tmp_path / "s.toml"
+    file.write_text('[timing]\npreset = "crazyflie"\ndelay = 0.0\n')
+    timing = load_scenario(file).timing
+    assert (timing.period, timing.delay) == (0.002, 0.0)
