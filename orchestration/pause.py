@@ -21,7 +21,7 @@ _ARRAYS = ("plant", "controller", "row", "rows", "received")
 def fly_until(
     scenario: Scenario,
     pause_at: float,
-    folder: Path,
+    folder: str | Path,
     *,
     progress: Progress | None = None,
     announce: Announce | None = None,
@@ -38,15 +38,16 @@ def fly_until(
         flight.master.initialise()
         if flight.master.run(pause_at=nanoseconds(pause_at), progress=progress):
             return flight.result()
-        _write(flight, folder)
+        _write(flight, Path(folder))
         return None
 
 
-def resume(folder: Path, *, progress: Progress | None = None, announce: Announce | None = None) -> Result:
+def resume(folder: str | Path, *, progress: Progress | None = None, announce: Announce | None = None) -> Result:
     """Go on with the run paused in `folder`, to the end.
 
     Raises `UsageError` if there is none, or if an FMU is not the one that it was paused with.
     """
+    folder = Path(folder)
     if not (folder / STATE).is_file():
         raise UsageError(f"{folder}: expected the directory of a paused run; it has no {STATE}")
     scenario = load_scenario(folder / SCENARIO)

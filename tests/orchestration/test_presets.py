@@ -1,0 +1,24 @@
+"""Presets are timings like any other."""
+
+import pytest
+
+import orchestration
+from orchestration import Scenario, Timing, UsageError
+from orchestration.presets import PRESETS, preset_timing
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_every_preset_flies(name: str) -> None:
+    result = orchestration.run(Scenario(stop_time=0.1, timing=Timing(**preset_timing(name))))
+    assert result.metrics["diverged"] is False
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_a_single_rate_controller_runs_at_the_rate_of_one_of_the_loops(name: str) -> None:
+    preset = PRESETS[name]
+    assert 1.0 / preset.timing["period"] in [pytest.approx(rate) for rate in preset.loops_hz.values()]
+
+
+def test_a_preset_that_does_not_exist_is_told_with_those_that_do() -> None:
+    with pytest.raises(UsageError, match="expected one of px4, crazyflie, betaflight"):
+        preset_timing("ardupilot")
