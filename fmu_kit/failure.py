@@ -17,8 +17,9 @@ _kept_references: list[Any] = []
 def keep(module_globals: dict[str, Any]) -> None:
     """Called by an entry script: give back the reference to its globals that each instantiation drops.
 
-    The native part decrements the borrowed reference of the module's dictionary every time that it looks
-    for the slave class; after a few instances the dictionary would be freed under the running module.
+    The native part decrements the borrowed reference of the module's dictionary every time that it looks for
+    the slave class. Classes that it leaks hide this as long as they hold more references to the dictionary
+    than it drops; what is given back here does not depend on that.
     """
     _kept_references.append(module_globals)
 

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import pytest
@@ -14,20 +14,11 @@ from controller_fmu.interface import UNIFIED
 from controller_fmu.law import Gains, Measurement, Model, evaluate
 from controller_fmu.slave import UnifiedController
 from fmu_kit.algebra import ZERO, Inertia, Quaternion, Vec3
-from fmu_kit.failure import Failure
 from fmu_kit.trajectory import Reference, Trajectory
+from tests.slaves import assert_fails, get, named, put
 
 COMMAND = ("thrust", "torque.x", "torque.y", "torque.z")
 PAPER_ATTITUDE = Quaternion.from_xyzw(0.1699, 0.3058, 0.1699, 0.9212).normalised()
-
-
-def put(slave: UnifiedController, values: Mapping[str, float]) -> None:
-    for name, value in values.items():
-        slave.set_real([slave._index[name]], [value])
-
-
-def get(slave: UnifiedController, *names: str) -> list[float]:
-    return slave.get_real([slave._index[name] for name in names])
 
 
 def count(slave: UnifiedController) -> int:
@@ -89,13 +80,6 @@ def law(values: Mapping[str, float], t: float, gains: Gains | None = None, model
 def close(values: list[float]) -> Any:
     """Equal to rounding: normalising a unit quaternion again may change its last digit."""
     return pytest.approx(values, rel=1e-12, abs=1e-12)
-
-
-def assert_fails(call: Callable[[], object], *words: str) -> None:
-    with pytest.raises(Failure) as caught:
-        call()
-    for word in words:
-        assert word in repr(caught.value)
 
 
 def warnings(slave: UnifiedController) -> list[str]:
@@ -390,12 +374,6 @@ OUT_OF_RANGE = [
     ("boundary_layer", 0.0, "> 0"),
     ("boundary_layer", -0.001, "> 0"),
 ]
-
-
-def named(name: str, value: float) -> tuple[str, str]:
-    """How a message names a variable and its value; an inertia is shown whole."""
-    group, _, entry = name.partition(".")
-    return (group, f"{entry} {value:g}") if group == "inertia" else (f"{name} = {value}", str(value))
 
 
 @pytest.mark.parametrize(("name", "value", "expected"), OUT_OF_RANGE)

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import pytest
@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 import plant_fmu.slave
 from fmu_kit.algebra import ZERO, Inertia, Quaternion, Vec3
-from fmu_kit.failure import Failure
 from plant_fmu.dynamics import Body, RigidState, Wrench, derivative
 from plant_fmu.integrator import rk4_step
 from plant_fmu.interface import QUADROTOR
 from plant_fmu.slave import QuadrotorPlant
+from tests.slaves import assert_fails, get, named, put
 
 POSITION = ("position.x", "position.y", "position.z")
 VELOCITY = ("velocity.x", "velocity.y", "velocity.z")
@@ -53,15 +53,6 @@ MOVING = {
 }
 
 
-def put(slave: QuadrotorPlant, values: Mapping[str, float]) -> None:
-    for name, value in values.items():
-        slave.set_real([slave._index[name]], [value])
-
-
-def get(slave: QuadrotorPlant, *names: str) -> list[float]:
-    return slave.get_real([slave._index[name] for name in names])
-
-
 def instance(values: Mapping[str, float] | None = None) -> QuadrotorPlant:
     slave = QuadrotorPlant(instance_name="p")
     put(slave, values or {})
@@ -84,13 +75,6 @@ def fly(slave: QuadrotorPlant, h: float, count: int, start: float = 0.0) -> None
 
 def close(values: list[float], tolerance: float = 1e-12) -> Any:
     return pytest.approx(values, rel=0.0, abs=tolerance)
-
-
-def assert_fails(call: Callable[[], object], *words: str) -> None:
-    with pytest.raises(Failure) as caught:
-        call()
-    for word in words:
-        assert word in repr(caught.value)
 
 
 # -- motion -------------------------------------------------------------------------------------------------
@@ -329,12 +313,6 @@ OUT_OF_RANGE = [
     ("max_internal_step", 0.0, "> 0"),
     ("max_internal_step", -0.002, "> 0"),
 ]
-
-
-def named(name: str, value: float) -> tuple[str, str]:
-    """How a message names a variable and its value; an inertia is shown whole."""
-    group, _, entry = name.partition(".")
-    return (group, f"{entry} {value:g}") if group == "inertia" else (f"{name} = {value}", str(value))
 
 
 @pytest.mark.parametrize(("name", "value", "expected"), OUT_OF_RANGE)
