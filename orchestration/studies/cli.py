@@ -2,19 +2,13 @@
 
 import dataclasses
 import json
-import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from orchestration.flags import FlightFlags, flies, scenario_from
-
-if TYPE_CHECKING:
-    from orchestration.studies.sweep import Progress
+from orchestration.terminal import runs_bar, say
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file.", metavar="STUDY.toml", show_default=False)]
 Out = Annotated[
@@ -35,7 +29,7 @@ def sweep(
     from orchestration.studies.study_file import load_study
     from orchestration.studies.sweep import sweep as fly
 
-    with _bar() as progress:
+    with runs_bar() as progress:
         summary = fly(
             load_study(study), folder=out, workers=workers, dask=dask, retry_failed=retry_failed, progress=progress
         )
@@ -105,12 +99,12 @@ def limit(
 
     chosen = scenario_from(scenario, flags)
     found = limits.find(
-        chosen, of, tolerance=tolerance, confidence=confidence, workers=workers, announce=_say
+        chosen, of, tolerance=tolerance, confidence=confidence, workers=workers, announce=say
     )  # fmt: skip
     if out is not None:
         from orchestration.studies.drawing import draw_limit
 
-        _say(str(draw_limit(chosen, found, out)))
+        say(str(draw_limit(chosen, found, out)))
     if as_json:
         print(json.dumps(dataclasses.asdict(found), indent=2))
         return
@@ -122,37 +116,3 @@ def register(app: typer.Typer) -> None:
     """Add the commands to the command line."""
     for command in (sweep, status, export, draw, limit):
         app.command()(command)
-
-
-def _say(text: str) -> None:
-    print(text, file=sys.stderr)
-
-
-@contextmanager
-def _bar() -> Iterator["Progress | None"]:
-    """A bar with rate and time left on a terminal; else a line now and then."""
-    started = time.monotonic()
-    if not sys.stderr.isatty():
-        last = [started]
-
-        def say(done: int, total: int) -> None:
-            if time.monotonic() - last[0] > 10.0:
-                last[0] = time.monotonic()
-                print(f"{done} of {total} runs", file=sys.stderr)
-
-        yield say
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[rate]}"), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task("runs", total=None, rate="")
-        first: list[int] = []
-
-        def update(done: int, total: int) -> None:
-            first[:] = first or [done]
-            rate = (done - first[0]) / max(time.monotonic() - started, 1e-9)
-            bar.update(task, completed=done, total=total, rate=f"{rate:.1f} runs/s")
-
-        yield update
