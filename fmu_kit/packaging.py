@@ -145,7 +145,7 @@ def build(target: Target, folder: Path) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{target.model}.fmu"
     temporary = path.with_suffix(f".{os.getpid()}.partial")
-    _write_archive(temporary, files)
+    write_archive(temporary, files, first="modelDescription.xml")
     os.replace(temporary, path)
     return path
 
@@ -161,10 +161,13 @@ def content_guid(files: dict[str, bytes]) -> str:
     return str(uuid.UUID(bytes=digest.digest()[:16]))
 
 
-def _write_archive(path: Path, files: dict[str, bytes]) -> None:
-    """Stored, not compressed: the bytes must not depend on a version of zlib."""
+def write_archive(path: Path, files: dict[str, bytes], *, first: str) -> None:
+    """Write a zip of `files` by name, `first` at its head: the same content, the same bytes.
+
+    Stored, not compressed: the bytes must not depend on a version of zlib.
+    """
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
-        for name in sorted(files, key=lambda name: (name != "modelDescription.xml", name)):
+        for name in sorted(files, key=lambda name: (name != first, name)):
             entry = zipfile.ZipInfo(name, _STAMP)
             entry.create_system = 3
             entry.external_attr = 0o644 << 16

@@ -3,8 +3,6 @@
 import json
 import sys
 import traceback
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,13 +10,18 @@ import typer
 
 from orchestration.errors import QuadcosimError, SimulatorError, UsageError
 from orchestration.flags import FlightFlags, flies, scenario_from
+from orchestration.interop import cli as interop
 from orchestration.studies import cli as studies
+from orchestration.terminal import progress_bar, say
 
 if TYPE_CHECKING:
-    from orchestration.flight import Progress
     from orchestration.result import Result
 
-STUDY_PACKAGES = ("dask", "distributed", "filelock", "pandas", "SALib", "scipy", "xarray")
+EXTRAS = {
+    "studies": ("dask", "distributed", "filelock", "pandas", "SALib", "scipy", "xarray"),
+    "interop": ("libcosimpy", "ecospy", "tbb", "fmu-manipulation-toolbox"),
+}
+"""Packages that the base install does without, by the extra that brings them."""
 
 app = typer.Typer(
     name="quadcosim",
@@ -74,20 +77,20 @@ def run(
         raise UsageError("--pause-at: expected --out DIR for the state")
     with progress_bar("flying") as progress:
         if resume is not None:
-            result: Result | None = pause.resume(resume, progress=progress, announce=_say)
+            result: Result | None = pause.resume(resume, progress=progress, announce=say)
         elif pause_at is not None and out is not None:
             chosen = scenario_from(scenario, flags)
-            result = pause.fly_until(chosen, pause_at, out, progress=progress, announce=_say)
+            result = pause.fly_until(chosen, pause_at, out, progress=progress, announce=say)
         else:
-            result = fly(scenario_from(scenario, flags), progress=progress, announce=_say)
+            result = fly(scenario_from(scenario, flags), progress=progress, announce=say)
     if result is None:
-        _say(f"paused in {out}; go on with: quadcosim run --resume {out}")
+        say(f"paused in {out}; go on with: quadcosim run --resume {out}")
         return
     _report(result, as_json)
     if out is not None:
-        _say(f"results in {save_run(result, out, figures=figures)}")
+        say(f"results in {save_run(result, out, figures=figures)}")
     elif not as_json:
-        _say("add --out DIR to keep the signals and the figures")
+        say("add --out DIR to keep the signals and the figures")
 
 
 @app.command()
@@ -124,7 +127,7 @@ def validate(
     from orchestration.wiring import MODELS
 
     count = 0
-    for path in fmu or [fmus.locate(name, _say) for name in MODELS]:
+    for path in fmu or [fmus.locate(name, say) for name in MODELS]:
         if not path.is_file():
             raise UsageError(f"{path}: expected an .fmu file")
         problems = validate_fmu(str(path))
@@ -136,16 +139,33 @@ def validate(
         raise typer.Exit(1)
 
 
+@app.command()
+@flies
+def ssp(
+    scenario: Annotated[
+        Path | None, typer.Argument(help="Scenario file; without one, the paper's flight.", show_default=False)
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="The file; fmus/QuadrotorLoop.ssp unless told.", metavar="FILE")
+    ] = None,
+    *,
+    flags: FlightFlags,
+) -> None:
+    """Write both FMUs, their connections and a scenario's parameters as one SSP 1.0 file for other tools."""
+    from orchestration import fmus
+    from orchestration import ssp as system
+
+    path = out or fmus.default_folder() / f"{system.NAME}.ssp"
+    print(system.write(scenario_from(scenario, flags), path, say))
+
+
 studies.register(app)
-
-
-def _say(text: str) -> None:
-    print(text, file=sys.stderr)
+interop.register(app)
 
 
 def _report(result: "Result", as_json: bool) -> None:
     for warning in result.warnings:
-        _say(f"warning: {warning}")
+        say(f"warning: {warning}")
     if as_json:
         print(json.dumps(result.metrics, indent=2))
         return
@@ -157,20 +177,6 @@ def _report(result: "Result", as_json: bool) -> None:
         print(f"diverged: {result.divergence}")
 
 
-@contextmanager
-def progress_bar(what: str) -> Iterator["Progress | None"]:
-    """A bar on standard error while the work goes on, if that is a terminal."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import Progress as Bar
-
-    with Bar(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what, total=1.0)
-        yield lambda share: bar.update(task, completed=share)
-
-
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line: 0 done, 1 failure, 2 wrong usage; one line for an error, more with --debug."""
     given = sys.argv[1:] if arguments is None else arguments
@@ -180,7 +186,7 @@ def main(arguments: list[str] | None = None) -> None:
         code = app(arguments or ["--help"], standalone_mode=False)
         sys.exit(code if arguments else 2)
     except (KeyboardInterrupt, typer.Abort):
-        _say("quadcosim: interrupted")
+        say("quadcosim: interrupted")
         sys.exit(130)
     except Exception as error:
         _fail(error, debug)
@@ -190,18 +196,22 @@ def _fail(error: Exception, debug: bool) -> None:
     if debug:
         traceback.print_exc()
         if isinstance(error, SimulatorError) and error.details:
-            _say(f"in the FMU:\n{error.details}")
+            say(f"in the FMU:\n{error.details}")
     describe = getattr(error, "format_message", None)  # of a usage error that the parser finds
     if isinstance(error, (QuadcosimError, OSError)):
-        _say(f"quadcosim: {error}")
+        say(f"quadcosim: {error}")
     elif describe is not None:
-        _say(f"quadcosim: {describe()} (--help lists what there is)")
+        say(f"quadcosim: {describe()} (--help lists what there is)")
         sys.exit(2)
-    elif isinstance(error, ModuleNotFoundError) and error.name in STUDY_PACKAGES:
-        _say(f"quadcosim: {error.name} is not installed; studies need: pip install 'quadcosim[studies]'")
+    elif isinstance(error, ModuleNotFoundError) and (extra := _extra_of(error.name)) is not None:
+        say(f"quadcosim: {error.name} is not installed; this command needs: pip install 'quadcosim[{extra}]'")
     else:
-        _say(f"quadcosim: {type(error).__name__}: {error} (an error of quadcosim itself; --debug shows where)")
+        say(f"quadcosim: {type(error).__name__}: {error} (an error of quadcosim itself; --debug shows where)")
     sys.exit(2 if isinstance(error, UsageError) else 1)
+
+
+def _extra_of(package: str | None) -> str | None:
+    return next((extra for extra, packages in EXTRAS.items() if package in packages), None)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,196 @@
+"""The same flight in every tool and in this project's master, compared signal by signal."""
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from orchestration import fmus, ssp
+from orchestration.errors import QuadcosimError
+from orchestration.flight import prepared
+from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.interop.catalogue import Tool
+from orchestration.interop.job import SIGNALS, Job
+from orchestration.interop.trace import PORTS, Trace, read_trace, traced_copy
+from orchestration.scenario import Scenario
+from orchestration.simulator import Floats, Transfer
+from orchestration.wiring import MEASUREMENT
+
+STATES = len(MEASUREMENT)
+"""The first so many of `SIGNALS` are the state of the plant, the others the command."""
+
+FirstInputs = dict[str, tuple[float, ...]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Agreement:
+    """How far one tool's flight is from this project's, in the order of exchange that the tool was seen to have."""
+
+    tool: Tool
+    versions: dict[str, str]
+    trace: Trace
+    as_it_comes: dict[str, float]
+    """by signal: largest difference from `quadcosim run` [SI]"""
+    same_start: dict[str, float]
+    """the same, with the tool's inputs of the first step given to this project's master too"""
+
+    def both(self) -> tuple[dict[str, float], dict[str, float]]:
+        """As it comes, and with the same start."""
+        return self.as_it_comes, self.same_start
+
+    def largest(self, differences: dict[str, float]) -> tuple[float, str]:
+        """The largest difference of a state, or of a command if the tool flew no plant, and the signal it is in."""
+        return max((value, name) for name, value in differences.items() if name in _compared(self.tool))
+
+
+def agreements(
+    scenario: Scenario,
+    tools: Iterable[Tool],
+    *,
+    announce: Callable[[str], None] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> list[Agreement]:
+    """Fly `scenario` in each tool, as many at a time as there are processors.
+
+    Its plant interval is the communication step of both FMUs, its period that of the controller's own clock.
+    Raises `ModuleNotFoundError` if a tool is not installed, `UsageError` for a scenario that an SSP cannot
+    carry, `QuadcosimError` with a tool's last words if it fails.
+    """
+    tools = list(tools)
+    versions = {tool.name: tool.versions() for tool in tools}
+    with tempfile.TemporaryDirectory(prefix="quadcosim_") as folder:
+        flights = _Flights(scenario, Path(folder), announce)
+        found = []
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            seen = pool.map(flights.seen, tools)
+            flown = pool.map(flights.flown, tools)
+            for tool, trace, rows in zip(tools, seen, flown):
+                found.append(flights.agreement(tool, versions[tool.name], trace, rows))
+                if progress is not None:
+                    progress(len(found) / len(tools))
+    return found
+
+
+class _Flights:
+    """The flights of one scenario, by tools and by this project's master."""
+
+    def __init__(self, scenario: Scenario, folder: Path, announce: Callable[[str], None] | None) -> None:
+        self._folder = folder
+        self._scenario = scenario.with_fmus(
+            plant=fmus.locate(scenario.plant.fmu, announce), controller=fmus.locate(scenario.controller.fmu, announce)
+        )
+        self._step = scenario.timing.plant_interval
+        self._own: dict[tuple[str, str], Floats] = {}
+        np.save(folder / "recorded.npy", self._rows_of_master("gauss-seidel", {})[:-1])
+
+    def flown(self, tool: Tool) -> Floats:
+        """A tool's rows, from the FMUs as they are."""
+        return self._in_a_process(tool, "flown", lambda path, component, folder: path)
+
+    def seen(self, tool: Tool) -> Trace:
+        """How a tool flies, from traced copies."""
+        self._in_a_process(tool, "seen", traced_copy)
+        folder = self._folder / tool.call.replace(":", "_") / "seen"
+        return read_trace(folder, {name: self._path(name) for name in tool.components}, self._step)
+
+    def agreement(self, tool: Tool, versions: dict[str, str], trace: Trace, rows: Floats) -> Agreement:
+        """Compare the rows of a tool with this project's in the order that it was seen to have."""
+        order = "gauss-seidel" if trace.order == "alone" else trace.order
+        late = np.abs(rows[:, 0] - self._step * np.arange(1, len(rows) + 1)).max()
+        if late > 0.01 * self._step:
+            raise QuadcosimError(f"{tool.name}: a row is {late:g} s beside its communication point")
+        first_inputs = {} if trace.order == "alone" else trace.first_inputs
+        return Agreement(
+            tool=tool,
+            versions=versions,
+            trace=trace,
+            as_it_comes=_differences(tool, rows, self._rows_of_master(order, {})),
+            same_start=_differences(tool, rows, self._rows_of_master(order, first_inputs)),
+        )
+
+    def _path(self, component: str) -> Path:
+        return Path(getattr(self._scenario, component).fmu)
+
+    def _in_a_process(self, tool: Tool, purpose: str, prepare: Callable[[Path, str, Path], Path]) -> Floats:
+        folder = self._folder / tool.call.replace(":", "_") / purpose
+        folder.mkdir(parents=True)
+        paths = {name: prepare(self._path(name), name, folder) for name in ("controller", "plant")}
+        scenario = self._scenario.with_fmus(**paths)
+        job = Job(
+            **paths,
+            ssp=ssp.write(scenario, folder / "loop.ssp"),
+            step=self._step,
+            stop=self._scenario.stop_time,
+            parameters={component.name: component.parameters for component in ssp.components(scenario)},
+            recorded=self._folder / "recorded.npy",
+            folder=folder,
+        )
+        (folder / "job.json").write_text(job.to_json(), encoding="utf-8")
+        arguments = [tool.name, str(folder / "job.json"), str(folder / "rows.npy")]
+        done = subprocess.run(
+            [sys.executable, "-m", "orchestration.interop.child", *arguments],
+            capture_output=True, text=True, errors="replace", check=False,
+        )  # fmt: skip
+        if done.returncode != 0:
+            lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
+            raise QuadcosimError(f"{tool.name}: {lines[-1]}")
+        return np.asarray(np.load(folder / "rows.npy"))
+
+    def _rows_of_master(self, order: str, first_inputs: FirstInputs) -> Floats:
+        """This project's flight: the time, `SIGNALS`; the command is the one computed at the row's time."""
+        key = (order, repr(first_inputs))
+        if key not in self._own:
+            late = 0.0 if order == "gauss-seidel" else self._step
+            scenario = self._scenario.with_changes(timing={"clock": "fmu", "delay": late})
+
+            def load(path: Path, instance_name: str) -> FmuSimulator:
+                if not first_inputs:
+                    return FmuSimulator(path, instance_name)
+                names, values = PORTS[instance_name][0], first_inputs[instance_name]
+                return _GivenFirstInputs(path, instance_name, dict(zip(names, values, strict=True)))
+
+            with prepared(scenario, load=load) as flight:
+                flight.master.initialise()
+                flight.master.run()
+                signals = flight.result().signals
+            self._own[key] = np.column_stack([signals[name] for name in ("time", *SIGNALS)])
+        return self._own[key]
+
+
+class _GivenFirstInputs(FmuSimulator):
+    """An FMU whose connected inputs are given ones until its first step is over, whatever the master sends."""
+
+    def __init__(self, path: Path, name: str, inputs: dict[str, float]) -> None:
+        super().__init__(path, name)
+        self._given = inputs
+        self._stepped = False
+
+    def writer(self, names: Sequence[str], source: Floats) -> Transfer:
+        """As of the base, but for the first step."""
+        usual = super().writer(names, source)
+        first = super().writer(names, np.array([self._given[name] for name in names]))
+        return lambda: usual() if self._stepped else first()
+
+    def step(self, t: float, h: float) -> None:
+        """As of the base."""
+        super().step(t, h)
+        self._stepped = True
+
+
+def _compared(tool: Tool) -> tuple[str, ...]:
+    """The states; the command of a tool that flew no plant."""
+    return SIGNALS[:STATES] if "plant" in tool.components else SIGNALS[STATES:]
+
+
+def _differences(tool: Tool, rows: Floats, own: Floats) -> dict[str, float]:
+    """By signal, the largest difference of a tool's rows, which are of the ends of steps, from this project's."""
+    count = min(len(rows), len(own) - 1)
+    expected = np.column_stack([own[1 : count + 1, 1 : STATES + 1], own[:count, STATES + 1 :]])
+    differences = np.abs(rows[:count, 1:] - expected).max(axis=0)
+    return {name: float(value) for name, value in zip(SIGNALS, differences, strict=True) if not np.isnan(value)}

@@ -1,0 +1,56 @@
+"""The agreement chart: how far each tool is from this project's master, by kind of signal."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib
+from matplotlib.figure import Figure
+
+from orchestration.interop.compare import Agreement
+from orchestration.interop.table import AIM
+from orchestration.plots import BLUE, GREEN, GREY, ORANGE, RED, STYLE
+
+SMALLEST = 1e-17
+"""Where a difference of zero is drawn."""
+
+_KINDS = {
+    "position": ("plant.position", "o", BLUE),
+    "velocity": ("plant.velocity", "s", GREEN),
+    "quaternion": ("plant.quaternion", "^", ORANGE),
+    "angular velocity": ("plant.angular_velocity", "D", RED),
+    "command": ("controller.", "P", "#5b4a8a"),
+}
+"""By name: the signals' prefix, marker, colour."""
+
+
+def draw(agreements: Sequence[Agreement], folder: Path) -> Path:
+    """Write `interop.png` into `folder`; its path."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "interop.png"
+    with matplotlib.rc_context(STYLE):
+        agreement_chart(agreements).savefig(path)
+    return path
+
+
+def agreement_chart(agreements: Sequence[Agreement]) -> Figure:
+    """A row for each tool; open: as it comes; filled: the tool's first inputs given to this master too."""
+    figure = Figure(figsize=(9.0, 1.6 + 0.42 * len(agreements)))
+    panel = figure.add_subplot()
+    for row, agreement in enumerate(agreements):
+        for kind, (name, (prefix, marker, color)) in enumerate(_KINDS.items()):
+            y = row + 0.14 * (kind - 2)
+            for differences, filled in zip(agreement.both(), (False, True), strict=True):
+                values = [value for signal, value in differences.items() if signal.startswith(prefix)]
+                if values:
+                    panel.plot(
+                        max(max(values), SMALLEST), y, marker, color=color, markersize=5,
+                        markerfacecolor=color if filled else "none", linestyle="none",
+                        label=name if filled and row == 0 else None,
+                    )  # fmt: skip
+    panel.axvline(AIM, color=GREY, linestyle="--", linewidth=1.0, label=f"aim, {AIM:g}")
+    panel.set(xscale="log", xlabel="largest difference from quadcosim's master [SI units]")
+    panel.set_yticks(range(len(agreements)), [agreement.tool.name for agreement in agreements])
+    panel.invert_yaxis()
+    panel.set_title("open: as the tool comes; filled: with the tool's inputs of the first step in both", fontsize=9)
+    figure.legend(loc="outside right upper", fontsize=8)
+    return figure

@@ -1,0 +1,136 @@
+"""What a tool does with the FMUs, step by step: flown with copies of them that write down what they are given.
+
+A copy differs from its FMU in the entry script alone; the law and the dynamics are the same files.
+"""
+
+import json
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import fmpy
+
+from fmu_kit.packaging import write_archive
+from orchestration.errors import QuadcosimError
+from orchestration.wiring import COMMAND, MEASUREMENT
+
+PORTS = {"controller": (MEASUREMENT, COMMAND), "plant": (COMMAND, MEASUREMENT)}
+"""By component: its connected inputs, and its outputs."""
+
+_LAYER = """
+
+# -- a copy that writes down what it is given ------------------------------------------------------------
+
+import json as _json
+
+_log = open({log!r}, "a", buffering=1, encoding="utf-8")
+
+
+def _do_step(self, t, h):
+    inputs = self.get_real({inputs})
+    done = _Model.do_step(self, t, h)
+    _log.write(_json.dumps({{"t": t, "h": h, "inputs": inputs, "outputs": self.get_real({outputs})}}) + "\\n")
+    return done
+
+
+def _exit_initialization_mode(self):
+    _Model.exit_initialization_mode(self)
+    _log.write(_json.dumps({{"inputs": self.get_real({inputs}), "outputs": self.get_real({outputs})}}) + "\\n")
+
+
+_Model = {model}.__mro__[1]
+{model}.do_step = _do_step
+{model}.exit_initialization_mode = _exit_initialization_mode
+"""
+
+
+def traced_copy(fmu: Path, component: str, folder: Path) -> Path:
+    """A copy of `fmu` in `folder` that writes its steps to `log_of(component, folder)`."""
+    with zipfile.ZipFile(fmu) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    description = fmpy.read_model_description(str(fmu))
+    references = {variable.name: variable.valueReference for variable in description.modelVariables}
+    inputs, outputs = ([references[name] for name in names] for names in PORTS[component])
+    entry = f"resources/{files['resources/slavemodule.txt'].decode().strip()}.py"
+    log = str(log_of(component, folder))
+    layer = _LAYER.format(log=log, inputs=inputs, outputs=outputs, model=description.modelName)
+    copy = folder / fmu.name
+    write_archive(copy, {**files, entry: files[entry] + layer.encode()}, first="modelDescription.xml")
+    return copy
+
+
+def log_of(component: str, folder: Path) -> Path:
+    """Where a traced copy writes: one JSON object for the end of initialisation, one for each step."""
+    return folder / f"{component}.jsonl"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trace:
+    """How a tool flew, as the FMUs saw it."""
+
+    order: str
+    """gauss-seidel: a command is there in the step that begins at its sample; jacobi: in the next one"""
+    first_inputs: dict[str, tuple[float, ...]]
+    """by component: what its first step found at its connected inputs"""
+    first_exchange: dict[str, str]
+    """by component, what that was: exchanged, start values or zeros"""
+    steps: int
+    drift: float
+    """largest distance of a communication point from a multiple of the step [s]"""
+    end: float
+    """where the last step ended [s]"""
+
+
+def read_trace(folder: Path, components: Mapping[str, Path], step: float) -> Trace:
+    """What the logs of `components`, FMUs by name, say; raises `QuadcosimError` if a component took no step."""
+    starts, steps = {}, {}
+    for component in components:
+        log = log_of(component, folder)
+        lines = log.read_text(encoding="utf-8").splitlines() if log.is_file() else []
+        if len(lines) < 2:
+            raise QuadcosimError(f"{component}: expected steps, found none in {log}")
+        starts[component], *steps[component] = map(json.loads, lines)
+    first = {component: tuple(found[0]["inputs"]) for component, found in steps.items()}
+    exact = Fraction(repr(step))
+    last = steps["plant" if "plant" in steps else "controller"]
+    return Trace(
+        order=_order(steps),
+        first_inputs=first,
+        first_exchange={name: _first_exchange(name, components[name], starts, steps) for name in components},
+        steps=len(last),
+        drift=max(abs(line["t"] - float(k * exact)) for k, line in enumerate(last)),
+        end=last[-1]["t"] + last[-1]["h"],
+    )
+
+
+def _order(steps: Mapping[str, list[dict[str, Any]]]) -> str:
+    """From which step's command each step of the plant had; `other` if measurements came late too."""
+    if len(steps) < 2:
+        return "alone"
+    controller, plant = steps["controller"], steps["plant"]
+    commands = [line["outputs"] for line in controller]
+    measured = all(line["inputs"] == before["outputs"] for line, before in zip(controller[1:], plant))
+    if measured and all(line["inputs"] == command for line, command in zip(plant[1:], commands[1:])):
+        return "gauss-seidel"
+    if measured and all(line["inputs"] == command for line, command in zip(plant[1:], commands)):
+        return "jacobi"
+    return "other"
+
+
+def _first_exchange(
+    component: str, fmu: Path, starts: Mapping[str, dict[str, Any]], steps: Mapping[str, list[dict[str, Any]]]
+) -> str:
+    """What the connected inputs of `component` were at its first step."""
+    variables = {v.name: v for v in fmpy.read_model_description(str(fmu)).modelVariables}
+    inputs = steps[component][0]["inputs"]
+    if inputs == [float(variables[name].start) for name in PORTS[component][0]]:
+        return "start values"
+    if not any(inputs):
+        return "zeros"
+    other = "plant" if component == "controller" else "controller"
+    if other not in starts or inputs in (starts[other]["outputs"], steps[other][0]["outputs"]):
+        return "exchanged"
+    return "other"
