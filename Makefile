@@ -1,10 +1,10 @@
 # make demo: build the FMUs, fly the paper's scenario, draw it. make test: lint and run all tests.
-# make bench: time the loop. make figures, make findings: what docs/ shows. Each makes its own environment first.
+# make bench: time the loop. make figures, make findings, make interop: what docs/ shows. Each makes its own environment first.
 PYTHON ?= python3
 BIN := .venv/bin
 export CI
 
-.PHONY: demo test bench figures findings clean
+.PHONY: demo test bench figures findings interop clean
 
 demo: .venv/.base
 	$(BIN)/quadcosim build
@@ -37,5 +37,8 @@ figures: .venv/.base
 findings: .venv/.test
 	$(BIN)/python docs/make_findings.py
 
+interop: .venv/.test
+	$(BIN)/python docs/make_interop.py
+
 clean:
-	rm -rf .venv results fmus/*.fmu
+	rm -rf .venv results fmus/*.fmu fmus/*.ssp

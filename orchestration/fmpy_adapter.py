@@ -42,6 +42,7 @@ class FmuSimulator:
         try:
             self.description: ModelDescription = fmpy.read_model_description(str(path))
             self._folder = fmpy.extract(str(path))
+            _expect_readable_place(Path(self._folder))
             self._fmu = fmi2.FMU2Slave(
                 guid=self.description.guid,
                 unzipDirectory=self._folder,
@@ -220,6 +221,19 @@ class FmuSimulator:
             f"{self.name} ({self.description.modelName}): {function}: {summary}",
             divergence=bool(diverged),
             details=details,
+        )
+
+
+def _expect_readable_place(folder: Path) -> None:
+    """Raises `QuadcosimError` if pythonfmu would crash on the folder in which its FMU was unpacked.
+
+    It is given the folder as a URI, of which pythonfmu 0.7.0 decodes blanks only.
+    """
+    resources = folder / "resources"
+    if (resources / "slavemodule.txt").is_file() and "%" in resources.as_uri().replace("%20", " "):
+        raise QuadcosimError(
+            f"unpacked in {folder}; pythonfmu reads no path with other characters than ASCII letters, digits, "
+            "blanks and - _ . ~: set TMPDIR (on Windows TEMP) to such a folder"
         )
 
 

@@ -2,8 +2,9 @@
 
 The tools differ in what they read of an SSP. libcosim and ecos take parameter sets that are bound to a
 component and want the prefixes ssd, ssc, ssv and osp; libcosim has its step from an annotation; fmpy takes
-a set as an argument, with the component's name before each parameter's. So every value is written twice:
-in a set of each component, and in one of the system. `docs/ssp.md` has the call for each tool.
+a set as an argument, with the component's name before each parameter's; OMSimulator wants its own annotation.
+So every value is written twice, in a set of each component and in one of the system, and the step three times.
+`docs/guides/ssp.md` has the call for each tool.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -36,6 +37,7 @@ _NAMESPACES = {
     "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
     "ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
     "osp": "http://opensimulationplatform.com/SSP/OSPAnnotations",
+    "oms": "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd",
 }
 
 
@@ -164,12 +166,28 @@ def _structure(scenario: Scenario, components: tuple[Component, ...]) -> Element
                 endElement=end.name,
                 endConnector=name,
             )
+    step = repr(scenario.timing.plant_interval)
+    _annotate_for_omsimulator(system, step)
     _add_units(_add(root, "ssd:Units"), components)
     experiment = _add(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(scenario.stop_time))
     annotation = _add(_add(experiment, "ssd:Annotations"), "ssc:Annotation", type="com.opensimulationplatform")
     algorithm = _add(annotation, "osp:Algorithm")
-    _add(algorithm, "osp:FixedStepAlgorithm", baseStepSize=repr(scenario.timing.plant_interval))
+    _add(algorithm, "osp:FixedStepAlgorithm", baseStepSize=step)
     return root
+
+
+def _annotate_for_omsimulator(system: Element, step: str) -> None:
+    """The attributes are what its version 3 reads, the child is what version 2 does not start without."""
+    annotation = _add(_add(system, "ssd:Annotations"), "ssc:Annotation", type="org.openmodelica")
+    master = _add(
+        _add(annotation, "oms:Annotations"),
+        "oms:SimulationInformation",
+        name="oms_ma_default",
+        method="oms_ma",
+        fixedStepSize=step,
+    )
+    tolerances = {"absoluteTolerance": "1e-4", "relativeTolerance": "1e-4"}  # required, and unused at a fixed step
+    _add(master, "oms:FixedStepMaster", description="oms-ma", stepSize=step, **tolerances)
 
 
 def _add_component(elements: Element, component: Component) -> None:
