@@ -12,6 +12,9 @@ from xml.etree.ElementTree import Element, SubElement
 from fmu_kit.units import BASE_UNIT_EXPONENTS
 from fmu_kit.variables import Variable
 
+PYTHON_REQUIRED = ">=3.10"
+"""The Pythons that run what an FMU bundles, as a version specifier; it is in every model description."""
+
 GUID_PLACEHOLDER = "guid-of-the-content"
 """Stands where packaging writes the GUID, once it knows the content."""
 
@@ -54,6 +57,8 @@ def to_xml(slave: Any) -> Element:
         stopTime=repr(experiment.stop_time),
         stepSize=repr(experiment.step_size),
     )
+    annotations = SubElement(root, "VendorAnnotations")
+    SubElement(SubElement(annotations, "Tool", name="quadcosim"), "Python", requires=PYTHON_REQUIRED)
     variables = SubElement(root, "ModelVariables")
     for value_reference, variable in enumerate(slave.variables):
         variables.append(_scalar_variable(variable, value_reference))

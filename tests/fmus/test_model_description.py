@@ -1,19 +1,26 @@
 """`modelDescription.xml`: the contract that people wire to, and the truth of what it says."""
 
+import ast
 import re
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from xml.etree.ElementTree import fromstring
 
 import fmpy
 import pytest
 from fmpy.model_description import ModelDescription
 from fmpy.validation import validate_fmu
 
+from fmu_kit.model_description import PYTHON_REQUIRED
+from orchestration.scenario_file import tomllib
 from orchestration.wiring import MODELS
+from tests.fmus.archive import files_of
 from tests.fmus.expected import MEASUREMENT
 from tests.fmus.instance import Instance
 from tests.fmus.interface_table import TABLES, Row
+from tests.fmus.process import ROOT
+from tests.fmus.python_library import OLDEST
 
 ROWS = [pytest.param(model, row, id=f"{model}-{row.name}") for model, table in TABLES.items() for row in table]
 
@@ -94,6 +101,37 @@ def test_names_are_structured(description: ModelDescription) -> None:
 
 def test_divergence_is_a_log_category(description: ModelDescription) -> None:
     assert "divergence" in {category.name for category in description.logCategories}
+
+
+# -- the Python that runs it ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_description_says_which_python_it_requires_where_the_schema_wants_it(
+    model: str, built: dict[str, Path]
+) -> None:
+    root = fromstring(files_of(built[model])["modelDescription.xml"])
+    assert root.find("VendorAnnotations/Tool[@name='quadcosim']/Python").attrib == {"requires": PYTHON_REQUIRED}
+    order = [element.tag for element in root]
+    place = order.index("VendorAnnotations")
+    assert order[place - 1 : place + 2] == ["DefaultExperiment", "VendorAnnotations", "ModelVariables"]
+
+
+def test_the_required_python_is_the_one_that_the_project_requires_and_is_checked_for() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    oldest = PYTHON_REQUIRED.removeprefix(">=")
+    assert project["project"]["requires-python"] == PYTHON_REQUIRED
+    assert project["tool"]["mypy"]["python_version"] == oldest
+    assert project["tool"]["ruff"]["target-version"] == "py" + oldest.replace(".", "")
+    assert f"{OLDEST[0]}.{OLDEST[1]}" == oldest
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_bundled_sources_are_in_the_syntax_of_the_required_python(model: str, built: dict[str, Path]) -> None:
+    sources = {name: content for name, content in files_of(built[model]).items() if name.endswith(".py")}
+    assert len(sources) > 10
+    for name, content in sources.items():
+        ast.parse(content, name, feature_version=OLDEST)
 
 
 # -- units ----------------------------------------------------------------------------------------------
