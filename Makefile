@@ -1,5 +1,6 @@
 # make demo: build the FMUs, fly the paper's scenario, draw it. make test: lint and run all tests.
-# make bench: time the loop. make figures, make findings, make interop: what docs/ shows. Each makes its own environment first.
+# make bench: time the loop. make figures, make findings, make interop: what docs/ shows, and the icons of the FMUs.
+# Each makes its own environment first.
 PYTHON ?= python3
 BIN := .venv/bin
 export CI
@@ -24,6 +25,7 @@ bench: .venv/.test
 
 figures: .venv/.base
 	$(BIN)/python docs/make_figures.py
+	$(BIN)/python docs/make_icons.py
 
 .venv/.base: pyproject.toml
 	$(PYTHON) -m venv .venv

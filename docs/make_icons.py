@@ -1,0 +1,68 @@
+"""Draws the icons that the FMUs carry as model.png, into the folders of their slaves: run as `make figures`."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, FancyBboxPatch, Polygon
+from PIL import Image
+
+from orchestration.plots import BLUE, ORANGE
+
+ROOT = Path(__file__).parent.parent
+PIXELS = 256
+COLOURS = 64
+"""of the palette: enough for smooth edges, and a file of a few kilobytes"""
+PALE, DARK = "#f3f7fa", "#33414d"
+
+
+def main() -> None:
+    """Draw both."""
+    for folder, draw in (("controller_fmu", controller), ("plant_fmu", plant)):
+        figure = Figure(figsize=(1.0, 1.0), dpi=PIXELS)
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        axes.set(xlim=(-1.0, 1.0), ylim=(-1.0, 1.0))
+        axes.axis("off")
+        draw(axes)
+        target = ROOT / folder / "model.png"
+        figure.savefig(target, transparent=True)
+        with Image.open(target) as image:
+            small = image.quantize(COLOURS)
+        small.save(target, optimize=True)
+
+
+def controller(axes: Axes) -> None:
+    """A signal, and what a controller with a clock makes of it: samples, held."""
+    _tile(axes, BLUE)
+    t = np.linspace(-0.74, 0.74, 200)
+    samples = np.linspace(-0.74, 0.74, 6)
+    signal = 0.45 * np.sin(2.6 * t - 0.2) + 0.12 * np.sin(6.0 * t)
+    held = np.interp(samples, t, signal)
+    held[-1] = held[-2]  # the picture ends before the next sample
+    axes.plot(t, signal, color="white", linewidth=1.0, alpha=0.6)
+    axes.step(samples, held, where="post", color=PALE, linewidth=2.2)
+    axes.plot(
+        samples[:-1], held[:-1], "o", color=ORANGE, markersize=5.0, markeredgecolor=PALE, markeredgewidth=0.8
+    )  # fmt: skip
+
+
+def plant(axes: Axes) -> None:
+    """The vehicle from above, an arrow at its front."""
+    _tile(axes, PALE)
+    for x, y in ((-0.44, -0.44), (-0.44, 0.44), (0.44, -0.44), (0.44, 0.44)):
+        axes.add_patch(Circle((x, y), 0.33, facecolor="#bcd4e2", edgecolor=BLUE, linewidth=1.6))
+        axes.plot((0.0, x), (0.0, y), color=DARK, linewidth=3.5, solid_capstyle="round")
+    body = {"boxstyle": "round,pad=0.08", "facecolor": DARK, "edgecolor": "none", "zorder": 3}
+    axes.add_patch(FancyBboxPatch((-0.12, -0.17), 0.24, 0.34, **body))
+    axes.add_patch(Polygon(((-0.12, 0.02), (0.12, 0.02), (0.0, 0.21)), facecolor=ORANGE, zorder=4))
+
+
+def _tile(axes: Axes, colour: str) -> None:
+    """The ground that the icon stands on, of its own colour so that it shows on light and dark."""
+    tile = {"boxstyle": "round,pad=0.2", "facecolor": colour, "edgecolor": BLUE, "linewidth": 1.2}
+    axes.add_patch(FancyBboxPatch((-0.76, -0.76), 1.52, 1.52, **tile))
+
+
+if __name__ == "__main__":
+    main()
