@@ -23,8 +23,9 @@ import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from xml.dom.minidom import parseString
-from xml.etree.ElementTree import tostring
+from xml.etree.ElementTree import ParseError, fromstring, tostring
 
+from fmu_kit import documentation
 from fmu_kit.model_description import GUID_PLACEHOLDER
 
 SHARED_PACKAGES = ("fmu_kit", "controller_fmu", "plant_fmu", "pythonfmu")
@@ -33,8 +34,17 @@ SHARED_PACKAGES = ("fmu_kit", "controller_fmu", "plant_fmu", "pythonfmu")
 EMPTY_INIT = {"pythonfmu/__init__.py"}
 """Package files replaced by empty ones: pythonfmu's imports its builder."""
 
+FRAGMENT, ICON = "documentation.html", "model.png"
+"""Files that a slave may have beside it: the part of its documentation written by hand, and its icon."""
+
 SOURCE_HASH_FILE = "resources/source_hash.txt"
 _STAMP = (1980, 1, 1, 0, 0, 0)
+
+_LICENCES = """\
+quadcosim.txt: quadcosim, which packed this FMU.
+pythonfmu.txt: pythonfmu, which connects it to FMI.
+The licence of the model itself is named in modelDescription.xml.
+"""
 
 _ENTRY = '''\
 """Entry of {model}.fmu. pythonfmu runs this file once for each instance."""
@@ -89,7 +99,7 @@ def bundled_sources(target: Target) -> dict[str, str]:
     while waiting:
         module = waiting.pop()
         path = _module_path(module)
-        key = "/".join(module.split(".")) + ("/__init__.py" if path.name == "__init__.py" else ".py")
+        key = _place(module)
         if key in sources:
             continue
         sources[key] = "" if key in EMPTY_INIT else path.read_text(encoding="utf-8")
@@ -101,13 +111,15 @@ def bundled_sources(target: Target) -> dict[str, str]:
 
 
 def source_hash(target: Target) -> str:
-    """The hash of all that decides the content of the FMU: its modules, binaries and the packaging itself."""
+    """The hash of all that decides the content of the FMU: its modules and other files, and the packaging itself."""
     digest = hashlib.sha256()
     sources = bundled_sources(target)
-    packaging = {"packaging": Path(__file__).read_text(encoding="utf-8")}
-    for name, text in {**sources, **packaging}.items():
+    packaging = {
+        path.name: _text(path) for path in (Path(__file__), Path(documentation.__file__), documentation.TEMPLATE)
+    }
+    for name, text in {**sources, **packaging, "fragment": _fragment(target)}.items():
         digest.update(f"{name}\0{text}\0".encode())
-    for name, content in _binaries(target.model).items():
+    for name, content in _unchanged_files(target).items():
         digest.update(name.encode() + b"\0" + hashlib.sha256(content).digest())
     return digest.hexdigest()
 
@@ -134,9 +146,10 @@ def build(target: Target, folder: Path) -> Path:
     files[f"resources/{entry}.py"] = _ENTRY.format(bundle=bundle, module=target.module, model=target.model).encode()
     files["resources/slavemodule.txt"] = entry.encode()
     files[SOURCE_HASH_FILE] = digest.encode()
-    files["documentation/licenses/pythonfmu.txt"] = _license_of_pythonfmu().encode()
-    files |= _binaries(target.model)
+    files |= _unchanged_files(target)
     slave = getattr(importlib.import_module(target.module), target.model)
+    source = f"../resources/{bundle}/{_place(target.module)}"
+    files["documentation/index.html"] = documentation.to_html(slave, source, _well_formed_fragment(target)).encode()
     description = parseString(tostring(slave(instance_name="description").to_xml())).toprettyxml(
         indent="  ", encoding="UTF-8"
     )
@@ -185,6 +198,11 @@ def _module_path(module: str) -> Path:
     if not path.is_file():
         raise PackagingError(f"{module}: no source at {path}")
     return path
+
+
+def _place(module: str) -> str:
+    """Where a module is in the bundle."""
+    return "/".join(module.split(".")) + ("/__init__.py" if _module_path(module).name == "__init__.py" else ".py")
 
 
 @functools.cache
@@ -238,6 +256,43 @@ def _binaries(model: str) -> dict[str, bytes]:
         for path in sorted(folder.glob("*/*"))
         if path.suffix in (".so", ".dll", ".dylib")
     }
+
+
+def _unchanged_files(target: Target) -> dict[str, bytes]:
+    """What goes into the FMU as it is, by its place there: binaries, licences, the slave's icon if it has one."""
+    files = _binaries(target.model)
+    for name, text in {
+        "license": _LICENCES,
+        "quadcosim": _text(Path(__file__).with_name("LICENSE")),
+        "pythonfmu": _license_of_pythonfmu(),
+    }.items():
+        files[f"documentation/licenses/{name}.txt"] = text.encode()
+    icon = _module_path(target.module).with_name(ICON)
+    if icon.is_file():
+        files[ICON] = icon.read_bytes()
+    return files
+
+
+def _fragment(target: Target) -> str:
+    """The part of the documentation written by hand; empty if there is none."""
+    path = _module_path(target.module).with_name(FRAGMENT)
+    return _text(path) if path.is_file() else ""
+
+
+def _well_formed_fragment(target: Target) -> str:
+    """The same; raises `PackagingError` if the page would not be well-formed XML with it."""
+    fragment = _fragment(target)
+    try:
+        fromstring(f"<body>{fragment}</body>")
+    except ParseError as error:
+        path = _module_path(target.module).with_name(FRAGMENT)
+        raise PackagingError(f"{path}: {error}; expected well-formed XML") from error
+    return fragment
+
+
+def _text(path: Path) -> str:
+    """The text of a file, lines ending the same on every system."""
+    return path.read_text(encoding="utf-8")
 
 
 def _license_of_pythonfmu() -> str:

@@ -4,7 +4,6 @@ import ast
 import datetime
 import shutil
 import sys
-import zipfile
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
@@ -14,8 +13,11 @@ import pytest
 from fmu_kit import packaging
 from orchestration import fmus
 from orchestration.errors import QuadcosimError
+from orchestration.scenario_file import tomllib
 from orchestration.wiring import MODELS
-from tests.fmus.source_tree import build, copy_sources, python, replace, try_to_build
+from tests.fmus.archive import files_of
+from tests.fmus.process import ROOT
+from tests.fmus.source_tree import PACKAGES, build, copy_sources, python, replace, try_to_build
 
 EPOCH = 1_000_000_000  # 2001-09-09T01:46:40Z
 
@@ -30,11 +32,6 @@ def sources(tmp_path: Path) -> Path:
 def no_source_date(monkeypatch: pytest.MonkeyPatch) -> None:
     """The environment of a packager must not decide these tests."""
     monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
-
-
-def files_of(fmu: Path) -> dict[str, bytes]:
-    with zipfile.ZipFile(fmu) as archive:
-        return {name: archive.read(name) for name in archive.namelist()}
 
 
 def hash_of(sources: Path, model: str) -> str:
@@ -155,6 +152,13 @@ def test_every_import_from_the_bundle_finds_a_bundled_file(model: str, built: di
 
 
 @pytest.mark.parametrize("model", MODELS)
+def test_what_only_building_needs_is_not_bundled(model: str, built: dict[str, Path]) -> None:
+    bundled = {PurePosixPath(name).name for name in files_of(built[model]) if "/fmu_kit/" in name}
+    assert "slave.py" in bundled
+    assert not bundled & {"packaging.py", "documentation.py", "page.html"}
+
+
+@pytest.mark.parametrize("model", MODELS)
 def test_the_archive_has_the_licence_of_pythonfmu(model: str, built: dict[str, Path]) -> None:
     licence = files_of(built[model])["documentation/licenses/pythonfmu.txt"].decode()
     assert "Permission is hereby granted, free of charge" in licence
@@ -246,12 +250,32 @@ def test_the_source_hash_changes_with_a_source(sources: Path) -> None:
     assert hash_of(sources, "UnifiedController") == before["UnifiedController"]
 
 
-@pytest.mark.parametrize("file", ["packaging.py", "slave.py", "failure.py", "algebra.py", "units.py"])
+@pytest.mark.parametrize("file", ["packaging.py", "documentation.py", "page.html", "LICENSE", "slave.py", "units.py"])
 def test_the_source_hash_changes_with_what_both_fmus_stand_on(file: str, sources: Path) -> None:
     before = {model: hash_of(sources, model) for model in MODELS}
     with (sources / "fmu_kit" / file).open("a", encoding="utf-8") as source:
         source.write("# changed\n")
     assert all(hash_of(sources, model) != before[model] for model in MODELS)
+
+
+@pytest.mark.parametrize("file", ["documentation.html", "model.png"])
+def test_the_source_hash_changes_with_the_files_beside_the_slave(file: str, sources: Path) -> None:
+    before = {model: hash_of(sources, model) for model in MODELS}
+    path = sources / "plant_fmu" / file
+    path.write_bytes(path.read_bytes() + b"\n")
+    changed = hash_of(sources, "QuadrotorPlant")
+    assert changed != before["QuadrotorPlant"]
+    assert hash_of(sources, "UnifiedController") == before["UnifiedController"]
+    path.unlink()
+    assert hash_of(sources, "QuadrotorPlant") not in (changed, before["QuadrotorPlant"])
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_an_installed_package_has_every_file_that_packaging_reads(package: str) -> None:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    declared = settings["tool"]["setuptools"]["package-data"][package]
+    files = {path.name for path in (ROOT / package).iterdir() if path.is_file() and path.suffix != ".py"}
+    assert sorted(declared) == sorted(files)
 
 
 def test_fresh_fmus_are_up_to_date(built: dict[str, Path]) -> None:

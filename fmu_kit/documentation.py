@@ -1,0 +1,117 @@
+"""`documentation/index.html` of an FMU: what its author wrote by hand, and tables of what the slave declares.
+
+Used when an FMU is built: no slave may import it, for an FMU bundles what its slave imports. The page is
+well-formed XML, and everything in it is in the file: the viewers that tools have load nothing else.
+"""
+
+import itertools
+import posixpath
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from html import escape
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from fmu_kit.model_description import PYTHON_REQUIRED
+from fmu_kit.variables import Variable
+
+TEMPLATE = Path(__file__).with_name("page.html")
+"""The page around the part written by hand."""
+
+HEADINGS = {"input": "Inputs", "output": "Outputs", "parameter": "Parameters", "local": "Locals"}
+"""The causalities in the order of the page."""
+
+
+def to_html(slave: Any, source: str, fragment: str = "") -> str:
+    """The page of a `Slave` class.
+
+    `source` is the link from the page to the slave's module. `fragment` is the part written by hand: sections
+    of XHTML, whose relative links start at the folder of the slave.
+    """
+    experiment = slave.default_experiment
+    return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
+        model=escape(slave.__name__),
+        description=escape(slave.description),
+        author=escape(slave.author),
+        license=escape(slave.license),
+        python=escape(PYTHON_REQUIRED),
+        start=_number(experiment.start_time),
+        stop=_number(experiment.stop_time),
+        step=_number(experiment.step_size),
+        source=escape(source),
+        contents="".join(f"{link} · " for link in _contents(fragment)),
+        fragment=_relocated(fragment, posixpath.dirname(source)).strip(),
+        variables="\n".join(_tables(slave.variables)),
+        categories=_table(("Category", "Messages"), [(_code(k), escape(v)) for k, v in slave.log_categories.items()]),
+    )
+
+
+def _contents(fragment: str) -> list[str]:
+    """Links to the sections of the part written by hand."""
+    return [f'<a href="#{name}">{title}</a>' for name, title in re.findall(r'<h2 id="([^"]+)">(.*?)</h2>', fragment)]
+
+
+def _relocated(fragment: str, folder: str) -> str:
+    """The fragment with its links to files starting at `folder`."""
+    return re.sub(r'\bhref="(?!#|[a-z]+:)', f'href="{escape(folder)}/', fragment)
+
+
+def _tables(variables: Sequence[Variable]) -> Iterator[str]:
+    """A heading and a table for each causality that occurs."""
+    for causality, heading in HEADINGS.items():
+        chosen = [v for v in variables if v.causality == causality]
+        if chosen:
+            yield f"<h3>{heading} ({len(chosen)})</h3>"
+            columns = ("Name", "Unit", "Start", "Min", "Max", "Variability", "Description")
+            yield _table(columns, [_row(alike) for alike in _vectors(chosen)])
+
+
+def _vectors(variables: Sequence[Variable]) -> Iterator[list[Variable]]:
+    """Neighbours that differ in the last part of the name and in the start only, together."""
+
+    def shared(variable: Variable) -> tuple[str, Variable]:
+        vector = variable.name.rpartition(".")[0] or variable.name
+        return variable.type, replace(variable, name=vector, start=0.0)
+
+    for _, alike in itertools.groupby(variables, shared):
+        yield list(alike)
+
+
+def _row(alike: list[Variable]) -> tuple[str, ...]:
+    first = alike[0]
+    vector = first.name.rpartition(".")[0]
+    axes = ",".join(variable.name.rpartition(".")[2] for variable in alike)
+    starts = [_number(variable.start) for variable in alike if variable.has_start]
+    return (
+        _code(f"{vector}.{{{axes}}}" if len(alike) > 1 else first.name),
+        escape(first.unit) if first.unit is not None else first.type,
+        starts[0] if len(set(starts)) == 1 else ", ".join(starts),
+        _number(first.minimum) if first.above is None else f"&gt; {_number(first.above)}",
+        _number(first.maximum),
+        first.variability,
+        escape(first.description),
+    )
+
+
+def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table of cells that are HTML already; columns in which no row has anything are left out."""
+    kept = [i for i in range(len(columns)) if any(row[i] for row in rows)]
+    lines = ["".join(f"<th>{columns[i]}</th>" for i in kept)]
+    lines += ["".join(f"<td>{row[i]}</td>" for i in kept) for row in rows]
+    return "\n".join(['<div class="wide"><table>', *(f"<tr>{line}</tr>" for line in lines), "</table></div>"])
+
+
+def _code(text: str) -> str:
+    return f"<code>{escape(text)}</code>"
+
+
+def _number(value: float | int | bool | None) -> str:
+    """In the shortest form that is exact; nothing for None."""
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return str(value).lower()
+    short = f"{value:g}"
+    return short if float(short) == value else repr(value)
