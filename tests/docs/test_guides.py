@@ -1,4 +1,7 @@
-"""The guides work: commands and programs are taken out of the pages and run, with nothing but the FMUs beside them."""
+"""The guides work: commands and programs are taken out of the pages and run, with nothing but the FMUs beside them.
+
+Of the pages for tools that are not to be had here, the names, the numbers of ports and the connections are checked.
+"""
 
 import os
 import re
@@ -6,9 +9,12 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import types
 from pathlib import Path
 from typing import NamedTuple
+from unittest.mock import MagicMock
 
+import fmpy
 import numpy as np
 import pytest
 
@@ -16,6 +22,7 @@ from orchestration import ssp
 from orchestration.flight import run
 from orchestration.scenario import Scenario
 from orchestration.timing import Timing
+from orchestration.wiring import COMMAND, MEASUREMENT
 
 GUIDES = Path(__file__).parent.parent.parent / "docs" / "guides"
 POSITION = [f"plant.position.{axis}" for axis in "xyz"]
@@ -135,3 +142,79 @@ def test_the_ssp_guide_flies_the_same_file_in_three_tools_and_the_container(
     container = np.genfromtxt(folder / "loop.csv", delimiter=",", names=True, deletechars="")
     for name in POSITION:
         assert np.abs(container[name.removeprefix("plant.")] - at_once[name]).max() < 1e-9, name
+
+
+# -- tools that are not to be had here --------------------------------------------------------------------
+
+NOT_RUN = ("simulink.md", "openmodelica.md", "dymola.md")
+CONNECTIONS = {
+    *((f"plant.{name}", f"controller.{name}") for name in MEASUREMENT),
+    *((f"controller.{name}", f"plant.{name}") for name in COMMAND),
+}
+
+
+def ports(fmu: Path, causality: str) -> list[str]:
+    """Names of inputs or outputs, in the order of the description."""
+    return [v.name for v in fmpy.read_model_description(str(fmu)).modelVariables if v.causality == causality]
+
+
+def program(page: str, name: str) -> str:
+    """The text of a block."""
+    return next(block.text for block in blocks(page) if block.name == name)
+
+
+def test_a_page_says_at_its_top_that_we_have_not_run_it_and_so_does_the_overview() -> None:
+    overview = (GUIDES / "README.md").read_text(encoding="utf-8")
+    for page in sorted(path.name for path in GUIDES.glob("*.md") if path.name != "README.md"):
+        top = (GUIDES / page).read_text(encoding="utf-8").split("\n\n")[1]
+        assert top.startswith("**Not run by us") == (page in NOT_RUN), page
+        (row,) = (line for line in overview.splitlines() if line.startswith("|") and f"({page})" in line)
+        assert row.split("|")[3].strip().startswith("no" if page in NOT_RUN else "yes"), page
+
+
+def test_the_simulink_script_counts_the_ports_as_they_are(built: dict[str, Path]) -> None:
+    text = program("simulink.md", "build_loop.m")
+    plant, controller = built["QuadrotorPlant"], built["UnifiedController"]
+    spans = {line: (int(a) - 1, int(b)) for line, a, b in re.findall(r"^(for k = (\d+):(\d+))", text, re.M)}
+    state, command, force, reference = spans.values()
+    assert ports(plant, "output")[slice(*state)] == ports(controller, "input")[slice(*state)] == list(MEASUREMENT)
+    assert ports(controller, "output")[slice(*command)] == ports(plant, "input")[slice(*command)] == list(COMMAND)
+    assert ports(plant, "input")[slice(*force)] == [f"external_force.{axis}" for axis in "xyz"]
+    assert force[1] == len(ports(plant, "input"))
+    assert all(name.startswith("reference.") for name in ports(controller, "input")[slice(*reference)])
+    assert reference[1] == len(ports(controller, "input"))
+
+
+def test_the_simulink_gains_are_all_of_them(built: dict[str, Path]) -> None:
+    gains = [
+        v.name
+        for v in fmpy.read_model_description(str(built["UnifiedController"])).modelVariables
+        if v.name.startswith("gain.")
+    ]
+    text = program("simulink.md", "set_gain.m")
+    read = re.findall(r"[ ,](gain\.[a-z.]+)", text[text.index("set_param") :])
+    assert read == gains
+
+
+def test_the_omsimulator_2_script_makes_every_connection(monkeypatch: pytest.MonkeyPatch) -> None:
+    oms = MagicMock()
+    module = types.ModuleType("OMSimulator")
+    monkeypatch.setattr(module, "OMSimulator", lambda: oms, raising=False)
+    monkeypatch.setitem(sys.modules, "OMSimulator", module)
+    exec(program("openmodelica.md", "fly_omsimulator_2.py"), {})
+    made = {tuple(end.removeprefix("loop.root.") for end in call.args) for call in oms.addConnection.call_args_list}
+    assert made == CONNECTIONS
+
+
+def test_the_modelica_model_gives_every_input_an_equation_once(built: dict[str, Path]) -> None:
+    text = program("dymola.md", "Loop.mo")
+    flat = {(a.replace(".", "_"), b.replace(".", "_")) for a, b in CONNECTIONS}
+    made = [(a.replace(".", "_"), b.replace(".", "_")) for a, b in re.findall(r"connect\((\S+), (\S+)\);", text)]
+    assert sorted(made) == sorted(flat)
+    zeros = {name.replace(".", "_", 1) for name in re.findall(r"^  (\S+) = 0;", text, re.M)}
+    inputs = {
+        f"{element}_{name.replace('.', '_')}"
+        for element, model in (("plant", "QuadrotorPlant"), ("controller", "UnifiedController"))
+        for name in ports(built[model], "input")
+    }
+    assert zeros == inputs - {end for _, end in flat}
