@@ -1,0 +1,72 @@
+"""The Python sources that pythonfmu has packed into an FMU, and what they import; nothing is imported here."""
+
+import ast
+import sys
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+ENTRY = "resources/slavemodule.txt"
+_MODULES = (".py", ".so", ".pyd")
+_FORGIVING = {"ImportError", "ModuleNotFoundError"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PythonSources:
+    """What the sources in an FMU of pythonfmu need."""
+
+    imports: tuple[str, ...]
+    """Top-level packages that are neither bundled nor in the standard library of this Python."""
+    problems: tuple[str, ...]
+
+
+def read(archive: zipfile.ZipFile) -> PythonSources | None:
+    """Look through the sources in `resources`; None for an FMU that pythonfmu did not make."""
+    names = archive.namelist()
+    if ENTRY not in names:
+        return None
+    bundled = set(filter(None, map(_bundled, names)))
+    imports: set[str] = set()
+    problems = []
+    entry = archive.read(ENTRY).decode("utf-8", "replace").strip()
+    if f"resources/{entry}.py" not in names:
+        problems.append(f"{ENTRY} names {entry}, but there is no resources/{entry}.py")
+    for name in names:
+        if name.startswith("resources/") and name.endswith(".py"):
+            try:
+                imports |= set(_needed(ast.parse(archive.read(name))))
+            except (SyntaxError, ValueError) as error:
+                problems.append(f"{name}: not Python {sys.version_info[0]}.{sys.version_info[1]}: {error}")
+    beyond = imports - bundled - sys.stdlib_module_names
+    return PythonSources(imports=tuple(sorted(beyond)), problems=tuple(problems))
+
+
+def _bundled(name: str) -> str | None:
+    """The name by which a file of the archive, or the package that it is in, can be imported."""
+    folder, _, place = name.partition("/")
+    return (
+        place.partition("/" if "/" in place else ".")[0] if folder == "resources" and place.endswith(_MODULES) else None
+    )
+
+
+def _needed(node: ast.AST) -> Iterator[str]:
+    """Top-level packages imported in a tree, without those that it does without if they are not there."""
+    if isinstance(node, ast.Import):
+        yield from (alias.name.partition(".")[0] for alias in node.names)
+    elif isinstance(node, ast.ImportFrom):
+        if node.level == 0 and node.module is not None:
+            yield node.module.partition(".")[0]
+    elif isinstance(node, ast.Try) and any(map(_forgives, node.handlers)):
+        for statement in (*node.orelse, *node.finalbody):
+            yield from _needed(statement)
+    elif isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+        for statement in node.orelse:
+            yield from _needed(statement)
+    else:
+        for child in ast.iter_child_nodes(node):
+            yield from _needed(child)
+
+
+def _forgives(handler: ast.ExceptHandler) -> bool:
+    caught = handler.type.elts if isinstance(handler.type, ast.Tuple) else [handler.type]
+    return any(isinstance(error, ast.Name) and error.id in _FORGIVING for error in caught)

@@ -1,0 +1,65 @@
+"""Looking at machines of other kinds, as far as they can be pretended: what cannot be had is unknown."""
+
+import os
+import platform
+import sys
+from pathlib import Path
+
+import pytest
+
+from orchestration.doctor.archive import open_fmu
+from orchestration.doctor.binaries import LINUX, MACOS, WINDOWS
+from orchestration.doctor.machine import this_machine
+from orchestration.doctor.report import Report, as_tables
+from orchestration.doctor.text import as_text
+from orchestration.doctor.verdict import judge
+
+
+@pytest.mark.parametrize(
+    ("name", "machine", "system", "architecture", "folder"),
+    [
+        ("Linux", "x86_64", LINUX, "x86-64", "linux64"),
+        ("Linux", "aarch64", LINUX, "aarch64", "linux64"),
+        ("Windows", "AMD64", WINDOWS, "x86-64", "win64"),
+        ("Darwin", "arm64", MACOS, "aarch64", "darwin64"),
+    ],
+)
+def test_every_system_is_called_as_binaries_call_it(
+    name: str, machine: str, system: str, architecture: str, folder: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(platform, "system", lambda: name)
+    monkeypatch.setattr(platform, "machine", lambda: machine)
+    looked_at = this_machine(())
+    assert (looked_at.system, looked_at.architecture, looked_at.platform) == (system, architecture, folder)
+
+
+@pytest.mark.parametrize("name", ["Windows", "Darwin", "FreeBSD", ""])
+def test_where_nothing_can_be_had_there_is_still_a_report(
+    name: str, built: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(platform, "system", lambda: name)
+    monkeypatch.setattr(sys, "executable", "")
+    monkeypatch.delattr(os, "confstr")
+    fmu = open_fmu(built["QuadrotorPlant"])
+    machine = this_machine([fmu])
+    assert machine.glibc is None
+    assert machine.shared is (True if name == "Windows" else None)
+    report = Report(machine=machine, verdicts=(judge(fmu, machine, "not tried"),))
+    assert not report.good
+    assert as_tables(report)["machine"]["python_libraries"] == []
+    assert "libpython    none for a host that is not Python" in as_text(report)
+
+
+def test_libraries_are_looked_for_under_the_names_that_binaries_give(built: dict[str, Path]) -> None:
+    machine = this_machine([open_fmu(path) for path in built.values()])
+    assert set(machine.found) == {"libstdc++.so.6", "libgcc_s.so.1", "libc.so.6"}
+    for library in machine.found.values():
+        assert library is not None
+        assert library.path.is_file()
+    assert set(machine.found_by_python) == set(machine.found)
+
+
+def test_a_process_of_32_bits_is_one_on_a_machine_of_64(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(platform, "machine", lambda: "x86_64")
+    monkeypatch.setattr("struct.calcsize", lambda kind: 4)
+    assert this_machine(()).platform == "linux32"
