@@ -140,6 +140,23 @@ def validate(
 
 
 @app.command()
+def doctor(
+    fmu: Annotated[list[Path] | None, typer.Argument(help="FMUs; without any, those of this project.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the same facts as JSON.")] = False,
+) -> None:
+    """Say what FMUs need to load, what of it this machine has, and try; exit code 1 if anything is missing."""
+    from orchestration import fmus
+    from orchestration.doctor.report import as_tables, examine
+    from orchestration.doctor.text import as_text
+    from orchestration.wiring import MODELS
+
+    report = examine(fmu or [fmus.locate(name, say) for name in MODELS])
+    print(json.dumps(as_tables(report), indent=2) if as_json else as_text(report))
+    if not report.good:
+        raise typer.Exit(1)
+
+
+@app.command()
 @flies
 def ssp(
     scenario: Annotated[

@@ -103,7 +103,7 @@ def error_line(done: Done) -> str:
 def test_help_lists_the_commands() -> None:
     for flag in ("--help", "-h"):
         text = quadcosim(flag).stdout
-        assert all(command in text for command in ("build", "run", "plot", "validate"))
+        assert all(command in text for command in ("build", "run", "plot", "validate", "doctor"))
 
 
 def test_without_a_command_the_help_is_shown_as_wrong_usage() -> None:
