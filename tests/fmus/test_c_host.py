@@ -7,9 +7,12 @@ from pathlib import Path
 import fmpy
 import pytest
 
+from orchestration.doctor.archive import open_fmu
+from orchestration.doctor.machine import this_machine
+from orchestration.doctor.pythons import PythonLibrary
+from orchestration.doctor.verdict import INSTALL_LIBPYTHON, other_host, satisfies
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
 from tests.fmus.process import run
-from tests.fmus.python_library import other_libraries, own_library
 
 STEPS, H = 100, 0.01
 
@@ -28,19 +31,16 @@ def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def library() -> str:
+def library() -> PythonLibrary:
     """A shared libpython."""
-    found = own_library() or next(other_libraries(), None)
-    if found is None:
-        pytest.skip(
-            "no shared libpython of 3.10 or later: install one "
-            "(Debian and Ubuntu: apt install libpython3-dev; Fedora: dnf install python3-libs)"
-        )
-    return str(found)
+    for found in this_machine(()).python_libraries:
+        if satisfies(found.version, ">=3.10"):
+            return found
+    pytest.skip(f"no shared libpython of 3.10 or later: {INSTALL_LIBPYTHON}")
 
 
 @pytest.fixture
-def environment(tmp_path: Path, library: str) -> dict[str, str]:
+def environment(tmp_path: Path, library: PythonLibrary) -> dict[str, str]:
     """For the embedded interpreter: a numpy that betrays its import, and the standard library that fits."""
     trap = tmp_path / "trap" / "numpy"
     trap.mkdir(parents=True)
@@ -48,8 +48,8 @@ def environment(tmp_path: Path, library: str) -> dict[str, str]:
         "import pathlib\npathlib.Path(__file__).with_name('imported').touch()\nraise ImportError('numpy in an FMU')\n"
     )
     variables = {"PYTHONPATH": str(trap.parent), "PYTHONDONTWRITEBYTECODE": "1"}
-    if library == str(own_library()):
-        variables["PYTHONHOME"] = sys.base_prefix
+    if library.home is not None:
+        variables["PYTHONHOME"] = str(library.home)
     return variables
 
 
@@ -71,15 +71,32 @@ def arguments(fmu: Path, folder: Path, inputs: dict[str, float]) -> list[str]:
 
 @pytest.mark.parametrize("folder", ["unpacked", "folder with spaces"])
 def test_a_c_program_gets_the_command_of_the_law_without_numpy(
-    folder: str, host: Path, library: str, environment: dict[str, str], built: dict[str, Path], tmp_path: Path
+    folder: str, host: Path, library: PythonLibrary, environment: dict[str, str], built: dict[str, Path], tmp_path: Path
 ) -> None:
     given = arguments(built["UnifiedController"], tmp_path / folder, MEASUREMENT)
-    done = run(str(host), library, *given, environment=environment)
+    done = run(str(host), str(library.path), *given, environment=environment)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     command = [float(line) for line in done.stdout.splitlines()]
     assert command == pytest.approx(law_command((STEPS - 1) * H), rel=1e-12, abs=1e-12)
     assert not list(tmp_path.glob("trap/numpy/imported"))
+
+
+@pytest.mark.usefixtures("library")
+def test_a_c_program_started_as_the_doctor_says_finds_python(
+    host: Path, built: dict[str, Path], tmp_path: Path
+) -> None:
+    """The host opens the C library in place of Python: what it then lacks is what doctor must give."""
+    fmu = open_fmu(built["UnifiedController"])
+    given = arguments(fmu.path, tmp_path / "unpacked", MEASUREMENT)
+    alone = run(str(host), "libc.so.6", *given)
+    assert alone.returncode == 1
+    assert "undefined symbol: " in alone.stderr
+    *variables, tool = (other_host(fmu, this_machine([fmu])).start or "").split(" ")
+    assert tool == "TOOL"
+    done = run(str(host), "libc.so.6", *given, environment=dict(pair.split("=", 1) for pair in variables))
+    assert done.returncode == 0, done.stderr
+    assert [float(line) for line in done.stdout.splitlines()] == pytest.approx(law_command((STEPS - 1) * H), rel=1e-12)
 
 
 def test_the_trap_would_have_caught_an_import_of_numpy(environment: dict[str, str], tmp_path: Path) -> None:
@@ -102,13 +119,13 @@ def test_a_c_program_is_told_why_a_call_failed(
     call: str,
     message: str,
     host: Path,
-    library: str,
+    library: PythonLibrary,
     environment: dict[str, str],
     built: dict[str, Path],
     tmp_path: Path,
 ) -> None:
     given = arguments(built["UnifiedController"], tmp_path / "unpacked", inputs)
-    done = run(str(host), library, *given, environment=environment)
+    done = run(str(host), str(library.path), *given, environment=environment)
     assert done.returncode == 3, done.stderr
     assert message in done.stderr
     assert f"{call}: status 4" in done.stderr
