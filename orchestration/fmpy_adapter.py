@@ -224,16 +224,19 @@ class FmuSimulator:
         )
 
 
-def _expect_readable_place(folder: Path) -> None:
-    """Raises `QuadcosimError` if pythonfmu would crash on the folder in which its FMU was unpacked.
+def uri_is_read(folder: Path) -> bool:
+    """Whether pythonfmu 0.7.0 finds an FMU that is unpacked in `folder`; it crashes where it does not.
 
-    It is given the folder as a URI, of which pythonfmu 0.7.0 decodes blanks only.
+    It is given the folder as a URI, of whose escapes it knows that of the space only.
     """
-    resources = folder / "resources"
-    if (resources / "slavemodule.txt").is_file() and "%" in resources.as_uri().replace("%20", " "):
+    return "%" not in folder.as_uri().replace("%20", "")
+
+
+def _expect_readable_place(folder: Path) -> None:
+    if (folder / "resources" / "slavemodule.txt").is_file() and not uri_is_read(folder):
         raise QuadcosimError(
             f"unpacked in {folder}; pythonfmu reads no path with other characters than ASCII letters, digits, "
-            "blanks and - _ . ~: set TMPDIR (on Windows TEMP) to such a folder"
+            "spaces and - . _ ~: set TMPDIR (on Windows TEMP) to such a folder"
         )
 
 

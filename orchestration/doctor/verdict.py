@@ -1,7 +1,6 @@
 """What an FMU needs against what a machine has: pure functions of the two."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from packaging.specifiers import InvalidSpecifier, SpecifierSet
 
@@ -10,6 +9,7 @@ from orchestration.doctor.binaries import LINUX, WINDOWS
 from orchestration.doctor.dependencies import PYTHON_DLL, lacking, part_for
 from orchestration.doctor.machine import Machine
 from orchestration.doctor.pythons import ON_PATH, PRELOADED, PythonLibrary
+from orchestration.fmpy_adapter import uri_is_read
 
 INSTALL_LIBPYTHON = "apt install libpython3-dev (Debian, Ubuntu), dnf install python3-libs (Fedora)"
 
@@ -127,11 +127,6 @@ def is_specifier(text: str) -> bool:
     except InvalidSpecifier:
         return False
     return True
-
-
-def uri_is_read(folder: Path) -> bool:
-    """Whether pythonfmu finds an FMU that is unpacked there: of the escapes in a URI it knows that of a space."""
-    return "%" not in folder.as_uri().replace("%20", "")
 
 
 def _general_needs(fmu: Fmu, machine: Machine, part: PlatformBinary | None) -> list[str]:

@@ -19,10 +19,13 @@ import numpy as np
 import pytest
 
 from orchestration import ssp
+from orchestration.doctor.machine import this_machine
+from orchestration.doctor.verdict import INSTALL_LIBPYTHON, satisfies
 from orchestration.flight import run
 from orchestration.scenario import Scenario
 from orchestration.timing import Timing
 from orchestration.wiring import COMMAND, MEASUREMENT
+from tests.fmus.expected import law_command
 
 GUIDES = Path(__file__).parent.parent.parent / "docs" / "guides"
 POSITION = [f"plant.position.{axis}" for axis in "xyz"]
@@ -142,6 +145,24 @@ def test_the_ssp_guide_flies_the_same_file_in_three_tools_and_the_container(
     container = np.genfromtxt(folder / "loop.csv", delimiter=",", names=True, deletechars="")
     for name in POSITION:
         assert np.abs(container[name.removeprefix("plant.")] - at_once[name]).max() < 1e-9, name
+
+
+def test_the_c_guide_compiles_and_flies_the_controller(folder: Path, environment: dict[str, str]) -> None:
+    if shutil.which("cc") is None:
+        pytest.skip("no C compiler: install one that is called cc (Debian and Ubuntu: apt install gcc libc6-dev)")
+    library = next((found for found in this_machine(()).python_libraries if satisfies(found.version, ">=3.10")), None)
+    if library is None:
+        pytest.skip(f"no shared libpython of 3.10 or later: {INSTALL_LIBPYTHON}")
+    shutil.copy(GUIDES / "host.c", folder)
+    host = {**environment, "LIBPYTHON": str(library.path)}
+    if library.home is not None:
+        host["PYTHONHOME"] = str(library.home)
+    (block,) = (block for block in blocks("c_host.md") if block.name == "fly.sh")
+    done = subprocess.run(["bash", "-c", block.text], cwd=folder, env=host, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    measurement = {"position.z": 2.0, "velocity.x": 0.6, "quaternion.w": 1.0}
+    expected = law_command(0.99, {name: measurement.get(name, 0.0) for name in MEASUREMENT})
+    assert [float(line) for line in done.stdout.splitlines()] == pytest.approx(expected, rel=1e-12)
 
 
 # -- tools that are not to be had here --------------------------------------------------------------------

@@ -1,5 +1,7 @@
 """The command that the controller FMU must give, from the law called directly."""
 
+from collections.abc import Mapping
+
 from controller_fmu.law import Gains, Measurement, Model, evaluate
 from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.trajectory import Trajectory
@@ -24,13 +26,13 @@ MEASUREMENT = {
 COMMAND = ("thrust", "torque.x", "torque.y", "torque.z")
 
 
-def law_command(t: float) -> list[float]:
-    """Thrust [N] and torque [N.m] at `t` [s] for `MEASUREMENT`, the built-in trajectory and default parameters."""
+def law_command(t: float, measurement: Mapping[str, float] = MEASUREMENT) -> list[float]:
+    """Thrust [N] and torque [N.m] at `t` [s] for a measurement, the built-in trajectory and default parameters."""
 
     def vector(name: str) -> Vec3:
-        return Vec3(*(MEASUREMENT[f"{name}.{axis}"] for axis in "xyz"))
+        return Vec3(*(measurement[f"{name}.{axis}"] for axis in "xyz"))
 
-    quaternion = Quaternion(vector("quaternion"), MEASUREMENT["quaternion.w"]).normalised()
+    quaternion = Quaternion(vector("quaternion"), measurement["quaternion.w"]).normalised()
     state = Measurement(vector("position"), vector("velocity"), quaternion, vector("angular_velocity"))
     evaluation = evaluate(state, Trajectory().at(t), Gains(), Model())
     return [evaluation.thrust, *evaluation.torque]

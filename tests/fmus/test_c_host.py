@@ -24,7 +24,7 @@ def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if compiler is None:
         pytest.skip("no C compiler: install one that is called cc (Debian and Ubuntu: apt install gcc libc6-dev)")
     program = tmp_path_factory.mktemp("host") / "host"
-    source = Path(__file__).with_name("host.c")
+    source = Path(__file__).parent.parent.parent / "docs" / "guides" / "host.c"
     done = run(compiler, "-std=c11", "-Wall", "-Wextra", "-Werror", str(source), "-o", str(program), "-ldl")
     assert done.returncode == 0, done.stderr
     return program
