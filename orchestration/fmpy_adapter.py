@@ -5,7 +5,7 @@ import difflib
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import fmpy
 from fmpy import fmi2
@@ -14,6 +14,9 @@ from fmpy.model_description import ModelDescription, ScalarVariable
 
 from orchestration.errors import QuadcosimError, SimulatorError, UsageError
 from orchestration.simulator import Floats, Transfer
+
+Message: TypeAlias = tuple[int, bytes | None, bytes]
+"""Status, category and text of what an FMU logged"""
 
 _WARNING = fmi2.fmi2Warning
 DIVERGENCE_CATEGORY = b"divergence"
@@ -33,7 +36,7 @@ class FmuSimulator:
         self.warnings: list[str] = []
         self.failed = False
         """Whether a call has failed: the instance is then never called again."""
-        self._messages: list[tuple[int, bytes | None, bytes]] = []
+        self._messages: list[Message] = []
         self._folder: str | None = None
         if path.is_file() and fmpy.platform not in fmpy.supported_platforms(str(path)):
             raise QuadcosimError(
@@ -49,8 +52,8 @@ class FmuSimulator:
                 modelIdentifier=self.description.coSimulation.modelIdentifier,
                 instanceName=instance_name,
             )
-            self._fmu.instantiate(callbacks=self._callbacks(), loggingOn=True)
-            _release_interpreter_state(self._fmu.dll)
+            self._fmu.instantiate(callbacks=collecting_callbacks(self._messages), loggingOn=True)
+            release_interpreter_state(self._fmu.dll)
         except Exception as error:
             self.failed = True
             self.close()
@@ -186,22 +189,6 @@ class FmuSimulator:
         except FMICallException as error:
             raise self._failure(error.function) from None
 
-    def _callbacks(self) -> fmi2.fmi2CallbackFunctions:
-        """Callbacks that collect the messages of this instance.
-
-        fmpy's own proxy, which formats messages, keeps one logger for the whole process; pythonfmu passes no
-        arguments to format, only doubled percent signs.
-        """
-
-        def log(environment: Any, instance: bytes, status: int, category: bytes | None, message: bytes) -> None:
-            self._messages.append((status, category, message.replace(b"%%", b"%")))
-
-        callbacks = fmi2.fmi2CallbackFunctions()
-        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(log)
-        callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
-        callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
-        return callbacks
-
     def _collect_warnings(self) -> None:
         for status, _, message in self._messages:
             if status == _WARNING:
@@ -211,12 +198,8 @@ class FmuSimulator:
     def _failure(self, function: str) -> SimulatorError:
         """The error for a call that failed, in the words that the FMU logged."""
         self.failed = True
-        bad = [m for m in self._messages if m[0] > _WARNING]
-        diverged = [m for m in bad if m[1] == DIVERGENCE_CATEGORY]
-        text = (diverged or bad or [(0, None, b"no message")])[0][2].decode("utf-8", "replace")
-        if text.startswith("Fatal py exception"):  # pythonfmu's own line comes before the slave's text
-            text = text.partition("\n")[2]
-        summary, _, details = text.partition("\n")
+        diverged = [m for m in self._messages if m[0] > _WARNING and m[1] == DIVERGENCE_CATEGORY]
+        summary, details = words(diverged or self._messages, "no message")
         return SimulatorError(
             f"{self.name} ({self.description.modelName}): {function}: {summary}",
             divergence=bool(diverged),
@@ -240,7 +223,34 @@ def _expect_readable_place(folder: Path) -> None:
         )
 
 
-def _release_interpreter_state(library: ctypes.CDLL) -> None:
+def collecting_callbacks(messages: list[Message]) -> fmi2.fmi2CallbackFunctions:
+    """Callbacks that collect in `messages` what one instance logs.
+
+    fmpy's own proxy, which formats messages, keeps one logger for the whole process; pythonfmu passes no
+    arguments to format, only doubled percent signs.
+    """
+
+    def log(environment: Any, instance: bytes, status: int, category: bytes | None, message: bytes) -> None:
+        messages.append((status, category, message.replace(b"%%", b"%")))
+
+    callbacks = fmi2.fmi2CallbackFunctions()
+    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(log)
+    callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+    callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
+    return callbacks
+
+
+def words(messages: Sequence[Message], otherwise: str) -> tuple[str, str]:
+    """The first line of the first message of a failure, and what follows it; `otherwise` if there is none."""
+    bad = [message for message in messages if message[0] > _WARNING]
+    text = bad[0][2].decode("utf-8", "replace") if bad else otherwise
+    if text.startswith("Fatal py exception"):  # pythonfmu's own line comes before the slave's text
+        text = text.partition("\n")[2]
+    summary, _, details = text.partition("\n")
+    return summary, details
+
+
+def release_interpreter_state(library: ctypes.CDLL) -> None:
     """Have pythonfmu let go of what it would otherwise free twice when its library is unloaded.
 
     In pythonfmu 0.7.0 the unloading releases a static pointer after its destructor has run, which now and then
