@@ -26,11 +26,9 @@ MEASUREMENT = POSITION + VELOCITY + QUATERNION + ANGULAR_VELOCITY
 COMMAND = ("thrust", *components("torque"))
 """Outputs of the controller and, by the same names, inputs of the plant."""
 
-REFERENCE = tuple(
-    name
-    for derivative in ("position", "velocity", "acceleration", "jerk", "snap")
-    for name in components(f"reference.{derivative}")
-)
+_REFERENCE_UNITS = {"position": "m", "velocity": "m/s", "acceleration": "m/s2", "jerk": "m/s3", "snap": "m/s4"}
+
+REFERENCE = tuple(name for derivative in _REFERENCE_UNITS for name in components(f"reference.{derivative}"))
 """Inputs of the controller that a reference from a file feeds."""
 
 USE_REFERENCE_INPUTS = "use_reference_inputs"
@@ -45,9 +43,23 @@ POSITION_REFERENCE = components("reference.position")
 
 ATTITUDE_ERROR_SCALAR = "attitude_error.w"
 ENERGY = "energy"
-DISTURBANCE = components("wind.amplitude") + components("external_force")
+EXTERNAL_FORCE = components("external_force")
+DISTURBANCE = components("wind.amplitude") + EXTERNAL_FORCE
 """What moves the plant beside its commands."""
 
 ACTUATOR_TIME_CONSTANT = "actuator_time_constant"
 THRUST_MAX = "thrust_max"
 TORQUE_MAX = "torque_max"
+
+UNITS = {
+    **dict.fromkeys(POSITION, "m"),
+    **dict.fromkeys(VELOCITY, "m/s"),
+    **dict.fromkeys(QUATERNION, "1"),
+    **dict.fromkeys(ANGULAR_VELOCITY, "rad/s"),
+    **dict.fromkeys(EXTERNAL_FORCE, "N"),
+    **dict(zip(COMMAND, ("N", "N.m", "N.m", "N.m"))),
+    **{name: unit for derivative, unit in _REFERENCE_UNITS.items() for name in components(f"reference.{derivative}")},
+    **dict(zip(TRAJECTORY, ("m", "m", "rad/s", "m", "m/s"))),
+    **dict.fromkeys((SAMPLE_PERIOD, SAMPLE_OFFSET), "s"),
+}
+"""Of what is connected, or set by the master."""
