@@ -3,6 +3,7 @@
 import json
 import sys
 import traceback
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -119,23 +120,36 @@ def plot(
 @app.command()
 def validate(
     fmu: Annotated[list[Path] | None, typer.Argument(help="FMUs; without any, those of this project.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
+    time_limit: Annotated[
+        float, typer.Option("--time-limit", help="For what an FMU does, before it is stopped.", metavar="SECONDS")
+    ] = 60.0,
 ) -> None:
-    """Check FMUs against the FMI standard; exit code 1 if there is any problem."""
-    from fmpy.validation import validate_fmu
+    """Check FMUs: archive, description, and what they do when they run; exit code 1 if there is any problem.
 
+    Any FMI 2.0 co-simulation FMU will do; those that quadcosim built must keep the rules of this project too.
+    """
     from orchestration import fmus
+    from orchestration.validation import validate as findings_of
     from orchestration.wiring import MODELS
 
-    count = 0
-    for path in fmu or [fmus.locate(name, say) for name in MODELS]:
+    if not time_limit > 0.0:
+        raise UsageError(f"--time-limit {time_limit:g}: expected a positive number of seconds")
+    paths = fmu or [fmus.locate(name, say) for name in MODELS]
+    for path in paths:
         if not path.is_file():
             raise UsageError(f"{path}: expected an .fmu file")
-        problems = validate_fmu(str(path))
-        count += len(problems)
-        print(f"{path}: {'no problems found' if not problems else f'{len(problems)} problems'}")
-        for problem in problems:
-            print(f"  {problem}")
-    if count:
+    results = []
+    for path in paths:
+        findings = findings_of(path, time_limit=time_limit)
+        results.append({"fmu": str(path), "findings": [asdict(finding) for finding in findings]})
+        if not as_json:
+            print(f"{path}: {f'{len(findings)} problems' if findings else 'no problems found'}")
+            for finding in findings:
+                print(f"  {finding}")
+    if as_json:
+        print(json.dumps(results, indent=2))
+    if any(result["findings"] for result in results):
         raise typer.Exit(1)
 
 
