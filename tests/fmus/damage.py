@@ -1,0 +1,191 @@
+"""Ways to damage an FMU: a mutant, and the changes to its files that make it one."""
+
+import re
+import zipfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree.ElementTree import Element, fromstring, tostring
+
+from fmu_kit.packaging import content_guid
+
+DESCRIPTION = "modelDescription.xml"
+Files = dict[str, bytes]
+Damage = Callable[[Files], None]
+"""Changes the files of an FMU in place"""
+
+_OF_THE_TYPE = ("start", "unit", "min", "max")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mutant:
+    """One way to damage an FMU, and how it must be found."""
+
+    name: str
+    rule: str
+    """The rule that is meant for it"""
+    words: tuple[str, ...]
+    """What the text of the finding must name"""
+    damage: Damage
+    model: str = "QuadrotorPlant"
+    keeps_guid: bool = False
+    """Whether the GUID is left as the damage made it"""
+    rewrite: Callable[[Path], None] | None = None
+    """Damage to the archive itself"""
+    time_limit: float = 20.0
+    """[s]; a mutant takes one or two"""
+
+    def write(self, fmu: Path, folder: Path) -> Path:
+        """A damaged copy of `fmu` in `folder`."""
+        files = files_of(fmu)
+        self.damage(files)
+        path = folder / f"{self.name.replace(' ', '_')}.fmu"
+        write_fmu(path, files if self.keeps_guid else with_its_guid(files))
+        if self.rewrite is not None:
+            self.rewrite(path)
+        return path
+
+
+def files_of(fmu: Path) -> Files:
+    """All files of an FMU by name."""
+    with zipfile.ZipFile(fmu) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def write_fmu(path: Path, files: Files) -> None:
+    """An archive of the files, in their order."""
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+
+
+def with_its_guid(files: Files) -> Files:
+    """The files with the GUID that their content has."""
+    guid = content_guid(files).encode()
+    return {**files, DESCRIPTION: re.sub(rb' guid="[^"]*"', b' guid="' + guid + b'"', files[DESCRIPTION], count=1)}
+
+
+def every(*damages: Damage) -> Damage:
+    """One damage after the other."""
+
+    def damage(files: Files) -> None:
+        for one in damages:
+            one(files)
+
+    return damage
+
+
+# -- the description ------------------------------------------------------------------------------------
+
+
+def description(change: Callable[[Element], None]) -> Damage:
+    """Change the XML of the model description."""
+
+    def damage(files: Files) -> None:
+        root = fromstring(files[DESCRIPTION])
+        change(root)
+        files[DESCRIPTION] = tostring(root, encoding="UTF-8")
+
+    return damage
+
+
+def root(**attributes: str | None) -> Damage:
+    """Set attributes of the whole; None: remove."""
+    return description(lambda root: put(root, attributes))
+
+
+def element(path: str, /, **attributes: str | None) -> Damage:
+    """Set attributes of the first element at a path."""
+    return description(lambda root: put(found(root, path), attributes))
+
+
+def unit(name: str, /, **attributes: str | None) -> Damage:
+    """Set attributes of the base units of a unit."""
+    return element(f"UnitDefinitions/Unit[@name='{name}']/BaseUnit", **attributes)
+
+
+def variable(name: str, /, **attributes: str | None) -> Damage:
+    """Set attributes of a variable or of its type."""
+
+    def change(root: Element) -> None:
+        scalar = found(root, f"ModelVariables/ScalarVariable[@name='{name}']")
+        put(scalar, {key: value for key, value in attributes.items() if key not in _OF_THE_TYPE})
+        put(scalar[0], {key: value for key, value in attributes.items() if key in _OF_THE_TYPE})
+
+    return description(change)
+
+
+def unknown(where: str, name: str, /, **attributes: str | None) -> Damage:
+    """Set attributes of the entry of a variable in a list of the model structure."""
+    return description(lambda root: put(entry(root, where, name), attributes))
+
+
+def without_unknown(where: str, name: str) -> Damage:
+    """Remove the entry of a variable from a list of the model structure."""
+    return description(lambda root: found(root, f"ModelStructure/{where}").remove(entry(root, where, name)))
+
+
+def index_of(root: Element, name: str) -> int:
+    """The index of a variable, from 1."""
+    return [v.get("name") for v in root.iterfind("ModelVariables/ScalarVariable")].index(name) + 1
+
+
+def entry(root: Element, where: str, name: str) -> Element:
+    """The entry of a variable in a list of the model structure."""
+    return found(root, f"ModelStructure/{where}/Unknown[@index='{index_of(root, name)}']")
+
+
+def found(root: Element, path: str) -> Element:
+    """The first element at a path, which must be there."""
+    result = root.find(path)
+    assert result is not None, path
+    return result
+
+
+def put(target: Element, attributes: dict[str, str | None]) -> None:
+    """Set attributes, or remove those that are None, which must be there."""
+    for key, value in attributes.items():
+        if value is None:
+            del target.attrib[key]
+        else:
+            target.set(key, value)
+
+
+# -- the other files ------------------------------------------------------------------------------------
+
+
+def source(name: str, old: str, new: str) -> Damage:
+    """Replace a text in a bundled source, every time that it occurs."""
+
+    def damage(files: Files) -> None:
+        (path,) = (path for path in files if path.startswith("resources/") and path.endswith(name))
+        assert old.encode() in files[path], f"{path}: expected {old!r}"
+        files[path] = files[path].replace(old.encode(), new.encode())
+
+    return damage
+
+
+def file(name: str, content: bytes) -> Damage:
+    """Write a file."""
+
+    def damage(files: Files) -> None:
+        files[name] = content
+
+    return damage
+
+
+def without(start: str) -> Damage:
+    """Remove the files whose names start so."""
+
+    def damage(files: Files) -> None:
+        for name in list(named(files, start)):
+            del files[name]
+
+    return damage
+
+
+def named(files: Files, start: str) -> Iterator[str]:
+    """Names that start so, of which there must be one."""
+    names = [name for name in files if name.startswith(start)]
+    assert names, start
+    yield from names

@@ -1,0 +1,80 @@
+"""Who notices that an FMU is damaged: quadcosim, and the checkers of others."""
+
+import logging
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from fmpy.validation import validate_fmu
+
+from orchestration.validation import Finding, validate
+from tests.fmus.damage import Mutant
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """What the validators say of one mutant."""
+
+    mutant: Mutant
+    quadcosim: tuple[Finding, ...]
+    fmpy: tuple[str, ...]
+    fmutool: tuple[str, ...]
+
+
+def fmpy_finds(fmu: Path) -> list[str]:
+    """The problems that `fmpy validate` prints; what stops it is one too."""
+    try:
+        return [str(problem) for problem in validate_fmu(str(fmu))]
+    except Exception as error:
+        return [f"{type(error).__name__}: {error}"]
+
+
+def fmutool_finds(fmu: Path) -> list[str]:
+    """The errors that `fmutool -check` logs."""
+    from fmu_manipulation_toolbox.checker import get_checkers
+    from fmu_manipulation_toolbox.operations import FMU, FMUError
+
+    errors: list[str] = []
+    handler = logging.Handler(logging.ERROR)
+    handler.emit = lambda record: errors.append(record.getMessage())  # type: ignore[method-assign]
+    logger = logging.getLogger("fmu_manipulation_toolbox")
+    logger.addHandler(handler)
+    try:
+        with FMU(str(fmu)) as opened:
+            for checker in get_checkers():
+                opened.apply_operation(checker())
+    except FMUError as error:
+        errors.append(error.reason)
+    except Exception as error:
+        errors.append(f"{type(error).__name__}: {error}")
+    finally:
+        logger.removeHandler(handler)
+    return errors
+
+
+def verdicts(mutants: Iterable[Mutant], built: dict[str, Path], folder: Path) -> list[Verdict]:
+    """What quadcosim, fmpy and fmutool say of mutants, which are written to `folder`."""
+    paths = {mutant: mutant.write(built[mutant.model], folder) for mutant in mutants}
+    with ThreadPoolExecutor() as pool:
+        own = pool.map(lambda mutant: validate(paths[mutant], time_limit=mutant.time_limit), paths)
+        return [
+            Verdict(
+                mutant=mutant,
+                quadcosim=tuple(findings),
+                fmpy=tuple(fmpy_finds(paths[mutant])),
+                fmutool=tuple(fmutool_finds(paths[mutant])),
+            )
+            for mutant, findings in zip(paths, own, strict=True)
+        ]
+
+
+def as_markdown(table: Iterable[Verdict]) -> str:
+    """The table of who notices what."""
+    lines = ["| damage | found by the rule | fmpy validate | fmutool -check |", "|---|---|---|---|"]
+    for verdict in table:
+        rules = {finding.rule for finding in verdict.quadcosim}
+        rule = f"`{verdict.mutant.rule}`" if verdict.mutant.rule in rules else "-"
+        others = ("yes" if texts else "-" for texts in (verdict.fmpy, verdict.fmutool))
+        lines.append(f"| {verdict.mutant.name} | {rule} | {' | '.join(others)} |")
+    return "\n".join(lines)
