@@ -1,8 +1,6 @@
-"""`modelDescription.xml`: the contract that people wire to, and the truth of what it says."""
+"""`modelDescription.xml`: the contract that people wire to, apart from what validation finds wrong with any FMU."""
 
 import ast
-import re
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from xml.etree.ElementTree import fromstring
@@ -10,7 +8,6 @@ from xml.etree.ElementTree import fromstring
 import fmpy
 import pytest
 from fmpy.model_description import ModelDescription
-from fmpy.validation import validate_fmu
 
 from fmu_kit.model_description import PYTHON_REQUIRED
 from orchestration.scenario_file import tomllib
@@ -38,19 +35,7 @@ def description(request: pytest.FixtureRequest, descriptions: dict[str, ModelDes
     return result
 
 
-@pytest.fixture
-def instance(description: ModelDescription, built: dict[str, Path]) -> Iterator[Instance]:
-    """Freshly instantiated, of each FMU in turn."""
-    with Instance(built[description.modelName]) as instance:
-        yield instance
-
-
 # -- what is declared -----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_fmpy_finds_no_problem(model: str, built: dict[str, Path]) -> None:
-    assert validate_fmu(str(built[model])) == []
 
 
 @pytest.mark.parametrize(("model", "row"), ROWS)
@@ -71,19 +56,15 @@ def test_no_input_or_output_is_missing_from_the_interface(description: ModelDesc
     assert declared == ports((row.name, row.causality) for row in TABLES[description.modelName])
 
 
-def test_bounds_contain_the_start(description: ModelDescription) -> None:
-    bounded = [v for v in description.modelVariables if v.start is not None and (v.min, v.max) != (None, None)]
-    assert {"mass", "gravity"} <= {v.name for v in bounded}
-    for v in bounded:
-        lower, upper = float(v.min or "-inf"), float(v.max or "inf")
-        assert lower <= float(v.start) <= upper, v.name
+def test_bounds_are_declared(description: ModelDescription) -> None:
+    bounded = {v.name: float(v.min) for v in description.modelVariables if v.min is not None}
+    assert (bounded["mass"], bounded["gravity"]) == (0.0, 0.0)
 
 
 def test_the_default_experiment_is_30_s_in_steps_of_10_ms(description: ModelDescription) -> None:
     experiment = description.defaultExperiment
     times = [float(text) for text in (experiment.startTime, experiment.stopTime, experiment.stepSize)]
     assert times == [0.0, 30.0, 0.01]
-    assert times[1] > times[0]
 
 
 def test_the_fmu_needs_no_tool_and_saves_its_state(description: ModelDescription) -> None:
@@ -134,59 +115,7 @@ def test_the_bundled_sources_are_in_the_syntax_of_the_required_python(model: str
         ast.parse(content, name, feature_version=OLDEST)
 
 
-# -- units ----------------------------------------------------------------------------------------------
-
-DERIVED = {"N": {"kg": 1, "m": 1, "s": -2}, "J": {"kg": 1, "m": 2, "s": -2}, "1": {}}
-
-
-def dimensions(unit: str) -> Counter[str]:
-    """Exponents of the base units, read from the name of the unit: `N.m.s`, `m/s3`, `1/s`."""
-    above, _, below = unit.partition("/")
-    total: Counter[str] = Counter()
-    for sign, symbols in ((1, above.split(".")), (-1, below.split(".") if below else [])):
-        for symbol in symbols:
-            match = re.fullmatch(r"([A-Za-z]+|1)(\d*)", symbol)
-            assert match, unit
-            for base, exponent in DERIVED.get(match[1], {match[1]: 1}).items():
-                total[base] += sign * exponent * int(match[2] or 1)
-    return total
-
-
-def test_every_unit_is_defined_by_the_base_units_that_its_name_means(description: ModelDescription) -> None:
-    defined = {unit.name: unit.baseUnit for unit in description.unitDefinitions}
-    used = {v.unit for v in description.modelVariables if v.unit is not None}
-    assert used == set(defined)
-    for name, base in defined.items():
-        assert base is not None, name
-        expected = dimensions(name)
-        found = {symbol: int(getattr(base, symbol)) for symbol in ("kg", "m", "s", "A", "K", "mol", "cd", "rad")}
-        assert found == {symbol: expected[symbol] for symbol in found}, name
-        assert (float(base.factor), float(base.offset)) == (1.0, 0.0), name
-
-
-def test_every_real_has_a_unit(description: ModelDescription) -> None:
-    assert [v.name for v in description.modelVariables if v.type == "Real" and v.unit is None] == []
-
-
-# -- what is declared is true ---------------------------------------------------------------------------
-
-
-def test_declared_starts_are_what_a_fresh_instance_has_to_the_last_digit(instance: Instance) -> None:
-    declared = {name: v for name, v in instance.variables.items() if v.start is not None}
-    assert len(declared) > 30
-    for name, variable in declared.items():
-        value = instance.value(name)
-        if variable.type == "Real":
-            assert variable.start == repr(value), name  # the shortest text that gives the same bits
-        else:
-            assert bool(value) == (variable.start == "true"), name
-
-
-def test_declared_starts_are_what_reset_restores(instance: Instance) -> None:
-    before = [instance.value(name) for name, v in instance.variables.items() if v.start is not None]
-    instance.initialise({"mass": 1.5, "gravity": 9.7})
-    instance.fmu.reset()
-    assert [instance.value(name) for name, v in instance.variables.items() if v.start is not None] == before
+# -- dependencies: that they are true is for validation to say -------------------------------------------
 
 
 def test_no_output_is_declared_to_follow_an_input_directly(description: ModelDescription) -> None:
@@ -205,49 +134,20 @@ def test_declared_initial_dependencies_are_all_inputs_of_the_controller_and_none
     assert declared == dict.fromkeys(outputs, expected)
 
 
-def perturbed(instance: Instance) -> Iterator[tuple[str, list[str]]]:
-    """Each input in turn, moved a little, with the outputs that moved with it."""
-    outputs = instance.names("output")
-    for name in instance.names("input"):
-        (before,), outputs_before = instance.get(name), instance.get(*outputs)
-        instance.set({name: before + 0.0625})
-        moved = zip(outputs, outputs_before, instance.get(*outputs), strict=True)
-        yield name, [output for output, old, new in moved if old != new]
-        instance.set({name: before})
-
-
-@pytest.mark.parametrize("steps", [0, 3])
-def test_at_a_communication_point_no_output_moves_with_an_input(steps: int, instance: Instance) -> None:
-    instance.initialise({})
-    for k in range(steps):
-        instance.step(k * 0.01, 0.01)
-    moved = dict(perturbed(instance))
-    assert moved == {name: [] for name in instance.names("input")}
-
-
-def test_in_initialisation_mode_the_outputs_of_the_plant_move_with_no_input(built: dict[str, Path]) -> None:
-    with Instance(built["QuadrotorPlant"]) as plant:
-        plant.fmu.setupExperiment(startTime=0.0)
-        plant.fmu.enterInitializationMode()
-        assert dict(perturbed(plant)) == {name: [] for name in plant.names("input")}
-
-
-def test_in_initialisation_mode_the_command_moves_with_every_input(built: dict[str, Path]) -> None:
-    with Instance(built["UnifiedController"]) as controller:
-        # Away from every symmetry, where some derivative would vanish.
-        general = {name: 0.05 * (i % 7 + 1) for i, name in enumerate(controller.names("input"))}
-        controller.set({**general, "quaternion.w": 0.9, "use_reference_inputs": True})
-        controller.fmu.setupExperiment(startTime=0.0)
-        controller.fmu.enterInitializationMode()
-        moved = dict(perturbed(controller))
-    assert [name for name, outputs in moved.items() if not outputs] == []
-    assert set().union(*moved.values()) == {"thrust", "torque.x", "torque.y", "torque.z"}
-
-
 def test_in_initialisation_mode_reference_inputs_that_are_not_used_move_nothing(built: dict[str, Path]) -> None:
     with Instance(built["UnifiedController"]) as controller:
         controller.set(MEASUREMENT)
         controller.fmu.setupExperiment(startTime=0.0)
         controller.fmu.enterInitializationMode()
-        moved = dict(perturbed(controller))
-    assert {name for name, outputs in moved.items() if not outputs} == {n for n in moved if n.startswith("reference.")}
+        moving = [name for name in controller.names("input") if moves_outputs(controller, name)]
+    assert moving == [name for name in controller.names("input") if not name.startswith("reference.")]
+
+
+def moves_outputs(instance: Instance, name: str) -> bool:
+    """Whether an output moves with an input, which is put back."""
+    outputs = instance.names("output")
+    (value,), before = instance.get(name), instance.get(*outputs)
+    instance.set({name: value + 0.0625})
+    after = instance.get(*outputs)
+    instance.set({name: value})
+    return before != after

@@ -1,0 +1,314 @@
+"""Validation of FMUs that are sound, of this project and of others, and rules that no damage of ours can reach."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO
+from xml.etree.ElementTree import Element, SubElement, fromstring
+
+import pytest
+
+from orchestration import cli
+from orchestration.errors import QuadcosimError
+from orchestration.validation import Finding, child, runs, validate
+from orchestration.validation.archive import Archive
+from orchestration.validation.bench import Bench
+from orchestration.validation.finding import check
+from orchestration.validation.fmu import Fmu, read_fmu
+from orchestration.validation.own_description import differences, elements
+from orchestration.validation.structure import initial_unknowns, known_dependencies, outputs
+from orchestration.validation.units import dimensions, unit_meaning
+from orchestration.validation.variables import aliases
+from orchestration.wiring import MODELS
+from tests.fmus.damage import DESCRIPTION, Damage, description, files_of, source, without, write_fmu
+from tests.fmus.process import ROOT, run
+
+# -- sound FMUs -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_nothing_is_wrong_with_the_fmus(model: str, built: dict[str, Path]) -> None:
+    assert validate(built[model]) == []
+
+
+def test_validation_leaves_the_file_as_it_is(built: dict[str, Path]) -> None:
+    before = built["QuadrotorPlant"].read_bytes()
+    validate(str(built["QuadrotorPlant"]))
+    assert built["QuadrotorPlant"].read_bytes() == before
+
+
+@pytest.fixture(scope="module")
+def low_pass(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The FMU that pythonfmu's own builder makes of a small slave."""
+    folder = tmp_path_factory.mktemp("foreign")
+    done = run(sys.executable, str(ROOT / "tests" / "fmus" / "scripts" / "low_pass.py"), str(folder))
+    assert done.returncode == 0, done.stderr
+    return Path(done.stdout.splitlines()[-1])
+
+
+def test_of_a_foreign_fmu_only_what_breaks_the_standard_is_found(low_pass: Path) -> None:
+    """pythonfmu writes no InitialUnknowns, which FMI asks for; what only this project asks for is not asked for."""
+    assert [finding for finding in validate(low_pass) if finding.rule != "standard"] == [
+        Finding("initial-unknowns", "InitialUnknowns: y is there 0 times, expected once"),
+        Finding("initial-unknowns", "InitialUnknowns: steps is there 0 times, expected once"),
+    ]
+
+
+def damaged(fmu: Path, path: Path, *damages: Damage) -> Path:
+    files = files_of(fmu)
+    for damage in damages:
+        damage(files)
+    write_fmu(path, files)
+    return path
+
+
+def list_initial_unknowns(root: Element) -> None:
+    structure = root.find("ModelStructure")
+    assert structure is not None
+    unknowns = SubElement(structure, "InitialUnknowns")
+    for index in (2, 6):
+        SubElement(unknowns, "Unknown", index=str(index))
+
+
+LISTED = description(list_initial_unknowns)
+
+
+def test_nothing_is_wrong_with_a_foreign_fmu_that_lists_its_initial_unknowns(low_pass: Path, tmp_path: Path) -> None:
+    assert validate(damaged(low_pass, tmp_path / "listed.fmu", LISTED)) == []
+
+
+def test_what_a_foreign_fmu_does_is_looked_at_too(low_pass: Path, tmp_path: Path) -> None:
+    lag = "(target - self.y) * min(1.0, step_size / self.tau)"
+    path = damaged(
+        low_pass, tmp_path / "shared.fmu", LISTED,
+        source("low_pass.py", "class LowPass", "SHARED = [0.0]\n\n\nclass LowPass"),
+        source("low_pass.py", f"self.y += {lag}", f"SHARED[0] += {lag}; self.y = SHARED[0]"),
+    )  # fmt: skip
+    found = validate(path)
+    assert {"reset", "instances"} <= {finding.rule for finding in found}
+    assert all("y = " in finding.text for finding in found)
+
+
+def test_an_fmu_that_cannot_run_here_is_not_said_to_be_sound(low_pass: Path, tmp_path: Path) -> None:
+    path = damaged(
+        low_pass, tmp_path / "elsewhere.fmu", LISTED, without("binaries/linux64/"), without("binaries/win64/")
+    )
+    rules = [finding.rule for finding in validate(path)]
+    assert rules == ["binaries", "platform"]
+
+
+# -- the command ----------------------------------------------------------------------------------------
+
+
+def test_a_file_that_is_no_fmu_is_one_problem(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "no.fmu"
+    path.write_bytes(b"not an archive")
+    with pytest.raises(SystemExit) as end:
+        cli.main(["validate", str(path)])
+    assert end.value.code == 1
+    first, second = capsys.readouterr().out.splitlines()
+    assert first == f"{path}: 1 problems"
+    assert second.startswith("  readable: no.fmu: expected a zip archive that is whole: ")
+
+
+@pytest.mark.parametrize("limit", ["0", "-1", "nan"])
+def test_a_time_limit_must_be_positive(limit: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        cli.main(["validate", f"--time-limit={limit}"])
+    assert end.value.code == 2
+    assert f"--time-limit {limit}: expected a positive number of seconds" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("report", "words"), [("", "no such module"), ('{"rule": "runs"}\n{"error": "KeyError: 3"}\n{"ru', "KeyError: 3")]
+)
+def test_an_error_of_the_validation_itself_is_no_finding(
+    report: str, words: str, low_pass: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(command: list[str], *, stderr: IO[bytes], **options: object) -> subprocess.CompletedProcess[bytes]:
+        Path(command[-1]).write_text(report)
+        stderr.write(b"Traceback\nno such module")
+        return subprocess.CompletedProcess(command, 1)
+
+    monkeypatch.setattr(subprocess, "run", fail)
+    with pytest.raises(QuadcosimError, match=f"LowPass.fmu: it is the validation that failed: {words}"):
+        validate(low_pass)
+
+
+def test_the_child_reports_an_error_in_a_rule(low_pass: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def odd(bench: Bench) -> list[str]:
+        raise KeyError(3)
+
+    monkeypatch.setattr(runs, "FIRST", (odd,))
+    with pytest.raises(KeyError):
+        child.main(str(low_pass), str(tmp_path), str(tmp_path / "report"))
+    lines = (tmp_path / "report").read_text().splitlines()
+    assert [json.loads(line) for line in lines] == [{"rule": "odd"}, {"error": "KeyError: 3"}]
+
+
+# -- units ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("1", {}),
+        ("m/s2", {"m": 1, "s": -2}),
+        ("1/s", {"s": -1}),
+        ("N.m.s", {"kg": 1, "m": 2, "s": -1}),
+        ("s-1", {"s": -1}),
+        ("J/(kg.K)", {"m": 2, "s": -2, "K": -1}),
+        ("W/m2", {"kg": 1, "s": -3}),
+        ("rad/s", {"rad": 1, "s": -1}),
+    ],
+)
+def test_the_name_of_a_unit_means_its_base_units(name: str, expected: dict[str, int]) -> None:
+    found = dimensions(name)
+    assert found is not None
+    assert {symbol: n for symbol, n in found.items() if n} == expected
+
+
+@pytest.mark.parametrize("name", ["degC", "rpm", "mm", "m^2", "kg m", "", "m/s/s", "Hz", "%"])
+def test_of_other_names_nothing_is_claimed(name: str) -> None:
+    assert dimensions(name) is None
+
+
+# -- descriptions made for one rule ---------------------------------------------------------------------
+
+
+def fmu(variables: str, structure: str = "", units: str = "", tool: str = "another") -> Fmu:
+    """The view of a description with these elements."""
+    text = f"""<fmiModelDescription fmiVersion="2.0" modelName="M" guid="g" generationTool="{tool}">
+        <CoSimulation modelIdentifier="M"/><UnitDefinitions>{units}</UnitDefinitions>
+        <ModelVariables>{variables}</ModelVariables><ModelStructure>{structure}</ModelStructure>
+    </fmiModelDescription>"""
+    return read_fmu(Archive(Path("m.fmu"), (), {DESCRIPTION: text.encode()}))
+
+
+def scalar(name: str, reference: int, attributes: str = "", real: str = "") -> str:
+    return f'<ScalarVariable name="{name}" valueReference="{reference}" {attributes}><Real {real}/></ScalarVariable>'
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "problem"),
+    [
+        (('causality="input"', 'start="0"'), ('causality="output"', ""), None),
+        (("", ""), ("", ""), None),
+        (('variability="constant"', 'start="1"'), ('variability="constant"', 'start="1"'), None),
+        (('variability="constant"', 'start="1"'), ('variability="constant"', 'start="2"'), "different starts"),
+        (('variability="constant"', 'start="1"'), ("", ""), "only some are constants"),
+        (('causality="input"', 'start="0"'), ('causality="parameter"', 'start="0"'), "set from outside"),
+        (('initial="exact"', 'start="0"'), ('initial="exact"', 'start="0"'), "more than one of them has a start"),
+        (("", 'unit="m"'), ("", 'unit="s"'), "their units are m, s"),
+    ],
+)
+def test_aliases_are_one_value(first: tuple[str, str], second: tuple[str, str], problem: str | None) -> None:
+    texts = list(aliases(fmu(scalar("a", 7, *first) + scalar("b", 7, *second))))
+    assert len(texts) == (problem is not None)
+    if problem is not None:
+        assert texts[0].startswith("a, b: value reference 7 for all of them")
+        assert problem in texts[0]
+
+
+STATE = (
+    scalar("x", 0, 'initial="exact"', 'start="1"')
+    + scalar("der(x)", 1, "", 'derivative="1"')
+    + scalar("y", 2, 'causality="output"')
+    + scalar("p", 3, 'causality="calculatedParameter" variability="fixed"')
+    + scalar("u", 4, 'causality="input"', 'start="0"')
+)
+
+
+def lists(outputs: str, derivatives: str, initial: str) -> str:
+    def listed(indices: str) -> str:
+        return "".join(f'<Unknown index="{index}"/>' for index in indices.split())
+
+    return (
+        f"<Outputs>{listed(outputs)}</Outputs><Derivatives>{listed(derivatives)}</Derivatives>"
+        f"<InitialUnknowns>{listed(initial)}</InitialUnknowns>"
+    )
+
+
+@pytest.mark.parametrize(
+    ("structure", "texts"),
+    [
+        (lists("3", "2", "2 3 4"), []),
+        (lists("3", "", "3 4"), []),  # without derivatives there are no states to speak of
+        (lists("3", "2", "3 2 4"), ["InitialUnknowns: expected the entries in the order of their indices"]),
+        (lists("3", "2", "2 3"), ["InitialUnknowns: p is there 0 times, expected once"]),
+        (lists("3", "2", "2 3 3 4"), ["InitialUnknowns: y is there 2 times, expected once"]),
+        (lists("3", "2", "1 2 3 4"), ["InitialUnknowns: x is there, expected it not to be"]),
+        (lists("3 4", "2", "2 3 4"), ["Outputs: p is there, expected it not to be"]),
+    ],
+)
+def test_the_lists_of_the_structure_hold_what_fmi_asks_for(structure: str, texts: list[str]) -> None:
+    assert [f.text for f in check((outputs, initial_unknowns), fmu(STATE, structure))] == texts
+
+
+@pytest.mark.parametrize(
+    ("where", "dependencies", "texts"),
+    [
+        ("Outputs", "1 5", []),
+        ("Outputs", "5 1", ["Outputs: y: expected its dependencies once each, in the order of their indices"]),
+        ("Outputs", "4", ["Outputs: y depends on p, a calculatedParameter: expected an input"]),
+        ("InitialUnknowns", "1 5", []),
+        ("InitialUnknowns", "2", ["InitialUnknowns: y depends on der(x), a local: expected an input"]),
+    ],
+)
+def test_dependencies_are_on_what_is_known(where: str, dependencies: str, texts: list[str]) -> None:
+    structure = f'<{where}><Unknown index="3" dependencies="{dependencies}"/></{where}>'
+    assert list(known_dependencies(fmu(STATE, structure))) == texts
+
+
+RADIAN_LEFT_OUT = '<Unit name="rad/s"><BaseUnit s="-1"/></Unit>'
+
+
+def test_others_may_take_the_radian_for_one() -> None:
+    assert list(unit_meaning(fmu("", units=RADIAN_LEFT_OUT))) == []
+    assert list(unit_meaning(fmu("", units=RADIAN_LEFT_OUT, tool="quadcosim"))) == [
+        "unit rad/s: base units s=-1, expected s=-1 rad=1"
+    ]
+
+
+def test_types_give_variables_their_attributes() -> None:
+    text = """<fmiModelDescription fmiVersion="2.0" guid="g"><CoSimulation/><TypeDefinitions>
+        <SimpleType name="Angle"><Real unit="rad" min="-1" max="1"/></SimpleType>
+        <SimpleType name="Gear"><Enumeration><Item name="r" value="-1"/><Item name="d" value="1"/></Enumeration>
+        </SimpleType></TypeDefinitions><ModelVariables>
+        <ScalarVariable name="a" valueReference="0"><Real declaredType="Angle" max="2"/></ScalarVariable>
+        <ScalarVariable name="g" valueReference="0"><Enumeration declaredType="Gear" start="1"/></ScalarVariable>
+        </ModelVariables></fmiModelDescription>"""
+    a, g = read_fmu(Archive(Path("m.fmu"), (), {DESCRIPTION: text.encode()})).variables
+    assert (a.unit, a.minimum, a.maximum) == ("rad", "-1", "2")
+    assert (g.items, g.start_value) == ((-1, 1), 1)
+
+
+# -- two descriptions -----------------------------------------------------------------------------------
+
+MINE = '<d a="1"><Units><Unit name="m"><BaseUnit m="1"/></Unit></Units><List><Unknown index="3"/></List></d>'
+
+
+@pytest.mark.parametrize(
+    ("change", "texts"),
+    [
+        (lambda text: text, []),
+        (lambda text: text.replace('a="1"', 'a="1" guid="g"'), []),
+        (lambda text: text.replace('m="1"', 'm="2"'), ["Units, Unit m, BaseUnit: m = 1, expected 2"]),
+        (lambda text: text.replace('name="m"', 'name="s"'), ["Units, Unit s: expected it", "Units, Unit m: found it"]),
+        (lambda text: text.replace('index="3"', 'index="3" dependencies=""'), ["dependencies = None, expected "]),
+        (
+            lambda text: text.replace("</List>", '<Unknown index="3"/></List>'),
+            ["List, Unknown 3 again: expected it as in the bundled slave, found none"],
+        ),
+        (
+            lambda text: '<d a="1"><List><Unknown index="3"/></List>' + text[9 : text.index("<List>")] + "</d>",
+            ["Units: expected List in its place"],
+        ),
+    ],
+)
+def test_a_difference_between_descriptions_is_named(change: Callable[[str], str], texts: list[str]) -> None:
+    found = list(differences(elements(fromstring(MINE)), elements(fromstring(change(MINE)))))
+    assert len(found) == len(texts)
+    assert all(text in whole for text, whole in zip(texts, found, strict=True))
