@@ -45,7 +45,7 @@ class FmuSimulator:
         try:
             self.description: ModelDescription = fmpy.read_model_description(str(path))
             self._folder = fmpy.extract(str(path))
-            _expect_readable_place(Path(self._folder))
+            expect_readable_place(Path(self._folder))
             self._fmu = fmi2.FMU2Slave(
                 guid=self.description.guid,
                 unzipDirectory=self._folder,
@@ -215,7 +215,8 @@ def uri_is_read(folder: Path) -> bool:
     return "%" not in folder.as_uri().replace("%20", "")
 
 
-def _expect_readable_place(folder: Path) -> None:
+def expect_readable_place(folder: Path) -> None:
+    """Raises `QuadcosimError` if pythonfmu would crash on the folder in which its FMU was unpacked."""
     if (folder / "resources" / "slavemodule.txt").is_file() and not uri_is_read(folder):
         raise QuadcosimError(
             f"unpacked in {folder}; pythonfmu reads no path with other characters than ASCII letters, digits, "

@@ -3,11 +3,13 @@
 import datetime
 from collections.abc import Iterator
 
-from fmu_kit.packaging import content_guid
+from fmu_kit.packaging import ICON, content_guid
 from orchestration import wiring
 from orchestration.validation.fmu import Fmu, Variable
 from orchestration.validation.units import base_units, dimensions
 
+PAGE = "documentation/index.html"
+_PNG = b"\x89PNG\r\n\x1a\n"
 _DATE = "%Y-%m-%dT%H:%M:%SZ"
 
 
@@ -64,6 +66,15 @@ def units(fmu: Fmu) -> Iterator[str]:
             yield f"unit {name}: expected a variable that has it, found none"
 
 
+def documentation(fmu: Fmu) -> Iterator[str]:
+    """The FMU explains itself to whoever has nothing else, and the models of this project have their icon."""
+    files = fmu.archive.files
+    if not files.get(PAGE, b"").strip():
+        yield f"{PAGE}: expected a page, found {'an empty file' if PAGE in files else 'none'}"
+    if fmu.root.get("modelName") in wiring.MODELS and not files.get(ICON, b"").startswith(_PNG):
+        yield f"{ICON}: expected an icon in PNG, found {'another file' if ICON in files else 'none'}"
+
+
 def ports(fmu: Fmu) -> Iterator[str]:
     """A controller, and a plant, has all that is wired to it, under the names and with the units of the wiring."""
     outputs = {v.name for v in fmu.of_causality("output")}
@@ -96,4 +107,4 @@ def _described(kind: str, causality: str, unit: str | None) -> str:
     return f"{kind} {causality}" + (f" in {unit}" if unit is not None else "")
 
 
-RULES = (guid_of_content, date, execution_tool, value_references, start_text, units, ports)
+RULES = (guid_of_content, date, execution_tool, value_references, start_text, units, documentation, ports)

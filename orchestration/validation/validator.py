@@ -38,11 +38,13 @@ def validate(path: str | Path, *, time_limit: float = TIME_LIMIT) -> list[Findin
 def _of_what_it_does(fmu: Fmu, time_limit: float) -> list[Finding]:
     import fmpy
 
+    from orchestration.fmpy_adapter import expect_readable_place
     from orchestration.validation.behaviour import behaviour
     from orchestration.validation.own_description import own_description
 
     with tempfile.TemporaryDirectory(prefix="quadcosim-", ignore_cleanup_errors=True) as folder:
         fmpy.extract(str(fmu.archive.path), folder)
+        expect_readable_place(Path(folder))
         own = own_description(fmu, Path(folder), time_limit) if fmu.is_ours else ()
         return [
             *(Finding(name_of(own_description), text) for text in own),

@@ -8,6 +8,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, fromstring, tostring
 
 from fmu_kit.packaging import content_guid
+from tests.fmus.archive import files_of
 
 DESCRIPTION = "modelDescription.xml"
 Files = dict[str, bytes]
@@ -44,12 +45,6 @@ class Mutant:
         if self.rewrite is not None:
             self.rewrite(path)
         return path
-
-
-def files_of(fmu: Path) -> Files:
-    """All files of an FMU by name."""
-    with zipfile.ZipFile(fmu) as archive:
-        return {name: archive.read(name) for name in archive.namelist()}
 
 
 def write_fmu(path: Path, files: Files) -> None:

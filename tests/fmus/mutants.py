@@ -176,6 +176,19 @@ WHOLE = (
         name="start not a number", rule="readable", words=("gravity", "g"), damage=variable("gravity", start="g")
     ),
     Mutant(
+        name="page missing", rule="documentation", words=("documentation/index.html", "none"),
+        damage=without("documentation/index.html"),
+    ),
+    Mutant(
+        name="page empty", rule="documentation", words=("documentation/index.html", "an empty file"),
+        damage=file("documentation/index.html", b" "),
+    ),
+    Mutant(name="icon missing", rule="documentation", words=("model.png", "none"), damage=without("model.png")),
+    Mutant(
+        name="icon no picture", rule="documentation", words=("model.png", "another file"),
+        damage=file("model.png", b"<svg/>"),
+    ),
+    Mutant(
         name="slave describes another", rule="own-description", words=("mass", "description", "payload"),
         damage=source("plant_fmu/interface.py", '"mass m"', '"payload m"'),
     ),

@@ -22,7 +22,8 @@ from orchestration.validation.structure import initial_unknowns, known_dependenc
 from orchestration.validation.units import dimensions, unit_meaning
 from orchestration.validation.variables import aliases
 from orchestration.wiring import MODELS
-from tests.fmus.damage import DESCRIPTION, Damage, description, files_of, source, without, write_fmu
+from tests.fmus.archive import files_of
+from tests.fmus.damage import DESCRIPTION, Damage, description, source, without, write_fmu
 from tests.fmus.process import ROOT, run
 
 # -- sound FMUs -----------------------------------------------------------------------------------------
