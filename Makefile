@@ -40,7 +40,7 @@ findings: .venv/.test
 	$(BIN)/python docs/make_findings.py
 
 interop: .venv/.test
-	$(BIN)/python docs/make_interop.py
+	$(BIN)/python -m docs.make_interop
 
 clean:
 	rm -rf .venv results fmus/*.fmu fmus/*.ssp

@@ -1,48 +1,91 @@
-"""Flies the paper's flight in other people's masters for `docs/interop.md`: run as `make interop`.
+"""Fills `docs/interop.md` and `docs/validation.md`, and draws the agreement chart: run as `make interop`.
 
-Writes the tables into the page, between the comments that name them, and draws its chart. A minute or two on
+Flies the paper's flight in other people's masters, and damages FMUs in every way that the tests know. Some minutes on
 two cores.
 """
 
-import re
 import sys
+import tempfile
 from pathlib import Path
 
 import matplotlib
 
-from orchestration import plots
+from docs.pages import fill
+from orchestration import fmus, plots
 from orchestration.interop import table
 from orchestration.interop.catalogue import chosen
 from orchestration.interop.compare import agreements
 from orchestration.interop.figure import agreement_chart
 from orchestration.scenario import Scenario
 from orchestration.timing import Timing
+from orchestration.validation import (
+    archive,
+    dependencies,
+    description,
+    house,
+    refusals,
+    runs,
+    structure,
+    units,
+    variables,
+)
+from orchestration.validation.finding import name_of
+from orchestration.validation.own_description import own_description
+from orchestration.wiring import MODELS
+from tests.fmus.mutants import MUTANTS
+from tests.fmus.verdicts import as_markdown, verdicts
 
-PAGE = Path(__file__).parent / "interop.md"
+DOCS = Path(__file__).parent
 INTERVALS = ("0.01", "0.001")
 """Communication steps, as the page names them [s]."""
 
+STANDARD = (
+    *archive.RULES, description.standard, *description.RULES, *variables.RULES, *units.RULES, *structure.RULES,
+    *runs.FIRST, *runs.RULES, *dependencies.RULES,
+)  # fmt: skip
+OURS = (*house.RULES, own_description, *refusals.RULES)
+
 
 def main() -> None:
+    """Both pages."""
+    interop()
+    validation()
+
+
+def interop() -> None:
     """Fly, put the tables into the page, draw the chart of the first."""
-    page = PAGE.read_text(encoding="utf-8")
+    tables = {}
     for interval in INTERVALS:
         print(f"flying with a step of {interval} s", file=sys.stderr)
         found = agreements(Scenario(timing=Timing(plant_interval=float(interval))), chosen(None))
-        page = with_table(page, interval, table.text(found))
+        tables[f"step {interval}"] = table.text(found)
         if interval == INTERVALS[0]:
             with matplotlib.rc_context({**plots.STYLE, "figure.dpi": 80}):
-                agreement_chart(found).savefig(PAGE.parent / "figures" / "interop.png")
-    PAGE.write_text(page, encoding="utf-8")
+                agreement_chart(found).savefig(DOCS / "figures" / "interop.png")
+    fill(DOCS / "interop.md", tables)
 
 
-def with_table(page: str, name: str, text: str) -> str:
-    """`page` with `text` between `<!-- table name -->` and `<!-- end -->`."""
-    start = f"<!-- table {name} -->"
-    replaced, count = re.subn(f"({re.escape(start)}\n).*?(<!-- end -->)", rf"\g<1>\n{text}\n\n\g<2>", page, flags=re.S)
-    if count != 1:
-        raise ValueError(f"{PAGE}: expected one {start}, found {count}")
-    return replaced
+def validation() -> None:
+    """The rules in their own words, and who finds which damage."""
+    print(f"damaging FMUs in {len(MUTANTS)} ways", file=sys.stderr)
+    with tempfile.TemporaryDirectory() as folder:
+        built = {path.stem: path for path in fmus.build(MODELS, Path(folder))}
+        found = verdicts(MUTANTS, built, Path(folder))
+    fill(
+        DOCS / "validation.md",
+        {
+            "standard": _sentences(STANDARD),
+            "ours": _sentences(OURS),
+            "count": f"Of {len(found)} damaged FMUs quadcosim finds {sum(bool(v.quadcosim) for v in found)}, fmpy "
+            f"{sum(bool(v.fmpy) for v in found)}, fmutool {sum(bool(v.fmutool) for v in found)}.",
+            "mutants": as_markdown(found),
+        },
+    )
+
+
+def _sentences(rules: tuple[object, ...]) -> str:
+    rows = [f"| `{name_of(rule)}` | {(rule.__doc__ or '').splitlines()[0]} |" for rule in rules]  # type: ignore[arg-type]
+    return "\n".join(["| rule | |", "|---|---|", *rows])
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ sys.stdout.buffer.write(text.encode("utf-8"))
 
 
 def own_description(fmu: Fmu, folder: Path, time_limit: float) -> Iterator[str]:
-    """Compare the description with that of the slave in the FMU that was unpacked to `folder`."""
+    """The description is the one that the slave gives of itself, run from the FMU that was unpacked to `folder`."""
     if SLAVE_MODULE not in fmu.archive.files:
         return  # for which there is a rule
     name = fmu.archive.files[SLAVE_MODULE].decode("utf-8", "replace").strip()
