@@ -7,6 +7,7 @@ So every value is written twice, in a set of each component and in one of the sy
 `docs/guides/ssp.md` has the call for each tool.
 """
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -131,11 +132,27 @@ def _component(
         if component.variable(key).causality not in ("parameter", "input") or key in inputs:
             raise UsageError(f"{name}.{key}: expected a parameter or an input that nothing is connected to")
     for variable in description.modelVariables:
-        # A Boolean only if it is set: fmpy takes the text false for true.
-        if variable.name in given or (variable.causality == "parameter" and variable.type != "Boolean"):
+        if variable.name in given:
+            value = _of_type(f"{name}.{variable.name}", given[variable.name], variable.type)
+            # A Boolean only if it is not what it is anyway: fmpy takes the text false for true.
+            if variable.type != "Boolean" or str(value).lower() != variable.start:
+                component.parameters[variable.name] = value
+        elif variable.causality == "parameter" and variable.type in ("Real", "Integer"):
             start = int(variable.start) if variable.type == "Integer" else float(variable.start)
-            component.parameters[variable.name] = given.get(variable.name, start)
+            component.parameters[variable.name] = start
     return component
+
+
+def _of_type(place: str, value: Parameter, kind: str) -> Parameter:
+    """A value as a variable of type `kind` takes it; raises `UsageError` for one that it cannot take."""
+    is_truth = isinstance(value, bool)
+    fits, expected = {
+        "Boolean": (is_truth, "true or false"),
+        "Integer": (isinstance(value, int) and not is_truth, "a whole number"),
+    }.get(kind, (not is_truth and math.isfinite(value), "a finite number"))
+    if not fits:
+        raise UsageError(f"{place} = {value}: expected {expected}")
+    return value if kind in ("Boolean", "Integer") else float(value)
 
 
 # -- the documents ----------------------------------------------------------------------------------------
@@ -166,10 +183,10 @@ def _structure(scenario: Scenario, components: tuple[Component, ...]) -> Element
                 endElement=end.name,
                 endConnector=name,
             )
-    step = repr(scenario.timing.plant_interval)
+    step = repr(float(scenario.timing.plant_interval))
     _annotate_for_omsimulator(system, step)
     _add_units(_add(root, "ssd:Units"), components)
-    experiment = _add(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(scenario.stop_time))
+    experiment = _add(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(float(scenario.stop_time)))
     annotation = _add(_add(experiment, "ssd:Annotations"), "ssc:Annotation", type="com.opensimulationplatform")
     algorithm = _add(annotation, "osp:Algorithm")
     _add(algorithm, "osp:FixedStepAlgorithm", baseStepSize=step)
