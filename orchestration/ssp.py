@@ -41,6 +41,9 @@ _NAMESPACES = {
     "oms": "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd",
 }
 
+_BASE = {**dict.fromkeys(("kg", "m", "s", "A", "K", "mol", "cd", "rad"), 0), "factor": 1.0, "offset": 0.0}
+"""What a base unit is by the standard where nothing is said."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Component:
@@ -185,7 +188,7 @@ def _structure(scenario: Scenario, components: tuple[Component, ...]) -> Element
             )
     step = repr(float(scenario.timing.plant_interval))
     _annotate_for_omsimulator(system, step)
-    _add_units(_add(root, "ssd:Units"), components)
+    _add_units(root, "ssd:Units", components)
     experiment = _add(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(float(scenario.stop_time)))
     annotation = _add(_add(experiment, "ssd:Annotations"), "ssc:Annotation", type="com.opensimulationplatform")
     algorithm = _add(annotation, "osp:Algorithm")
@@ -220,7 +223,7 @@ def _add_component(elements: Element, component: Component) -> None:
     for kind, names in (("input", component.inputs), ("output", component.outputs)):
         for name in names:
             connector = _add(connectors, "ssd:Connector", name=name, kind=kind)
-            _add(connector, "ssc:Real", unit=component.variable(name).unit)
+            _add(connector, "ssc:Real", **_unit(component.variable(name)))
     _bind(element, component.parameter_file)
 
 
@@ -235,21 +238,28 @@ def _parameter_set(components: Mapping[str, Component]) -> Element:
     for prefix, component in components.items():
         for name, value in component.parameters.items():
             variable = component.variable(name)
-            text = repr(value).lower()
-            attributes = {"value": text} if variable.unit is None else {"value": text, "unit": variable.unit}
-            _add(_add(parameters, "ssv:Parameter", name=prefix + name), f"ssv:{variable.type}", **attributes)
-    _add_units(_add(root, "ssv:Units"), components.values())
+            parameter = _add(parameters, "ssv:Parameter", name=prefix + name)
+            _add(parameter, f"ssv:{variable.type}", value=repr(value).lower(), **_unit(variable))
+    _add_units(root, "ssv:Units", components.values())
     return root
 
 
-def _add_units(parent: Element, components: Iterable[Component]) -> None:
-    """The unit definitions of the FMUs, each once."""
-    units = {unit.name: unit for component in components for unit in component.description.unitDefinitions}
-    for name in sorted(units):
-        base = units[name].baseUnit
-        exponents = {key: str(getattr(base, key)) for key in ("kg", "m", "s", "A", "K", "mol", "cd", "rad")}
-        unit = _add(parent, "ssc:Unit", name=name)
-        _add(unit, "ssc:BaseUnit", **{key: value for key, value in exponents.items() if value != "0"})
+def _unit(variable: ScalarVariable) -> dict[str, str]:
+    """The attribute `unit`, if the variable has one."""
+    return {} if variable.unit is None else {"unit": variable.unit}
+
+
+def _add_units(root: Element, tag: str, components: Iterable[Component]) -> None:
+    """The unit definitions of the FMUs that say what the unit is, each once."""
+    definitions = (unit for component in components for unit in component.description.unitDefinitions)
+    bases = {unit.name: unit.baseUnit for unit in definitions if unit.baseUnit is not None}
+    if not bases:
+        return
+    units = _add(root, tag)
+    for name in sorted(bases):
+        base = {key: getattr(bases[name], key) for key in _BASE}
+        unit = _add(units, "ssc:Unit", name=name)
+        _add(unit, "ssc:BaseUnit", **{key: str(value) for key, value in base.items() if value != _BASE[key]})
 
 
 def _element(tag: str, **attributes: str) -> Element:
