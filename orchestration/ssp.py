@@ -30,8 +30,8 @@ PARAMETER_SET = "scenario"
 SYSTEM_PARAMETERS = "resources/scenario.ssv"
 """The set with the names of the components before those of the parameters."""
 
-CARRIED = ("period", "offset", "plant_interval")
-"""What of the timing an SSP can say: the sample clock of the controller, and the step of the tool."""
+CARRIED = ("period", "offset", "plant_interval", "clock")
+"""What of the timing an SSP can say: the sample clock, always the controller's own there, and the step of the tool."""
 
 _NAMESPACES = {
     "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
