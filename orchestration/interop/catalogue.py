@@ -50,8 +50,8 @@ TOOLS = {
 
 
 def chosen(names: Sequence[str] | None) -> list[Tool]:
-    """The tools of these names, all if there are none; raises `UsageError` naming those that exist."""
+    """The tools of these names, each once, all if there are none; raises `UsageError` naming those that exist."""
     for name in names or ():
         if name not in TOOLS:
             raise UsageError(f"--tool {name}: expected one of {'; '.join(TOOLS)}")
-    return [TOOLS[name] for name in names or TOOLS]
+    return [TOOLS[name] for name in dict.fromkeys(names or TOOLS)]

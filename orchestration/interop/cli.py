@@ -43,7 +43,7 @@ def interop(
     print(json.dumps([table.as_dict(agreement) for agreement in found], indent=2) if as_json else table.text(found))
     far = [agreement.tool.name for agreement in found if not table.agrees(agreement)]
     if far:
-        say(f"farther than {table.AIM:g} from this project's master: {', '.join(far)}")
+        say(f"farther than {table.AIM:g} from this project's master: {'; '.join(far)}")
         raise typer.Exit(1)
 
 
