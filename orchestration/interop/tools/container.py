@@ -20,7 +20,8 @@ def fly_sequential(job: Job) -> Rows:
 
 
 def _fly(job: Job, *, sequential: bool) -> Rows:
-    files = {name: path.name for name, path in job.fmus.items()}
+    # File names of its own: it takes none with a space, and calls what it connects after the file.
+    files = {name: f"{name}_fmu.fmu" for name in job.fmus}
     description = {
         "name": "loop.fmu",
         "fmu": list(files.values()),
@@ -35,8 +36,8 @@ def _fly(job: Job, *, sequential: bool) -> Rows:
     }
     folder = job.folder / "container"
     folder.mkdir()
-    for path in job.fmus.values():
-        shutil.copyfile(path, folder / path.name)
+    for name, path in job.fmus.items():
+        shutil.copyfile(path, folder / files[name])
     (folder / "loop.json").write_text(json.dumps(description), encoding="utf-8")
     Assembly("loop.json", fmu_directory=folder).make_fmu()
     table = simulate_fmu(
