@@ -22,6 +22,9 @@ from orchestration.scenario import Scenario
 from orchestration.simulator import Floats, Transfer
 from orchestration.wiring import MEASUREMENT
 
+_TEMPORARY = ("TMPDIR", "TEMP", "TMP")
+"""Where a tool unpacks, by the names that systems have for it: not all clean up after themselves."""
+
 STATES = len(MEASUREMENT)
 """The first so many of `SIGNALS` are the state of the plant, the others the command."""
 
@@ -136,6 +139,7 @@ class _Flights:
         done = subprocess.run(
             [sys.executable, "-m", "orchestration.interop.child", *arguments],
             capture_output=True, text=True, errors="replace", check=False,
+            env={**os.environ, **dict.fromkeys(_TEMPORARY, str(folder))},
         )  # fmt: skip
         if done.returncode != 0:
             lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
