@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestration import fmus, ssp
-from orchestration.errors import QuadcosimError
+from orchestration.errors import QuadcosimError, UsageError
 from orchestration.flight import prepared
 from orchestration.fmpy_adapter import FmuSimulator
 from orchestration.interop.catalogue import Tool
@@ -20,6 +20,7 @@ from orchestration.interop.job import SIGNALS, Job
 from orchestration.interop.trace import PORTS, Trace, read_trace, traced_copy
 from orchestration.scenario import Scenario
 from orchestration.simulator import Floats, Transfer
+from orchestration.timing import exact_nanoseconds
 from orchestration.wiring import MEASUREMENT
 
 _TEMPORARY = ("TMPDIR", "TEMP", "TMP")
@@ -63,7 +64,7 @@ def agreements(
 
     Its plant interval is the communication step of both FMUs, its period that of the controller's own clock.
     Raises `ModuleNotFoundError` if a tool is not installed, `UsageError` for a scenario that an SSP cannot
-    carry, `QuadcosimError` with a tool's last words if it fails.
+    carry or whose times are no multiples of that step, `QuadcosimError` with a tool's last words if it fails.
     """
     tools = list(tools)
     versions = {tool.name: tool.versions() for tool in tools}
@@ -88,6 +89,7 @@ class _Flights:
         self._scenario = scenario.with_fmus(
             plant=fmus.locate(scenario.plant.fmu, announce), controller=fmus.locate(scenario.controller.fmu, announce)
         )
+        _expect_common_grid(self._scenario)
         self._step = scenario.timing.plant_interval
         self._own: dict[tuple[str, str], Floats] = {}
         np.save(folder / "recorded.npy", self._rows_of_master("gauss-seidel", {})[:-1])
@@ -185,6 +187,21 @@ class _GivenFirstInputs(FmuSimulator):
         """As of the base."""
         super().step(t, h)
         self._stepped = True
+
+
+def _expect_common_grid(scenario: Scenario) -> None:
+    """Other masters step both FMUs together; between two of their points nothing can be due."""
+    ssp.components(scenario)
+    timing = scenario.timing
+    step = exact_nanoseconds(timing.plant_interval)
+    if step.denominator != 1:
+        raise UsageError(f"timing.plant_interval = {timing.plant_interval}: expected a whole number of nanoseconds")
+    times = {"timing.period": timing.period, "timing.offset": timing.offset, "stop_time": scenario.stop_time}
+    for name, value in times.items():
+        if exact_nanoseconds(value) % step != 0:
+            raise UsageError(
+                f"{name} = {value}: expected a multiple of the plant interval of {timing.plant_interval} s"
+            )
 
 
 def _compared(tool: Tool) -> tuple[str, ...]:
