@@ -164,8 +164,10 @@ class _Flights:
             with prepared(scenario, load=load) as flight:
                 flight.master.initialise()
                 flight.master.run()
-                signals = flight.result().signals
-            self._own[key] = np.column_stack([signals[name] for name in ("time", *SIGNALS)])
+                result = flight.result()
+            if result.divergence is not None:
+                raise QuadcosimError(f"in this project's master, {order}: {result.divergence}; nothing to compare")
+            self._own[key] = np.column_stack([result.signals[name] for name in ("time", *SIGNALS)])
         return self._own[key]
 
 
