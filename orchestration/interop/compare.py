@@ -1,5 +1,6 @@
 """The same flight in every tool and in this project's master, compared signal by signal."""
 
+import math
 import os
 import subprocess
 import sys
@@ -28,6 +29,9 @@ _TEMPORARY = ("TMPDIR", "TEMP", "TMP")
 
 STATES = len(MEASUREMENT)
 """The first so many of `SIGNALS` are the state of the plant, the others the command."""
+
+MISSING = 1
+"""Steps before the end that a tool may leave out: some stop where the next step would end beyond it."""
 
 FirstInputs = dict[str, tuple[float, ...]]
 
@@ -91,6 +95,7 @@ class _Flights:
         )
         _expect_common_grid(self._scenario)
         self._step = scenario.timing.plant_interval
+        self._steps = round(scenario.stop_time / self._step)
         self._own: dict[tuple[str, str], Floats] = {}
         np.save(folder / "recorded.npy", self._rows_of_master("gauss-seidel", {})[:-1])
 
@@ -107,6 +112,8 @@ class _Flights:
     def agreement(self, tool: Tool, versions: dict[str, str], trace: Trace, rows: Floats) -> Agreement:
         """Compare the rows of a tool with this project's in the order that it was seen to have."""
         order = "gauss-seidel" if trace.order == "alone" else trace.order
+        if len(rows) < self._steps - MISSING:
+            raise QuadcosimError(f"{tool.name}: ended after {len(rows)} steps, expected {self._steps}")
         late = np.abs(rows[:, 0] - self._step * np.arange(1, len(rows) + 1)).max()
         if late > 0.01 * self._step:
             raise QuadcosimError(f"{tool.name}: a row is {late:g} s beside its communication point")
@@ -216,4 +223,9 @@ def _differences(tool: Tool, rows: Floats, own: Floats) -> dict[str, float]:
     count = min(len(rows), len(own) - 1)
     expected = np.column_stack([own[1 : count + 1, 1 : STATES + 1], own[:count, STATES + 1 :]])
     differences = np.abs(rows[:count, 1:] - expected).max(axis=0)
-    return {name: float(value) for name, value in zip(SIGNALS, differences, strict=True) if not np.isnan(value)}
+    flown = {name: float(value) for name, value in zip(SIGNALS, differences, strict=True) if _flies(tool, name)}
+    return {name: math.inf if math.isnan(value) else value for name, value in flown.items()}
+
+
+def _flies(tool: Tool, signal: str) -> bool:
+    return signal.partition(".")[0] in tool.components
