@@ -33,7 +33,8 @@ STATES = len(MEASUREMENT)
 MISSING = 1
 """Steps before the end that a tool may leave out: some stop where the next step would end beyond it."""
 
-FirstInputs = dict[str, tuple[float, ...]]
+Start = dict[str, tuple[tuple[float, ...], tuple[float, ...]]]
+"""By component: its connected inputs as its initialisation ends, and those of its first step."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +47,7 @@ class Agreement:
     as_it_comes: dict[str, float]
     """by signal: largest difference from `quadcosim run` [SI]"""
     same_start: dict[str, float]
-    """the same, with the tool's inputs of the first step given to this project's master too"""
+    """the same, with the tool's inputs until the end of the first step given to this project's master too"""
 
     def both(self) -> tuple[dict[str, float], dict[str, float]]:
         """As it comes, and with the same start."""
@@ -117,13 +118,13 @@ class _Flights:
         late = np.abs(rows[:, 0] - self._step * np.arange(1, len(rows) + 1)).max()
         if late > 0.01 * self._step:
             raise QuadcosimError(f"{tool.name}: a row is {late:g} s beside its communication point")
-        first_inputs = {} if trace.order == "alone" else trace.first_inputs
+        given = {name: (trace.initial_inputs[name], first) for name, first in trace.first_inputs.items()}
         return Agreement(
             tool=tool,
             versions=versions,
             trace=trace,
             as_it_comes=_differences(tool, rows, self._rows_of_master(order, {})),
-            same_start=_differences(tool, rows, self._rows_of_master(order, first_inputs)),
+            same_start=_differences(tool, rows, self._rows_of_master(order, {} if trace.order == "alone" else given)),
         )
 
     def _path(self, component: str) -> Path:
@@ -155,18 +156,17 @@ class _Flights:
             raise QuadcosimError(f"{tool.name}: {lines[-1]}")
         return np.asarray(np.load(folder / "rows.npy"))
 
-    def _rows_of_master(self, order: str, first_inputs: FirstInputs) -> Floats:
+    def _rows_of_master(self, order: str, start: Start) -> Floats:
         """This project's flight: the time, `SIGNALS`; the command is the one computed at the row's time."""
-        key = (order, repr(first_inputs))
+        key = (order, repr(start))
         if key not in self._own:
             late = 0.0 if order == "gauss-seidel" else self._step
             scenario = self._scenario.with_changes(timing={"clock": "fmu", "delay": late})
 
             def load(path: Path, instance_name: str) -> FmuSimulator:
-                if not first_inputs:
+                if not start:
                     return FmuSimulator(path, instance_name)
-                names, values = PORTS[instance_name][0], first_inputs[instance_name]
-                return _GivenFirstInputs(path, instance_name, dict(zip(names, values, strict=True)))
+                return _GivenStart(path, instance_name, *start[instance_name])
 
             with prepared(scenario, load=load) as flight:
                 flight.master.initialise()
@@ -178,24 +178,36 @@ class _Flights:
         return self._own[key]
 
 
-class _GivenFirstInputs(FmuSimulator):
+class _GivenStart(FmuSimulator):
     """An FMU whose connected inputs are given ones until its first step is over, whatever the master sends."""
 
-    def __init__(self, path: Path, name: str, inputs: dict[str, float]) -> None:
+    def __init__(self, path: Path, name: str, initial: Sequence[float], first: Sequence[float]) -> None:
         super().__init__(path, name)
-        self._given = inputs
+        names = PORTS[name][0]
+        self._put_initial = super().writer(names, np.array(initial))
+        self._put_first = super().writer(names, np.array(first))
+        self._held: list[Transfer] = []
         self._stepped = False
 
     def writer(self, names: Sequence[str], source: Floats) -> Transfer:
-        """As of the base, but for the first step."""
+        """As of the base, once the first step is over."""
         usual = super().writer(names, source)
-        first = super().writer(names, np.array([self._given[name] for name in names]))
-        return lambda: usual() if self._stepped else first()
+        self._held.append(usual)
+        return lambda: usual() if self._stepped else None
+
+    def exit_initialization(self) -> None:
+        """As of the base, between the given inputs."""
+        self._put_initial()
+        super().exit_initialization()
+        self._put_first()
 
     def step(self, t: float, h: float) -> None:
-        """As of the base."""
+        """As of the base; after the first one the inputs are what the master has sent meanwhile."""
         super().step(t, h)
-        self._stepped = True
+        if not self._stepped:
+            self._stepped = True
+            for write in self._held:
+                write()
 
 
 def _expect_common_grid(scenario: Scenario) -> None:

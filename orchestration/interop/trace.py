@@ -73,6 +73,8 @@ class Trace:
 
     order: str
     """gauss-seidel: a command is there in the step that begins at its sample; jacobi: in the next one"""
+    initial_inputs: dict[str, tuple[float, ...]]
+    """by component: what was at its connected inputs when its initialisation ended"""
     first_inputs: dict[str, tuple[float, ...]]
     """by component: what its first step found at its connected inputs"""
     first_exchange: dict[str, str]
@@ -93,12 +95,12 @@ def read_trace(folder: Path, components: Mapping[str, Path], step: float) -> Tra
         if len(lines) < 2:
             raise QuadcosimError(f"{component}: expected steps, found none in {log}")
         starts[component], *steps[component] = map(json.loads, lines)
-    first = {component: tuple(found[0]["inputs"]) for component, found in steps.items()}
     exact = Fraction(repr(step))
     last = steps["plant" if "plant" in steps else "controller"]
     return Trace(
         order=_order(steps),
-        first_inputs=first,
+        initial_inputs={component: tuple(start["inputs"]) for component, start in starts.items()},
+        first_inputs={component: tuple(found[0]["inputs"]) for component, found in steps.items()},
         first_exchange={name: _first_exchange(name, components[name], starts, steps) for name in components},
         steps=len(last),
         drift=max(abs(line["t"] - float(k * exact)) for k, line in enumerate(last)),
