@@ -92,7 +92,8 @@ class _Flights:
     def __init__(self, scenario: Scenario, folder: Path, announce: Callable[[str], None] | None) -> None:
         self._folder = folder
         self._scenario = scenario.with_fmus(
-            plant=fmus.locate(scenario.plant.fmu, announce), controller=fmus.locate(scenario.controller.fmu, announce)
+            plant=fmus.locate(scenario.plant.fmu, announce).absolute(),
+            controller=fmus.locate(scenario.controller.fmu, announce).absolute(),
         )
         _expect_common_grid(self._scenario)
         self._step = scenario.timing.plant_interval
@@ -148,8 +149,8 @@ class _Flights:
         arguments = [tool.name, str(folder / "job.json"), str(folder / "rows.npy")]
         done = subprocess.run(
             [sys.executable, "-m", "orchestration.interop.child", *arguments],
-            capture_output=True, text=True, errors="replace", check=False,
-            env={**os.environ, **dict.fromkeys(_TEMPORARY, str(folder))},
+            capture_output=True, text=True, errors="replace", check=False, env=_environment(folder),
+            cwd=folder,  # not this process's: fmpy changes that while it loads an FMU, in another thread
         )  # fmt: skip
         if done.returncode != 0:
             lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
@@ -208,6 +209,13 @@ class _GivenStart(FmuSimulator):
             self._stepped = True
             for write in self._held:
                 write()
+
+
+def _environment(folder: Path) -> dict[str, str]:
+    """Of a flight in `folder`: it finds this package wherever it lies, and unpacks there."""
+    root = str(Path(fmus.__file__).resolve().parent.parent)
+    path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
+    return {**os.environ, **dict.fromkeys(_TEMPORARY, str(folder)), "PYTHONPATH": path}
 
 
 def _expect_common_grid(scenario: Scenario) -> None:
