@@ -13,8 +13,8 @@ from typing import Any
 
 import fmpy
 
-from fmu_kit.packaging import write_archive
-from orchestration.errors import QuadcosimError
+from fmu_kit.packaging import read_source_hash, write_archive
+from orchestration.errors import QuadcosimError, UsageError
 from orchestration.wiring import COMMAND, MEASUREMENT
 
 PORTS = {"controller": (MEASUREMENT, COMMAND), "plant": (COMMAND, MEASUREMENT)}
@@ -48,7 +48,12 @@ _Model = {model}.__mro__[1]
 
 
 def traced_copy(fmu: Path, component: str, folder: Path) -> Path:
-    """A copy of `fmu` in `folder` that writes its steps to `log_of(component, folder)`."""
+    """A copy of `fmu` in `folder` that writes its steps to `log_of(component, folder)`.
+
+    Raises `UsageError` for an FMU that was not packed by this project.
+    """
+    if read_source_hash(fmu) is None:
+        raise UsageError(f"{fmu}: expected an FMU packed by fmu_kit; what others are given cannot be seen")
     with zipfile.ZipFile(fmu) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}
     description = fmpy.read_model_description(str(fmu))
