@@ -45,12 +45,14 @@ def agreement_chart(agreements: Sequence[Agreement]) -> Figure:
                     panel.plot(
                         max(max(values), SMALLEST), y, marker, color=color, markersize=5,
                         markerfacecolor=color if filled else "none", linestyle="none",
-                        label=name if filled and row == 0 else None,
+                        label=name if filled else None,
                     )  # fmt: skip
     panel.axvline(AIM, color=GREY, linestyle="--", linewidth=1.0, label=f"aim, {AIM:g}")
     panel.set(xscale="log", xlabel="largest difference from quadcosim's master [SI units]")
     panel.set_yticks(range(len(agreements)), [agreement.tool.name for agreement in agreements])
     panel.invert_yaxis()
     panel.set_title("open: as the tool comes; filled: with the tool's inputs of the first step in both", fontsize=9)
-    figure.legend(loc="outside right upper", fontsize=8)
+    lines = {line.get_label(): line for line in reversed(panel.get_legend_handles_labels()[0])}
+    names = [name for name in (*_KINDS, f"aim, {AIM:g}") if name in lines]
+    figure.legend([lines[name] for name in names], names, loc="outside right upper", fontsize=8)
     return figure
