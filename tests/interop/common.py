@@ -1,0 +1,77 @@
+"""What the tests of `quadcosim ssp` and `quadcosim interop` share: other parameters, agreements, flights."""
+
+import subprocess
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from orchestration import Scenario
+from orchestration.flight import run
+from orchestration.interop.catalogue import TOOLS
+from orchestration.interop.compare import Agreement
+from orchestration.interop.job import SIGNALS
+from orchestration.interop.trace import Trace
+from orchestration.simulator import Floats
+
+Done = subprocess.CompletedProcess[str]
+Main = Callable[..., Done]
+
+OTHER = {
+    "plant.mass": 1.2,
+    "plant.inertia.xx": 1.1,
+    "plant.inertia.xy": 0.05,
+    "plant.inertia.xz": -0.03,
+    "plant.inertia.yz": 0.02,
+    "plant.initial.position.x": 1.5,
+    "plant.initial.velocity.y": -0.2,
+    "plant.external_force.x": 0.1,
+    "controller.mass": 1.2,
+    "controller.inertia.xy": 0.05,
+    "controller.gain.eta": 10.0,
+}
+"""Parameters, and an input that nothing is connected to, all away from their defaults."""
+
+
+def with_other_parameters(scenario: Scenario) -> Scenario:
+    return scenario.with_changes(parameters=OTHER, timing={"period": 0.02})
+
+
+def states_of_master(scenario: Scenario) -> Floats:
+    """The states of the plant as this project's master flies them, shape (n, 13)."""
+    signals = run(scenario.with_changes(timing={"clock": "fmu"})).signals
+    return np.column_stack([signals[name] for name in SIGNALS if name.startswith("plant.")])
+
+
+def farthest(agreement: Agreement, differences: dict[str, float]) -> float:
+    """The largest difference of a state, of a command if no plant was flown."""
+    kind = "plant." if "plant" in agreement.tool.components else "controller."
+    values = [value for name, value in differences.items() if name.startswith(kind)]
+    assert len(values) == (13 if kind == "plant." else 4)
+    return max(values)
+
+
+def agreement(
+    tool: str = "libcosim",
+    same_start: float = 1e-12,
+    as_it_comes: float = 1e-3,
+    first: Sequence[str] = ("exchanged",) * 2,
+) -> Agreement:
+    """One that was never flown: every signal of the tool is so far from this project's."""
+    chosen = TOOLS[tool]
+    names = [name for name in SIGNALS if name.partition(".")[0] in chosen.components]
+    inputs = dict.fromkeys(chosen.components, (0.0,))
+    return Agreement(
+        tool=chosen,
+        versions=dict.fromkeys(chosen.packages, "1.0"),
+        trace=Trace(
+            order="jacobi",
+            initial_inputs=inputs,
+            first_inputs=inputs,
+            first_exchange=dict(zip(chosen.components, first)),
+            steps=3000,
+            drift=2e-12,
+            end=30.0,
+        ),
+        as_it_comes=dict.fromkeys(names, as_it_comes),
+        same_start=dict.fromkeys(names, same_start),
+    )

@@ -1,0 +1,51 @@
+"""What the tests of `quadcosim ssp` and `quadcosim interop` share."""
+
+from pathlib import Path
+
+import pytest
+
+from orchestration import Scenario, cli
+from tests.fmus.source_tree import build, copy_sources, replace
+from tests.interop.common import Done, Main
+
+
+@pytest.fixture
+def main(capsys: pytest.CaptureFixture[str]) -> Main:
+    """The command `quadcosim` to its end, in this process."""
+
+    def call(*arguments: str | Path, code: int = 0) -> Done:
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as end:
+            cli.main([*map(str, arguments)])
+        out, err = capsys.readouterr()
+        assert (end.value.code or 0) == code, out + err
+        return Done(arguments, code, out, err)
+
+    return call
+
+
+@pytest.fixture(scope="session")
+def paper(built: dict[str, Path]) -> Scenario:
+    """The paper's flight, with the FMUs of the session."""
+    return Scenario().with_fmus(plant=built["QuadrotorPlant"], controller=built["UnifiedController"])
+
+
+@pytest.fixture(scope="session")
+def short(paper: Scenario) -> Scenario:
+    """Its first moments, on a coarse grid."""
+    return paper.with_changes(stop_time=0.2, timing={"plant_interval": 0.01})
+
+
+@pytest.fixture(scope="session")
+def odd_plant(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A plant with a parameter of each type: it is heavier by 0.1 kg for each box of its `cargo` if it is `loaded`."""
+    folder = tmp_path_factory.mktemp("odd")
+    sources = copy_sources(folder / "sources")
+    declared = """    *LOCALS,
+    fixed_parameter("cargo", "number of boxes", None, 0),
+    fixed_parameter("loaded", "whether they are on board", None, False),
+)"""
+    replace(sources / "plant_fmu" / "interface.py", "    *LOCALS,\n)", declared)
+    heavier = 'mass=self.real("mass") + 0.1 * self.count("cargo") * self.boolean("loaded")'
+    replace(sources / "plant_fmu" / "slave.py", 'mass=self.real("mass")', heavier)
+    return build(sources, folder, "QuadrotorPlant")
