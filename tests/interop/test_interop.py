@@ -2,10 +2,12 @@
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 
 from orchestration import QuadcosimError, Scenario, UsageError
+from orchestration.interop import table
 from orchestration.interop.catalogue import TOOLS, chosen
 from orchestration.interop.compare import Agreement, agreements
 from orchestration.interop.table import AIM, agrees
@@ -65,6 +67,20 @@ One = tuple[Scenario, Agreement, Fact]
 
 def test_the_table_has_every_tool_in_order(flown: Flown) -> None:
     assert list(flown[1]) == list(TOOLS) == list(FACTS)
+
+
+def test_the_page_has_the_table_that_was_found(flown: Flown) -> None:
+    scenario, found = flown
+    page = (Path(__file__).parent.parent.parent / "docs" / "interop.md").read_text(encoding="utf-8")
+    block = page.partition(f"<!-- step {scenario.timing.plant_interval} -->")[2].partition("<!-- end -->")[0]
+    # Tool, order, first inputs: no rounding moves them; nor the steps, of the page's 30 s.
+    columns = slice(1, 5 if scenario.stop_time == 30.0 else 4)
+
+    def rows(text: str) -> list[list[str]]:
+        lines = [line.split("|") for line in text.strip().splitlines()]
+        return [[cell.strip() for cell in line[columns]] for line in (lines[0], *lines[2:])]
+
+    assert rows(block) == rows(table.text(list(found.values())))
 
 
 def test_the_order_of_each_tool_is_as_stated(one: One) -> None:

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from orchestration import Scenario, ssp
+from orchestration import Scenario, fmus, ssp
 from orchestration.interop.catalogue import TOOLS
+from orchestration.wiring import MODELS
 from tests.interop.common import Main
 from tests.studies.common import error_line, quadcosim
 
@@ -44,6 +45,8 @@ def libcosim_that(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[
 
 
 def test_a_tool_by_name_is_flown_alone_and_its_row_printed(tmp_path: Path) -> None:
+    for model in MODELS:
+        fmus.locate(model)  # a build would be announced
     done = quadcosim(*INTEROP, "--tool", "fmucontainer -sequential", cwd=tmp_path)
     rows = done.stdout.splitlines()
     assert len(rows) == 3
