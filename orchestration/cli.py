@@ -144,7 +144,8 @@ def validate(
         findings = findings_of(path, time_limit=time_limit)
         results.append({"fmu": str(path), "findings": [asdict(finding) for finding in findings]})
         if not as_json:
-            print(f"{path}: {f'{len(findings)} problems' if findings else 'no problems found'}")
+            count = len(findings) or "no"
+            print(f"{path}: {count} problem{'' if count == 1 else 's'}{'' if findings else ' found'}")
             for finding in findings:
                 print(f"  {finding}")
     if as_json:

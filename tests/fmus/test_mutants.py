@@ -100,7 +100,7 @@ def test_the_command_names_what_it_finds_and_ends_with_1(
         cli.main(["validate", str(path)])
     assert end.value.code == 1
     first, *lines = capsys.readouterr().out.splitlines()
-    assert first == f"{path}: {len(lines)} problems"
+    assert first == f"{path}: {len(lines)} problem{'s' if len(lines) > 1 else ''}"
     assert any(line.startswith(f"  {BY_NAME[name].rule}: ") for line in lines)
     assert all(line.startswith("  ") for line in lines)
 

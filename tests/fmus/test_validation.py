@@ -110,7 +110,7 @@ def test_a_file_that_is_no_fmu_is_one_problem(tmp_path: Path, capsys: pytest.Cap
         cli.main(["validate", str(path)])
     assert end.value.code == 1
     first, second = capsys.readouterr().out.splitlines()
-    assert first == f"{path}: 1 problems"
+    assert first == f"{path}: 1 problem"
     assert second.startswith("  readable: no.fmu: expected a zip archive that is whole: ")
 
 
