@@ -18,19 +18,8 @@ from orchestration.interop.compare import agreements
 from orchestration.interop.figure import agreement_chart
 from orchestration.scenario import Scenario
 from orchestration.timing import Timing
-from orchestration.validation import (
-    archive,
-    dependencies,
-    description,
-    house,
-    refusals,
-    runs,
-    structure,
-    units,
-    variables,
-)
+from orchestration.validation import rules
 from orchestration.validation.finding import name_of
-from orchestration.validation.own_description import own_description
 from orchestration.wiring import MODELS
 from tests.fmus.mutants import MUTANTS
 from tests.fmus.verdicts import as_markdown, verdicts
@@ -38,12 +27,6 @@ from tests.fmus.verdicts import as_markdown, verdicts
 DOCS = Path(__file__).parent
 INTERVALS = ("0.01", "0.001")
 """Communication steps, as the page names them [s]."""
-
-STANDARD = (
-    *archive.RULES, description.standard, *description.RULES, *variables.RULES, *units.RULES, *structure.RULES,
-    *runs.FIRST, *runs.RULES, *dependencies.RULES,
-)  # fmt: skip
-OURS = (*house.RULES, own_description, *refusals.RULES)
 
 
 def main() -> None:
@@ -74,8 +57,8 @@ def validation() -> None:
     fill(
         DOCS / "validation.md",
         {
-            "standard": _sentences(STANDARD),
-            "ours": _sentences(OURS),
+            "standard": _sentences(rules.STANDARD),
+            "ours": _sentences(rules.OURS),
             "count": f"Of {len(found)} damaged FMUs quadcosim finds {sum(bool(v.quadcosim) for v in found)}, fmpy "
             f"{sum(bool(v.fmpy) for v in found)}, fmutool {sum(bool(v.fmutool) for v in found)}.",
             "mutants": as_markdown(found),

@@ -274,9 +274,13 @@ def _unchanged_files(target: Target) -> dict[str, bytes]:
 
 
 def _fragment(target: Target) -> str:
-    """The part of the documentation written by hand; empty if there is none."""
+    """The part of the documentation written by hand; empty if there is none.
+
+    `<?include NAME?>` in it stands for the file NAME of this package, which several may share.
+    """
     path = _module_path(target.module).with_name(FRAGMENT)
-    return _text(path) if path.is_file() else ""
+    text = _text(path) if path.is_file() else ""
+    return re.sub(r"<\?include (\S+)\?>", lambda found: _text(Path(__file__).with_name(found[1])), text)
 
 
 def _well_formed_fragment(target: Target) -> str:

@@ -6,8 +6,9 @@ from pathlib import Path
 import hypothesis
 import pytest
 
-from orchestration import fmus
+from orchestration import cli, fmus
 from orchestration.wiring import MODELS
+from tests.commands import Done, Main
 
 hypothesis.settings.register_profile("ci", derandomize=True, deadline=None)
 hypothesis.settings.register_profile("local", deadline=None)
@@ -27,3 +28,18 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Both FMUs by model name, freshly built into a folder of the session."""
     folder = tmp_path_factory.mktemp("fmus")
     return {path.stem: path for path in fmus.build(MODELS, folder)}
+
+
+@pytest.fixture
+def main(capsys: pytest.CaptureFixture[str]) -> Main:
+    """The command `quadcosim` in this process, which saves the imports: for what does not hang on the process."""
+
+    def call(*arguments: str | Path, code: int = 0) -> Done:
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as end:
+            cli.main([*map(str, arguments)])
+        out, err = capsys.readouterr()
+        assert (end.value.code or 0) == code, out + err
+        return Done(arguments, code, out, err)
+
+    return call

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import IO
 
-from orchestration.validation import dependencies, refusals, runs
+from orchestration.validation import rules, runs
 from orchestration.validation.archive import read_archive
 from orchestration.validation.bench import Bench
 from orchestration.validation.finding import Rule, name_of
@@ -28,18 +28,17 @@ def main(path: str, folder: str, report: str) -> None:
     with Path(report).open("a", encoding="utf-8", buffering=1) as out:
         try:
             if not any(_tried([rule], bench, out) for rule in runs.FIRST):
-                for rules in (runs.RULES, dependencies.RULES, refusals.RULES if bench.fmu.is_ours else ()):
-                    _tried(rules, bench, out)
+                _tried((*rules.OF_RUNS, *(rules.OUR_RUNS if bench.fmu.is_ours else ())), bench, out)
             _write(out, rule=END)
         except Exception as error:
             _write(out, **{ERROR: f"{type(error).__name__}: {error}"})
             raise
 
 
-def _tried(rules: Iterable[Rule[Bench]], bench: Bench, out: IO[str]) -> int:
+def _tried(chosen: Iterable[Rule[Bench]], bench: Bench, out: IO[str]) -> int:
     """How many findings there were."""
     count = 0
-    for rule in rules:
+    for rule in chosen:
         _write(out, rule=name_of(rule))
         try:
             for text in rule(bench):

@@ -3,7 +3,7 @@
 import tempfile
 from pathlib import Path
 
-from orchestration.validation import archive, description, house, structure, units, variables
+from orchestration.validation import rules
 from orchestration.validation.archive import UnreadableError, can_be_unpacked, read_archive
 from orchestration.validation.finding import Finding, check, name_of
 from orchestration.validation.fmu import Fmu, read_fmu
@@ -22,14 +22,13 @@ def validate(path: str | Path, *, time_limit: float = TIME_LIMIT) -> list[Findin
     findings: list[Finding] = []
     try:
         content = read_archive(Path(path))
-        findings += check((*archive.RULES, description.standard), content)
+        findings += check(rules.OF_ARCHIVES, content)
         fmu = read_fmu(content)
     except UnreadableError as error:
         return [*findings, Finding(READABLE, str(error))]
-    for module in (description, variables, units, structure):
-        findings += check(module.RULES, fmu)
+    findings += check(rules.OF_DESCRIPTIONS, fmu)
     if fmu.is_ours:
-        findings += check(house.RULES, fmu)
+        findings += check(rules.OUR_DESCRIPTIONS, fmu)
     if can_be_unpacked(content):
         findings += _of_what_it_does(fmu, time_limit)
     return findings

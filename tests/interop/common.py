@@ -1,7 +1,6 @@
 """What the tests of `quadcosim ssp` and `quadcosim interop` share: other parameters, agreements, flights."""
 
-import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -12,9 +11,6 @@ from orchestration.interop.compare import Agreement
 from orchestration.interop.job import SIGNALS
 from orchestration.interop.trace import Trace
 from orchestration.simulator import Floats
-
-Done = subprocess.CompletedProcess[str]
-Main = Callable[..., Done]
 
 OTHER = {
     "plant.mass": 1.2,

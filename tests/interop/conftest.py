@@ -4,24 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestration import Scenario, cli
+from orchestration import Scenario
 from tests.fmus.source_tree import build, copy_sources, replace
-from tests.interop.common import Done, Main
-
-
-@pytest.fixture
-def main(capsys: pytest.CaptureFixture[str]) -> Main:
-    """The command `quadcosim` to its end, in this process."""
-
-    def call(*arguments: str | Path, code: int = 0) -> Done:
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as end:
-            cli.main([*map(str, arguments)])
-        out, err = capsys.readouterr()
-        assert (end.value.code or 0) == code, out + err
-        return Done(arguments, code, out, err)
-
-    return call
 
 
 @pytest.fixture(scope="session")

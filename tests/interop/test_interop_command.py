@@ -12,7 +12,7 @@ import pytest
 from orchestration import Scenario, fmus, ssp
 from orchestration.interop.catalogue import TOOLS
 from orchestration.wiring import MODELS
-from tests.interop.common import Main
+from tests.commands import Main
 from tests.studies.common import error_line, quadcosim
 
 SHORT = ("--plant-interval", "0.01", "--stop-time", "0.1")

@@ -10,7 +10,8 @@ import pytest
 from fmpy.ssp.ssd import read_ssd
 
 from orchestration import ReferenceChoice, Scenario, Timing, UsageError, fmus, ssp
-from tests.interop.common import OTHER, Main
+from tests.commands import Main
+from tests.interop.common import OTHER
 from tests.studies.common import error_line, one_line, quadcosim
 
 

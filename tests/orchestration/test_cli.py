@@ -6,14 +6,14 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import orchestration
-from orchestration import Scenario, Timing, cli
+from orchestration import Scenario, Timing
+from tests.commands import Done, Main
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = shutil.which("quadcosim", path=str(Path(sys.executable).parent))
@@ -41,9 +41,6 @@ KEYS = {
 }
 
 
-Done = subprocess.CompletedProcess[str]
-
-
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder to start from that is not the project's."""
@@ -63,24 +60,6 @@ def quadcosim(*arguments: str | Path, code: int = 0, environment: dict[str, str]
     )  # fmt: skip
     assert done.returncode == code, done.stdout + done.stderr
     return done
-
-
-Main = Callable[..., Done]
-
-
-@pytest.fixture
-def main(capsys: pytest.CaptureFixture[str]) -> Main:
-    """The same in this process, which saves the imports: for what does not hang on the process."""
-
-    def call(*arguments: str | Path, code: int = 0) -> Done:
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as end:
-            cli.main([*map(str, arguments)])
-        out, err = capsys.readouterr()
-        assert (end.value.code or 0) == code, out + err
-        return Done(arguments, code, out, err)
-
-    return call
 
 
 def flown(**timing: Any) -> dict[str, Any]:

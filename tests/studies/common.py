@@ -16,9 +16,9 @@ from orchestration.studies.axes import Axis
 from orchestration.studies.store import Row, open_for_reading
 from orchestration.studies.study import Study, locate_fmus
 from orchestration.studies.sweep import store_path, sweep
+from tests.commands import Done
 
 SCRIPT = shutil.which("quadcosim", path=str(Path(sys.executable).parent))
-Done = subprocess.CompletedProcess[str]
 
 # Everything random is on: a run that took another seed or an order of its own would show in its bits.
 NOISY = """
