@@ -276,13 +276,14 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     @guarded
     def get_string(self, vrs: list[int]) -> list[str]:
-        """fmi2GetString; there are no String variables."""
-        raise self._wrong_type(vrs, "String")
+        """fmi2GetString; there are no String variables, but some masters ask for none of them."""
+        self._of_type(vrs, "String")
+        return []
 
     @guarded
     def set_string(self, vrs: list[int], values: list[str]) -> None:
-        """fmi2SetString; there are no String variables."""
-        raise self._wrong_type(vrs, "String")
+        """fmi2SetString; as `get_string`."""
+        self._of_type(vrs, "String")
 
     @guarded
     def _get_fmu_state(self) -> State:
