@@ -83,11 +83,13 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         if "variables" in cls.__dict__:
             cls._index = {v.name: i for i, v in enumerate(cls.variables)}
             cls._real_count = sum(v.type == "Real" for v in cls.variables)
+            cls._given = frozenset(i for i, v in enumerate(cls.variables) if v.has_start)
             cls._inputs = frozenset(i for i, v in enumerate(cls.variables) if v.causality == "input")
             cls._tunable = frozenset(i for i, v in enumerate(cls.variables) if v.variability == "tunable")
 
     _index: ClassVar[dict[str, int]]
     _real_count: ClassVar[int]
+    _given: ClassVar[frozenset[int]]
     _inputs: ClassVar[frozenset[int]]
     _tunable: ClassVar[frozenset[int]]
 
@@ -232,8 +234,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     @guarded
     def get_real(self, vrs: list[int]) -> list[float]:
-        """fmi2GetReal."""
-        if self._stale and self._phase is Phase.INITIALIZATION:
+        """fmi2GetReal; in initialisation mode, what was set can be read back before the rest is set too."""
+        if self._stale and self._phase is Phase.INITIALIZATION and not self._given.issuperset(vrs):
             self._initialise()
         reals = self._reals
         try:
