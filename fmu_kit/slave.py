@@ -5,6 +5,7 @@ A model lists its variables and defines `read_parameters`, `initialise`, `step`,
 readable message.
 """
 
+import contextlib
 import enum
 import functools
 import json
@@ -95,8 +96,10 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
-        # All imports are done: the host's import path is left as it was before pythonfmu added to it.
-        sys.path[:] = [entry for entry in sys.path if entry != self.resources]
+        # All imports are done: the host's import path is left as it was before pythonfmu added to it. In one
+        # call, which no other thread can come between; after a reset and while building there is nothing to remove.
+        with contextlib.suppress(ValueError):
+            sys.path.remove(self.resources)
         starts = [v.start for v in self.variables]
         self._reals: list[float] = [float(v) for v in starts[: self._real_count]]
         self._others: dict[int, int | bool] = {
