@@ -2,6 +2,7 @@
 
 import json
 import math
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -14,7 +15,7 @@ from orchestration.errors import SimulatorError
 from orchestration.fmpy_adapter import FmuSimulator
 from orchestration.wiring import MODELS
 from tests.fmus.instance import Instance
-from tests.fmus.process import run_script
+from tests.fmus.process import run, run_script
 
 PLANT, CONTROLLER = "QuadrotorPlant", "UnifiedController"
 Values = dict[str, float | bool]
@@ -287,6 +288,44 @@ def test_a_plant_state_that_overflows_is_divergence(start: Values, inputs: Value
     assert "\n" not in str(error)
     assert "Traceback" in error.details
     assert error.divergence
+
+
+# -- where it is unpacked -------------------------------------------------------------------------------
+
+LOAD = """
+import sys
+from pathlib import Path
+from orchestration.errors import QuadcosimError
+from orchestration.fmpy_adapter import FmuSimulator
+try:
+    FmuSimulator(Path(sys.argv[1]), "it").close()
+except QuadcosimError as error:
+    sys.exit(str(error))
+"""
+
+
+def loaded_in(folder: Path, fmu: Path) -> str:
+    """What is said when the adapter unpacks an FMU in `folder`; pythonfmu may bring the process down there."""
+    folder.mkdir()
+    done = run(sys.executable, "-c", LOAD, str(fmu), environment={"TMPDIR": str(folder)})
+    assert done.returncode in (0, 1), done.stderr
+    assert list(folder.iterdir()) == []
+    return done.stderr
+
+
+@pytest.mark.parametrize("name", ["Jürgen", "copy (2)", "a%20b"])
+def test_a_temporary_folder_that_pythonfmu_cannot_find_is_refused(
+    name: str, built: dict[str, Path], tmp_path: Path
+) -> None:
+    said = loaded_in(tmp_path / name, built[PLANT])
+    assert said.startswith(f"{built[PLANT]}: expected a co-simulation FMU that loads here: pythonfmu does not find ")
+    assert f"{tmp_path / name}" in said
+    assert "expected a temporary folder (TMPDIR) of ASCII letters, digits, spaces" in said
+    assert said.count("\n") == 1
+
+
+def test_a_temporary_folder_with_spaces_will_do(built: dict[str, Path], tmp_path: Path) -> None:
+    assert loaded_in(tmp_path / "with many spaces", built[PLANT]) == ""
 
 
 # -- text and aftermath ---------------------------------------------------------------------------------
