@@ -71,12 +71,12 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     author = "The quadcosim authors"
     license = "MIT"
     default_experiment = DefaultExperiment(start_time=0.0, stop_time=30.0, step_size=0.01)
+    # Those that messages carry. All other failures have none: the native part logs them itself, and hides them
+    # from a master that asks for categories.
     log_categories: ClassVar[dict[str, str]] = {
         "logStatusWarning": "What the user should know about how the FMU is used.",
-        "logStatusFatal": "Failures: the variable, its value and what was expected.",
         "divergence": "Failures because the closed loop diverged: a state that is not finite, "
         "a virtual control without a desired attitude.",
-        "logAll": "All messages.",
     }
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
