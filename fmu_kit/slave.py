@@ -111,6 +111,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._stale = True  # values were set that initialise() or step() has not seen yet
         self._quickly_settable: frozenset[int] = frozenset()
         self._warned: list[str] = []
+        self._has_failed = False  # of this object, whatever phase a restored state says
 
     # -- what a model defines ---------------------------------------------------------------------------
 
@@ -382,7 +383,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         return FmuError(f"value reference {bad}: expected one of a {kind} variable ({expected})")
 
     def _failed(self, error: Exception) -> Failure:
-        failure = report(self, error, again=self._phase is Phase.FAILED)
+        failure = report(self, error, again=self._has_failed)
+        self._has_failed = True
         self._phase = Phase.FAILED
         self._quickly_settable = frozenset()
         return failure
