@@ -24,6 +24,7 @@ from fmu_kit import model_description
 from fmu_kit.algebra import Inertia, Quaternion, Vec3, is_positive_definite
 from fmu_kit.errors import DivergenceError, FmuError, require
 from fmu_kit.failure import Failure, printf_safe, report
+from fmu_kit.unloading import release_at_exit
 from fmu_kit.variables import INERTIA_AXES, Variable
 
 State = dict[str, Any]  # of JSON types only: it is serialised as JSON
@@ -100,6 +101,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         # call, which no other thread can come between; after a reset and while building there is nothing to remove.
         with contextlib.suppress(ValueError):
             sys.path.remove(self.resources)
+        release_at_exit(self.resources, type(self).__name__)
         starts = [v.start for v in self.variables]
         self._reals: list[float] = [float(v) for v in starts[: self._real_count]]
         self._others: dict[int, int | bool] = {
