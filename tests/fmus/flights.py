@@ -8,6 +8,9 @@ from tests.fmus.instance import Instance
 
 Values = dict[str, float | bool]
 
+STEPS = 25
+"""Of a whole flight."""
+
 
 @dataclass(frozen=True)
 class Flight:

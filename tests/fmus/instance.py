@@ -12,6 +12,7 @@ from fmpy import fmi2
 class Message(NamedTuple):
     """What an FMU logged."""
 
+    instance: str
     status: int
     category: bytes | None
     text: str
@@ -20,7 +21,15 @@ class Message(NamedTuple):
 class Instance:
     """One instance, its log collected in `messages` unless fmpy's own logger is asked for."""
 
-    def __init__(self, path: Path, *, unpacked: Path | None = None, default_logger: bool = False) -> None:
+    def __init__(
+        self,
+        path: Path,
+        *,
+        unpacked: Path | None = None,
+        default_logger: bool = False,
+        name: str = "instance",
+        logging: bool = True,
+    ) -> None:
         self.description = fmpy.read_model_description(str(path), validate=False)
         self.variables = {v.name: v for v in self.description.modelVariables}
         self.messages: list[Message] = []
@@ -29,9 +38,9 @@ class Instance:
             guid=self.description.guid,
             unzipDirectory=str(unpacked or self._own_folder),
             modelIdentifier=self.description.coSimulation.modelIdentifier,
-            instanceName="instance",
+            instanceName=name,
         )
-        self.fmu.instantiate(callbacks=None if default_logger else self._collecting(), loggingOn=True)
+        self.fmu.instantiate(callbacks=None if default_logger else self._collecting(), loggingOn=logging)
 
     def __enter__(self) -> "Instance":
         return self
@@ -97,7 +106,7 @@ class Instance:
     def _collecting(self) -> fmi2.fmi2CallbackFunctions:
         # Not through fmpy's proxy, which would hand the messages of all instances to the last logger made.
         def log(environment: Any, instance: bytes, status: int, category: bytes | None, message: bytes) -> None:
-            self.messages.append(Message(status, category, message.decode().replace("%%", "%")))
+            self.messages.append(Message(instance.decode(), status, category, message.decode().replace("%%", "%")))
 
         callbacks = fmi2.fmi2CallbackFunctions()
         callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(log)

@@ -1,7 +1,8 @@
-"""The controller FMU in a host that is not Python, as in Simulink or a Modelica tool."""
+"""The FMUs in a host that is not Python, as in Simulink or a Modelica tool."""
 
 import shutil
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import fmpy
@@ -12,22 +13,36 @@ from orchestration.doctor.machine import this_machine
 from orchestration.doctor.pythons import PythonLibrary
 from orchestration.doctor.verdict import INSTALL_LIBPYTHON, other_host, satisfies
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
+from tests.fmus.instance import Instance
+from tests.fmus.loop import MOTION
 from tests.fmus.process import run
 
 STEPS, H = 100, 0.01
+GUIDE_HOST = Path(__file__).parent.parent.parent / "docs" / "guides" / "host.c"
+
+
+def compiled(source: Path, folder: Path) -> Path:
+    """The program, from a source beside this file."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no C compiler: install one that is called cc (Debian and Ubuntu: apt install gcc libc6-dev)")
+    program = folder / "host"
+    options = ("-std=c11", "-Wall", "-Wextra", "-Werror", "-pthread")
+    done = run(compiler, *options, str(source), "-o", str(program), "-ldl")
+    assert done.returncode == 0, done.stderr
+    return program
 
 
 @pytest.fixture(scope="module")
 def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The compiled host."""
-    compiler = shutil.which("cc")
-    if compiler is None:
-        pytest.skip("no C compiler: install one that is called cc (Debian and Ubuntu: apt install gcc libc6-dev)")
-    program = tmp_path_factory.mktemp("host") / "host"
-    source = Path(__file__).parent.parent.parent / "docs" / "guides" / "host.c"
-    done = run(compiler, "-std=c11", "-Wall", "-Wextra", "-Werror", str(source), "-o", str(program), "-ldl")
-    assert done.returncode == 0, done.stderr
-    return program
+    return compiled(GUIDE_HOST, tmp_path_factory.mktemp("host"))
+
+
+@pytest.fixture(scope="module")
+def threads(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The compiled host that has threads."""
+    return compiled(Path(__file__).with_name("threads.c"), tmp_path_factory.mktemp("threads"))
 
 
 @pytest.fixture(scope="module")
@@ -53,20 +68,28 @@ def environment(tmp_path: Path, library: PythonLibrary) -> dict[str, str]:
     return variables
 
 
-def arguments(fmu: Path, folder: Path, inputs: dict[str, float]) -> list[str]:
-    """What the host wants to know of the FMU, unpacked into `folder`."""
+def unpacked(fmu: Path, folder: Path) -> list[str]:
+    """Library, resources and GUID of the FMU, unpacked into `folder`."""
     fmpy.extract(str(fmu), str(folder))
     description = fmpy.read_model_description(str(fmu))
-    references = {v.name: v.valueReference for v in description.modelVariables}
-    return [
-        str(folder / "binaries" / fmpy.platform / f"{description.coSimulation.modelIdentifier}.so"),
-        (folder / "resources").as_uri(),
-        description.guid,
-        str(STEPS),
-        repr(H),
-        ",".join(str(references[name]) for name in COMMAND),
-        *(f"{references[name]}={value!r}" for name, value in inputs.items()),
-    ]
+    library = folder / "binaries" / fmpy.platform / f"{description.coSimulation.modelIdentifier}.so"
+    return [str(library), (folder / "resources").as_uri(), description.guid]
+
+
+def references(fmu: Path) -> dict[str, int]:
+    """Value references by name."""
+    return {v.name: v.valueReference for v in fmpy.read_model_description(str(fmu)).modelVariables}
+
+
+def listed(fmu: Path, names: Sequence[str]) -> str:
+    """Their value references, as the hosts take outputs."""
+    return ",".join(str(references(fmu)[name]) for name in names)
+
+
+def arguments(fmu: Path, folder: Path, inputs: dict[str, float]) -> list[str]:
+    """What the host wants to know of the controller."""
+    given = [f"{references(fmu)[name]}={value!r}" for name, value in inputs.items()]
+    return [*unpacked(fmu, folder), str(STEPS), repr(H), listed(fmu, COMMAND), *given]
 
 
 @pytest.mark.parametrize("folder", ["unpacked", "folder with spaces"])
@@ -129,3 +152,31 @@ def test_a_c_program_is_told_why_a_call_failed(
     assert done.returncode == 3, done.stderr
     assert message in done.stderr
     assert f"{call}: status 4" in done.stderr
+
+
+@pytest.mark.parametrize("order", [("QuadrotorPlant", "UnifiedController"), ("UnifiedController", "QuadrotorPlant")])
+def test_fmus_step_in_threads_of_a_c_program_and_survive_that_the_first_is_unloaded(
+    order: tuple[str, ...],
+    threads: Path,
+    library: PythonLibrary,
+    environment: dict[str, str],
+    built: dict[str, Path],
+    tmp_path: Path,
+) -> None:
+    outputs = {"QuadrotorPlant": MOTION, "UnifiedController": COMMAND}
+    models = order * 2  # two instances of each, every one with a library of its own
+    given = [
+        argument
+        for number, model in enumerate(models)
+        for argument in (*unpacked(built[model], tmp_path / str(number)), listed(built[model], outputs[model]))
+    ]
+    done = run(str(threads), str(library.path), str(STEPS), repr(H), *given, environment=environment)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    rows = [[float(value) for value in line.split()] for line in done.stdout.splitlines()]
+    for number, (model, row) in enumerate(zip(models, rows, strict=True)):
+        with Instance(built[model]) as instance:
+            instance.initialise({})
+            for k in range(STEPS if number else STEPS // 2):
+                instance.step(k * H, H)
+            assert row == pytest.approx(instance.get(*outputs[model]), rel=1e-12, abs=1e-12)

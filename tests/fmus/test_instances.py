@@ -7,24 +7,12 @@ import pytest
 
 from orchestration.wiring import MODELS
 from tests.fmus.expected import law_command
-from tests.fmus.flights import FLIGHTS
 from tests.fmus.instance import Instance
 from tests.fmus.process import run_script
 from tests.fmus.source_tree import build, copy_sources, replace
 
 KILOBYTES_PER_INSTANCE = 16.0
 """What an instance may leave behind: pythonfmu leaks about 5 kB: the class that it makes for each."""
-
-
-@pytest.fixture(scope="module")
-def alone(built: dict[str, Path]) -> dict[str, list[list[str]]]:
-    """Each flight with no other instance in the process."""
-    flights = {}
-    for name, flight in FLIGHTS.items():
-        with Instance(built[flight.model]) as instance:
-            flight.begin(instance)
-            flights[name] = flight.fly(instance, 0, 25)
-    return flights
 
 
 @pytest.mark.parametrize("unpacked", ["shared", "apart"])

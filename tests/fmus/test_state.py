@@ -16,17 +16,6 @@ from tests.fmus.process import run_script
 SAVED, END = 7, 20  # step at which the state is taken, and the end of the flight
 
 
-@pytest.fixture(params=FLIGHTS)
-def name(request: pytest.FixtureRequest) -> str:
-    """Of each flight in turn."""
-    return str(request.param)
-
-
-@pytest.fixture
-def flight(name: str) -> Flight:
-    return FLIGHTS[name]
-
-
 @pytest.fixture
 def fmu(flight: Flight, built: dict[str, Path]) -> Path:
     return built[flight.model]

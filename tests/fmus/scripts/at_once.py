@@ -8,10 +8,8 @@ from tempfile import TemporaryDirectory
 
 import fmpy
 
-from tests.fmus.flights import FLIGHTS
+from tests.fmus.flights import FLIGHTS, STEPS
 from tests.fmus.instance import Instance
-
-STEPS = 25
 
 
 def main(fmus: dict[str, Path], shared: bool) -> dict[str, list[list[str]]]:

@@ -1,0 +1,46 @@
+"""What the tests of the packed FMUs share."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.fmus.flights import FLIGHTS, STEPS, Flight
+from tests.fmus.instance import Instance
+
+
+@pytest.fixture(scope="session")
+def alone(built: dict[str, Path]) -> dict[str, list[list[str]]]:
+    """Each flight with no other instance in the process, and no call too many."""
+    flights = {}
+    for name, flight in FLIGHTS.items():
+        with Instance(built[flight.model]) as instance:
+            flight.begin(instance)
+            flights[name] = flight.fly(instance, 0, STEPS)
+    return flights
+
+
+@pytest.fixture(params=FLIGHTS)
+def name(request: pytest.FixtureRequest) -> str:
+    """Of each flight in turn."""
+    return str(request.param)
+
+
+@pytest.fixture
+def flight(name: str) -> Flight:
+    """Each in turn."""
+    return FLIGHTS[name]
+
+
+@pytest.fixture
+def controller(built: dict[str, Path]) -> Iterator[Instance]:
+    """Freshly instantiated."""
+    with Instance(built["UnifiedController"]) as controller:
+        yield controller
+
+
+@pytest.fixture
+def plant(built: dict[str, Path]) -> Iterator[Instance]:
+    """Freshly instantiated."""
+    with Instance(built["QuadrotorPlant"]) as plant:
+        yield plant

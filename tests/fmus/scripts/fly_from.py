@@ -1,0 +1,51 @@
+"""Unpack the controller FMU into a folder, tell it in some form where its resources are, and print its command."""
+
+import ctypes
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import fmpy
+from fmpy import fmi2
+
+from tests.fmus.expected import COMMAND, MEASUREMENT
+
+FORMS: dict[str, Callable[[Path], str]] = {
+    "URI": Path.as_uri,
+    "URI with a slash at its end": lambda path: path.as_uri() + "/",
+    "URI with one slash": lambda path: path.as_uri().replace("file:///", "file:/"),  # as Java writes it
+    "path": str,
+}
+
+
+def main(fmu: Path, folder: Path, form: str) -> list[float]:
+    description = fmpy.read_model_description(str(fmu))
+    references = {v.name: v.valueReference for v in description.modelVariables}
+    fmpy.extract(str(fmu), str(folder))
+    controller = fmi2.FMU2Slave(
+        guid=description.guid,
+        unzipDirectory=str(folder),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+    )
+    controller.callbacks = fmi2.defaultCallbacks
+    controller.component = controller.fmi2Instantiate(
+        b"controller",
+        fmi2.fmi2CoSimulation,
+        description.guid.encode(),
+        FORMS[form](folder / "resources").encode(),
+        ctypes.byref(controller.callbacks),
+        False,
+        True,
+    )
+    controller.setReal([references[name] for name in MEASUREMENT], list(MEASUREMENT.values()))
+    controller.setupExperiment()
+    controller.enterInitializationMode()
+    controller.exitInitializationMode()
+    command = controller.getReal([references[name] for name in COMMAND])
+    controller.freeInstance()
+    return [float(value) for value in command]
+
+
+if __name__ == "__main__":
+    print(json.dumps(main(Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3])))

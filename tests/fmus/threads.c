@@ -1,0 +1,153 @@
+/* A host that is not Python and has threads: flies several FMUs, each step of each in a thread made for it.
+
+   threads LIBPYTHON STEPS STEP_SIZE (FMU_LIBRARY RESOURCES_URI GUID OUTPUT,OUTPUT,...)...
+
+   After half of the steps the first FMU is freed and its library closed; the others fly on. Variables are given
+   by value reference. Prints the outputs of each FMU after its last step, one FMU a line, to the last digit.
+   Ends with 3 if an FMU refuses a call. */
+
+#include <dlfcn.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct {
+    void (*logger)(void *environment, const char *instance, int status, const char *category, const char *message, ...);
+    void *(*allocate)(size_t, size_t);
+    void (*release)(void *);
+    void (*step_finished)(void *, int);
+    void *environment;
+} Callbacks;
+
+typedef int (*DoStep)(void *, double, double, int);
+
+typedef struct {
+    void *library, *component;
+    DoStep do_step;
+    char *outputs;
+    double t, h;
+    int status;
+} Fmu;
+
+enum { WARNING = 1, CO_SIMULATION = 1, MOST_FMUS = 8, MOST_OUTPUTS = 16 };
+
+static void print_message(void *environment, const char *instance, int status, const char *category,
+                          const char *message, ...)
+{
+    (void)environment;
+    fprintf(stderr, "%s, status %d, category %s: %s\n", instance, status, category ? category : "none", message);
+}
+
+static void *open_library(const char *path, int mode)
+{
+    void *library = dlopen(path, RTLD_NOW | mode);
+    if (!library) {
+        fprintf(stderr, "%s\n", dlerror());
+        exit(1);
+    }
+    return library;
+}
+
+static void find(void *library, const char *name, void *function)
+{
+    void *symbol = dlsym(library, name);
+    if (!symbol) {
+        fprintf(stderr, "no %s\n", name);
+        exit(1);
+    }
+    memcpy(function, &symbol, sizeof symbol); /* ISO C has no cast from object to function pointers */
+}
+
+static void check(int status, const char *call)
+{
+    if (status > WARNING) {
+        fprintf(stderr, "%s: status %d\n", call, status);
+        exit(3);
+    }
+}
+
+static void start(Fmu *fmu, const char *resources, const char *guid)
+{
+    static const Callbacks callbacks = {print_message, calloc, free, NULL, NULL};
+    void *(*instantiate)(const char *, int, const char *, const char *, const Callbacks *, int, int);
+    int (*setup_experiment)(void *, int, double, double, int, double);
+    int (*enter)(void *), (*leave)(void *);
+    find(fmu->library, "fmi2Instantiate", &instantiate);
+    find(fmu->library, "fmi2SetupExperiment", &setup_experiment);
+    find(fmu->library, "fmi2EnterInitializationMode", &enter);
+    find(fmu->library, "fmi2ExitInitializationMode", &leave);
+    find(fmu->library, "fmi2DoStep", &fmu->do_step);
+    fmu->component = instantiate("instance", CO_SIMULATION, guid, resources, &callbacks, 0, 1);
+    if (!fmu->component)
+        exit(3);
+    check(setup_experiment(fmu->component, 0, 0.0, 0.0, 0, 0.0), "fmi2SetupExperiment");
+    check(enter(fmu->component), "fmi2EnterInitializationMode");
+    check(leave(fmu->component), "fmi2ExitInitializationMode");
+}
+
+static void *step(void *argument)
+{
+    Fmu *fmu = argument;
+    fmu->status = fmu->do_step(fmu->component, fmu->t, fmu->h, 1);
+    return NULL;
+}
+
+static void fly(Fmu *fmus, int count, int first, int last, double h)
+{
+    pthread_t threads[MOST_FMUS];
+    for (int k = first; k < last; k++) {
+        for (int i = 0; i < count; i++) {
+            fmus[i].t = k * h;
+            fmus[i].h = h;
+            if (pthread_create(&threads[i], NULL, step, &fmus[i]))
+                exit(1);
+        }
+        for (int i = 0; i < count; i++)
+            pthread_join(threads[i], NULL);
+        for (int i = 0; i < count; i++)
+            check(fmus[i].status, "fmi2DoStep");
+    }
+}
+
+static void print_and_free(Fmu *fmu)
+{
+    int (*get_real)(void *, const unsigned *, size_t, double *);
+    void (*free_instance)(void *);
+    find(fmu->library, "fmi2GetReal", &get_real);
+    find(fmu->library, "fmi2FreeInstance", &free_instance);
+    unsigned outputs[MOST_OUTPUTS];
+    double values[MOST_OUTPUTS];
+    size_t n = 0;
+    for (char *text = strtok(fmu->outputs, ","); text && n < MOST_OUTPUTS; text = strtok(NULL, ","))
+        outputs[n++] = (unsigned)strtoul(text, NULL, 10);
+    check(get_real(fmu->component, outputs, n, values), "fmi2GetReal");
+    for (size_t i = 0; i < n; i++)
+        printf("%.17g%c", values[i], i + 1 < n ? ' ' : '\n');
+    free_instance(fmu->component);
+    dlclose(fmu->library);
+}
+
+int main(int count, char **arguments)
+{
+    const int fmu_count = (count - 4) / 4;
+    if (fmu_count < 1 || fmu_count > MOST_FMUS)
+        return 2;
+    const int steps = atoi(arguments[2]);
+    const double h = strtod(arguments[3], NULL);
+    open_library(arguments[1], RTLD_GLOBAL); /* the FMUs find Python's symbols in the global scope */
+
+    Fmu fmus[MOST_FMUS];
+    for (int i = 0; i < fmu_count; i++) {
+        char **of_this = arguments + 4 + 4 * i;
+        fmus[i].library = open_library(of_this[0], RTLD_LOCAL);
+        fmus[i].outputs = of_this[3];
+        start(&fmus[i], of_this[1], of_this[2]);
+    }
+    fly(fmus, fmu_count, 0, steps / 2, h);
+    print_and_free(&fmus[0]);
+    fly(fmus + 1, fmu_count - 1, steps / 2, steps, h);
+    for (int i = 1; i < fmu_count; i++)
+        print_and_free(&fmus[i]);
+    return 0;
+}
