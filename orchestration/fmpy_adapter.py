@@ -256,7 +256,8 @@ def release_interpreter_state(library: ctypes.CDLL) -> None:
 
     In pythonfmu 0.7.0 the unloading releases a static pointer after its destructor has run, which now and then
     corrupts the heap as the process ends. Released before, both do nothing. It holds a thread that initialises
-    Python where the host has not, so a host that is Python has no use for it.
+    Python where the host has not, so a host that is Python has no use for it. FMUs of this project do so
+    themselves; those that pythonfmu's own builder packed do not.
     """
     release = getattr(library, "finalizePythonInterpreter", None)
     if release is not None:
