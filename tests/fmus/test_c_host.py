@@ -22,12 +22,12 @@ GUIDE_HOST = Path(__file__).parent.parent.parent / "docs" / "guides" / "host.c"
 
 
 def compiled(source: Path, folder: Path) -> Path:
-    """The program, from a source beside this file."""
+    """The program of a source."""
     compiler = shutil.which("cc")
     if compiler is None:
         pytest.skip("no C compiler: install one that is called cc (Debian and Ubuntu: apt install gcc libc6-dev)")
     program = folder / "host"
-    options = ("-std=c11", "-Wall", "-Wextra", "-Werror", "-pthread")
+    options = ("-std=c11", "-Wall", "-Wextra", "-Werror", "-pthread", "-I", str(GUIDE_HOST.parent))
     done = run(compiler, *options, str(source), "-o", str(program), "-ldl")
     assert done.returncode == 0, done.stderr
     return program

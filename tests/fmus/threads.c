@@ -6,21 +6,11 @@
    by value reference. Prints the outputs of each FMU after its last step, one FMU a line, to the last digit.
    Ends with 3 if an FMU refuses a call. */
 
-#include <dlfcn.h>
 #include <pthread.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
-typedef struct {
-    void (*logger)(void *environment, const char *instance, int status, const char *category, const char *message, ...);
-    void *(*allocate)(size_t, size_t);
-    void (*release)(void *);
-    void (*step_finished)(void *, int);
-    void *environment;
-} Callbacks;
-
-typedef int (*DoStep)(void *, double, double, int);
+#define main main_of_the_guide /* its types, log and loading are what this host needs too */
+#include "host.c"
+#undef main
 
 typedef struct {
     void *library, *component;
@@ -30,49 +20,14 @@ typedef struct {
     int status;
 } Fmu;
 
-enum { WARNING = 1, CO_SIMULATION = 1, MOST_FMUS = 8, MOST_OUTPUTS = 16 };
-
-static void print_message(void *environment, const char *instance, int status, const char *category,
-                          const char *message, ...)
-{
-    (void)environment;
-    fprintf(stderr, "%s, status %d, category %s: %s\n", instance, status, category ? category : "none", message);
-}
-
-static void *open_library(const char *path, int mode)
-{
-    void *library = dlopen(path, RTLD_NOW | mode);
-    if (!library) {
-        fprintf(stderr, "%s\n", dlerror());
-        exit(1);
-    }
-    return library;
-}
-
-static void find(void *library, const char *name, void *function)
-{
-    void *symbol = dlsym(library, name);
-    if (!symbol) {
-        fprintf(stderr, "no %s\n", name);
-        exit(1);
-    }
-    memcpy(function, &symbol, sizeof symbol); /* ISO C has no cast from object to function pointers */
-}
-
-static void check(int status, const char *call)
-{
-    if (status > WARNING) {
-        fprintf(stderr, "%s: status %d\n", call, status);
-        exit(3);
-    }
-}
+enum { MOST_FMUS = 8 };
 
 static void start(Fmu *fmu, const char *resources, const char *guid)
 {
     static const Callbacks callbacks = {print_message, calloc, free, NULL, NULL};
-    void *(*instantiate)(const char *, int, const char *, const char *, const Callbacks *, int, int);
-    int (*setup_experiment)(void *, int, double, double, int, double);
-    int (*enter)(void *), (*leave)(void *);
+    Instantiate instantiate;
+    SetupExperiment setup_experiment;
+    Plain enter, leave;
     find(fmu->library, "fmi2Instantiate", &instantiate);
     find(fmu->library, "fmi2SetupExperiment", &setup_experiment);
     find(fmu->library, "fmi2EnterInitializationMode", &enter);
