@@ -2,11 +2,11 @@
 
 import os
 import subprocess
-import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from fmu_kit import packaging
+from orchestration import child
 from orchestration.errors import QuadcosimError, UsageError
 from orchestration.wiring import MODELS
 
@@ -55,11 +55,9 @@ def build(names: Iterable[str], folder: Path) -> list[Path]:
     Raises `QuadcosimError` with what the build said if it fails.
     """
     targets = [MODELS[name] for name in names]
-    root = str(Path(packaging.__file__).resolve().parent.parent)
-    path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
     done = subprocess.run(
-        [sys.executable, "-m", "fmu_kit.packaging", str(folder.resolve()), *targets],
-        capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path}, check=False,
+        child.command("fmu_kit.packaging", folder.resolve(), *targets),
+        capture_output=True, text=True, env=child.environment(), check=False,
     )  # fmt: skip
     if done.returncode != 0:
         lines = done.stderr.strip().splitlines() or ["no output"]

@@ -3,12 +3,12 @@
 `python -m orchestration.doctor.trial FMU` does what the process does.
 """
 
-import os
 import signal
 import subprocess
 import sys
 from pathlib import Path
 
+from orchestration import child
 from orchestration.errors import QuadcosimError
 
 PATIENCE = 120
@@ -17,13 +17,10 @@ PATIENCE = 120
 
 def attempt(fmu: Path) -> str | None:
     """Load and initialise an FMU in this Python; None if that went well, else what was said."""
-    root = str(Path(__file__).resolve().parents[2])
-    path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
     try:
         done = subprocess.run(
-            [sys.executable, "-m", "orchestration.doctor.trial", str(fmu)],
-            capture_output=True, text=True, errors="replace", env={**os.environ, "PYTHONPATH": path},
-            timeout=PATIENCE, check=False,
+            child.command("orchestration.doctor.trial", fmu),
+            capture_output=True, text=True, errors="replace", env=child.environment(), timeout=PATIENCE, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
         return f"no answer within {PATIENCE} s"

@@ -1,14 +1,12 @@
 """The flights of one scenario: by tools, in processes of their own, and by this project's master."""
 
-import os
 import subprocess
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from orchestration import fmus, ssp
+from orchestration import child, fmus, ssp
 from orchestration.errors import QuadcosimError, UsageError
 from orchestration.flight import prepared
 from orchestration.fmpy_adapter import FmuSimulator
@@ -70,10 +68,10 @@ class Flights:
             folder=folder,
         )
         (folder / "job.json").write_text(job.to_json(), encoding="utf-8")
-        arguments = [tool.name, str(folder / "job.json"), str(folder / "rows.npy")]
         done = subprocess.run(
-            [sys.executable, "-m", "orchestration.interop.child", *arguments],
-            capture_output=True, text=True, errors="replace", check=False, env=_environment(folder),
+            child.command("orchestration.interop.child", tool.name, folder / "job.json", folder / "rows.npy"),
+            capture_output=True, text=True, errors="replace", check=False,
+            env=child.environment(**dict.fromkeys(_TEMPORARY, str(folder))),
             cwd=folder,  # not this process's: fmpy changes that while it loads an FMU, in another thread
         )  # fmt: skip
         if done.returncode != 0:
@@ -133,13 +131,6 @@ class _GivenStart(FmuSimulator):
             self.stepped = True
             for write in self._held:
                 write()
-
-
-def _environment(folder: Path) -> dict[str, str]:
-    """Of a flight in `folder`: it finds this package wherever it lies, and unpacks there."""
-    root = str(Path(fmus.__file__).resolve().parent.parent)
-    path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
-    return {**os.environ, **dict.fromkeys(_TEMPORARY, str(folder)), "PYTHONPATH": path}
 
 
 def _expect_common_grid(scenario: Scenario) -> None:

@@ -1,16 +1,15 @@
 """What an FMU does, found out in a process of its own: a crash is a finding, and so is no answer in time."""
 
 import json
-import os
 import signal
 import subprocess
-import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
 import fmpy
 
+from orchestration import child
 from orchestration.errors import QuadcosimError
 from orchestration.validation.child import END, ERROR
 from orchestration.validation.finding import Finding
@@ -52,13 +51,11 @@ class _Ending:
 
 
 def _run(arguments: list[str], time_limit: float) -> _Ending:
-    root = str(Path(__file__).resolve().parents[2])
-    search = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
     with tempfile.TemporaryFile() as errors:
         try:
             code: int | None = subprocess.run(
-                [sys.executable, "-m", "orchestration.validation.child", *arguments],
-                env={**os.environ, "PYTHONPATH": search}, timeout=time_limit, check=False,
+                child.command("orchestration.validation.child", *arguments),
+                env=child.environment(), timeout=time_limit, check=False,
                 stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=errors,
             ).returncode  # fmt: skip
         except subprocess.TimeoutExpired:
