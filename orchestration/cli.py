@@ -198,11 +198,12 @@ interop.register(app)
 def _report(result: "Result", as_json: bool) -> None:
     for warning in result.warnings:
         say(f"warning: {warning}")
+    printed = {**result.metrics, "wall_time": result.provenance["wall_time"]}
     if as_json:
-        print(json.dumps(result.metrics, indent=2))
+        print(json.dumps(printed, indent=2))
         return
-    width = max(map(len, result.metrics))
-    for name, value in result.metrics.items():
+    width = max(map(len, printed))
+    for name, value in printed.items():
         shown = f"{value:.6g}" if isinstance(value, float) else "-" if value is None else str(value)
         print(f"{name:<{width}}  {shown}")
     if result.divergence is not None:

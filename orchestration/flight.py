@@ -68,7 +68,8 @@ class Flight:
             thrust_max=_parameter(self.plant, self.scenario.plant, wiring.THRUST_MAX, math.inf),
             torque_max=_parameter(self.plant, self.scenario.plant, wiring.TORQUE_MAX, math.inf),
         )
-        diverged_at = master.divergence_time
+        diverged_at = None if master.divergence_time is None else master.divergence_time / NANOSECONDS
+        horizon = float(rows[-1, 0]) if diverged_at is None else self.scenario.stop_time
         return Result(
             scenario=self.scenario,
             columns=columns,
@@ -76,14 +77,13 @@ class Flight:
             desired=desired,
             events=events,
             metrics={
-                **computed,
-                "diverged": master.divergence is not None,
-                "divergence_time": None if diverged_at is None else diverged_at / NANOSECONDS,
+                **metrics.judged(computed, horizon=horizon, divergence_time=diverged_at),
+                "diverged": diverged_at is not None,
+                "divergence_time": diverged_at,
                 "steps": master.steps,
-                "wall_time": time.perf_counter() - self.started,
             },
             divergence=master.divergence,
-            provenance=provenance(self.plant, self.controller),
+            provenance={**provenance(self.plant, self.controller), "wall_time": time.perf_counter() - self.started},
             warnings=tuple(self.plant.warnings + self.controller.warnings),
         )
 

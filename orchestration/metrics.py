@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +13,11 @@ from orchestration.wiring import ATTITUDE_ERROR_SCALAR, COMMAND, ENERGY, POSITIO
 SETTLED = 0.05
 """[m] of position error"""
 
-Metrics = dict[str, float | int | bool | None]
+Metrics = dict[str, float | int | bool | str | None]
+
+Outcome = Literal["settled", "bounded", "diverged"]
+"""What became of a flight by its horizon: settled is what counts as flying"""
+OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
 
 
 def compute(
@@ -50,6 +55,19 @@ def compute(
             "saturation_share": float(np.diff(t)[limited[:-1]].sum() / duration) if duration else 0.0,
         }
     return {name: None if isinstance(v, float) and not math.isfinite(v) else v for name, v in found.items()}
+
+
+def judged(found: Metrics, *, horizon: float, divergence_time: float | None) -> Metrics:
+    """`found` with the outcome by the `horizon` [s]: one that diverged at some time has no other metric.
+
+    Settled: the position error stays below `SETTLED` in the last third; bounded: neither that nor diverged.
+    A longer horizon may make another outcome of bounded, so the horizon stands beside it.
+    """
+    if divergence_time is not None:
+        return {"outcome": "diverged", "horizon": horizon, **dict.fromkeys(found)}
+    bound = found["ultimate_bound"]
+    settled = isinstance(bound, float) and bound < SETTLED
+    return {"outcome": "settled" if settled else "bounded", "horizon": horizon, **found}
 
 
 def position_error(signals: Mapping[str, Floats], desired: Floats) -> Floats:

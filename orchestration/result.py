@@ -30,7 +30,7 @@ class Result:
     divergence: str | None
     """what diverged, if it did"""
     provenance: dict[str, Any]
-    """versions, and the GUID of each FMU"""
+    """versions, the GUID of each FMU, and `wall_time`, what the run took [s]"""
     warnings: tuple[str, ...] = ()
     """what the FMUs warned of"""
 

@@ -127,10 +127,8 @@ def sensitivity_bars(indices: "list[Index]", metric: str) -> Figure:
 
 
 def flew(table: "pd.DataFrame") -> "pd.Series":
-    """Which runs fly: done, not diverged, within 5 cm in the last third."""
-    return (
-        (table["status"] == "done") & ~table["diverged"].fillna(True).astype(bool) & (table["ultimate_bound"] < SETTLED)
-    )
+    """Which runs fly: those that settle by their horizon."""
+    return table["outcome"] == "settled"
 
 
 def save(make: Callable[[], Figure], path: Path) -> Path:

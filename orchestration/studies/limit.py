@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from orchestration.errors import UsageError
-from orchestration.metrics import SETTLED
 from orchestration.scenario import Scenario
 from orchestration.studies.engine import Pool
 from orchestration.studies.linear import HoverLoop
@@ -51,8 +50,8 @@ class Limit:
 
 
 def flies(metrics: dict[str, Any]) -> bool:
-    """The criterion: not diverged, and within 5 cm in the last third of the run."""
-    return not metrics["diverged"] and metrics["ultimate_bound"] < SETTLED
+    """The criterion: settled, which is not diverged and within 5 cm in the last third of the run."""
+    return bool(metrics["outcome"] == "settled")
 
 
 def find(

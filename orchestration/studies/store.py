@@ -15,19 +15,23 @@ import filelock
 from orchestration.errors import QuadcosimError, UsageError
 
 METRICS = (
+    "outcome", "horizon",
     "position_rmse", "position_iae", "position_itae", "position_max", "settling_time", "ultimate_bound",
     "attitude_error_rmse", "attitude_error_max", "control_effort.thrust", "control_effort.torque",
     "total_variation.thrust", "total_variation.torque", "energy_growth_share", "saturation_share", "diverged",
     "divergence_time", "steps",
 )  # fmt: skip
 """Metrics of a row; the wall time of a run is its duration."""
+TEXTS = ("outcome",)
+"""Metrics that are words; all others are numbers."""
 
+_TYPED = ", ".join(f'"{name}" {"TEXT" if name in TEXTS else "REAL"}' for name in METRICS)
 _COLUMNS = ("design_index", "key", "status", "message", "settings", "seed", "duration", *METRICS)
 _SCHEMA = f"""
 CREATE TABLE IF NOT EXISTS about (name TEXT PRIMARY KEY, value TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS runs (
     design_index INTEGER PRIMARY KEY, key TEXT NOT NULL, status TEXT NOT NULL, message TEXT, settings TEXT NOT NULL,
-    seed INTEGER NOT NULL, duration REAL, {", ".join(f'"{name}" REAL' for name in METRICS)}
+    seed INTEGER NOT NULL, duration REAL, {_TYPED}
 );
 """
 

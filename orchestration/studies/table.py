@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from orchestration.errors import UsageError
-from orchestration.studies.store import METRICS, open_for_reading
+from orchestration.studies.store import METRICS, TEXTS, open_for_reading
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -45,7 +45,7 @@ def dataset(path: Path) -> "xr.Dataset":
         raise UsageError(f"{path}: expected a study whose axes all list their values, to make a grid of it")
     kept = [name for name in (*METRICS, "seed", "duration") if name not in grid]
     table = frame(path).set_index(list(grid))[kept]
-    table = table.astype(float)
+    table = table.astype({name: float for name in kept if name not in TEXTS})
     cube: xr.Dataset = xr.Dataset.from_dataframe(table).reindex(grid)
     return cube
 

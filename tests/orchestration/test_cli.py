@@ -20,6 +20,8 @@ SCRIPT = shutil.which("quadcosim", path=str(Path(sys.executable).parent))
 SHORT = ("--stop-time", "0.5")
 
 KEYS = {
+    "outcome",
+    "horizon",
     "position_rmse",
     "position_iae",
     "position_itae",
@@ -192,7 +194,12 @@ def test_flags_go_before_the_scenario_file(main: Main, here: Path) -> None:
 
 def test_out_keeps_the_run_and_its_figures(here: Path) -> None:
     done = quadcosim("run", *SHORT, "--json", "--out", "results/first")
-    assert json.loads(done.stdout) == json.loads((here / "results/first/metrics.json").read_text())
+    printed = json.loads(done.stdout)
+    kept, notes = (
+        json.loads((here / "results/first" / name).read_text()) for name in ("metrics.json", "provenance.json")
+    )
+    assert printed == {**kept, "wall_time": notes["wall_time"]}
+    assert "wall_time" not in kept, "of two equal flights the metrics are equal"
     names = {path.name for path in (here / "results/first").iterdir()}
     assert names >= {"signals.parquet", "events.parquet", "metrics.json", "scenario.toml", "commands.png", "path.png"}
     assert "results/first" in done.stderr.replace(os.sep, "/")

@@ -3,7 +3,6 @@
 import csv
 import hashlib
 import json
-import math
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -140,7 +139,7 @@ def test_the_scenario_of_no_arguments_is_the_paper_at_10_ms() -> None:
 
 def test_the_paper_flight_settles() -> None:
     metrics = long_flight().metrics
-    assert metrics["diverged"] is False
+    assert (metrics["outcome"], metrics["diverged"]) == ("settled", False)
     assert metrics["ultimate_bound"] < 0.05
     assert metrics["settling_time"] < 10.0
     assert metrics["steps"] == 30_000
@@ -216,11 +215,23 @@ def test_a_period_that_is_too_long_diverges_as_a_result() -> None:
     assert flight.metrics["diverged"] is True
     assert 0.0 < flight.metrics["divergence_time"] < 5.0
     assert flight.signals["time"][-1] < flight.metrics["divergence_time"]
-    numbers = {name: value for name, value in flight.metrics.items() if value is not None}
-    assert all(math.isfinite(value) for value in numbers.values())
-    assert set(flight.metrics) - set(numbers) <= {"settling_time"}
     assert np.isfinite(flight.rows).all()
     assert "angular speed" in str(flight.divergence)
+
+
+def test_a_flight_that_diverged_has_no_metrics_but_what_became_of_it() -> None:
+    found = fly(5.0, period=0.3).metrics
+    assert {name for name, value in found.items() if value is not None} == {
+        "outcome", "horizon", "diverged", "divergence_time", "steps",
+    }  # fmt: skip
+    assert (found["outcome"], found["horizon"]) == ("diverged", 5.0)
+    assert set(found) == set(plain().metrics)
+
+
+def test_a_flight_that_has_not_come_close_by_its_horizon_is_bounded() -> None:
+    assert (plain().metrics["outcome"], plain().metrics["horizon"]) == ("bounded", plain().scenario.stop_time)
+    assert plain().provenance["wall_time"] > 0.0
+    assert "wall_time" not in plain().metrics
 
 
 def test_a_flight_that_does_not_diverge_says_so() -> None:

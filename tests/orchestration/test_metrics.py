@@ -96,6 +96,22 @@ def test_the_ultimate_bound_is_the_largest_error_of_the_last_third(fault: float)
     assert measured(early)["ultimate_bound"] == pytest.approx(0.01)
 
 
+# -- what became of it ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("error", "outcome"), [(0.0499, "settled"), (0.0501, "bounded"), (80.0, "bounded")])
+def test_the_outcome_is_settled_below_5_cm_in_the_last_third_and_else_bounded(error: float, outcome: str) -> None:
+    found = metrics.judged(measured(np.where(TIME < 1.9, 1.0, error)), horizon=3.0, divergence_time=None)
+    assert (found["outcome"], found["horizon"], found["ultimate_bound"]) == (outcome, 3.0, pytest.approx(error))
+
+
+def test_of_a_diverged_run_nothing_is_told_that_rests_on_the_time_that_it_lasted() -> None:
+    found = metrics.judged(measured(0.01), horizon=30.0, divergence_time=3.0)
+    assert {name: value for name, value in found.items() if value is not None} == {
+        "outcome": "diverged", "horizon": 30.0,
+    }  # fmt: skip
+
+
 # -- settling ---------------------------------------------------------------------------------------------
 
 

@@ -86,7 +86,8 @@ def row(index: int = 0, **fields: Any) -> Row:
     """A row that was never flown."""
     given: dict[str, Any] = {
         "index": index, "key": f"key {index}", "settings": {"timing.period": 0.001 * index}, "seed": index,
-        "metrics": {"position_rmse": 0.5, "diverged": False, "steps": 3}, "message": None, "duration": 0.1,
+        "metrics": {"outcome": "settled", "position_rmse": 0.5, "diverged": False, "steps": 3}, "message": None,
+        "duration": 0.1,
     }  # fmt: skip
     return Row(**{**given, **fields})
 

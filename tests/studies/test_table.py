@@ -96,7 +96,7 @@ def test_a_dataset_has_each_run_in_the_cell_of_its_settings(grid: tuple[Study, P
     assert {name: cube[name].to_numpy().tolist() for name in GRIDDED} == GRIDDED
     for _, run in table.iterrows():
         cell = cube.sel({"timing.period": run["timing.period"], "timing.delay": run["timing.delay"]})
-        for name in ("position_rmse", "control_effort.torque", "steps", "diverged"):
+        for name in ("outcome", "position_rmse", "control_effort.torque", "steps", "diverged"):
             assert cell[name].item() == run[name]
     assert len(set(cube["position_rmse"].to_numpy().ravel())) > 1
 

@@ -1,0 +1,49 @@
+"""Intervals of shares, against the equation that defines them and the coverage that they promise."""
+
+import math
+from statistics import NormalDist
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orchestration import UsageError
+from orchestration.statistics import wilson
+
+
+@given(st.integers(1, 2000), st.data(), st.sampled_from([0.5, 0.9, 0.95, 0.99]))
+def test_at_its_ends_the_seen_share_is_z_standard_errors_away(trials: int, data: st.DataObject, level: float) -> None:
+    seen = data.draw(st.integers(0, trials))
+    z, share = NormalDist().inv_cdf(0.5 + 0.5 * level), seen / trials
+    low, high = wilson(seen, trials, level)
+    assert 0.0 <= low <= share <= high <= 1.0
+    for end in (low, high):
+        if 0.0 < end < 1.0:
+            assert abs(share - end) == pytest.approx(z * math.sqrt(end * (1.0 - end) / trials), rel=1e-6, abs=1e-9)
+
+
+def test_published_values() -> None:
+    """Newcombe, Statistics in Medicine 17 (1998), table I, method 3: 81/263, 15/148, 0/20, 1/29."""
+    for (seen, trials), ends in {
+        (81, 263): (0.2553, 0.3662), (15, 148): (0.0624, 0.1605), (0, 20): (0.0, 0.1611), (1, 29): (0.0061, 0.1718),
+    }.items():  # fmt: skip
+        assert wilson(seen, trials) == pytest.approx(ends, abs=5e-5)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9, 0.97])
+def test_the_interval_covers_the_share_about_as_often_as_it_says(share: float) -> None:
+    trials = 200
+    covered = sum(
+        math.comb(trials, k) * share**k * (1.0 - share) ** (trials - k)
+        for k in range(trials + 1)
+        if wilson(k, trials)[0] <= share <= wilson(k, trials)[1]
+    )
+    assert 0.93 < covered < 0.98
+
+
+@pytest.mark.parametrize(
+    ("seen", "trials", "level"), [(1, 0, 0.9), (3, 2, 0.9), (-1, 2, 0.9), (1, 2, 0.0), (1, 2, 1.0)]
+)
+def test_numbers_that_cannot_be_are_told(seen: int, trials: int, level: float) -> None:
+    with pytest.raises(UsageError, match="expected"):
+        wilson(seen, trials, level)
