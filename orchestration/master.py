@@ -206,6 +206,7 @@ class Master:
         if isinstance(error, SimulatorError) and not error.divergence:
             raise error
         self.divergence, self.divergence_time = str(error), self.now
+        self.events = [event for event in self.events if event[0] <= self.now]  # no command goes out after the end
         if not self._rows:
             self._record(self.now)
 

@@ -319,6 +319,13 @@ def test_divergence_at_a_sampling_instant_is_noticed_before_the_controller_hears
     assert len(flown.controller.steps()) == 1
 
 
+@pytest.mark.parametrize("loss", [0.0, 1.0])
+def test_in_jacobi_order_nothing_is_sent_or_lost_after_a_run_has_diverged(loss: float) -> None:
+    flown = Flown(Timing(order="jacobi", command_loss=loss), 0.1, Straying(time=0.012, position__x=math.nan))
+    assert flown.events("sampled")[-1].time == 10 * MS
+    assert max(event[0] for event in flown.master.events) == 10 * MS < (flown.master.divergence_time or 0)
+
+
 def test_what_is_just_inside_the_region_flies_on() -> None:
     plant = Straying(time=0.012, position__x=60.0, position__y=79.9, position__z=0.0, angular_velocity__z=FASTEST)
     flown = Flown(Timing(period=0.01), 0.05, plant)
