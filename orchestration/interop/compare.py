@@ -3,10 +3,11 @@
 import math
 import os
 import tempfile
-from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -64,15 +65,26 @@ def agreements(
     versions = {tool.name: tool.versions() for tool in tools}
     with tempfile.TemporaryDirectory(prefix="quadcosim_") as folder:
         flights = Flights(scenario, Path(folder), announce)
-        found = []
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            seen = pool.map(flights.seen, tools)
-            flown = pool.map(flights.flown, tools)
-            for tool, trace, rows in zip(tools, seen, flown):
-                found.append(_agreement(flights, tool, versions[tool.name], trace, rows))
-                if progress is not None:
-                    progress(len(found) / len(tools))
-    return found
+            seen = [pool.submit(flights.seen, tool) for tool in tools]
+            flown = [pool.submit(flights.flown, tool) for tool in tools]
+            _wait([*seen, *flown], progress)
+            return [
+                _agreement(flights, tool, versions[tool.name], trace.result(), rows.result())
+                for tool, trace, rows in zip(tools, seen, flown)
+            ]
+
+
+def _wait(tasks: Sequence[Future[Any]], progress: Callable[[float], None] | None) -> None:
+    """Until all are done or one fails; none is begun after a failure."""
+    try:
+        for done, task in enumerate(as_completed(tasks), 1):
+            task.result()
+            if progress is not None:
+                progress(done / len(tasks))
+    finally:
+        for task in tasks:
+            task.cancel()
 
 
 def _agreement(flights: Flights, tool: Tool, versions: dict[str, str], trace: Trace, rows: Floats) -> Agreement:

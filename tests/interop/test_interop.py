@@ -49,7 +49,7 @@ def flown(request: pytest.FixtureRequest, paper: Scenario) -> tuple[Scenario, di
     scenario = paper.with_changes(timing={"plant_interval": step}, stop_time=stop)
     heard: list[float] = []
     found = agreements(scenario, chosen(None), progress=heard.append)
-    assert heard == [(i + 1) / len(TOOLS) for i in range(len(TOOLS))]
+    assert heard == [(i + 1) / (2 * len(TOOLS)) for i in range(2 * len(TOOLS))]  # each flies twice
     return scenario, {agreement.tool.name: agreement for agreement in found}
 
 

@@ -1,0 +1,70 @@
+"""What long work says of itself: a bar on a terminal, and where none can be drawn a line now and then."""
+
+import io
+import sys
+import time
+from collections.abc import Callable
+
+import pytest
+
+from orchestration import terminal
+from orchestration.terminal import SPARSE, progress_bar, runs_bar
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture
+def wait(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
+    """Lets the time pass that the lines are counted by."""
+    now = [100.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+
+    def passes(seconds: float) -> None:
+        now[0] += seconds
+
+    return passes
+
+
+@pytest.mark.parametrize("kind", ["pipe", "dumb terminal"])
+def test_where_no_bar_can_be_drawn_a_line_comes_now_and_then(
+    kind: str, wait: Callable[[float], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    heard = io.StringIO() if kind == "pipe" else Terminal()
+    monkeypatch.setattr(sys, "stderr", heard)
+    monkeypatch.setenv("TERM", "dumb")
+    with progress_bar("flying") as progress:
+        for percent in range(101):
+            wait(SPARSE / 40)
+            progress(percent / 100)
+    assert heard.getvalue().splitlines() == ["flying: 39%", "flying: 79%"]
+
+
+def test_runs_are_counted_on_such_lines_too(
+    wait: Callable[[float], None], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with runs_bar() as progress:
+        for done in range(4):
+            wait(0.6 * SPARSE)
+            progress(done, 50)
+    assert capsys.readouterr().err.splitlines() == ["1 of 50 runs", "3 of 50 runs"]
+
+
+def test_short_work_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    with progress_bar("flying") as progress:
+        progress(0.5)
+        progress(1.0)
+    assert capsys.readouterr().err == ""
+
+
+def test_on_a_terminal_there_is_a_bar_without_colours_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    heard = Terminal()
+    monkeypatch.setattr(sys, "stderr", heard)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("NO_COLOR", "1")
+    with progress_bar("flying") as progress:
+        progress(0.5)
+    assert "50%" in heard.getvalue()
+    assert terminal._draws()
