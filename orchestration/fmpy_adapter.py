@@ -5,7 +5,7 @@ import difflib
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import fmpy
 from fmpy import fmi2
@@ -13,12 +13,9 @@ from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription, ScalarVariable
 
 from orchestration.errors import QuadcosimError, SimulatorError, UsageError
+from orchestration.messages import PYTHONFMU_ENTRY, WARNING, Message, collecting_callbacks, words
 from orchestration.simulator import Floats, Transfer
 
-Message: TypeAlias = tuple[int, bytes | None, bytes]
-"""Status, category and text of what an FMU logged"""
-
-_WARNING = fmi2.fmi2Warning
 DIVERGENCE_CATEGORY = b"divergence"
 
 
@@ -52,7 +49,8 @@ class FmuSimulator:
                 modelIdentifier=self.description.coSimulation.modelIdentifier,
                 instanceName=instance_name,
             )
-            self._fmu.instantiate(callbacks=collecting_callbacks(self._messages), loggingOn=True)
+            callbacks = collecting_callbacks(self._messages, instance_name, Path(self._folder))
+            self._fmu.instantiate(callbacks=callbacks, loggingOn=True)
             release_interpreter_state(self._fmu.dll)
         except Exception as error:
             self.failed = True
@@ -76,7 +74,7 @@ class FmuSimulator:
 
     def step(self, t: float, h: float) -> None:
         """Advance from `t` to `t + h` seconds."""
-        if self._do_step(self._component, t, h, True) > _WARNING:
+        if self._do_step(self._component, t, h, True) > WARNING:
             raise self._failure("fmi2DoStep")
         if self._messages:
             self._collect_warnings()
@@ -176,7 +174,7 @@ class FmuSimulator:
         call, component, failure = getattr(self._fmu.dll, function), self._component, self._failure
 
         def transfer() -> None:
-            if call(component, references, count, values) > _WARNING:
+            if call(component, references, count, values) > WARNING:
                 raise failure(function)
 
         return transfer
@@ -191,14 +189,14 @@ class FmuSimulator:
 
     def _collect_warnings(self) -> None:
         for status, _, message in self._messages:
-            if status == _WARNING:
+            if status == WARNING:
                 self.warnings.append(f"{self.name}: {message.decode('utf-8', 'replace')}")
         self._messages.clear()
 
     def _failure(self, function: str) -> SimulatorError:
         """The error for a call that failed, in the words that the FMU logged."""
         self.failed = True
-        diverged = [m for m in self._messages if m[0] > _WARNING and m[1] == DIVERGENCE_CATEGORY]
+        diverged = [m for m in self._messages if m[0] > WARNING and m[1] == DIVERGENCE_CATEGORY]
         summary, details = words(diverged or self._messages, "no message")
         return SimulatorError(
             f"{self.name} ({self.description.modelName}): {function}: {summary}",
@@ -217,38 +215,11 @@ def uri_is_read(folder: Path) -> bool:
 
 def expect_readable_place(folder: Path) -> None:
     """Raises `QuadcosimError` if pythonfmu would crash on the folder in which its FMU was unpacked."""
-    if (folder / "resources" / "slavemodule.txt").is_file() and not uri_is_read(folder):
+    if (folder / PYTHONFMU_ENTRY).is_file() and not uri_is_read(folder):
         raise QuadcosimError(
             f"unpacked in {folder}; pythonfmu reads no path with other characters than ASCII letters, digits, "
             "spaces and - . _ ~: set TMPDIR (on Windows TEMP) to such a folder"
         )
-
-
-def collecting_callbacks(messages: list[Message]) -> fmi2.fmi2CallbackFunctions:
-    """Callbacks that collect in `messages` what one instance logs.
-
-    fmpy's own proxy, which formats messages, keeps one logger for the whole process; pythonfmu passes no
-    arguments to format, only doubled percent signs.
-    """
-
-    def log(environment: Any, instance: bytes, status: int, category: bytes | None, message: bytes) -> None:
-        messages.append((status, category, message.replace(b"%%", b"%")))
-
-    callbacks = fmi2.fmi2CallbackFunctions()
-    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(log)
-    callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
-    callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
-    return callbacks
-
-
-def words(messages: Sequence[Message], otherwise: str) -> tuple[str, str]:
-    """The first line of the first message of a failure, and what follows it; `otherwise` if there is none."""
-    bad = [message for message in messages if message[0] > _WARNING]
-    text = bad[0][2].decode("utf-8", "replace") if bad else otherwise
-    if text.startswith("Fatal py exception"):  # pythonfmu's own line comes before the slave's text
-        text = text.partition("\n")[2]
-    summary, _, details = text.partition("\n")
-    return summary, details
 
 
 def release_interpreter_state(library: ctypes.CDLL) -> None:

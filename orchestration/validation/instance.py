@@ -9,7 +9,8 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
 from orchestration.errors import QuadcosimError
-from orchestration.fmpy_adapter import Message, collecting_callbacks, release_interpreter_state, words
+from orchestration.fmpy_adapter import release_interpreter_state
+from orchestration.messages import Message, collecting_callbacks, words
 from orchestration.validation.fmu import Fmu, Variable
 
 Value: TypeAlias = float | int | bool | str
@@ -39,7 +40,7 @@ class Instance:
             self._slave = fmi2.FMU2Slave(
                 guid=fmu.guid, unzipDirectory=str(folder), modelIdentifier=fmu.model_identifier, instanceName=name
             )
-            self._slave.instantiate(callbacks=collecting_callbacks(self.messages), loggingOn=True)
+            self._slave.instantiate(callbacks=collecting_callbacks(self.messages, name, folder), loggingOn=True)
         except Exception as error:
             raise RefusedError(f"fmi2Instantiate: {words(self.messages, str(error))[0]}") from error
         release_interpreter_state(self._slave.dll)

@@ -1,0 +1,22 @@
+"""What FMUs log reaches the instance that logged it, with its arguments put in."""
+
+from pathlib import Path
+
+import pytest
+
+from orchestration.errors import SimulatorError
+from orchestration.fmpy_adapter import FmuSimulator
+from tests.fmus.foreign import lag, needs_compiler
+
+
+@needs_compiler
+def test_what_an_fmu_prints_like_c_is_formatted_and_told_apart_by_instance(tmp_path: Path) -> None:
+    path = lag(tmp_path / "lag.fmu", "REFUSES")
+    with FmuSimulator(path, "first") as first, FmuSimulator(path, "second") as second:
+        for one in (first, second):
+            one.enter_initialization(0.0, 1.0)
+            one.exit_initialization()
+        for one, time in ((first, 0.5), (second, 0.25)):
+            with pytest.raises(SimulatorError) as error:
+                one.step(time, 0.01)
+            assert str(error.value) == f"{one.name} (Lag): fmi2DoStep: {one.name}: 7 of {time:g} at 100%"
