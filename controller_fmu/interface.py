@@ -85,7 +85,11 @@ GAINS = (
         "boundary_layer", "epsilon: below this position error the surface is linear", "m", 0.001, above=0.0
     ),
     tunable_parameter(
-        "coupling", "kappa, of the attitude loop to s: 1 as the proof needs, 0 none, k_q as printed", "1", 1.0
+        "coupling",
+        "kappa >= 0, weight of s.s/2 in the energy (33) and so of its term in Psi (29): "
+        "0 none, 1 as the energy is printed, k_q as Psi is printed",
+        "kg",
+        1.0,
     ),
 )
 
@@ -105,7 +109,7 @@ LAW_LOCALS = (
     *vector(
         discrete_local("desired_angular_velocity", "Omega_d as of the last sample (13), desired body frame", "rad/s")
     ),
-    discrete_local("energy", "energy function L as of the last sample (33), s.s taken per unit mass", "J"),
+    discrete_local("energy", "energy function L_kappa as of the last sample (33), with coupling/2 s.s", "J"),
 )
 
 COUNT_AND_SWITCH = (

@@ -42,7 +42,10 @@ class Gains:
     k_q: float = 15.0
     """attitude, k_q [N·m]"""
     kappa: float = 1.0
-    """κ [1], coupling of the attitude loop to s: 1 as the proof needs, 0 none, k_q as printed (erratum 8)"""
+    """κ [kg], weight of ½ s·s in the energy, and so of its term in Ψ: any κ >= 0 has the proof (erratum 8).
+
+    0: none; 1: as the energy is printed; k_q: as Ψ is printed.
+    """
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -108,7 +111,7 @@ class Evaluation(NamedTuple):
     theta: Vec3
     """Θ [rad/s], body"""
     energy: Scalar
-    """L (33), [J] with s·s taken per unit mass"""
+    """L_κ (33) [J]"""
 
 
 class Surface(NamedTuple):
@@ -248,7 +251,7 @@ def evaluate(
     F_ddot = reference.snap - k * (D_dot * s_dot) - kD * s_ddot  # (27)
     omega_d_dot = rate.angular_acceleration(F_ddot)
 
-    coupling = 2.0 * gains.kappa / gains.k_q  # the weight 1/k_q: erratum 8
+    coupling = 2.0 * gains.kappa / gains.k_q  # the weight κ/k_q: erratum 8
     s_body = to_body(s)
     cross_s = q_bar.cross(s_body)
     psi = -gains.k_eta * q - (coupling * n) * cross_s  # (29)
@@ -259,7 +262,7 @@ def evaluate(
     J_theta = J @ theta
     feedforward = Q_err.to_body(omega_d_dot) - omega_err.cross(omega_d_body) + psi_dot
     torque = omega.cross(J @ omega) + J @ feedforward - gains.k_theta * theta - gains.k_q * q  # (30)
-    energy = 2.0 * gains.k_q * (1.0 - q0) + 0.5 * (theta @ J_theta) + 0.5 * (s @ s)  # (33) (erratum 10)
+    energy = 2.0 * gains.k_q * (1.0 - q0) + 0.5 * (theta @ J_theta) + 0.5 * gains.kappa * (s @ s)  # (33) (errata 8, 10)
 
     return Evaluation(
         thrust=thrust,

@@ -3,7 +3,7 @@
 import csv
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -207,7 +207,7 @@ gains_anywhere = st.builds(
     k_eta=between(1.0, 15.0),
     k_theta=between(1.0, 15.0),
     k_q=between(1.0, 15.0),
-    kappa=st.one_of(st.sampled_from([0.0, 1.0]), between(-1.0, 3.0)),
+    kappa=st.one_of(st.sampled_from([0.0, 1.0]), between(0.0, 15.0)),
 )
 trajectories = st.builds(
     Trajectory,
@@ -289,26 +289,42 @@ def test_eq10_is_the_rate_of_the_attitude_error(situation: Situation) -> None:
 
 
 def energy_rate(situation: Situation) -> float:
-    """dL/dt as the proof has it, with what the coupling κ ≠ 1 leaves over."""
-    now, gains, model = situation.now(), situation.gains, situation.model
-    s, e, ev, theta = now.sliding, now.position_error, now.velocity_error, now.theta
-    q, q0 = now.attitude_error.vector, now.attitude_error.scalar
-    n, q_bar = now.thrust / model.mass, Vec3(q.y, -q.x, -q0)
+    """dL_κ/dt as the proof has it, for any κ."""
+    now, gains = situation.now(), situation.gains
+    s, e, ev, theta, q = now.sliding, now.position_error, now.velocity_error, now.theta, now.attitude_error.vector
     k = gains.k_t + Vec3(gains.beta, gains.beta, gains.beta)
 
     def slope(e: float) -> float:
         outside = abs(e) >= gains.epsilon
         return gains.k_s * gains.beta_t * abs(e) ** (gains.beta_t - 1.0) if outside else gains.k_s
 
-    rate = -gains.k_theta * (theta @ theta) - gains.k_q * gains.k_eta * (q @ q)
-    rate += s @ (e.map(slope) * ev) - k @ (s * s.map(math.tanh))
-    rate += 2.0 * n * (1.0 - gains.kappa) * (q @ q_bar.cross(situation.state.quaternion.to_body(s)))
-    return float(rate)
+    translation = s @ (e.map(slope) * ev) - k @ (s * s.map(math.tanh))
+    return float(-gains.k_theta * (theta @ theta) - gains.k_q * gains.k_eta * (q @ q) + gains.kappa * translation)
 
 
-@given(situations())
-def test_energy_falls_as_the_proof_says(situation: Situation) -> None:
+def coupled(situation: Situation, kappa: float | None) -> Situation:
+    """`situation` with a weight κ, k_q if None."""
+    gains = situation.gains
+    return replace(situation, gains=replace(gains, kappa=gains.k_q if kappa is None else kappa))
+
+
+WEIGHTS = (0.0, 1.0, 3.0, None)
+"""κ: none, as the energy is printed, one of no meaning, and k_q as Ψ is printed."""
+
+
+@pytest.mark.parametrize("kappa", WEIGHTS)
+@given(situation=situations())
+def test_energy_has_the_rate_of_the_proof_for_every_weight(kappa: float | None, situation: Situation) -> None:
+    situation = coupled(situation, kappa)
     assert_is_the_rate(energy_rate(situation), lambda h: situation.flow(h).energy)
+
+
+@given(gains_anywhere)
+def test_energy_is_none_at_the_goal_and_some_elsewhere(gains: Gains) -> None:
+    goal = Measurement(ZERO, ZERO, IDENTITY, ZERO)
+    assert evaluate(goal, Reference(position=ZERO), gains, Model()).energy == 0.0
+    turned = goal._replace(quaternion=Quaternion.from_xyzw(0.0, 0.0, 0.6, 0.8))
+    assert evaluate(turned, Reference(position=ZERO), gains, Model()).energy > 0.0
 
 
 @given(triple(between(-2.0, 2.0)), gains_anywhere)

@@ -96,7 +96,7 @@ CONTROLLER = (
     *row("gain.attitude", "parameter tunable", "N.m", 15.0),
     *row("surface_exponent", "parameter tunable", "1", 0.99),
     *row("boundary_layer", "parameter tunable", "m", 0.001),
-    *row("coupling", "parameter tunable", "1", 1.0),
+    *row("coupling", "parameter tunable", "kg", 1.0),
     *row("sample_period", "parameter fixed", "s", 0.01),
     *row("sample_offset", "parameter fixed", "s", 0.0),
     *row("desired_quaternion", "local discrete", "1", axes=XYZW),
