@@ -18,7 +18,7 @@ from orchestration.fleet import Loader
 from orchestration.fmpy_adapter import FmuSimulator
 from orchestration.master import Event, Master, Signals
 from orchestration.reference import BuiltIn, FromFile, ReferencePath
-from orchestration.result import Result, sampled_rows
+from orchestration.result import Result, rows_of
 from orchestration.scenario import FmuChoice, Parameter, Scenario
 from orchestration.sensors import Sensors
 from orchestration.timing import NANOSECONDS
@@ -61,10 +61,13 @@ class Flight:
         rows = master.rows()
         events = tuple(sorted(map(Event._make, master.events), key=lambda event: event.time))
         desired = self.reference.positions(rows[:, 0])
+        lost = rows_of(rows[:, 0], events, "lost", "measurement")
         computed = metrics.compute(
             {name: rows[:, i] for i, name in enumerate(columns)},
             desired,
-            sampled_rows(rows[:, 0], events),
+            measured=rows_of(rows[:, 0], events, "sampled") & ~lost,
+            arrived=rows_of(rows[:, 0], events, "arrived"),
+            hold=self.scenario.timing.hold,
             thrust_max=_parameter(self.plant, self.scenario.plant, wiring.THRUST_MAX, math.inf),
             torque_max=_parameter(self.plant, self.scenario.plant, wiring.TORQUE_MAX, math.inf),
         )

@@ -8,11 +8,16 @@ import numpy as np
 import numpy.typing as npt
 
 from orchestration.simulator import Floats
+from orchestration.timing import Hold
 from orchestration.wiring import ATTITUDE_ERROR_SCALAR, COMMAND, ENERGY, POSITION
 
 SETTLED = 0.05
 """[m] of position error"""
+ENERGY_FLOOR = 1e-3
+"""of the largest energy of a run: growth to less than that is not counted"""
 
+Marks = npt.NDArray[np.bool_]
+"""Of rows, shape (n,)"""
 Metrics = dict[str, float | int | bool | str | None]
 
 Outcome = Literal["settled", "bounded", "diverged"]
@@ -23,20 +28,25 @@ OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
 def compute(
     signals: Mapping[str, Floats],
     desired: Floats,
-    sampled: npt.NDArray[np.bool_],
     *,
+    measured: Marks,
+    arrived: Marks,
+    hold: Hold,
     thrust_max: float,
     torque_max: float,
 ) -> Metrics:
     """The metrics of `signals` (arrays of shape (n,) by column) against the `desired` positions (n, 3) [m].
 
-    `sampled` marks the rows at which the controller sampled; limits are the plant's, in N and N·m.
-    Commands are as applied to the plant, before its limits. Integrals are by the trapezoid rule over the rows.
-    What is taken at samples is None without any; so is what no float holds.
+    `measured` marks the rows at which the controller got a measurement, `arrived` those at which a command
+    arrived; limits are the plant's, in N and N·m. Commands are as applied to the plant, before its limits,
+    and between the rows what their `hold` makes of them; their integrals are exact. Those of the position
+    error are by the trapezoid rule over the rows. What is taken at samples is None without any; so is what
+    no float holds.
     """
     t = signals["time"]
     e = position_error(signals, desired)
     thrust, *torque = (signals[f"plant.{name}"] for name in COMMAND)
+    held = [(u, _before_next_row(t, u, arrived, hold)) for u in (thrust, *torque)]
     duration = float(t[-1] - t[0])
     limited = (thrust < 0.0) | (thrust > thrust_max) | (np.abs(torque) > torque_max).any(axis=0)
     with np.errstate(over="ignore"):  # a diverging run may end in squares that no float holds
@@ -47,11 +57,11 @@ def compute(
             "position_max": float(e.max()),
             "settling_time": _settling_time(t, e),
             "ultimate_bound": float(e[t >= t[0] + duration * 2.0 / 3.0].max()),
-            **_at_samples(signals, sampled),
-            "control_effort.thrust": _integral(thrust**2, t),
-            "control_effort.torque": _integral(np.square(torque).sum(axis=0), t),
-            "total_variation.thrust": float(np.abs(np.diff(thrust)).sum()),
-            "total_variation.torque": float(np.abs(np.diff(torque)).sum()),
+            **_at_samples(signals, measured),
+            "control_effort.thrust": _effort(t, *held[0]),
+            "control_effort.torque": sum(_effort(t, *axis) for axis in held[1:]),
+            "total_variation.thrust": _variation(*held[0]),
+            "total_variation.torque": sum(_variation(*axis) for axis in held[1:]),
             "saturation_share": float(np.diff(t)[limited[:-1]].sum() / duration) if duration else 0.0,
         }
     return {name: None if isinstance(v, float) and not math.isfinite(v) else v for name, v in found.items()}
@@ -87,6 +97,34 @@ def _integral(values: Floats, t: Floats) -> float:
     return float(0.5 * ((values[1:] + values[:-1]) * np.diff(t)).sum())
 
 
+def _before_next_row(t: Floats, command: Floats, arrived: Marks, hold: Hold) -> Floats:
+    """What `command` (n,), given at the rows, has become just before the row after each, shape (n - 1,).
+
+    With first-order hold that is on the line through the last two commands that were applied. (The plant gets
+    the line's value at the start of each of its steps; the line itself does not depend on their length.)
+    """
+    if hold == "zero":
+        return command[:-1]
+    marks = arrived.copy()
+    marks[0] = True  # the command of the initialisation
+    rows = np.flatnonzero(marks)
+    slopes = np.concatenate([[0.0], np.diff(command[rows]) / np.diff(t[rows])])
+    latest = np.searchsorted(rows, np.arange(len(t) - 1), side="right") - 1
+    line: Floats = command[:-1] + slopes[latest] * np.diff(t)
+    return line
+
+
+def _effort(t: Floats, starts: Floats, ends: Floats) -> float:
+    """∫u²dt of what goes from `starts` at each row along a line to `ends` before the next."""
+    first = starts[:-1]
+    return float((np.diff(t) * (first * first + first * ends + ends * ends)).sum() / 3.0)
+
+
+def _variation(starts: Floats, ends: Floats) -> float:
+    """How far a command moves in all: along its lines, and where it jumps."""
+    return float(np.abs(ends - starts[:-1]).sum() + np.abs(starts[1:] - ends).sum())
+
+
 def _settling_time(t: Floats, e: Floats) -> float | None:
     outside = np.flatnonzero(e > SETTLED)
     if len(outside) == 0:
@@ -95,13 +133,22 @@ def _settling_time(t: Floats, e: Floats) -> float | None:
     return float(t[first_inside]) if first_inside < len(t) else None
 
 
-def _at_samples(signals: Mapping[str, Floats], sampled: npt.NDArray[np.bool_]) -> Metrics:
+def _at_samples(signals: Mapping[str, Floats], measured: Marks) -> Metrics:
     result: Metrics = {"attitude_error_rmse": None, "attitude_error_max": None, "energy_growth_share": None}
     scalar, energy = (signals.get(f"controller.{name}") for name in (ATTITUDE_ERROR_SCALAR, ENERGY))
-    if scalar is not None and sampled.any():
-        angle = attitude_angle(scalar[sampled])
+    if scalar is not None and measured.any():
+        angle = attitude_angle(scalar[measured])
         result["attitude_error_rmse"] = math.sqrt(float(np.mean(angle**2)))
         result["attitude_error_max"] = float(angle.max())
-    if energy is not None and sampled.any():
-        result["energy_growth_share"] = float(np.count_nonzero(np.diff(energy[sampled]) > 0.0) / sampled.sum())
+    if energy is not None and measured.sum() > 1:
+        result["energy_growth_share"] = _growth_share(energy[measured])
     return result
+
+
+def _growth_share(energy: Floats) -> float:
+    """Of the steps from one value to the next, the share of those that grow and end above the floor.
+
+    The floor keeps out what goes up and down about the end of a settled flight, at any sampling period.
+    """
+    floor = ENERGY_FLOOR * float(energy.max())
+    return float(np.mean((np.diff(energy) > 0.0) & (energy[1:] > floor)))

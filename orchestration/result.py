@@ -42,10 +42,10 @@ class Result:
     @cached_property
     def sampled(self) -> npt.NDArray[np.bool_]:
         """Which rows are sampling instants, shape (n,)."""
-        return sampled_rows(self.rows[:, 0], self.events)
+        return rows_of(self.rows[:, 0], self.events, "sampled")
 
 
-def sampled_rows(time: Floats, events: tuple[Event, ...]) -> npt.NDArray[np.bool_]:
-    """Which of the recorded times [s] are sampling instants."""
-    samples = [event.time for event in events if event.kind == "sampled"]
-    return np.isin(np.round(time * 1e9).astype(np.int64), np.array(samples, dtype=np.int64))
+def rows_of(time: Floats, events: tuple[Event, ...], kind: str, what: str | None = None) -> npt.NDArray[np.bool_]:
+    """At which of the recorded times [s] there is an event of a kind, and of that (`what`) if it is given."""
+    instants = [event.time for event in events if event.kind == kind and what in (None, event.what)]
+    return np.isin(np.round(time * 1e9).astype(np.int64), np.array(instants, dtype=np.int64))

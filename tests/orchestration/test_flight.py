@@ -207,6 +207,33 @@ def test_a_table_that_is_too_short_is_refused(tmp_path: Path) -> None:
         orchestration.run(Scenario(stop_time=2.0, reference=ReferenceChoice(file=table)))
 
 
+# -- what its metrics rest on -----------------------------------------------------------------------------
+
+
+def test_the_effort_of_a_flight_is_that_of_its_held_commands() -> None:
+    flight = fly(0.5, period=0.05)
+    held = np.diff(flight.signals["time"])
+    for name, axes in (("thrust", ("thrust",)), ("torque", ("torque.x", "torque.y", "torque.z"))):
+        squares = sum(flight.signals[f"plant.{axis}"][:-1] ** 2 for axis in axes)
+        assert flight.metrics[f"control_effort.{name}"] == pytest.approx(float((squares * held).sum()), rel=1e-12)
+
+
+def test_with_first_order_hold_the_effort_does_not_depend_on_the_rows() -> None:
+    efforts = [fly(0.5, period=0.02, hold="first", plant_interval=step).metrics for step in (0.001, 0.00025)]
+    for name in ("control_effort.torque", "total_variation.torque", "total_variation.thrust"):
+        assert efforts[0][name] == pytest.approx(efforts[1][name], rel=0.005), name
+
+
+def test_samples_whose_measurement_was_lost_do_not_count() -> None:
+    flight = fly(1.0, period=0.02, measurement_loss=0.4, seed=1)
+    lost = {event.time for event in flight.events if (event.kind, event.what) == ("lost", "measurement")}
+    fresh = flight.sampled & ~np.isin(np.round(flight.signals["time"] * 1e9), list(lost))
+    assert 0 < fresh.sum() < flight.sampled.sum()
+    energy = flight.signals["controller.energy"][fresh]
+    grown = (np.diff(energy) > 0.0) & (energy[1:] > 1e-3 * energy.max())
+    assert flight.metrics["energy_growth_share"] == grown.mean() > 0.0
+
+
 # -- divergence -------------------------------------------------------------------------------------------
 
 

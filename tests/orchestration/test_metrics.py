@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from orchestration import metrics
+from orchestration.timing import Hold
 from orchestration.wiring import COMMAND, POSITION
 
 Array = npt.NDArray[np.float64]
@@ -25,6 +26,8 @@ def measured(
     t: Array = TIME,
     command: dict[str, Array] | None = None,
     sampled: Array | None = None,
+    arrived: Array | None = None,
+    hold: Hold = "zero",
     thrust_max: float = math.inf,
     torque_max: float = math.inf,
     **controller: Array,
@@ -39,8 +42,10 @@ def measured(
         **{f"plant.{name}": (command or {}).get(name, zero) for name in COMMAND},
         **{f"controller.{name}": values for name, values in controller.items()},
     }
-    marks = np.ones(len(t), dtype=bool) if sampled is None else sampled.astype(bool)
-    return metrics.compute(signals, desired, marks, thrust_max=thrust_max, torque_max=torque_max)
+    marks = [np.ones(len(t), dtype=bool) if rows is None else rows.astype(bool) for rows in (sampled, arrived)]
+    return metrics.compute(
+        signals, desired, measured=marks[0], arrived=marks[1], hold=hold, thrust_max=thrust_max, torque_max=torque_max
+    )
 
 
 # -- position ---------------------------------------------------------------------------------------------
@@ -149,10 +154,24 @@ def test_a_scalar_part_that_rounding_made_too_large_is_no_error() -> None:
     assert (m["attitude_error_rmse"], m["attitude_error_max"]) == (0.0, 0.0)
 
 
-def test_energy_growth_is_counted_from_sample_to_sample() -> None:
+def test_energy_growth_is_the_share_of_the_steps_from_sample_to_sample_that_grow() -> None:
     energy = np.array([5.0, 9.0, 4.0, 0.0, 4.5, 9.0, 4.5, 0.0, 3.0, 0.0])  # at samples: 5 4 4.5 4.5 3
     m = measured(t=np.arange(10.0), sampled=np.arange(10) % 2 == 0, energy=energy)
-    assert m["energy_growth_share"] == pytest.approx(1 / 5)
+    assert m["energy_growth_share"] == pytest.approx(1 / 4)
+    assert measured(t=np.arange(10.0), energy=np.arange(10.0))["energy_growth_share"] == 1.0
+
+
+def test_what_goes_up_and_down_once_settled_is_no_growth_of_energy() -> None:
+    settled = np.where(TIME < 0.5, 7.0 * (1.0 - TIME), 1e-3 * (2.0 + np.sin(900.0 * TIME)))
+    assert measured(energy=settled)["energy_growth_share"] == 0.0
+    assert measured(energy=settled + np.where(TIME > 2.0, TIME - 2.0, 0.0))["energy_growth_share"] > 0.3
+
+
+@pytest.mark.parametrize("every", [1, 10, 50])
+def test_energy_growth_does_not_depend_on_how_often_it_is_looked_at(every: int) -> None:
+    rising_for_a_third = np.exp(-np.abs(TIME - 1.0))
+    share = measured(sampled=np.arange(len(TIME)) % every == 0, energy=rising_for_a_third)["energy_growth_share"]
+    assert share == pytest.approx(1 / 3, abs=0.01)
 
 
 def test_what_is_taken_at_samples_is_none_without_any() -> None:
@@ -176,6 +195,35 @@ def test_control_effort_is_the_integral_of_the_squares() -> None:
     m = measured(command=sine)
     assert m["control_effort.thrust"] == pytest.approx(12.0)
     assert m["control_effort.torque"] == pytest.approx(5.0 * 3.0)
+
+
+def test_a_command_that_is_held_counts_until_the_next_row() -> None:
+    steps = {"thrust": np.array([2.0, 3.0, 1.0, 9.0]), "torque.y": np.array([0.0, 4.0, 0.0, 9.0])}
+    m = measured(t=np.array([0.0, 1.0, 1.5, 4.0]), command=steps)
+    assert m["control_effort.thrust"] == pytest.approx(4.0 * 1.0 + 9.0 * 0.5 + 1.0 * 2.5)
+    assert m["control_effort.torque"] == pytest.approx(16.0 * 0.5)
+
+
+def extrapolated(points: int) -> metrics.Metrics:
+    """Commands 0, 1, 0 that arrive at 0, 1 and 2 s of 3 s, on the lines through the last two: up, then down."""
+    t = np.linspace(0.0, 3.0, 3 * points + 1)
+    line = np.select([t < 1.0, t < 2.0], [0.0 * t, t], 2.0 - t)
+    return measured(t=t, command={"thrust": line}, arrived=np.arange(len(t)) % points == 0, hold="first")
+
+
+@pytest.mark.parametrize("points", [1, 2, 7, 50])
+def test_with_first_order_hold_commands_count_along_their_line_whatever_the_plant_interval(points: int) -> None:
+    m = extrapolated(points)  # from 1 up to 2, down at once to 0, and on to -1
+    assert m["total_variation.thrust"] == pytest.approx(1.0 + 1.0 + 2.0 + 1.0)
+    assert m["control_effort.thrust"] == pytest.approx(7.0 / 3.0 + 1.0 / 3.0)
+
+
+def test_until_the_second_command_there_is_no_line_to_follow() -> None:
+    t, arrived = np.arange(6.0), np.array([0, 0, 1, 0, 0, 0])
+    command = {"thrust": np.array([1.0, 1.0, 2.0, 2.5, 3.0, 3.5])}  # the first one is that of the initialisation
+    m = measured(t=t, command=command, arrived=arrived, hold="first")
+    assert m["total_variation.thrust"] == pytest.approx(2.5)
+    assert m["control_effort.thrust"] == pytest.approx(2.0 + (3.5**3 - 2.0**3) / 3.0 / 0.5)
 
 
 def test_total_variation_is_the_sum_of_all_changes() -> None:
