@@ -1,12 +1,14 @@
 """Slaves with the variables of the real ones that compute nothing: the floor that pythonfmu and fmpy set."""
 
 from controller_fmu.slave import UnifiedController
-from fmu_kit.slave import State
+from fmu_kit.saved_state import State
 from plant_fmu.slave import QuadrotorPlant
 
 
 class EmptyPlant(QuadrotorPlant):
     """The plant's variables, no dynamics."""
+
+    description = "The plant's variables, no dynamics"
 
     def read_parameters(self) -> None:
         """Nothing to read."""
@@ -24,6 +26,8 @@ class EmptyPlant(QuadrotorPlant):
 
 class EmptyController(UnifiedController):
     """The controller's variables, no law."""
+
+    description = "The controller's variables, no law"
 
     def read_parameters(self) -> None:
         """Nothing to read."""

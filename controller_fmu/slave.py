@@ -4,7 +4,8 @@ from controller_fmu.interface import UNIFIED
 from controller_fmu.law import Evaluation, Gains, Measurement, Model, evaluate
 from controller_fmu.sample_clock import SampleClock
 from fmu_kit.errors import require, require_finite_state
-from fmu_kit.slave import Slave, State
+from fmu_kit.saved_state import State
+from fmu_kit.slave import Slave
 from fmu_kit.trajectory import Reference, Trajectory
 
 SHORTEST_PERIOD = 1e-9
@@ -69,7 +70,7 @@ class UnifiedController(Slave):
 
     def restore(self, state: State) -> None:
         """Put the clock back."""
-        self._clock = SampleClock(self.real("sample_period"), self.real("sample_offset"), state["next_index"])
+        self._clock = SampleClock(self.real("sample_period"), self.real("sample_offset"), int(state["next_index"]))
 
     def _sample(self, t: float) -> None:
         quaternion = self.quaternion("quaternion")

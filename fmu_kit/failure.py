@@ -4,6 +4,7 @@ Everything here answers to how the native part of pythonfmu 0.7.0 treats excepti
 """
 
 import traceback
+from pathlib import Path
 from typing import Any
 
 from pythonfmu.enums import Fmi2Status
@@ -39,7 +40,7 @@ class Failure(Exception):
     """What a callback raises: the native part logs its repr, as a printf format."""
 
     def __init__(self, error: Exception) -> None:
-        message = str(error) if isinstance(error, FmuError) else repr(error)
+        message = str(error) if isinstance(error, FmuError) else f"{error!r}{_place(error)}"
         details = "".join(traceback.format_exception(error)).rstrip()
         self.text = printf_safe(f"{message}\n{details}")
         super().__init__(self.text)
@@ -69,8 +70,14 @@ class DivergenceMessage(LogMsg):  # type: ignore[misc]
 
 
 def printf_safe(text: str) -> str:
-    """`text` as a printf format that prints it."""
-    return text.replace("%", "%%")
+    """`text` as a printf format that prints it, without what UTF-8 cannot hold: the native part would crash on it."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8").replace("%", "%%")
+
+
+def _place(error: Exception) -> str:
+    """File and line of the statement that failed; the file with its folder, which says whose it is."""
+    frames = traceback.extract_tb(error.__traceback__)
+    return "".join(f" in {'/'.join(Path(frame.filename).parts[-2:])}, line {frame.lineno}" for frame in frames[-1:])
 
 
 def report(slave: Any, error: Exception, *, again: bool) -> Failure:

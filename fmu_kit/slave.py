@@ -8,7 +8,6 @@ readable message.
 import contextlib
 import enum
 import functools
-import json
 import math
 import sys
 from abc import abstractmethod
@@ -24,10 +23,9 @@ from fmu_kit import model_description
 from fmu_kit.algebra import Inertia, Quaternion, Vec3, is_positive_definite
 from fmu_kit.errors import DivergenceError, FmuError, require
 from fmu_kit.failure import Failure, printf_safe, report
+from fmu_kit.saved_state import State, expect_state, parsed
 from fmu_kit.unloading import release_at_exit
 from fmu_kit.variables import INERTIA_AXES, Variable
-
-State = dict[str, Any]  # of JSON types only: it is serialised as JSON
 
 
 class Phase(enum.IntEnum):
@@ -85,12 +83,14 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         if "variables" in cls.__dict__:
             cls._index = {v.name: i for i, v in enumerate(cls.variables)}
             cls._real_count = sum(v.type == "Real" for v in cls.variables)
+            cls._readable = frozenset(range(cls._real_count))
             cls._given = frozenset(i for i, v in enumerate(cls.variables) if v.has_start)
             cls._inputs = frozenset(i for i, v in enumerate(cls.variables) if v.causality == "input")
             cls._tunable = frozenset(i for i, v in enumerate(cls.variables) if v.variability == "tunable")
 
     _index: ClassVar[dict[str, int]]
     _real_count: ClassVar[int]
+    _readable: ClassVar[frozenset[int]]
     _given: ClassVar[frozenset[int]]
     _inputs: ClassVar[frozenset[int]]
     _tunable: ClassVar[frozenset[int]]
@@ -243,11 +243,10 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         """fmi2GetReal; in initialisation mode, what was set can be read back before the rest is set too."""
         if self._stale and self._phase is Phase.INITIALIZATION and not self._given.issuperset(vrs):
             self._initialise()
+        if not self._readable.issuperset(vrs):
+            raise self._wrong_type(vrs, "Real")
         reals = self._reals
-        try:
-            return [reals[vr] for vr in vrs]
-        except IndexError:
-            raise self._wrong_type(vrs, "Real") from None
+        return [reals[vr] for vr in vrs]
 
     @guarded
     def set_real(self, vrs: list[int], values: list[float]) -> None:
@@ -308,9 +307,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     @guarded
     def _set_fmu_state(self, state: State) -> None:
-        mine = (type(self).__name__, len(self._reals))
-        given = (state.get("model"), len(state.get("reals", ())))
-        require(given == mine, "FMU state (model, number of Reals)", given, f"{mine}")
+        expect_state(state, type(self).__name__, self.variables)
         self._reals[:] = state["reals"]
         self._others.update(state["others"])
         self._phase = Phase(state["phase"])
@@ -320,17 +317,18 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._quickly_settable = self._inputs if self._phase is Phase.STEPPING else frozenset()
         self._initialised = state["internal"] is not None
         if self._initialised:
+            if not self._stale:  # else they are checked, and perhaps refused, when the next step begins
+                self._check_parameters()
             self.read_parameters()
-            self.restore(state["internal"])
+            try:
+                self.restore(state["internal"])
+            except (LookupError, TypeError, ValueError) as error:
+                raise FmuError(f"FMU state (internal) = {state['internal']}: expected what the model saves") from error
 
     @staticmethod
     def _fmu_state_from_bytes(content: bytes) -> State:
         """Never raises: pythonfmu could not free the class after it; `_set_fmu_state` refuses what is no state."""
-        try:
-            state = json.loads(content.decode("utf-8"))
-        except ValueError:
-            state = None
-        return state if isinstance(state, dict) else {}
+        return parsed(content)
 
     def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
         """The model description; called when the FMU is built."""
@@ -346,11 +344,14 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             raise DivergenceError(f"at initialisation: {error}, expected finite values") from error
 
     def _take_parameters(self) -> None:
+        self._check_parameters()
+        self.read_parameters()
+        self._stale = False
+
+    def _check_parameters(self) -> None:
         for variable, value in zip(self.variables, self._reals):
             if variable.causality == "parameter":
                 variable.check(value)
-        self.read_parameters()
-        self._stale = False
 
     def _expect(self, phase: Phase, call: str) -> None:
         if self._phase is not phase:
@@ -381,7 +382,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     def _wrong_type(self, vrs: list[int], kind: str) -> FmuError:
         known = [i for i, v in enumerate(self.variables) if v.type == kind]
         expected = f"{known[0]} to {known[-1]}" if known else "none, this FMU has no such variables"
-        bad = [vr for vr in vrs if vr not in known]
+        bad = [vr % 2**32 for vr in vrs if vr not in known]  # the native part passes them as signed numbers
         return FmuError(f"value reference {bad}: expected one of a {kind} variable ({expected})")
 
     def _failed(self, error: Exception) -> Failure:

@@ -4,11 +4,14 @@ import math
 
 from fmu_kit.algebra import Vec3
 from fmu_kit.errors import require, require_finite_state
-from fmu_kit.slave import Slave, State
+from fmu_kit.saved_state import State
+from fmu_kit.slave import Slave
 from plant_fmu.dynamics import Actuators, Body, RigidState, Wind, Wrench, acceleration, derivative, tilt
 from plant_fmu.integrator import internal_steps, rk4_step
 from plant_fmu.interface import MOTION, QUADROTOR
 
+MOST_INTERNAL_STEPS = 100_000
+"""In one communication step: some seconds of work, during which no master can get in between"""
 _MOTION_NAMES = tuple(variable.name for variable in MOTION)
 
 
@@ -53,6 +56,12 @@ class QuadrotorPlant(Slave):
             wrench = actuators.response(start, target, time - t)
             return derivative(x, wrench, wind.force(time) + external, body)
 
+        require(
+            h <= MOST_INTERNAL_STEPS * self._largest_step,
+            "communicationStepSize",
+            h,
+            f"at most {MOST_INTERNAL_STEPS} times max_internal_step = {self._largest_step} s",
+        )
         count = internal_steps(h, self._largest_step)
         internal = h / count
         for i in range(count):
@@ -67,7 +76,8 @@ class QuadrotorPlant(Slave):
 
     def restore(self, state: State) -> None:
         """Put the actuators and the motion back."""
-        self._wrench = Wrench(state["thrust"], Vec3(*state["torque"]))
+        x, y, z = map(float, state["torque"])
+        self._wrench = Wrench(float(state["thrust"]), Vec3(x, y, z))
         self._state = RigidState(
             self.vec3("position"), self.vec3("velocity"), self.quaternion("quaternion"), self.vec3("angular_velocity")
         )

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -14,6 +15,7 @@ from controller_fmu.interface import UNIFIED
 from controller_fmu.law import Gains, Measurement, Model, evaluate
 from controller_fmu.slave import UnifiedController
 from fmu_kit.algebra import ZERO, Inertia, Quaternion, Vec3
+from fmu_kit.failure import Failure
 from fmu_kit.trajectory import Reference, Trajectory
 from tests.slaves import assert_fails, get, named, put
 
@@ -526,6 +528,15 @@ def test_instance_that_failed_makes_no_more_steps() -> None:
 
 def test_failure_can_be_logged_as_a_printf_format() -> None:
     assert "100 %%s" in repr(started()._failed(ValueError("100 %s")))
+
+
+def test_an_error_of_python_is_reported_with_its_place_in_the_first_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    slave = started()
+    monkeypatch.setattr(slave, "_clock", None)
+    with pytest.raises(Failure) as caught:
+        slave.do_step(0.0, 0.01)
+    first = str(caught.value).partition("\n")[0]
+    assert re.fullmatch(r"AttributeError\(.*\) in controller_fmu/slave.py, line \d+", first)
 
 
 # -- state ----------------------------------------------------------------------------------------------------

@@ -218,6 +218,29 @@ def test_what_is_not_open_to_change_is_refused(model: str, name: str, message: s
     assert_readable(refusal(lambda: simulator.set(name, 1.0)), model, "fmi2SetReal", message)
 
 
+@pytest.mark.parametrize("values", [{"max_internal_step": 1e-9}, {"max_internal_step": 5e-324}, {}])
+def test_a_plant_step_of_too_many_internal_steps_is_refused(values: Values, make: Make) -> None:
+    plant = make(PLANT)
+    initialise(plant, values)
+    h, largest = (0.01, values["max_internal_step"]) if values else (1e4, 0.002)
+    error = refusal(lambda: plant.step(0.0, h))
+    message = f"communicationStepSize = {h}: expected at most 100000 times max_internal_step = {largest} s"
+    assert_readable(error, PLANT, "fmi2DoStep", message)
+    assert not error.divergence
+
+
+@pytest.mark.parametrize("reference", [2**31 - 1, 2**31, 2**32 - 1])
+@pytest.mark.parametrize("model", MODELS)
+def test_a_value_reference_that_is_none_is_refused_as_it_was_given(
+    model: str, reference: int, built: dict[str, Path]
+) -> None:
+    with Instance(built[model]) as instance:
+        for get in (instance.fmu.getReal, instance.fmu.getInteger, instance.fmu.getBoolean):
+            with pytest.raises(FMICallException):
+                get([reference])
+            assert f"value reference [{reference}]: expected one of " in instance.messages[-1].text
+
+
 # -- divergence -----------------------------------------------------------------------------------------
 
 FREE_FALL: Values = {"use_reference_inputs": True, "reference.acceleration.z": 20.0}
@@ -330,6 +353,13 @@ def test_a_temporary_folder_with_spaces_will_do(built: dict[str, Path], tmp_path
 
 
 # -- text and aftermath ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("text", ["\ud800", "a\0b"])
+def test_text_that_utf_8_does_not_hold_is_escaped_in_a_message(text: str, make: Make) -> None:
+    plant = make(PLANT)
+    handle = plant._call("deSerializeFMUstate", json.dumps({"model": text, "reals": []}).encode())
+    assert f"= ({text!r}, 0): expected" in str(refusal(lambda: plant._call("setFMUstate", handle)))
 
 
 @pytest.mark.parametrize("text", ["100 %", "%s%n%d", "%%", "50%% of %p"])

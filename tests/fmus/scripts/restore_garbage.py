@@ -9,7 +9,10 @@ from fmpy.fmi1 import FMICallException
 
 from tests.fmus.instance import Instance
 
-GARBAGE = (b"no state", b"", b"[]", b"{}", b"\xff\x00")
+GARBAGE = (
+    *(b"no state", b"", b"[]", b"{}", b"\xff\x00"),
+    *(b"[" * 1000, b'{"a": ' + b"[" * 900 + b"]" * 900 + b"}", b'{"model": "\\ud800"}', b"9" * 5000),
+)
 REPETITIONS = 20
 
 
@@ -28,6 +31,7 @@ def main(fmu: Path) -> dict[str, int]:
         instance = Instance(fmu)
         instance.initialise({})
         refused += refuses(instance, GARBAGE[k % len(GARBAGE)])
+        refused += refuses(instance, GARBAGE[k % len(GARBAGE)])  # a call after a failure
         gc.collect()
         instance.fmu.reset()
         instance.initialise({})

@@ -1,0 +1,67 @@
+"""What a saved state must look like before a slave takes it over: it may come from a file that was damaged or made up.
+
+The native part of pythonfmu 0.7.0 reads values of other types than a variable's without looking, and cannot free
+the class after an exception while it makes or writes a state.
+"""
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+from fmu_kit.errors import FmuError, require
+from fmu_kit.variables import Variable
+
+State = dict[str, Any]  # of JSON types only: it is serialised as JSON
+
+DEEPEST = 8
+"""Levels of lists and dictionaries in a state; the states of slaves have less than half of them."""
+
+_INTEGERS = range(-(2**31), 2**31)
+
+
+def parsed(content: bytes) -> State:
+    """The state in `content`; an empty one, which `expect_state` refuses, for whatever is none. Never raises."""
+    try:
+        state = json.loads(content.decode("utf-8"))
+    except Exception:
+        return {}
+    return state if isinstance(state, dict) and _is_shallow(state, DEEPEST) else {}
+
+
+def expect_state(state: State, model: str, variables: Sequence[Variable]) -> None:
+    """Raise `FmuError` unless `state` has all that a slave saves, of the types that it saves."""
+    reals = [v for v in variables if v.type == "Real"]
+    given = state.get("reals", ())
+    found = (state.get("model"), len(given) if isinstance(given, list | tuple) else 0)
+    mine = (model, len(reals))
+    require(found == mine, "FMU state (model, number of Reals)", found, f"{mine}")
+    for variable, value in zip(reals, given):
+        require(type(value) is float, f"FMU state ({variable.name})", repr(value), "a float")
+    others = dict(enumerate(variables[len(reals) :], start=len(reals)))
+    values = _by_reference(state.get("others"))
+    require(values.keys() == others.keys(), "FMU state (others)", list(values), f"{list(others)}")
+    for vr, variable in others.items():
+        name, value = f"FMU state ({variable.name})", values[vr]
+        if variable.type == "Boolean":
+            require(value in (0, 1), name, repr(value), "0 or 1")
+        else:
+            require(type(value) is int and value in _INTEGERS, name, repr(value), "an integer of 32 bits")
+    for key, kind in (("phase", int), ("start_time", float), ("stale", bool), ("warned", list)):
+        require(type(state.get(key)) is kind, f"FMU state ({key})", repr(state.get(key)), f"of type {kind.__name__}")
+    require("internal" in state, "FMU state (internal)", "missing", "what the model saves")
+
+
+def _by_reference(pairs: Any) -> dict[int, Any]:
+    """Values by reference, from a list of pairs."""
+    try:
+        return {int(vr): value for vr, value in pairs}
+    except (TypeError, ValueError, OverflowError):
+        raise FmuError(f"FMU state (others) = {pairs!r}: expected pairs of value reference and value") from None
+
+
+def _is_shallow(value: Any, levels: int) -> bool:
+    """Whether lists and dictionaries are nested in `levels` levels at most."""
+    if not isinstance(value, list | dict):
+        return True
+    inner = value.values() if isinstance(value, dict) else value
+    return levels > 0 and all(_is_shallow(one, levels - 1) for one in inner)
