@@ -27,7 +27,7 @@ STYLE = {
 BLUE, ORANGE, GREEN, RED, GREY = "#1f6f9f", "#e0812b", "#2f8f5b", "#b5323e", "#8a8a8a"
 
 FIGURES = ("path", "errors", "commands", "energy")
-"""The figures of a run, in the order in which they are drawn."""
+"""The figures of a run, in the order in which they are drawn; the last where the controller has an energy."""
 
 Window = tuple[float, float]
 """A span of time [s]."""
@@ -35,7 +35,7 @@ Window = tuple[float, float]
 
 def draw(result: Result, folder: Path, window: Window | None = None) -> list[Path]:
     """Write the figures of a run as PNG; `window` is what the commands are zoomed on. Returns their paths."""
-    makers: tuple[Callable[[], Figure], ...] = (
+    makers: tuple[Callable[[], Figure | None], ...] = (
         lambda: path(result),
         lambda: errors(result),
         lambda: commands(result, window),
@@ -44,9 +44,10 @@ def draw(result: Result, folder: Path, window: Window | None = None) -> list[Pat
     written = []
     with matplotlib.rc_context(STYLE):
         for name, make in zip(FIGURES, makers, strict=True):
-            target = folder / f"{name}.png"
-            make().savefig(target)
-            written.append(target)
+            figure = make()
+            if figure is not None:
+                figure.savefig(folder / f"{name}.png")
+                written.append(folder / f"{name}.png")
     return written
 
 
@@ -114,13 +115,14 @@ def commands(result: Result, window: Window | None = None) -> Figure:
     return figure
 
 
-def energy(result: Result) -> Figure:
-    """The energy function L at the samples."""
+def energy(result: Result) -> Figure | None:
+    """The energy function L at the samples; None if the controller has none, or has not sampled."""
+    values = result.signals.get(f"controller.{ENERGY}")
+    if values is None or not result.sampled.any():
+        return None
     figure = Figure(figsize=(8.0, 4.0))
     axes = figure.add_subplot()
-    values = result.signals.get(f"controller.{ENERGY}")
-    if values is not None and result.sampled.any():
-        _log_line(axes, result.signals["time"][result.sampled], values[result.sampled], BLUE, "L")
+    _log_line(axes, result.signals["time"][result.sampled], values[result.sampled], BLUE, "L")
     axes.set(xlabel="time [s]", ylabel="energy L (33) [J]", yscale="log", title=_title(result))
     axes.margins(x=0)
     return figure

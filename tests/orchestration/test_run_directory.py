@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib.image
@@ -122,7 +123,13 @@ def test_the_commands_are_zoomed_on_the_window(result: Result, window: tuple[flo
 
 def test_a_run_without_samples_can_be_drawn(tmp_path: Path) -> None:
     without = orchestration.run(Scenario(stop_time=0.05, timing=Timing(offset=1.0)))
-    assert {path.name for path in plots.draw(without, tmp_path)} == FIGURES
+    assert {path.name for path in plots.draw(without, tmp_path)} == FIGURES - {"energy.png"}
+
+
+def test_no_energy_is_drawn_of_a_controller_that_has_none(result: Result, tmp_path: Path) -> None:
+    columns = tuple(name if name != "controller.energy" else "controller.other" for name in result.columns)
+    written = plots.draw(replace(result, columns=columns), tmp_path)
+    assert {path.name for path in written} == {path.name for path in tmp_path.iterdir()} == FIGURES - {"energy.png"}
 
 
 # -- replacing --------------------------------------------------------------------------------------------
