@@ -1,4 +1,4 @@
-"""Draws the icons that the FMUs carry as model.png, into the folders of their slaves: run as `make figures`."""
+"""Draws the icons that the FMUs carry as model.png, beside their slaves: run as `make figures`."""
 
 from pathlib import Path
 
@@ -19,13 +19,13 @@ PALE, DARK = "#f3f7fa", "#33414d"
 
 def main() -> None:
     """Draw both."""
-    for folder, draw in (("controller_fmu", controller), ("plant_fmu", plant)):
+    for place, draw in (("controller_fmu/UnifiedController", controller), ("plant_fmu/QuadrotorPlant", plant)):
         figure = Figure(figsize=(1.0, 1.0), dpi=PIXELS)
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         axes.set(xlim=(-1.0, 1.0), ylim=(-1.0, 1.0))
         axes.axis("off")
         draw(axes)
-        target = ROOT / folder / "model.png"
+        target = ROOT / f"{place}.png"
         figure.savefig(target, transparent=True)
         with Image.open(target) as image:
             small = image.quantize(COLOURS)

@@ -48,6 +48,11 @@ def to_html(slave: Any, source: str, fragment: str = "") -> str:
     )
 
 
+def files_linked(page: str) -> list[str]:
+    """The links of a page that lead to files beside it, not to a section or to the web."""
+    return re.findall(r'\bhref="(?!#|[a-z]+:)([^"#]*)', page)
+
+
 def _contents(fragment: str) -> list[str]:
     """Links to the sections of the part written by hand."""
     return [f'<a href="#{name}">{title}</a>' for name, title in re.findall(r'<h2 id="([^"]+)">(.*?)</h2>', fragment)]

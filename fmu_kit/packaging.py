@@ -16,17 +16,19 @@ import importlib
 import importlib.metadata
 import importlib.util
 import os
+import posixpath
 import re
 import sys
 import uuid
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from xml.dom.minidom import parseString
 from xml.etree.ElementTree import ParseError, fromstring, tostring
 
 from fmu_kit import documentation
-from fmu_kit.model_description import GUID_PLACEHOLDER
+from fmu_kit.model_description import GUID_PLACEHOLDER, PYTHON_REQUIRED
 
 SHARED_PACKAGES = ("fmu_kit", "controller_fmu", "plant_fmu", "pythonfmu")
 """Top-level packages that may be bundled beside the slave's own; all else must be the standard library."""
@@ -34,8 +36,8 @@ SHARED_PACKAGES = ("fmu_kit", "controller_fmu", "plant_fmu", "pythonfmu")
 EMPTY_INIT = {"pythonfmu/__init__.py"}
 """Package files replaced by empty ones: pythonfmu's imports its builder."""
 
-FRAGMENT, ICON = "documentation.html", "model.png"
-"""Files that a slave may have beside it: the part of its documentation written by hand, and its icon."""
+PAGE, ICON = "documentation/index.html", "model.png"
+"""The documentation of an FMU and its icon, by their place in the archive."""
 
 SOURCE_HASH_FILE = "resources/source_hash.txt"
 _STAMP = (1980, 1, 1, 0, 0, 0)
@@ -48,6 +50,11 @@ The licence of the model itself is named in modelDescription.xml.
 
 _ENTRY = '''\
 """Entry of {model}.fmu. pythonfmu runs this file once for each instance."""
+
+import sys
+
+if sys.version_info < {oldest}:
+    raise ImportError("{model}.fmu: expected Python {required}, found " + sys.version.split()[0])
 
 from {bundle}.fmu_kit.failure import keep
 from {bundle}.{module} import {model} as Model
@@ -87,6 +94,16 @@ class Target:
     def packages(self) -> frozenset[str]:
         """Top-level packages that may be bundled."""
         return frozenset((*SHARED_PACKAGES, self.module.partition(".")[0]))
+
+    @property
+    def fragment(self) -> Path:
+        """Where the part of its documentation written by hand is, if it has one: beside it, under its name."""
+        return _module_path(self.module).with_name(f"{self.model}.html")
+
+    @property
+    def icon(self) -> Path:
+        """Where its icon is, if it has one."""
+        return _module_path(self.module).with_name(f"{self.model}.png")
 
 
 def bundled_sources(target: Target) -> dict[str, str]:
@@ -143,13 +160,16 @@ def build(target: Target, folder: Path) -> Path:
         f"resources/{bundle}/{name}": _renamed(text, bundle, target.packages).encode() for name, text in sources.items()
     }
     files[f"resources/{bundle}/__init__.py"] = b""
-    files[f"resources/{entry}.py"] = _ENTRY.format(bundle=bundle, module=target.module, model=target.model).encode()
+    files[f"resources/{entry}.py"] = _entry(bundle, target).encode()
     files["resources/slavemodule.txt"] = entry.encode()
     files[SOURCE_HASH_FILE] = digest.encode()
     files |= _unchanged_files(target)
-    slave = getattr(importlib.import_module(target.module), target.model)
+    slave = _slave(target)
     source = f"../resources/{bundle}/{_place(target.module)}"
-    files["documentation/index.html"] = documentation.to_html(slave, source, _well_formed_fragment(target)).encode()
+    files[PAGE] = documentation.to_html(slave, source, _well_formed_fragment(target)).encode()
+    for link in documentation.files_linked(files[PAGE].decode()):
+        if posixpath.normpath(posixpath.join(posixpath.dirname(PAGE), link)) not in files:
+            raise PackagingError(f"{target.fragment}: links to {link}, which is not in the FMU")
     description = parseString(tostring(slave(instance_name="description").to_xml())).toprettyxml(
         indent="  ", encoding="UTF-8"
     )
@@ -161,6 +181,14 @@ def build(target: Target, folder: Path) -> Path:
     write_archive(temporary, files, first="modelDescription.xml")
     os.replace(temporary, path)
     return path
+
+
+def _entry(bundle: str, target: Target) -> str:
+    """The module that pythonfmu runs; nothing in it is newer than the oldest Python that could load it."""
+    oldest = tuple(map(int, PYTHON_REQUIRED.removeprefix(">=").split(".")))
+    return _ENTRY.format(
+        bundle=bundle, module=target.module, model=target.model, oldest=oldest, required=PYTHON_REQUIRED
+    )
 
 
 def content_guid(files: dict[str, bytes]) -> str:
@@ -185,6 +213,14 @@ def write_archive(path: Path, files: dict[str, bytes], *, first: str) -> None:
             entry.create_system = 3
             entry.external_attr = 0o644 << 16
             archive.writestr(entry, files[name])
+
+
+def _slave(target: Target) -> Any:
+    """The class; raises `PackagingError` if it says nothing of itself, only what its base class says."""
+    slave = getattr(importlib.import_module(target.module), target.model)
+    if "description" not in vars(slave):
+        raise PackagingError(f"{target.module}:{target.model}: expected a description of its own")
+    return slave
 
 
 def _module_path(module: str) -> Path:
@@ -267,9 +303,8 @@ def _unchanged_files(target: Target) -> dict[str, bytes]:
         "pythonfmu": _license_of_pythonfmu(),
     }.items():
         files[f"documentation/licenses/{name}.txt"] = text.encode()
-    icon = _module_path(target.module).with_name(ICON)
-    if icon.is_file():
-        files[ICON] = icon.read_bytes()
+    if target.icon.is_file():
+        files[ICON] = target.icon.read_bytes()
     return files
 
 
@@ -278,8 +313,7 @@ def _fragment(target: Target) -> str:
 
     `<?include NAME?>` in it stands for the file NAME of this package, which several may share.
     """
-    path = _module_path(target.module).with_name(FRAGMENT)
-    text = _text(path) if path.is_file() else ""
+    text = _text(target.fragment) if target.fragment.is_file() else ""
     return re.sub(r"<\?include (\S+)\?>", lambda found: _text(Path(__file__).with_name(found[1])), text)
 
 
@@ -289,8 +323,7 @@ def _well_formed_fragment(target: Target) -> str:
     try:
         fromstring(f"<body>{fragment}</body>")
     except ParseError as error:
-        path = _module_path(target.module).with_name(FRAGMENT)
-        raise PackagingError(f"{path}: {error}; expected well-formed XML") from error
+        raise PackagingError(f"{target.fragment}: {error}; expected well-formed XML") from error
     return fragment
 
 

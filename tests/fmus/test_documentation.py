@@ -332,7 +332,7 @@ def test_texts_with_signs_of_html_are_shown_as_they_are(tree: Path, tmp_path: Pa
 
 
 def test_what_is_written_by_hand_may_link_to_the_files_beside_it(tree: Path, tmp_path: Path) -> None:
-    (tree / "other_fmu" / "documentation.html").write_text(
+    (tree / "other_fmu" / "Still.html").write_text(
         '<h2 id="own">Own</h2><p><a href="slave.py">a</a> <a href="../fmu_kit/units.py">b</a> <a href="#own">c</a> '
         '<a href="https://fmi-standard.org">d</a> costs 5$ and $more</p>'
     )
@@ -344,9 +344,43 @@ def test_what_is_written_by_hand_may_link_to_the_files_beside_it(tree: Path, tmp
 
 
 def test_what_is_written_by_hand_must_be_well_formed(tree: Path, tmp_path: Path) -> None:
-    fragment = tree / "other_fmu" / "documentation.html"
+    fragment = tree / "other_fmu" / "Still.html"
     fragment.write_text("<p>\n<br></p>")
     done = python(tree, "-m", "fmu_kit.packaging", str(tmp_path), "other_fmu.slave:Still")
     assert done.returncode == 1
     assert done.stderr == f"{fragment}: mismatched tag: line 2, column 6; expected well-formed XML\n"
     assert not list(tmp_path.glob("*.fmu"))
+
+
+def test_a_link_to_a_file_that_is_not_packed_is_refused(tree: Path, tmp_path: Path) -> None:
+    fragment = tree / "other_fmu" / "Still.html"
+    fragment.write_text('<p><a href="law.py#L1">the law</a></p>')
+    done = python(tree, "-m", "fmu_kit.packaging", str(tmp_path), "other_fmu.slave:Still")
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"{fragment}: links to ../resources/quadcosim_")
+    assert done.stderr.endswith("/other_fmu/law.py, which is not in the FMU\n")
+
+
+SECOND = """
+from controller_fmu.slave import UnifiedController
+
+
+class Second(UnifiedController):
+    description = "Another controller"
+"""
+
+
+def test_a_second_controller_beside_the_first_has_nothing_of_its_page_icon_and_description(
+    tree: Path, tmp_path: Path
+) -> None:
+    source = tree / "controller_fmu" / "second.py"
+    source.write_text(SECOND, encoding="utf-8")
+    done = python(tree, "-m", "fmu_kit.packaging", str(tmp_path), "controller_fmu.second:Second")
+    assert done.returncode == 0, done.stderr
+    second = documented(Path(done.stdout.strip()))
+    assert "model.png" not in second.files
+    assert [heading.attrib["id"] for heading in second.page.iter("h2")] == ["variables", "errors", "needs", "licences"]
+    assert "Another controller" in second.text
+    source.write_text(SECOND.replace("description =", "subtitle ="), encoding="utf-8")
+    done = python(tree, "-m", "fmu_kit.packaging", str(tmp_path), "controller_fmu.second:Second")
+    assert (done.returncode, done.stderr) == (1, "controller_fmu.second:Second: expected a description of its own\n")

@@ -16,7 +16,7 @@ from orchestration.errors import QuadcosimError
 from orchestration.scenario_file import tomllib
 from orchestration.wiring import MODELS
 from tests.fmus.archive import files_of
-from tests.fmus.process import ROOT
+from tests.fmus.process import ROOT, run
 from tests.fmus.source_tree import PACKAGES, build, copy_sources, python, replace, try_to_build
 
 EPOCH = 1_000_000_000  # 2001-09-09T01:46:40Z
@@ -173,6 +173,15 @@ def test_the_archive_has_a_binary_named_after_the_model_for_linux_and_windows(
     assert {f"binaries/linux64/{model}.so", f"binaries/win64/{model}.dll"} <= binaries
 
 
+@pytest.mark.parametrize("model", MODELS)
+def test_a_python_that_is_too_old_is_refused_in_a_sentence(model: str, built: dict[str, Path], tmp_path: Path) -> None:
+    fmpy.extract(str(built[model]), str(tmp_path))
+    (entry,) = (tmp_path / "resources").glob("*_entry.py")
+    old = f"import sys; sys.version_info = (3, 9, 18); sys.version = '3.9.18 (main)'; import {entry.stem}"
+    done = run(sys.executable, "-c", old, cwd=entry.parent)
+    assert done.stderr.splitlines()[-1] == f"ImportError: {model}.fmu: expected Python >=3.10, found 3.9.18"
+
+
 # -- refused --------------------------------------------------------------------------------------------
 
 
@@ -258,7 +267,7 @@ def test_the_source_hash_changes_with_what_both_fmus_stand_on(file: str, sources
     assert all(hash_of(sources, model) != before[model] for model in MODELS)
 
 
-@pytest.mark.parametrize("file", ["documentation.html", "model.png"])
+@pytest.mark.parametrize("file", ["QuadrotorPlant.html", "QuadrotorPlant.png"])
 def test_the_source_hash_changes_with_the_files_beside_the_slave(file: str, sources: Path) -> None:
     before = {model: hash_of(sources, model) for model in MODELS}
     path = sources / "plant_fmu" / file
