@@ -197,7 +197,8 @@ class Clock(Iterator[Instant]):
 
 
 _NORMAL = NormalDist(0.5, 1.0 / 6.0)
-_LOWEST, _HIGHEST = _NORMAL.cdf(0.0), _NORMAL.cdf(1.0)
+_LOWEST, _HIGHEST = 0.0013498980316301035, 0.9986501019683699
+"""`_NORMAL.cdf` of 0 and 1, written down: versions of Python compute it by formulas that differ in the last digits."""
 
 
 def _cut_normal(uniform: float) -> float:
