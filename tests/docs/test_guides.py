@@ -227,6 +227,20 @@ def test_the_omsimulator_2_script_makes_every_connection(monkeypatch: pytest.Mon
     assert made == CONNECTIONS
 
 
+def test_the_omsimulator_3_script_sets_the_step_of_an_instantiated_model_before_it_is_initialised(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    opened = MagicMock()
+    module = types.ModuleType("OMSimulator")
+    monkeypatch.setattr(module, "SSP", opened, raising=False)
+    monkeypatch.setitem(sys.modules, "OMSimulator", module)
+    exec(program("openmodelica.md", "fly_omsimulator_3.py"), {})
+    opened.assert_called_once_with("QuadrotorLoop.ssp")
+    made = opened.return_value.instantiate.return_value.method_calls
+    assert [call[0] for call in made][:3] == ["setFixedStepSize", "setResultFile", "initialize"]
+    assert made[0].args == (0.01,)
+
+
 def test_the_modelica_model_gives_every_input_an_equation_once(built: dict[str, Path]) -> None:
     text = program("dymola.md", "Loop.mo")
     flat = {(a.replace(".", "_"), b.replace(".", "_")) for a, b in CONNECTIONS}
