@@ -5,16 +5,19 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import plant_fmu.slave
-from fmu_kit.algebra import ZERO, Inertia, Quaternion, Vec3
-from plant_fmu.dynamics import Body, RigidState, Wrench, derivative
+from fmu_kit.algebra import ZERO
+from plant_fmu.dynamics import RigidState
 from plant_fmu.integrator import rk4_step
 from plant_fmu.interface import QUADROTOR
 from plant_fmu.slave import QuadrotorPlant
+from tests.reference.flight import Q0, integrated, quaternion
+from tests.reference.law import Parameters, rotation
 from tests.slaves import assert_fails, get, named, put
 
 POSITION = ("position.x", "position.y", "position.z")
@@ -111,22 +114,34 @@ def test_free_fall_is_exact() -> None:
     assert get(slave, *POSITION, *VELOCITY) == close([0.0, 0.0, 0.5 * 9.81 * 4.0, 0.0, 0.0, 9.81 * 2.0], 1e-11)
 
 
-def test_step_is_the_runge_kutta_method_on_the_rigid_body() -> None:
-    slave = started({**BODY, **MOVING, **NO_WIND, "max_internal_step": 0.01})
-    put(slave, {"thrust": 12.0, "torque.x": 0.1, "torque.y": -0.2, "torque.z": 0.3, "external_force.y": 0.4})
-    state = RigidState(
-        Vec3(1.0, -2.0, 3.0),
-        Vec3(0.1, 0.2, -0.3),
-        Quaternion.from_xyzw(0.1699, 0.3058, 0.1699, 0.9212).normalised(),
-        Vec3(0.4, -0.5, 0.6),
-    )
-    body = Body(mass=1.3, inertia=Inertia(xx=0.8, yy=0.9, zz=1.4, xy=0.05, xz=-0.02, yz=0.03), gravity=9.7)
-    wrench, force = Wrench(12.0, Vec3(0.1, -0.2, 0.3)), Vec3(0.0, 0.4, 0.0)
-    for k in range(20):
-        slave.do_step(0.01 * k, 0.01)
-        state = rk4_step(lambda t, x: derivative(x, wrench, force, body), 0.0, state, 0.01).normalised()
-    expected = [*state.position, *state.velocity, *state.quaternion, *state.angular_velocity]
-    assert get(slave, *MOTION) == close(expected, 1e-14)
+def independent_motion(seconds: float, command: list[float]) -> Any:
+    """Where BODY flies from MOVING in wind and an external force, by adaptive integration."""
+    p = Parameters(m=1.3, g=9.7, J=np.array([[0.8, 0.05, -0.02], [0.05, 0.9, 0.03], [-0.02, 0.03, 1.4]]))
+    Q = Q0 / np.linalg.norm(Q0)
+    start = np.concatenate([[1.0, -2.0, 3.0, 0.1, 0.2, -0.3], rotation(Q).ravel(), [0.4, -0.5, 0.6]])
+    force = lambda t: np.array([0.5, -0.2, 0.1]) * math.cos(2.0 * t) + [0.0, 0.4, 0.0]  # noqa: E731
+    x = integrated(start, 0.0, seconds, np.array(command), p, force=force)
+    return np.concatenate([x[:6], quaternion(x[6:15].reshape(3, 3), Q), x[15:]])
+
+
+def distance_from_it(internal_step: float) -> float:
+    """Of the plant after 1 s under one command."""
+    wind = {"wind.amplitude.x": 0.5, "wind.amplitude.y": -0.2, "wind.amplitude.z": 0.1, "wind.frequency": 2.0}
+    slave = started({**BODY, **MOVING, **wind, "max_internal_step": internal_step})
+    put(slave, {"thrust": 12.0, "torque.x": 1.0, "torque.y": -2.0, "torque.z": 3.0, "external_force.y": 0.4})
+    fly(slave, 0.1, 10)
+    expected = independent_motion(1.0, [12.0, 1.0, -2.0, 3.0])
+    return float(np.max(np.abs(np.array(get(slave, *MOTION)) - expected)))
+
+
+def test_flight_is_that_of_an_independent_model() -> None:
+    assert distance_from_it(0.001) <= 1e-11
+
+
+def test_halving_the_internal_step_divides_the_distance_from_an_independent_model_by_16() -> None:
+    coarse, middle, fine = (distance_from_it(step) for step in (0.05, 0.025, 0.0125))
+    assert math.log2(coarse / middle) == pytest.approx(4.0, abs=0.3)
+    assert math.log2(middle / fine) == pytest.approx(4.0, abs=0.3)
 
 
 def test_quaternion_keeps_its_length() -> None:
