@@ -47,7 +47,9 @@ EXTERNAL_FORCE = components("external_force")
 DISTURBANCE = components("wind.amplitude") + EXTERNAL_FORCE
 """What moves the plant beside its commands."""
 
-ACTUATOR_TIME_CONSTANT = "actuator_time_constant"
+BOUNDARY_LAYER = "boundary_layer"
+SURFACE_GAIN, SURFACE_EXPONENT = "gain.surface", "surface_exponent"
+"""Parameters of the controller: its gain is constant for position errors below ε, a power of them beyond."""
 THRUST_MAX = "thrust_max"
 TORQUE_MAX = "torque_max"
 

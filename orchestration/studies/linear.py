@@ -4,6 +4,9 @@ Hover is a reference at rest and no wind. The state is the vehicle's twelve coor
 instant (the attitude as its vector part: with all four components the norm of the quaternion would give
 an eigenvalue at one), the actuators if they lag, and the commands still on their way. At an equilibrium
 the derivative of a period is the product of the derivatives of the steps that make it.
+
+Hover lies inside the boundary layer of the law, where its gain is constant. Outside, the gain depends on the
+position error and is largest at the edge of the layer: `at_edge` is the scenario for the loop with that gain.
 """
 
 import dataclasses
@@ -23,13 +26,15 @@ from orchestration.simulator import Floats
 from orchestration.studies.study import locate_fmus
 
 STEP = 1e-6
-"""of each coordinate in a difference, small against the boundary layer of 1 mm"""
+"""of each coordinate in a difference; a thousandth of a boundary layer that is smaller than 1 mm"""
 COORDINATES = wiring.POSITION + wiring.VELOCITY + wiring.QUATERNION[:3] + wiring.ANGULAR_VELOCITY
 SCALAR_PART = wiring.QUATERNION[3]
 _MEASURED = [wiring.MEASUREMENT.index(name) for name in COORDINATES]
 _COMMANDS = len(wiring.COMMAND)
 _INSTANT = 1e-12
 """[s]; shorter spans count as none"""
+_NO_EFFECT = 1e-9
+"""of an actuator's state on the vehicle's, per unit: what differences leave of none"""
 
 
 def hover_of(scenario: Scenario) -> Scenario:
@@ -44,6 +49,22 @@ def hover_of(scenario: Scenario) -> Scenario:
         plant=dataclasses.replace(scenario.plant, parameters=plant),
         reference=dataclasses.replace(scenario.reference, file=None),
     )
+
+
+def at_edge(scenario: Scenario) -> Scenario:
+    """`scenario` with the gain everywhere that its law has just outside the boundary layer.
+
+    That is the slope of k_s |e|^β_t sgn(e) at |e| = ε. Raises `UsageError` for a controller without these names.
+    """
+    starts, given = locate_fmus(scenario).starts, scenario.controller.parameters
+    values = []
+    for name in (wiring.SURFACE_GAIN, wiring.SURFACE_EXPONENT, wiring.BOUNDARY_LAYER):
+        if name not in given and f"controller.{name}" not in starts:
+            raise UsageError(f"the controller has no {name}: there is no local limit outside a boundary layer")
+        values.append(float(given.get(name, starts.get(f"controller.{name}", 0.0))))
+    gain, exponent, layer = values
+    slope = exponent * gain * layer ** (exponent - 1.0)
+    return scenario.with_changes(parameters={f"controller.{wiring.SURFACE_GAIN}": slope})
 
 
 class HoverLoop:
@@ -82,21 +103,29 @@ class HoverLoop:
 
 
 class PlantStep:
-    """Derivatives of the plant FMU over a span of time, the command held, about hover."""
+    """Derivatives of the plant FMU over a span of time, the command held, about hover.
+
+    Actuators that lag are states too, four of them, which the first command sets. No output shows them: they
+    are known by what they do to the vehicle in one more plant interval.
+    """
 
     def __init__(self, hover: Scenario, fleet: Fleet, trim: Floats) -> None:
         self._hover, self._fleet, self._trim = hover, fleet, trim
         self._interval = hover.timing.plant_interval
-        self._lag = float(hover.plant.parameters.get(wiring.ACTUATOR_TIME_CONSTANT, 0.0))
-        self.size = len(COORDINATES) + (_COMMANDS if self._lag else 0)
-        self._at_hover = self._saved({}, trim)
-        self._moved = [
-            [self._saved(_displaced(name, sign * STEP), trim) for sign in (1.0, -1.0)] for name in COORDINATES
-        ]
-        if self._lag:  # the actuators start at the first command
-            self._moved += [[self._saved({}, trim + sign * STEP * unit) for sign in (1.0, -1.0)] for unit in _UNITS]
+        at_hover = self._saved({}, trim)
+        self._expect_equilibrium(at_hover)
+        vehicle = [[(self._saved(_displaced(name, size), trim), trim) for size in _BOTH_WAYS] for name in COORDINATES]
+        actuators = [[(self._saved({}, trim + size * unit), trim) for size in _BOTH_WAYS] for unit in _UNITS]
+        command = [[(at_hover, trim + size * unit) for size in _BOTH_WAYS] for unit in _UNITS]
+        self._moved = [*vehicle, *actuators, *command]
         self._known: dict[float, Floats] = {}
-        self._expect_equilibrium()
+        self._next = self._differences(self._interval)[: len(COORDINATES), : len(COORDINATES) + _COMMANDS]
+        by_actuators = self._next[:, len(COORDINATES) :]
+        self._lags = bool(np.abs(by_actuators).max() > _NO_EFFECT)
+        if not self._lags:
+            self._moved = [*vehicle, *command]
+        self._seen = np.linalg.pinv(by_actuators)
+        self.size = len(self._moved) - _COMMANDS
 
     def over(self, duration: float) -> tuple[Floats, Floats]:
         """d(state)/d(state before) and d(state)/d(command) over `duration` [s]."""
@@ -110,21 +139,19 @@ class PlantStep:
     def _one(self, h: float) -> Floats:
         """The derivative of one step of `h` [s], the command as further states that stay."""
         if h not in self._known:
-            with self._plant() as plant:
-                after = [[self._after(plant, state, self._trim, h) for state in pair] for pair in self._moved]
-                after += [
-                    [self._after(plant, self._at_hover, self._trim + sign * STEP * unit, h) for sign in (1.0, -1.0)]
-                    for unit in _UNITS
-                ]
+            after, later = np.vsplit(self._differences(h), 2)
             result = np.eye(self.size + _COMMANDS)
-            result[: len(COORDINATES)] = np.array([(plus - minus) / (2.0 * STEP) for plus, minus in after]).T
-            if self._lag:
-                left = math.exp(-h / self._lag)
-                rows = slice(len(COORDINATES), self.size)
-                result[rows, rows] = left * np.eye(_COMMANDS)
-                result[rows, self.size :] = (1.0 - left) * np.eye(_COMMANDS)
+            result[: len(COORDINATES)] = after
+            if self._lags:
+                result[len(COORDINATES) : self.size] = self._seen @ (later - self._next[:, : len(COORDINATES)] @ after)
             self._known[h] = result
         return self._known[h]
+
+    def _differences(self, h: float) -> Floats:
+        """d(vehicle after `h`, vehicle a plant interval later under the command of hover)/d(what is moved)."""
+        with self._plant() as plant:
+            flown = [[self._after(plant, *start, h) for start in pair] for pair in self._moved]
+        return np.column_stack([(plus - minus) / (2.0 * STEP) for plus, minus in flown])
 
     @contextmanager
     def _plant(self, parameters: dict[str, float] | None = None) -> Iterator[FmuSimulator]:
@@ -139,16 +166,20 @@ class PlantStep:
             return plant.save()
 
     def _after(self, plant: FmuSimulator, state: bytes, command: Floats, h: float) -> Floats:
+        """The vehicle after `h` [s] under `command`, and a plant interval later under that of hover."""
         plant.restore(state)
-        plant.writer(wiring.COMMAND, command)()
-        plant.step(0.0, h)
-        measured: Floats = np.zeros(len(wiring.MEASUREMENT))
-        plant.reader(wiring.MEASUREMENT, measured)()
-        return measured[_MEASURED]
+        found = []
+        for start, duration, held in ((0.0, h, command), (h, self._interval, self._trim)):
+            plant.writer(wiring.COMMAND, held)()
+            plant.step(start, duration)
+            measured: Floats = np.zeros(len(wiring.MEASUREMENT))
+            plant.reader(wiring.MEASUREMENT, measured)()
+            found.append(measured[_MEASURED])
+        return np.concatenate(found)
 
-    def _expect_equilibrium(self) -> None:
+    def _expect_equilibrium(self, at_hover: bytes) -> None:
         with self._plant() as plant:
-            drift = float(np.abs(self._after(plant, self._at_hover, self._trim, self._interval)).max())
+            drift = float(np.abs(self._after(plant, at_hover, self._trim, self._interval)).max())
         if drift > 1e-9:
             raise UsageError(
                 f"hover is no equilibrium, the vehicle drifts by {drift:.2g} in a plant interval; expected a "
@@ -157,6 +188,7 @@ class PlantStep:
 
 
 _UNITS = np.eye(_COMMANDS)
+_BOTH_WAYS = (STEP, -STEP)
 
 
 def _controller_at_hover(hover: Scenario, fleet: Fleet) -> tuple[Floats, Floats]:
@@ -165,6 +197,7 @@ def _controller_at_hover(hover: Scenario, fleet: Fleet) -> tuple[Floats, Floats]
         controller = flight.controller
         at_rest = _measurement({})
         _initialise(controller, wiring.MEASUREMENT, at_rest)
+        step = min(STEP, 1e-3 * _value(controller, wiring.BOUNDARY_LAYER, absent=1.0))
 
         def command(measurement: Floats) -> Floats:
             result: Floats = np.zeros(_COMMANDS)
@@ -175,9 +208,18 @@ def _controller_at_hover(hover: Scenario, fleet: Fleet) -> tuple[Floats, Floats]
 
         columns = []
         for name in COORDINATES:
-            plus, minus = (command(_measurement(_displaced(name, sign * STEP))) for sign in (1.0, -1.0))
-            columns.append((plus - minus) / (2.0 * STEP))
+            plus, minus = (command(_measurement(_displaced(name, size))) for size in (step, -step))
+            columns.append((plus - minus) / (2.0 * step))
         return command(at_rest), np.column_stack(columns)
+
+
+def _value(fmu: FmuSimulator, name: str, *, absent: float) -> float:
+    """What a Real variable of an FMU is; `absent` if it has none of that name."""
+    if name not in fmu.variables:
+        return absent
+    value: Floats = np.zeros(1)
+    fmu.reader((name,), value)()
+    return float(value[0])
 
 
 def _displaced(name: str, size: float) -> dict[str, float]:

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,12 +18,14 @@ import orchestration
 from orchestration import Result, Scenario, Timing, UsageError
 from orchestration.fleet import Fleet
 from orchestration.flight import prepared
+from orchestration.scenario import FmuChoice
 from orchestration.simulator import Floats
 from orchestration.studies import limit as limits
 from orchestration.studies.limit import find, first_failure, flies, local_limit
-from orchestration.studies.linear import COORDINATES, HoverLoop, hover_of
+from orchestration.studies.linear import COORDINATES, HoverLoop, at_edge, hover_of
 from orchestration.timing import NANOSECONDS
 from orchestration.wiring import COMMAND
+from tests.fmus import source_tree
 from tests.studies.common import one_line, short
 
 SAMPLED = [f"plant.{name}" for name in COORDINATES]
@@ -226,6 +229,36 @@ def test_powers_of_the_matrix_are_derivatives_of_whole_periods_of_flight(
     matrix = HoverLoop.of(base).matrix(base.timing.period, base.timing.delay)
     assert matrix.shape == (size, size)
     expect_powers(matrix, base, fleet)
+
+
+def test_the_lag_that_an_fmu_has_by_itself_is_in_the_loop(tmp_path: Path) -> None:
+    sources = source_tree.copy_sources(tmp_path)
+    source_tree.replace(
+        sources / "plant_fmu" / "dynamics.py", "time_constant: float = 0.0", "time_constant: float = 0.05"
+    )
+    lagging = source_tree.build(sources, tmp_path, "QuadrotorPlant")
+    by_itself = dataclasses.replace(scenario_of(), plant=FmuChoice(fmu=str(lagging)))
+    by_parameter = scenario_of().with_changes(parameters={"plant.actuator_time_constant": 0.05})
+    own, set_to = (HoverLoop.of(scenario).matrix(0.04, 0.01) for scenario in (by_itself, by_parameter))
+    assert own.shape == (20, 20)
+    assert own == pytest.approx(set_to, abs=1e-9)
+    assert set_to[12:16, 12:16] == pytest.approx(math.exp(-0.04 / 0.05) * np.eye(4), abs=1e-6)
+
+
+@pytest.mark.parametrize(("exponent", "limit"), [(0.5, 0.0085), (0.99, 0.0801), (1.0, 0.0801)])
+def test_at_the_edge_of_the_boundary_layer_the_exponent_matters(exponent: float, limit: float) -> None:
+    scenario = scenario_of().with_changes(parameters={"controller.surface_exponent": exponent})
+    inside, outside = (local_limit(HoverLoop.of(each), each, "period") for each in (scenario, at_edge(scenario)))
+    assert inside == theory()
+    assert outside == pytest.approx(limit, abs=1e-4)
+
+
+def test_differences_stay_inside_a_boundary_layer_that_is_small() -> None:
+    small = {"controller.boundary_layer": 1e-7, "controller.surface_exponent": 0.5}
+    scenario = scenario_of().with_changes(parameters=small)
+    assert HoverLoop.of(scenario).spectral_radius(0.05, 0.0) == pytest.approx(
+        HoverLoop.of(scenario_of()).spectral_radius(0.05, 0.0), rel=1e-5
+    )
 
 
 def test_with_jacobi_order_the_loop_is_that_of_a_delay_of_one_period(fleet: Fleet) -> None:
