@@ -1,8 +1,14 @@
 """Failures that a user sees as one line."""
 
+LONGEST = 4000
+"""Characters of a message; what a message names may come from a file and be of any length."""
+
 
 class QuadcosimError(Exception):
     """Something went wrong; the text says what, and what was expected (exit code 1)."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(one_line(text))
 
 
 class UsageError(QuadcosimError):
@@ -17,3 +23,18 @@ class SimulatorError(QuadcosimError):
         self.divergence = divergence
         self.details = details
         """The FMU's own traceback, for `--debug`."""
+
+
+def one_line(text: str) -> str:
+    """`text` in one line of printable characters, cut where it is longer than a message may be."""
+    if not text.isprintable():
+        text = "".join(
+            c if c.isprintable() else c.encode("unicode_escape").decode() for c in " ".join(text.split("\n"))
+        )
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
+
+
+def shown(value: object) -> str:
+    """A value as a message gives it: a float to twelve digits, 0.3 for 0.30000000000000004; anything long cut."""
+    text = repr(float(f"{value:.12g}")) if isinstance(value, float) else str(value)
+    return text if len(text) <= 100 else f"{text[:99]}…"

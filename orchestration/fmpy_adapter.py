@@ -12,9 +12,10 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription, ScalarVariable
 
-from orchestration.errors import QuadcosimError, SimulatorError, UsageError
+from orchestration.errors import QuadcosimError, SimulatorError, UsageError, shown
 from orchestration.messages import PYTHONFMU_ENTRY, WARNING, Message, collecting_callbacks, words
 from orchestration.simulator import Floats, Transfer
+from orchestration.timing import is_number
 
 DIVERGENCE_CATEGORY = b"divergence"
 
@@ -134,10 +135,11 @@ class FmuSimulator:
             self._expect(isinstance(value, bool), name, value, "true or false")
             self._call("setBoolean", reference, [value])
         elif variable.type == "Integer":
-            self._expect(isinstance(value, int) and not isinstance(value, bool), name, value, "a whole number")
+            whole = isinstance(value, int) and not isinstance(value, bool) and -(2**31) <= value < 2**31
+            self._expect(whole, name, value, "a whole number of 32 bits")
             self._call("setInteger", reference, [value])
         else:
-            self._expect(not isinstance(value, bool), name, value, "a number")
+            self._expect(is_number(value), name, value, "a number")
             self._call("setReal", reference, [float(value)])
 
     def get(self, name: str) -> float | bool:
@@ -163,7 +165,7 @@ class FmuSimulator:
 
     def _expect(self, condition: bool, name: str, value: object, expected: str) -> None:
         if not condition:
-            raise UsageError(f"{self.name}.{name} = {value}: expected {expected}")
+            raise UsageError(f"{self.name}.{name} = {shown(value)}: expected {expected}")
 
     def _transfer(self, function: str, names: Sequence[str], array: Floats) -> Transfer:
         count = len(names)

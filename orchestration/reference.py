@@ -1,13 +1,16 @@
 """Where P_d(t) comes from in a run: the controller's built-in trajectory, or a CSV file."""
 
 import csv
+import math
+from array import array
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol, TextIO
 
 import numpy as np
 
 from fmu_kit.scalar import ScalarOps
 from fmu_kit.trajectory import Trajectory
+from orchestration.documents import readable
 from orchestration.errors import UsageError
 from orchestration.simulator import Floats
 from orchestration.wiring import REFERENCE
@@ -75,26 +78,51 @@ class FromFile:
         return np.column_stack([np.interp(t, self.time, self.columns[:, axis]) for axis in range(3)])
 
 
+LONGEST_LINE = 2**17
+"""Characters of a line, so that a file without line ends is not read whole."""
+
+
 def _read_table(path: Path) -> tuple[Floats, Floats]:
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path}: expected a readable CSV file: {error}") from error
-    header = [name.strip() for name in rows[0]] if rows else []
-    missing = [name for name in ("time", *REFERENCE) if name not in header]
-    if missing:
-        raise UsageError(f"{path}: no column {', '.join(missing)}; expected time, {', '.join(REFERENCE)}")
-    body = [row for row in rows[1:] if row]
-    if len(body) < 2 or any(len(row) != len(header) for row in body):
-        raise UsageError(f"{path}: expected at least two rows, each of {len(header)} numbers")
-    try:
-        table = np.array([[float(cell) for cell in row] for row in body])
-    except ValueError as error:
-        raise UsageError(f"{path}: expected numbers only: {error}") from error
-    if not np.isfinite(table).all():
-        raise UsageError(f"{path}: expected finite numbers only")
+    with readable(path, "CSV file"), path.open(newline="", encoding="utf-8-sig") as file:
+        try:
+            header, table = _read_rows(path, csv.reader(iter(lambda: _line(file), ""), strict=True))
+        except csv.Error as error:
+            raise UsageError(f"{path}: expected CSV: {error}") from error
     time = table[:, header.index("time")].copy()
     if not (np.diff(time) > 0.0).all():
         raise UsageError(f"{path}: expected times that increase")
     return time, table[:, [header.index(name) for name in REFERENCE]].copy()
+
+
+def _line(file: TextIO) -> str:
+    line = file.readline(LONGEST_LINE + 1)
+    if len(line) > LONGEST_LINE:
+        raise csv.Error(f"a line has more than {LONGEST_LINE} characters")
+    return line
+
+
+def _read_rows(path: Path, lines: Any) -> tuple[list[str], Floats]:
+    """The names of the columns, and the numbers below them, shape (number of rows, number of columns)."""
+    header = [name.strip() for name in next(lines, [])]
+    missing = [name for name in ("time", *REFERENCE) if name not in header]
+    if missing:
+        for separator, mark in ((";", "semicolons"), ("\t", "tabulators")):
+            if any(separator in name for name in header):
+                raise UsageError(f"{path}: columns separated by {mark}; expected commas, and points in numbers")
+        raise UsageError(f"{path}: no column {', '.join(missing)}; expected time, {', '.join(REFERENCE)}")
+    numbers = array("d")
+    for row in lines:
+        if not row:
+            continue
+        place = f"{path}: line {lines.line_num}"
+        if len(row) != len(header):
+            raise UsageError(f"{place}: {len(row)} values, expected {len(header)} as in the header")
+        try:
+            numbers.extend(map(float, row))
+        except ValueError as error:
+            raise UsageError(f"{place}: expected numbers only: {error}") from error
+        if not all(map(math.isfinite, numbers[-len(header) :])):
+            raise UsageError(f"{place}: expected finite numbers only")
+    if len(numbers) < 2 * len(header):
+        raise UsageError(f"{path}: expected at least two rows of numbers")
+    return header, np.array(numbers).reshape(-1, len(header))

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-from orchestration.errors import UsageError
-from orchestration.timing import Timing
+from orchestration.errors import UsageError, shown
+from orchestration.timing import Timing, is_number
 from orchestration.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT, SAMPLE_OFFSET, SAMPLE_PERIOD
 
 Parameter = float | bool
@@ -59,10 +59,10 @@ class Scenario:
     record: Record = field(default_factory=Record)
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.stop_time) and self.stop_time > 0.0):
-            raise UsageError(f"stop_time = {self.stop_time}: expected a positive number of seconds")
-        if not 0 <= self.seed < 2**63:
-            raise UsageError(f"seed = {self.seed}: expected a whole number from 0 to 2^63 - 1")
+        if not (is_number(self.stop_time) and math.isfinite(self.stop_time) and self.stop_time > 0.0):
+            raise UsageError(f"stop_time = {shown(self.stop_time)}: expected a positive number of seconds")
+        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or not 0 <= self.seed < 2**63:
+            raise UsageError(f"seed = {shown(self.seed)}: expected a whole number from 0 to 2^63 - 1")
         for name, flag in ((SAMPLE_PERIOD, "--period and --clock"), (SAMPLE_OFFSET, "--offset")):
             if name in self.controller.parameters:
                 raise UsageError(

@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import sys
 import typing
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -11,16 +10,12 @@ from typing import Any, ClassVar
 
 import pydantic
 
-from orchestration.errors import UsageError
+from orchestration.documents import read_toml
+from orchestration.errors import UsageError, shown
 from orchestration.presets import preset_timing
 from orchestration.scenario import FmuChoice, Record, ReferenceChoice, Scenario
 from orchestration.timing import Timing
 from orchestration.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,12 +40,7 @@ def load_scenario(path: str | Path) -> Scenario:
     or a value of the wrong kind.
     """
     path = Path(path)
-    try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path}: expected a readable scenario file: {error}") from error
-    except tomllib.TOMLDecodeError as error:
-        raise UsageError(f"{path}: expected TOML: {error}") from error
+    tables = read_toml(path, "scenario file")
     try:
         return scenario_from_tables(tables, path.parent)
     except UsageError as error:
@@ -93,10 +83,10 @@ def _choice(side: str, table: dict[str, Any], default: str, folder: Path) -> Fmu
     parameters = dict(_flattened(table))
     fmu = parameters.pop("fmu", default)
     if not isinstance(fmu, str):
-        raise UsageError(f"{side}.fmu = {fmu}: expected the name of an FMU or a path")
+        raise UsageError(f"{side}.fmu = {shown(fmu)}: expected the name of an FMU or a path")
     for name, value in parameters.items():
         if not isinstance(value, (int, float, bool)):
-            raise UsageError(f"{side}.{name} = {value!r}: expected a number, true or false")
+            raise UsageError(f"{side}.{name} = {shown(repr(value))}: expected a number, true or false")
     if fmu.endswith(".fmu"):
         fmu = str(folder / fmu)
     return FmuChoice(fmu=fmu, parameters=parameters)
@@ -132,5 +122,5 @@ def first_problem(error: pydantic.ValidationError, file: type) -> str:
         names = [f.name for f in dataclasses.fields(table)] + list(SHORTHANDS if table is Timing else ())
         keys = ", ".join(names)
         return f"{place}: no such key; expected one of {keys}"
-    message = problem["msg"]
-    return f"{place} = {problem['input']!r}: {message[:1].lower()}{message[1:]}"
+    message, value = problem["msg"], problem["input"]
+    return f"{place} = {shown(value if isinstance(value, float) else repr(value))}: {message[:1].lower()}{message[1:]}"

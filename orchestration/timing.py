@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, fields
 from fractions import Fraction
 from typing import ClassVar, Literal, get_args
 
-from orchestration.errors import UsageError
+from orchestration.errors import UsageError, shown
 
 NANOSECONDS = 1_000_000_000
 
@@ -62,8 +62,7 @@ class Timing:
         for name, choices in _CHOICES.items():
             _require(getattr(self, name) in choices, name, getattr(self, name), f"one of {', '.join(choices)}")
         for name in _NUMBERS:
-            value = getattr(self, name)
-            _require(isinstance(value, (int, float)) and not isinstance(value, bool), name, value, "a number")
+            _require(is_number(getattr(self, name)), name, getattr(self, name), "a number")
         for name in ("period", "plant_interval", "clock_ratio"):
             value = getattr(self, name)
             _require(math.isfinite(value) and value > 0.0, name, value, "a positive number")
@@ -77,7 +76,8 @@ class Timing:
             _require(0.0 <= getattr(self, name) <= 1.0, name, getattr(self, name), "a probability in [0, 1]")
         for name in ("noise", "quantisation"):
             for variable, value in getattr(self, name).items():
-                _require(math.isfinite(value) and value >= 0.0, f"{name} of {variable}", value, "zero or positive")
+                valid = is_number(value) and math.isfinite(value) and value >= 0.0
+                _require(valid, f"{name} of {variable}", value, "zero or positive")
         longest = self.period / self.clock_ratio
         _require(self.jitter < longest, "jitter", self.jitter, f"less than the period of {longest:g} s")
         self._check_bursts()
@@ -87,9 +87,7 @@ class Timing:
         if self.burst_length is None:
             return
         length = self.burst_length
-        _require(
-            isinstance(length, (int, float)) and 1.0 <= length < math.inf, "burst_length", length, "at least 1 loss"
-        )
+        _require(is_number(length) and 1.0 <= length < math.inf, "burst_length", length, "at least 1 loss")
         for name in ("measurement_loss", "command_loss"):
             loss = getattr(self, name)
             possible = self.burst_length / (self.burst_length + 1.0)
@@ -127,9 +125,16 @@ _NUMBERS = (
 )  # fmt: skip
 
 
+def is_number(value: object) -> bool:
+    """Whether `value` can be a time, a share or a factor; true and false are none, nor is what no float holds."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return False
+    return isinstance(value, float) or abs(value) < 2**63
+
+
 def _require(condition: bool, name: str, value: object, expected: str) -> None:
     if not condition:
-        raise UsageError(f"timing.{name} = {value}: expected {expected}")
+        raise UsageError(f"timing.{name} = {shown(value)}: expected {expected}")
 
 
 TIMING_KEYS = tuple(f.name for f in fields(Timing))

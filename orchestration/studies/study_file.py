@@ -1,22 +1,17 @@
 """Reads study files."""
 
 import json
-import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
 import pydantic
 
+from orchestration.documents import read_toml
 from orchestration.errors import UsageError
 from orchestration.scenario_file import first_problem, load_scenario, scenario_from_tables
 from orchestration.studies.axes import Axis, Method, Scale, Value, span
 from orchestration.studies.study import Study, expect_target
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 _FORBID: dict[str, str] = {"extra": "forbid"}
 
@@ -70,13 +65,9 @@ def load_study(path: str | Path) -> Study:
     value that cannot be.
     """
     path = Path(path)
+    tables = read_toml(path, "study file")
     try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
         return _study(tables, path)
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path}: expected a readable study file: {error}") from error
-    except tomllib.TOMLDecodeError as error:
-        raise UsageError(f"{path}: expected TOML: {error}") from error
     except UsageError as error:
         raise UsageError(f"{path}: {error}") from error
 

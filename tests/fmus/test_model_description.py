@@ -10,7 +10,7 @@ import pytest
 from fmpy.model_description import ModelDescription
 
 from fmu_kit.model_description import PYTHON_REQUIRED
-from orchestration.scenario_file import tomllib
+from orchestration.documents import tomllib
 from orchestration.wiring import MODELS
 from tests.fmus.archive import files_of
 from tests.fmus.expected import MEASUREMENT

@@ -12,8 +12,8 @@ import pytest
 
 from fmu_kit import packaging
 from orchestration import fmus
+from orchestration.documents import tomllib
 from orchestration.errors import QuadcosimError
-from orchestration.scenario_file import tomllib
 from orchestration.wiring import MODELS
 from tests.fmus.archive import files_of
 from tests.fmus.process import ROOT, run

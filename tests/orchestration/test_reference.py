@@ -83,12 +83,12 @@ def test_a_table_that_does_not_cover_the_run_is_refused(tmp_path: Path, times: t
 
 @pytest.mark.parametrize("cell", ["fast", "", "0x10"])
 def test_what_is_no_number_is_refused(tmp_path: Path, cell: str) -> None:
-    assert "expected numbers only" in refused(tmp_path, row(0.0), row(1.0, cell), row(2.0))
+    assert "line 3: expected numbers only" in refused(tmp_path, row(0.0), row(1.0, cell), row(2.0))
 
 
 @pytest.mark.parametrize("cell", ["nan", "inf", "-inf"])
 def test_what_is_not_finite_is_refused(tmp_path: Path, cell: str) -> None:
-    assert "expected finite numbers only" in refused(tmp_path, row(0.0), row(1.0, cell), row(2.0))
+    assert "line 3: expected finite numbers only" in refused(tmp_path, row(0.0), row(1.0, cell), row(2.0))
 
 
 @pytest.mark.parametrize("rows", [(), (0.0,)])
@@ -97,8 +97,27 @@ def test_fewer_than_two_rows_are_refused(tmp_path: Path, rows: tuple[float, ...]
 
 
 def test_rows_of_another_length_are_refused(tmp_path: Path) -> None:
-    refused(tmp_path, row(0.0), row(1.0) + ",3.0", row(2.0))
-    assert "expected at least two rows, each of 16 numbers" in refused(tmp_path, *(row(t) + ",1.0" for t in (0.0, 2.0)))
+    assert "line 3: 17 values, expected 16" in refused(tmp_path, row(0.0), row(1.0) + ",3.0", row(2.0))
+    assert "line 2: 15 values, expected 16" in refused(tmp_path, row(0.0).removesuffix(",0.0"), row(2.0))
+
+
+@pytest.mark.parametrize(("separator", "name"), [(";", "semicolons"), ("\t", "tabulators")])
+def test_columns_that_commas_do_not_separate_are_refused_with_what_does(
+    tmp_path: Path, separator: str, name: str
+) -> None:
+    rows = [row(t).replace(",", separator).replace(".", ",") for t in (0.0, 2.0)]
+    message = refused(tmp_path, *rows, header=HEADER.replace(",", separator))
+    assert message.endswith(f"columns separated by {name}; expected commas, and points in numbers")
+
+
+@pytest.mark.parametrize("cell", ['"' + "1" * 200_000 + '"', "1\n" * 70_000 + '"', "0" * 200_000])
+def test_a_field_or_a_line_without_end_is_refused(tmp_path: Path, cell: str) -> None:
+    assert "expected" in refused(tmp_path, row(0.0), row(1.0, cell), row(2.0))
+
+
+def test_a_byte_order_mark_is_no_part_of_the_first_name(tmp_path: Path) -> None:
+    reference = table(tmp_path, row(0.0, 1.0), row(2.0, 1.0), header=f"\ufeff{HEADER}")
+    assert reference.position(1.0) == (1.0, 1.0, 1.0)
 
 
 def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path) -> None:

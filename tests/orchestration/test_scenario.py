@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import orchestration
 from orchestration import FmuChoice, Record, ReferenceChoice, Scenario, Timing, UsageError, load_scenario
-from orchestration.scenario_file import tomllib
+from orchestration.documents import tomllib
 from orchestration.timing import TIMING_KEYS
 from tests.orchestration.strategies import timings
 
@@ -236,8 +236,49 @@ def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="expected a readable scenario file"):
         load_scenario(tmp_path)
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(UsageError, match="expected a readable scenario file"):
+    with pytest.raises(UsageError, match="expected a readable scenario file: its text is not in UTF-8"):
         load_scenario(tmp_path / "binary.toml")
+
+
+def test_a_byte_order_mark_is_no_part_of_the_first_key(file: Path) -> None:
+    assert loaded(file, "\ufeffstop_time = 3.0") == Scenario(stop_time=3.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (f"x = {'[' * 5000}", "expected TOML nested at most 20 deep"),
+        (f"plant{'.a' * 100_000} = 1", "expected TOML nested at most 20 deep"),
+        ("plant" + ' . "a"' * 30 + " = 1", "expected TOML nested at most 20 deep"),
+        (f"[[plant{'.a' * 18}]]\nx.y.z = 1", "expected at most 20 tables and lists in each other"),
+        (f"seed = {'9' * 5000}", "expected whole numbers of at most 64 bits"),
+        (f"seed = 0x{'f' * 5000}", "seed: expected a whole number of at most 64 bits"),
+        (f"[plant]\nmass = {'9' * 400}", "plant.mass: expected a whole number of at most 64 bits"),
+        ('[reference]\nfile = "a\\u0000"', "reference.file = 'a\\x00': expected text without NUL characters"),
+        ('[plant]\n"a\\u0000" = 1', "plant: 'a\\x00': expected a name without NUL characters"),
+        (f"# {'x' * 2**20}", "it has more than 1048576 characters"),
+        (f'stop_time = "{"x" * 2**19}"', "…: input should be a valid number"),
+    ],
+    ids=range(11),
+)
+def test_what_no_reader_could_take_is_refused_in_a_short_line(file: Path, text: str, expected: str) -> None:
+    message = refusal(file, text)
+    assert expected in message
+    assert len(message) < 300
+
+
+@pytest.mark.parametrize("name", ["stop_time", "seed"])
+@pytest.mark.parametrize("value", ["a lot", True, None, [1]])
+def test_a_scenario_takes_numbers_only(name: str, value: Any) -> None:
+    with pytest.raises(UsageError, match=f"^{name} = .*: expected a"):
+        Scenario().with_changes(**{name: value})
+    with pytest.raises(UsageError, match=r"^timing.noise of position = .*: expected zero or positive"):
+        Scenario().with_changes(timing={"noise": {"position": value}})
+
+
+def test_a_message_gives_numbers_as_they_are_meant() -> None:
+    with pytest.raises(UsageError, match=r"^timing.jitter = 0.3: expected less than the period"):
+        Timing(jitter=0.1 + 0.2)
 
 
 def test_a_wrong_fmu_name_is_refused_with_those_there_are(file: Path) -> None:

@@ -1,0 +1,112 @@
+"""Reads the text files that people write and edit: whatever is wrong with one is a `UsageError`.
+
+A file is read up to a stated size, so that none fills memory, and may begin with a byte-order mark, as
+editors on Windows write it.
+"""
+
+import json
+import re
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from orchestration.errors import UsageError
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+LARGEST = 2**20
+"""Characters of a TOML or JSON file."""
+DEEPEST = 20
+"""Tables and lists in each other."""
+
+_PART = r"""(?:[\w-]+|"(?:[^"\\\n]|\\.)*"?|'[^'\n]*'?)"""
+_NEXT = rf"(?:[ \t]*\.[ \t]*{_PART})"
+_KEYS = re.compile(rf"#[^\n]*|(?P<deep>{_PART}{_NEXT}{{{DEEPEST}}})|{_PART}{_NEXT}*")
+"""Keys, and what looks like them; every character is looked at a few times only."""
+
+
+@contextmanager
+def readable(path: Path, what: str) -> Iterator[None]:
+    """Turns the failure to open or decode a file into a `UsageError` that says what was expected."""
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise UsageError(f"{path}: expected a readable {what}: {reason[:1].lower()}{reason[1:]}") from error
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{path}: expected a readable {what}: its text is not in UTF-8 ({error.reason})") from error
+
+
+def read_text(path: Path, what: str) -> str:
+    """The text of a UTF-8 file of at most `LARGEST` characters; raises `UsageError`, naming `what` it should be."""
+    if "\0" in str(path):
+        raise UsageError(f"{path}: expected a path without NUL characters")
+    with readable(path, what), path.open(encoding="utf-8-sig") as file:
+        text = file.read(LARGEST + 1)
+    if len(text) > LARGEST:
+        raise UsageError(f"{path}: expected a readable {what}: it has more than {LARGEST} characters")
+    return text
+
+
+def read_toml(path: Path, what: str) -> dict[str, Any]:
+    """The tables of a TOML file.
+
+    Raises `UsageError` for what is no TOML, is nested deeper than `DEEPEST`, or has a whole number beyond 64
+    bits or a NUL character in it.
+    """
+    text = read_text(path, what)
+    if any(key["deep"] for key in _KEYS.finditer(text)):  # parsing takes time by the square of a key's parts
+        raise UsageError(f"{path}: expected TOML nested at most {DEEPEST} deep")
+    try:
+        tables: dict[str, Any] = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise UsageError(f"{path}: expected TOML: {error}") from error
+    except ValueError as error:  # of a number with more digits than Python reads
+        raise UsageError(f"{path}: expected whole numbers of at most 64 bits") from error
+    except RecursionError as error:
+        raise UsageError(f"{path}: expected TOML nested at most {DEEPEST} deep") from error
+    _expect_plain(tables, str(path))
+    return tables
+
+
+def read_json(path: Path, what: str) -> Any:
+    """The value of a JSON file; raises `UsageError` for what is none, `NaN` and `Infinity` included."""
+    text = read_text(path, what)
+    try:
+        value = json.loads(text, parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
+        raise UsageError(f"{path}: expected JSON, as it was written: {error}") from error
+    _expect_plain(value, str(path))
+    return value
+
+
+def _refuse_constant(name: str) -> None:
+    raise ValueError(f"{name} is no JSON")
+
+
+def _expect_plain(value: Any, place: str) -> None:
+    """Refuse what later readers cannot take, at its place in the document."""
+    waiting = [(place, 0, value)]
+    while waiting:
+        place, depth, value = waiting.pop()
+        if isinstance(value, str) and "\0" in value:
+            raise UsageError(f"{place} = {value!r}: expected text without NUL characters")
+        if isinstance(value, int) and not -(2**63) <= value < 2**63:
+            raise UsageError(f"{place}: expected a whole number of at most 64 bits")
+        if isinstance(value, Mapping):
+            items = [(str(key), item) for key, item in value.items()]
+        elif isinstance(value, Sequence) and not isinstance(value, str):
+            items = [(str(index), item) for index, item in enumerate(value)]
+        else:
+            continue
+        if depth == DEEPEST:
+            raise UsageError(f"{place}: expected at most {DEEPEST} tables and lists in each other")
+        for key, item in items:
+            if "\0" in key:
+                raise UsageError(f"{place}: {key!r}: expected a name without NUL characters")
+            waiting.append((f"{place}: {key}" if depth == 0 else f"{place}.{key}", depth + 1, item))
