@@ -111,6 +111,15 @@ class FlightFlags:
     stop_time: Annotated[float | None, _option("--stop-time", panel=MODEL, text="End of the run; 30 unless told.")] = (
         None
     )
+    model_mismatch: Annotated[
+        bool | None,
+        _option(
+            "--model-mismatch",
+            panel=MODEL,
+            metavar="",
+            text="The controller's nominal mass or inertia is not the plant's on purpose: no warning.",
+        ),
+    ] = None
     set: Annotated[
         list[str] | None,
         _option(
@@ -135,11 +144,16 @@ class FlightFlags:
             if given:
                 old: Mapping[str, float] = getattr(scenario.timing, name)
                 timing[name] = {**old, **{key: _number(f"--{name}", text) for key, text in _pairs(name, given)}}
-        top = {name: value for name in ("seed", "stop_time") if (value := getattr(self, name)) is not None}
+        top = {
+            name: value
+            for name in ("seed", "stop_time", "model_mismatch")
+            if (value := getattr(self, name)) is not None
+        }
         parameters = {key: _value(key, text) for key, text in _pairs("set", self.set or [])}
         return scenario.with_changes(timing=timing, parameters=parameters, **top)
 
 
+_TOP_FLAGS = ("seed", "stop_time", "model_mismatch")
 _TIMING_FLAGS = (
     "period", "offset", "plant_interval", "order", "hold", "clock", "delay", "delay_jitter", "jitter",
     "jitter_distribution", "measurement_loss", "command_loss", "burst_length", "clock_ratio",

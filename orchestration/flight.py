@@ -17,6 +17,7 @@ from orchestration.errors import UsageError
 from orchestration.fleet import Loader
 from orchestration.fmpy_adapter import FmuSimulator
 from orchestration.master import Event, Master, Signals
+from orchestration.nominal_model import mismatch
 from orchestration.reference import BuiltIn, FromFile, ReferencePath
 from orchestration.result import Result, rows_of
 from orchestration.scenario import FmuChoice, Parameter, Scenario
@@ -87,8 +88,15 @@ class Flight:
             },
             divergence=master.divergence,
             provenance={**provenance(self.plant, self.controller), "wall_time": time.perf_counter() - self.started},
-            warnings=tuple(self.plant.warnings + self.controller.warnings),
+            warnings=(*self._mismatch(), *self.plant.warnings, *self.controller.warnings),
         )
+
+    def _mismatch(self) -> tuple[str, ...]:
+        scenario = self.scenario
+        if scenario.model_mismatch:
+            return ()
+        found = mismatch(_rigid_body(self.plant, scenario.plant), _rigid_body(self.controller, scenario.controller))
+        return () if found is None else (found,)
 
 
 @contextmanager
@@ -178,6 +186,11 @@ def _parameter(fmu: FmuSimulator, choice: FmuChoice, name: str, absent: Any) -> 
         return absent
     value: Parameter = choice.parameters.get(name, float(fmu.variable(name).start))
     return float(value)
+
+
+def _rigid_body(fmu: FmuSimulator, choice: FmuChoice) -> dict[str, float]:
+    parameters = fmu.names("parameter")
+    return {name: _parameter(fmu, choice, name, None) for name in wiring.RIGID_BODY if name in parameters}
 
 
 def _recorded(fmu: FmuSimulator, chosen: tuple[str, ...] | None) -> tuple[str, ...]:

@@ -52,6 +52,8 @@ class Scenario:
     """[s]"""
     seed: int = 0
     """of all random numbers"""
+    model_mismatch: bool = False
+    """whether it is meant if the controller's nominal mass or inertia is not the plant's; no effect on the flight"""
     controller: FmuChoice = field(default_factory=lambda: FmuChoice(fmu=DEFAULT_CONTROLLER))
     plant: FmuChoice = field(default_factory=lambda: FmuChoice(fmu=DEFAULT_PLANT))
     timing: Timing = field(default_factory=Timing)
@@ -116,6 +118,7 @@ class Scenario:
         tables: dict[str, Any] = {
             "stop_time": self.stop_time,
             "seed": self.seed,
+            **({"model_mismatch": True} if self.model_mismatch else {}),
             "controller": _table(self.controller),
             "plant": _table(self.plant),
             "timing": timing,

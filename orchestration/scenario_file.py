@@ -26,6 +26,7 @@ class ScenarioFile:
 
     stop_time: float = Scenario.stop_time
     seed: int = Scenario.seed
+    model_mismatch: bool = Scenario.model_mismatch
     controller: dict[str, Any] = field(default_factory=dict)
     plant: dict[str, Any] = field(default_factory=dict)
     timing: Timing = field(default_factory=Timing)
@@ -54,6 +55,7 @@ def scenario_from_tables(tables: dict[str, Any], folder: Path) -> Scenario:
     return Scenario(
         stop_time=parsed.stop_time,
         seed=parsed.seed,
+        model_mismatch=parsed.model_mismatch,
         controller=_choice("controller", parsed.controller, DEFAULT_CONTROLLER, folder),
         plant=_choice("plant", parsed.plant, DEFAULT_PLANT, folder),
         timing=parsed.timing,

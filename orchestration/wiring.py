@@ -1,5 +1,7 @@
 """The names of both FMUs and what is connected to what; no other file of this package knows them."""
 
+from collections.abc import Iterable
+
 MODELS = {
     "UnifiedController": "controller_fmu.slave:UnifiedController",
     "QuadrotorPlant": "plant_fmu.slave:QuadrotorPlant",
@@ -10,7 +12,7 @@ DEFAULT_CONTROLLER = "UnifiedController"
 DEFAULT_PLANT = "QuadrotorPlant"
 
 
-def components(name: str, axes: str = "xyz") -> tuple[str, ...]:
+def components(name: str, axes: Iterable[str] = "xyz") -> tuple[str, ...]:
     """The scalar variables of a vector."""
     return tuple(f"{name}.{axis}" for axis in axes)
 
@@ -50,6 +52,10 @@ DISTURBANCE = components("wind.amplitude") + EXTERNAL_FORCE
 BOUNDARY_LAYER = "boundary_layer"
 SURFACE_GAIN, SURFACE_EXPONENT = "gain.surface", "surface_exponent"
 """Parameters of the controller: its gain is constant for position errors below ε, a power of them beyond."""
+
+RIGID_BODY = ("mass", *components("inertia", ("xx", "yy", "zz", "xy", "xz", "yz")))
+"""Parameters of the plant and, by the same names, of the controller's nominal model."""
+
 THRUST_MAX = "thrust_max"
 TORQUE_MAX = "torque_max"
 

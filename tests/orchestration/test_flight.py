@@ -376,6 +376,18 @@ def test_the_fmus_have_nothing_to_warn_of() -> None:
     assert fly(0.1, clock="fmu", offset=0.005, plant_interval=0.02).warnings == ()
 
 
+def test_nominal_model_that_is_not_the_plant_is_warned_of_unless_it_is_meant() -> None:
+    one_side = Scenario(stop_time=0.02).with_changes(parameters={"plant.mass": 1.2, "controller.inertia.xy": 0.1})
+    (warning,) = orchestration.run(one_side).warnings
+    assert "controller.mass = 1 where plant.mass = 1.2" in warning
+    assert "controller.inertia.xy = 0.1 where plant.inertia.xy = 0," not in warning
+    assert "controller.inertia.xy = 0.1 where plant.inertia.xy = 0." in warning
+    assert "inertia.xx" not in warning
+    assert orchestration.run(one_side.with_changes(model_mismatch=True)).warnings == ()
+    both = one_side.with_changes(parameters={"controller.mass": 1.2, "plant.inertia.xy": 0.1})
+    assert orchestration.run(both).warnings == ()
+
+
 def test_progress_and_announcements_are_heard() -> None:
     heard: list[float] = []
     orchestration.run(Scenario(stop_time=1.0), progress=heard.append)

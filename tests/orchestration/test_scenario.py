@@ -145,6 +145,7 @@ def test_a_scenario_written_and_loaded_is_the_same(
     scenario = Scenario(
         stop_time=stop_time,
         seed=seed,
+        model_mismatch=seed % 2 == 1,
         timing=timing,
         plant=FmuChoice(fmu="QuadrotorPlant", parameters=parameters),
         record=Record(controller=("energy",)),

@@ -397,6 +397,10 @@ def test_the_key_is_the_same_for_an_fmu_or_a_reference_that_lies_elsewhere(tmp_p
     assert found[0] == found[1]
 
 
+def test_the_key_does_not_hang_on_whether_a_wrong_model_is_meant() -> None:
+    assert run_key(BASE.with_changes(model_mismatch=True), GUIDS) == run_key(BASE, GUIDS)
+
+
 def test_the_key_does_not_hang_on_the_order_in_which_parameters_are_given() -> None:
     one = BASE.with_changes(parameters={"plant.mass": 1.0, "plant.gravity": 9.0})
     two = BASE.with_changes(parameters={"plant.gravity": 9.0, "plant.mass": 1.0})
