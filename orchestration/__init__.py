@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from orchestration.errors import QuadcosimError, SimulatorError, UsageError
-    from orchestration.flight import run
+    from orchestration.flight import FlightInterrupted, run
     from orchestration.pause import fly_until, resume
     from orchestration.result import Result
     from orchestration.run_directory import load_run, save_run
@@ -24,6 +24,7 @@ _HOMES = {
     "QuadcosimError": "errors",
     "SimulatorError": "errors",
     "UsageError": "errors",
+    "FlightInterrupted": "flight",
     "run": "flight",
     "Result": "result",
     "load_run": "run_directory",
@@ -39,6 +40,7 @@ _HOMES = {
 }
 
 __all__ = [
+    "FlightInterrupted",
     "FmuChoice",
     "QuadcosimError",
     "Record",

@@ -5,9 +5,10 @@ import sys
 import traceback
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+import typer.core
 
 from orchestration.errors import QuadcosimError, SimulatorError, UsageError
 from orchestration.flags import FlightFlags, flies, scenario_from
@@ -24,8 +25,22 @@ EXTRAS = {
 }
 """Packages that the base install does without, by the extra that brings them."""
 
+
+class _Stopped(Exception):
+    """Ctrl-C; the text says how far the work was."""
+
+
+class _Commands(typer.core.TyperGroup):
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except (KeyboardInterrupt, typer.Abort) as stop:  # of which the parser would keep an exit code only
+            raise _Stopped(str(stop)) from stop
+
+
 app = typer.Typer(
     name="quadcosim",
+    cls=_Commands,
     help="Fly a quadrotor controller FMU under a realistic digital clock.",
     epilog="A first flight: quadcosim run --out results/paper. Add --debug to any command for a traceback.",
     no_args_is_help=True,
@@ -70,7 +85,7 @@ def run(
     """Fly a scenario and print its metrics. FMUs that are missing or out of date are built first."""
     from orchestration import pause
     from orchestration.flight import run as fly
-    from orchestration.run_directory import save_run
+    from orchestration.run_directory import keep_flight
 
     if resume is not None and (scenario is not None or pause_at is not None or flags != FlightFlags()):
         raise UsageError("--resume: expected no scenario and no flags of the flight; the paused run has its own")
@@ -78,10 +93,13 @@ def run(
         raise UsageError("--pause-at: expected --out DIR for the state")
     with progress_bar("flying") as progress:
         if resume is not None:
-            result: Result | None = pause.resume(resume, progress=progress, announce=say)
+            result: Result | None = pause.resume(resume, out, figures=figures, progress=progress, announce=say)
         elif pause_at is not None and out is not None:
             chosen = scenario_from(scenario, flags)
-            result = pause.fly_until(chosen, pause_at, out, progress=progress, announce=say)
+            result = pause.fly_until(chosen, pause_at, out, figures=figures, progress=progress, announce=say)
+        elif out is not None:
+            chosen = scenario_from(scenario, flags)
+            result = keep_flight(out, lambda _: fly(chosen, progress=progress, announce=say), figures=figures)
         else:
             result = fly(scenario_from(scenario, flags), progress=progress, announce=say)
     if result is None:
@@ -89,7 +107,7 @@ def run(
         return
     _report(result, as_json)
     if out is not None:
-        say(f"results in {save_run(result, out, figures=figures)}")
+        say(f"results in {out}")
     elif not as_json:
         say("add --out DIR to keep the signals and the figures")
 
@@ -218,8 +236,8 @@ def main(arguments: list[str] | None = None) -> None:
         arguments = [argument for argument in given if argument != "--debug"]
         code = app(arguments or ["--help"], standalone_mode=False)
         sys.exit(code if arguments else 2)
-    except (KeyboardInterrupt, typer.Abort):
-        say("quadcosim: interrupted")
+    except (KeyboardInterrupt, _Stopped) as stop:
+        say(f"quadcosim: interrupted {stop}".rstrip())
         sys.exit(130)
     except Exception as error:
         _fail(error, debug)

@@ -16,6 +16,7 @@ from orchestration.clock import Clock, random_streams
 from orchestration.errors import UsageError
 from orchestration.fleet import Loader
 from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.interrupt import Interrupt, Interrupted, interrupts_held_back
 from orchestration.master import Event, Master, Signals
 from orchestration.nominal_model import mismatch
 from orchestration.reference import BuiltIn, FromFile, ReferencePath
@@ -36,12 +37,20 @@ def run(
     """Fly a scenario, the paper's if none is given; divergence is a result, not an error.
 
     Raises `UsageError` for an FMU, variable or value that does not exist, `SimulatorError` if an FMU
-    refuses a call for another reason than divergence.
+    refuses a call for another reason than divergence, `FlightInterrupted` after Ctrl-C.
     """
     with prepared(scenario or Scenario(), announce) as flight:
         flight.master.initialise()
         flight.master.run(progress=progress)
         return flight.result()
+
+
+class FlightInterrupted(Interrupted):
+    """A flight has ended at the first instant after Ctrl-C, with this `result` so far."""
+
+    def __init__(self, text: str, result: Result) -> None:
+        super().__init__(text)
+        self.result = result
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,11 +62,12 @@ class Flight:
     controller: FmuSimulator
     reference: ReferencePath
     master: Master
+    interrupt: Interrupt
     started: float
     """on the performance counter [s]"""
 
     def result(self) -> Result:
-        """What was recorded so far, with its metrics."""
+        """What was recorded so far, with its metrics; raises `FlightInterrupted` with it if that is why it ended."""
         master, columns = self.master, self.master.board.columns
         rows = master.rows()
         events = tuple(sorted(map(Event._make, master.events), key=lambda event: event.time))
@@ -74,7 +84,8 @@ class Flight:
         )
         diverged_at = None if master.divergence_time is None else master.divergence_time / NANOSECONDS
         horizon = float(rows[-1, 0]) if diverged_at is None else self.scenario.stop_time
-        return Result(
+        interrupted_at = None if master.interrupted_at is None else master.interrupted_at / NANOSECONDS
+        result = Result(
             scenario=self.scenario,
             columns=columns,
             rows=rows,
@@ -87,9 +98,13 @@ class Flight:
                 "steps": master.steps,
             },
             divergence=master.divergence,
+            interrupted_at=interrupted_at,
             provenance={**provenance(self.plant, self.controller), "wall_time": time.perf_counter() - self.started},
             warnings=(*self._mismatch(), *self.plant.warnings, *self.controller.warnings),
         )
+        if self.interrupt.requested:
+            raise FlightInterrupted(f"at t = {rows[-1, 0]:g} s of {self.scenario.stop_time:g} s", result)
+        return result
 
     def _mismatch(self) -> tuple[str, ...]:
         scenario = self.scenario
@@ -101,11 +116,18 @@ class Flight:
 
 @contextmanager
 def prepared(scenario: Scenario, announce: Announce | None = None, *, load: Loader = FmuSimulator) -> Iterator[Flight]:
-    """Both FMUs of `scenario`, built if need be, instantiated by `load` and with their parameters."""
+    """Both FMUs of `scenario`, built if need be, instantiated by `load` and with their parameters.
+
+    Ctrl-C ends the flight at its next instant.
+    """
     started = time.perf_counter()
     plant_path = fmus.locate(scenario.plant.fmu, announce)
     controller_path = fmus.locate(scenario.controller.fmu, announce)
-    with load(plant_path, "plant") as plant, load(controller_path, "controller") as controller:
+    with (
+        interrupts_held_back() as interrupt,
+        load(plant_path, "plant") as plant,
+        load(controller_path, "controller") as controller,
+    ):
         _set_parameters(plant, scenario.plant)
         _set_parameters(controller, scenario.controller)
         _set_clock(controller, scenario)
@@ -116,6 +138,7 @@ def prepared(scenario: Scenario, announce: Announce | None = None, *, load: Load
             plant=plant,
             controller=controller,
             reference=reference,
+            interrupt=interrupt,
             started=started,
             master=Master(
                 plant,
@@ -128,6 +151,7 @@ def prepared(scenario: Scenario, announce: Announce | None = None, *, load: Load
                     plant=_recorded(plant, scenario.record.plant),
                     controller=_recorded(controller, scenario.record.controller),
                 ),
+                interrupted=lambda: interrupt.requested,
             ),
         )
 

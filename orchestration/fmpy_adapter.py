@@ -2,7 +2,6 @@
 
 import ctypes
 import difflib
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,8 +11,10 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription, ScalarVariable
 
+from orchestration import scratch
 from orchestration.errors import QuadcosimError, SimulatorError, UsageError, shown
 from orchestration.messages import PYTHONFMU_ENTRY, WARNING, Message, collecting_callbacks, words
+from orchestration.scratch import Scratch
 from orchestration.simulator import Floats, Transfer
 from orchestration.timing import is_number
 
@@ -35,22 +36,23 @@ class FmuSimulator:
         self.failed = False
         """Whether a call has failed: the instance is then never called again."""
         self._messages: list[Message] = []
-        self._folder: str | None = None
+        self._folder: Scratch | None = None
         if path.is_file() and fmpy.platform not in fmpy.supported_platforms(str(path)):
             raise QuadcosimError(
                 f"{path}: has no binary for {fmpy.platform}; pythonfmu ships them for 64-bit Linux and Windows only"
             )
         try:
             self.description: ModelDescription = fmpy.read_model_description(str(path))
-            self._folder = fmpy.extract(str(path))
-            expect_readable_place(Path(self._folder))
+            self._folder = scratch.temporary()
+            fmpy.extract(str(path), str(self._folder.path))
+            expect_readable_place(self._folder.path)
             self._fmu = fmi2.FMU2Slave(
                 guid=self.description.guid,
-                unzipDirectory=self._folder,
+                unzipDirectory=str(self._folder.path),
                 modelIdentifier=self.description.coSimulation.modelIdentifier,
                 instanceName=instance_name,
             )
-            callbacks = collecting_callbacks(self._messages, instance_name, Path(self._folder))
+            callbacks = collecting_callbacks(self._messages, instance_name, self._folder.path)
             self._fmu.instantiate(callbacks=callbacks, loggingOn=True)
             release_interpreter_state(self._fmu.dll)
         except Exception as error:
@@ -104,7 +106,7 @@ class FmuSimulator:
             self.failed = True
             self._fmu.freeInstance()
         if self._folder is not None:
-            shutil.rmtree(self._folder, ignore_errors=True)
+            self._folder.remove()
             self._folder = None
 
     def __enter__(self) -> "FmuSimulator":

@@ -78,14 +78,17 @@ class Master:
         sensors: Sensors,
         reference: ReferencePath,
         signals: Signals,
+        interrupted: Callable[[], bool] = lambda: False,
     ) -> None:
         self.board = board = Board(signals)
         self.events: list[tuple[int, str, str, int]] = []  # fields of `Event`, made cheaply
         self.divergence: str | None = None
         self.divergence_time: int | None = None
+        self.interrupted_at: int | None = None
         self.steps = 0
         self.now = 0
         self._plant, self._controller = plant, controller
+        self._interrupted = interrupted
         self._clock, self._timing, self._sensors, self._reference = clock, timing, sensors, reference
         self._rows = bytearray()
         self._received: Floats = np.zeros(len(MEASUREMENT))
@@ -120,7 +123,10 @@ class Master:
         self._read_plant()
 
     def run(self, *, pause_at: int | None = None, progress: Callable[[float], None] | None = None) -> bool:
-        """Fly to the end, to divergence or to the first instant from `pause_at` [ns]; whether it is over."""
+        """Fly to the end, to divergence or to the first instant from `pause_at` [ns]; whether it is over.
+
+        So it is at the first instant after an interruption, but not at its end.
+        """
         if self.divergence is not None:
             return True
         count = 0
@@ -135,6 +141,9 @@ class Master:
                 if self._timing.hold == "first":
                     self._extrapolate(time)
                 self._record(time)
+                if self._interrupted() and time < self._clock.stop:
+                    self._end_early(time)
+                    return True
                 if pause_at is not None and time >= pause_at and time < self._clock.stop:
                     return False
                 count += 1
@@ -206,9 +215,17 @@ class Master:
         if isinstance(error, SimulatorError) and not error.divergence:
             raise error
         self.divergence, self.divergence_time = str(error), self.now
-        self.events = [event for event in self.events if event[0] <= self.now]  # no command goes out after the end
+        self._drop_later_events()
         if not self._rows:
             self._record(self.now)
+
+    def _end_early(self, time: int) -> None:
+        self.interrupted_at = time
+        self._drop_later_events()
+
+    def _drop_later_events(self) -> None:
+        """In Jacobi order a command is written down before it goes out; after the end none does."""
+        self.events = [event for event in self.events if event[0] <= self.now]
 
     def _step_controller(self, time: int, sample: Sample | None) -> None:
         if time == self._clock.stop:

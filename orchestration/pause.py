@@ -1,5 +1,6 @@
 """Stopping a run at a communication point and going on later, in another process, to the same bits."""
 
+import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -7,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from orchestration.errors import UsageError
-from orchestration.flight import Announce, Flight, Progress, prepared, provenance
+from orchestration.flight import Announce, Flight, Progress, prepared
 from orchestration.result import Result
-from orchestration.run_directory import SCENARIO, STATE, replaced_folder
+from orchestration.run_directory import METRICS, SCENARIO, STATE, keep_flight
 from orchestration.scenario import Scenario
 from orchestration.scenario_file import load_scenario
 from orchestration.timing import nanoseconds
@@ -23,29 +24,42 @@ def fly_until(
     pause_at: float,
     folder: str | Path,
     *,
+    figures: bool = True,
     progress: Progress | None = None,
     announce: Announce | None = None,
 ) -> Result | None:
-    """Fly to the first communication point from `pause_at` [s] and write the state into `folder`.
+    """Fly to the first communication point from `pause_at` [s] and write the state into `folder`, a new one.
 
-    Returns None, or the result if the run was over before.
+    Returns None, or the result if the run was over before: its directory is then in `folder`.
     """
     if not 0.0 <= pause_at < scenario.stop_time:
         raise UsageError(
             f"pause at {pause_at:g} s: expected a time from 0 to before stop_time {scenario.stop_time:g} s"
         )
-    with prepared(scenario, announce) as flight:
-        flight.master.initialise()
-        if flight.master.run(pause_at=nanoseconds(pause_at), progress=progress):
-            return flight.result()
-        _write(flight, Path(folder))
-        return None
+
+    def fly(new: Path) -> Result | None:
+        with prepared(scenario, announce) as flight:
+            flight.master.initialise()
+            if flight.master.run(pause_at=nanoseconds(pause_at), progress=progress):
+                return flight.result()
+            _write(flight, new)
+            return None
+
+    return keep_flight(folder, fly, figures=figures, replaces=())
 
 
-def resume(folder: str | Path, *, progress: Progress | None = None, announce: Announce | None = None) -> Result:
-    """Go on with the run paused in `folder`, to the end.
+def resume(
+    folder: str | Path,
+    out: str | Path | None = None,
+    *,
+    figures: bool = True,
+    progress: Progress | None = None,
+    announce: Announce | None = None,
+) -> Result:
+    """Go on with the run paused in `folder`, to the end; its directory is then in `out`, which may be `folder`.
 
-    Raises `UsageError` if there is none, or if an FMU is not the one that it was paused with.
+    Raises `UsageError` if there is none, or if the scenario, its reference or an FMU is not the one that it was
+    paused with.
     """
     folder = Path(folder)
     if not (folder / STATE).is_file():
@@ -54,28 +68,46 @@ def resume(folder: str | Path, *, progress: Progress | None = None, announce: An
     with np.load(folder / STATE, allow_pickle=False) as archive:
         state: dict[str, Any] = json.loads(str(archive["json"]))
         state |= {name: archive[name].tobytes() for name in _ARRAYS}
-    with prepared(scenario, announce) as flight:
-        _expect_same_fmus(state.pop("fmus"), flight)
-        flight.master.restore(state)
-        flight.master.run(progress=progress)
-        return flight.result()
+
+    def fly(new: Path | None = None) -> Result:
+        with prepared(scenario, announce) as flight:
+            _expect_same(state.pop("of"), flight, folder)
+            flight.master.restore(state)
+            flight.master.run(progress=progress)
+            return flight.result()
+
+    if out is None:
+        return fly()
+    same = folder.resolve() == Path(out).resolve()
+    result = keep_flight(out, fly, figures=figures, replaces=(METRICS, STATE) if same else (METRICS,))
+    assert result is not None
+    return result
 
 
 def _write(flight: Flight, folder: Path) -> None:
     state = flight.master.state()
     arrays = {name: np.frombuffer(state.pop(name), dtype=np.uint8) for name in _ARRAYS}
-    state["fmus"] = _guids(flight)
-    with replaced_folder(folder) as partial:
-        (partial / SCENARIO).write_text(flight.scenario.to_toml(), encoding="utf-8")
-        np.savez(partial / STATE, allow_pickle=False, json=np.array(json.dumps(state)), **arrays)
+    state["of"] = _hashes(flight)
+    (folder / SCENARIO).write_text(flight.scenario.to_toml(), encoding="utf-8")
+    np.savez(folder / STATE, allow_pickle=False, json=np.array(json.dumps(state)), **arrays)
 
 
-def _guids(flight: Flight) -> dict[str, str]:
-    fmus = provenance(flight.plant, flight.controller)["fmus"]
-    return {side: fmu["guid"] for side, fmu in fmus.items()}
+def _hashes(flight: Flight) -> dict[str, str]:
+    """Of everything that a run goes on from beside its state."""
+    reference = flight.scenario.reference.file
+    return {
+        SCENARIO: hashlib.sha256(flight.scenario.to_toml().encode()).hexdigest(),
+        "the reference": "" if reference is None else _hash(reference),
+        "the plant's FMU": _hash(flight.plant.path),
+        "the controller's FMU": _hash(flight.controller.path),
+    }
 
 
-def _expect_same_fmus(paused: dict[str, str], flight: Flight) -> None:
-    for side, guid in _guids(flight).items():
-        if guid != paused[side]:
-            raise UsageError(f"{side}: FMU with GUID {guid}, expected {paused[side]} as when the run was paused")
+def _hash(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _expect_same(paused: dict[str, str], flight: Flight, folder: Path) -> None:
+    for what, found in _hashes(flight).items():
+        if found != paused[what]:
+            raise UsageError(f"{folder}: {what} is not as when the run was paused; expected it unchanged")

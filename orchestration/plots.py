@@ -159,4 +159,6 @@ def _title(result: Result) -> str:
         parts.append("Jacobi")
     if result.divergence is not None:
         parts.append(f"diverged at {result.metrics['divergence_time']:g} s")
+    if result.interrupted_at is not None:
+        parts.append(f"interrupted at {result.interrupted_at:g} s")
     return ", ".join(parts)

@@ -29,6 +29,8 @@ class Result:
     metrics: Metrics
     divergence: str | None
     """what diverged, if it did"""
+    interrupted_at: float | None
+    """[s]; it was ended there before its time"""
     provenance: dict[str, Any]
     """versions, the GUID of each FMU, and `wall_time`, what the run took [s]"""
     warnings: tuple[str, ...] = ()

@@ -1,15 +1,14 @@
-"""A run's directory: written in one go, so that a killed run leaves none that looks whole."""
+"""A run's directory: there when it is whole, so that a killed run leaves none that looks it."""
 
 import json
-import os
-import shutil
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Container
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 from orchestration import plots, tables
 from orchestration.errors import UsageError
+from orchestration.flight import FlightInterrupted
+from orchestration.folder import NewFolder, new_folder
 from orchestration.result import Result
 from orchestration.scenario_file import load_scenario
 
@@ -24,16 +23,25 @@ def save_run(result: Result, folder: str | Path, *, figures: bool = True) -> Pat
 
     Raises `UsageError` if `folder` holds something else.
     """
-    notes = {**result.provenance, "divergence": result.divergence, "warnings": list(result.warnings)}
-    with replaced_folder(Path(folder)) as partial:
-        (partial / METRICS).write_text(json.dumps(result.metrics, indent=2) + "\n", encoding="utf-8")
-        (partial / SCENARIO).write_text(result.scenario.to_toml(), encoding="utf-8")
-        (partial / PROVENANCE).write_text(json.dumps(notes, indent=2) + "\n", encoding="utf-8")
-        tables.write_signals(partial / SIGNALS, result.columns, result.rows, result.desired)
-        tables.write_events(partial / EVENTS, result.events)
-        if figures:
-            plots.draw(result, partial)
+    with run_folder(Path(folder), (METRICS,)) as new:
+        _write(result, new.path, figures=figures)
     return Path(folder)
+
+
+def _write(result: Result, folder: Path, *, figures: bool) -> None:
+    notes = {
+        **result.provenance,
+        "divergence": result.divergence,
+        "interrupted_at": result.interrupted_at,
+        "warnings": list(result.warnings),
+    }
+    tables.write_signals(folder / SIGNALS, result.columns, result.rows, result.desired)
+    tables.write_events(folder / EVENTS, result.events)
+    (folder / METRICS).write_text(json.dumps(result.metrics, indent=2) + "\n", encoding="utf-8")
+    (folder / SCENARIO).write_text(result.scenario.to_toml(), encoding="utf-8")
+    (folder / PROVENANCE).write_text(json.dumps(notes, indent=2) + "\n", encoding="utf-8")
+    if figures:
+        plots.draw(result, folder)
 
 
 def load_run(folder: str | Path) -> Result:
@@ -52,37 +60,54 @@ def load_run(folder: str | Path) -> Result:
         events=tables.read_events(folder / EVENTS),
         metrics=json.loads((folder / METRICS).read_text(encoding="utf-8")),
         divergence=notes.pop("divergence"),
+        interrupted_at=notes.pop("interrupted_at"),
         warnings=tuple(notes.pop("warnings")),
         provenance=notes,
     )
 
 
-@contextmanager
-def replaced_folder(folder: Path) -> Iterator[Path]:
-    """A new folder beside `folder` that takes its place when all went well, and vanishes if not."""
-    if folder.exists() and not _is_replaceable(folder):
-        raise UsageError(
-            f"{folder}: expected a new or empty directory, or that of an earlier run with nothing else in it"
-        )
-    if folder.resolve() == Path.cwd():
-        raise UsageError(f"{folder}: expected another directory than the one you are in")
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    partial = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".partial", dir=folder.parent))
-    try:
-        yield partial
-        partial.chmod(0o755)
-        if folder.exists():
-            old = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".old", dir=folder.parent))
-            os.replace(folder, old)
-            os.replace(partial, folder)
-            shutil.rmtree(old)
-        else:
-            os.replace(partial, folder)
-    except BaseException:
-        shutil.rmtree(partial, ignore_errors=True)
-        raise
+def keep_flight(
+    folder: str | Path,
+    fly: Callable[[Path], Result | None],
+    *,
+    figures: bool = True,
+    replaces: Container[str] = (METRICS,),
+) -> Result | None:
+    """Fly, and write the directory of the run, whose place is made sure of before; the result.
+
+    `fly` is given the new directory; if it comes to no result, it has written there what is to be kept. The
+    directory takes the place of an earlier one that has a file of `replaces`. If that cannot be after all, it
+    is kept beside `folder`, and `QuadcosimError` says where. After Ctrl-C what was recorded is kept too, but
+    not in place of anything: `FlightInterrupted` says where. Raises `UsageError` if `folder` holds something
+    else or cannot be written.
+    """
+    interrupted: FlightInterrupted | None = None
+    with run_folder(Path(folder), replaces) as new:
+        try:
+            result = fly(new.path)
+        except FlightInterrupted as stop:
+            interrupted, result = stop, stop.result
+            new.replaces = result.interrupted_at is None
+        new.precious = True
+        if result is not None:
+            _write(result, new.path, figures=figures)
+    if interrupted is not None:
+        raise FlightInterrupted(f"{interrupted}; what was recorded is in {new.place}", interrupted.result)
+    return result
 
 
-def _is_replaceable(folder: Path) -> bool:
-    known = {SIGNALS, EVENTS, METRICS, SCENARIO, PROVENANCE, STATE, *(f"{name}.png" for name in plots.FIGURES)}
-    return folder.is_dir() and all(path.name in known and path.is_file() for path in folder.iterdir())
+def run_folder(folder: Path, replaces: Container[str] = ()) -> AbstractContextManager[NewFolder]:
+    """A new folder of a run that takes the place of `folder` if that has a file of `replaces` and no unknown one."""
+    kinds = {METRICS: "an earlier run", STATE: "a paused run"}
+    allowed = [text for name, text in kinds.items() if name in replaces]
+    expected = ", or that of ".join(["a new or empty directory", *allowed]) + " with nothing else in it" * bool(allowed)
+
+    def replaceable(place: Path) -> bool:
+        names = {path.name for path in place.iterdir() if path.is_file()}
+        others = {path.name for path in place.iterdir()} - _KNOWN
+        return not others and any(name in names and name in replaces for name in kinds)
+
+    return new_folder(folder, replaceable, expected)
+
+
+_KNOWN = {SIGNALS, EVENTS, METRICS, SCENARIO, PROVENANCE, STATE, *(f"{name}.png" for name in plots.FIGURES)}

@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import zipfile
@@ -217,6 +218,31 @@ def test_plot_zooms_on_a_window(main: Main, here: Path) -> None:
     assert error_line(backwards) == "--from 0.2 --to 0.1: expected 0 <= from < to"
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are another matter there")
+@pytest.mark.parametrize("out", [[], ["--out", "stopped", "--no-figures"]], ids=["nothing kept", "kept"])
+def test_ctrl_c_ends_a_flight_with_one_line_and_130(here: Path, out: list[str]) -> None:
+    code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n" + (
+        "from orchestration import terminal; terminal.SPARSE = 0.0\n"  # says when it flies
+        "from orchestration.cli import main; main()"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", code, "run", "--stop-time", "1000", *out], stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr is not None
+        while "flying" not in process.stderr.readline():
+            assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+        lines = [line for line in process.stderr if not line.startswith("flying")]
+    assert process.returncode == 130
+    assert len(lines) == 1
+    assert lines[0].startswith("quadcosim: interrupted at t = ")
+    if out:
+        assert lines[0].endswith("; what was recorded is in stopped\n")
+        assert orchestration.load_run(here / "stopped").interrupted_at is not None
+    else:
+        assert list(here.iterdir()) == []
+
+
 def test_divergence_is_a_result(main: Main) -> None:
     diverging = ("run", "--stop-time", "2", "--period", "0.3")
     done = quadcosim(*diverging)
@@ -300,7 +326,7 @@ def test_a_directory_of_something_else_is_not_overwritten(main: Main, here: Path
     (here / "thesis").mkdir()
     (here / "thesis" / "thesis.tex").write_text("years of work")
     done = main("run", *SHORT, "--json", "--out", "thesis", code=2)
-    assert "expected a new or empty directory" in done.stderr.splitlines()[-1]
+    assert "expected a new or empty directory" in error_line(done)  # before the flight
     assert [path.name for path in (here / "thesis").iterdir()] == ["thesis.tex"]
 
 

@@ -3,11 +3,13 @@
 import csv
 import hashlib
 import json
+import signal
 import subprocess
 import sys
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -15,7 +17,8 @@ import pytest
 
 import orchestration
 from fmu_kit.trajectory import Trajectory
-from orchestration import Result, Scenario, SimulatorError, Timing, UsageError
+from orchestration import FlightInterrupted, Result, Scenario, SimulatorError, Timing, UsageError
+from orchestration.fmpy_adapter import FmuSimulator
 from orchestration.scenario import FmuChoice, Record, ReferenceChoice
 from orchestration.wiring import COMMAND, MEASUREMENT, REFERENCE
 
@@ -393,3 +396,54 @@ def test_progress_and_announcements_are_heard() -> None:
     orchestration.run(Scenario(stop_time=1.0), progress=heard.append)
     assert heard == sorted(heard)
     assert heard[-1] == 1.0
+
+
+# -- Ctrl-C -----------------------------------------------------------------------------------------------
+
+
+def test_ctrl_c_is_not_blamed_on_an_fmu_that_is_python() -> None:
+    """The signal comes while the slave computes, which would take it for an exception of its own."""
+    steps = 0
+
+    def hear(frame: FrameType, event: str, _: object) -> None:
+        nonlocal steps
+        if event == "call" and frame.f_code.co_name == "do_step":
+            steps += 1
+            if steps == 100:
+                signal.raise_signal(signal.SIGINT)
+
+    sys.setprofile(hear)
+    try:
+        with pytest.raises(FlightInterrupted, match=r"^at t = 0\.0\d+ s of 1 s$") as stop:
+            orchestration.run(Scenario(stop_time=1.0))
+    finally:
+        sys.setprofile(None)
+    assert stop.value.result.interrupted_at == stop.value.result.rows[-1, 0]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_ctrl_c_before_the_first_instant_ends_the_flight_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(FmuSimulator, "enter_initialization", lambda *_: signal.raise_signal(signal.SIGINT))
+    with pytest.raises(KeyboardInterrupt):
+        orchestration.run(Scenario(stop_time=1.0))
+
+
+def test_an_error_after_ctrl_c_is_ctrl_c(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        signal.raise_signal(signal.SIGINT)
+        raise SimulatorError("plant: KeyboardInterrupt()")
+
+    monkeypatch.setattr(FmuSimulator, "step", fail)
+    with pytest.raises(KeyboardInterrupt):
+        orchestration.run(Scenario(stop_time=1.0))
+
+
+def test_the_second_ctrl_c_does_not_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+    def hang(*_: object) -> None:
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+        raise AssertionError("went on")
+
+    monkeypatch.setattr(FmuSimulator, "step", hang)
+    with pytest.raises(KeyboardInterrupt):
+        orchestration.run(Scenario(stop_time=1.0))

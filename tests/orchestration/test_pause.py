@@ -1,16 +1,19 @@
 """A run that is stopped and goes on later has the bits of one that never stopped."""
 
+import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import orchestration
-from orchestration import Scenario, Timing, UsageError
+from orchestration import ReferenceChoice, Scenario, Timing, UsageError
 from orchestration.pause import fly_until, resume
 from orchestration.result import Result
+from orchestration.wiring import REFERENCE
 
 EVERYTHING = Timing(
     period=0.01,
@@ -23,7 +26,17 @@ EVERYTHING = Timing(
     burst_length=2.0,
     noise={"position": 0.001},
 )
+SIDES = {"plant": "QuadrotorPlant", "controller": "UnifiedController"}
 LAGGING = {"plant.actuator_time_constant": 0.02}
+
+
+def own(built: dict[str, Path], folder: Path) -> dict[str, Path]:
+    """Copies of both FMUs in `folder`, by side."""
+    return {side: Path(shutil.copy(built[model], folder)) for side, model in SIDES.items()}
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
 def equal(a: Result, b: Result) -> bool:
@@ -57,15 +70,59 @@ def test_a_run_that_diverges_before_the_pause_is_over(tmp_path: Path) -> None:
     result = fly_until(Scenario(stop_time=5.0, timing=Timing(period=0.3)), 4.0, tmp_path / "paused")
     assert result is not None
     assert result.metrics["diverged"] is True
-    assert not (tmp_path / "paused").exists()
+    assert orchestration.load_run(tmp_path / "paused").rows.tobytes() == result.rows.tobytes()
 
 
-def test_other_fmus_than_those_of_the_pause_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    fly_until(Scenario(stop_time=0.1), 0.05, tmp_path / "paused")
-    other = {"fmus": {"plant": {"guid": "another"}, "controller": {"guid": "another"}}}
-    monkeypatch.setattr("orchestration.pause.provenance", lambda plant, controller: other)
-    with pytest.raises(UsageError, match="plant: FMU with GUID another, expected"):
+def test_other_fmus_than_those_of_the_pause_are_refused(built: dict[str, Path], tmp_path: Path) -> None:
+    fly_until(Scenario(stop_time=0.1).with_fmus(**own(built, tmp_path)), 0.05, tmp_path / "paused")
+    with zipfile.ZipFile(tmp_path / "UnifiedController.fmu", "a") as fmu:
+        fmu.writestr("resources/more.txt", "more")  # its GUID stays
+    with pytest.raises(UsageError, match=r"the controller's FMU is not as when the run was paused"):
         resume(tmp_path / "paused")
+
+
+@pytest.mark.parametrize("edit", [("period = 0.01", "period = 0.02"), ("seed = 0", "seed = 1")], ids=str)
+def test_another_scenario_than_that_of_the_pause_is_refused(edit: tuple[str, str], tmp_path: Path) -> None:
+    fly_until(Scenario(stop_time=0.1), 0.05, tmp_path / "paused")
+    file = tmp_path / "paused" / "scenario.toml"
+    assert edit[0] in file.read_text()
+    file.write_text(file.read_text().replace(*edit))
+    with pytest.raises(UsageError, match=r"scenario.toml is not as when the run was paused"):
+        resume(tmp_path / "paused", tmp_path / "done")
+    assert [path.name for path in tmp_path.iterdir()] == ["paused"]
+
+
+def test_another_reference_than_that_of_the_pause_is_refused(tmp_path: Path) -> None:
+    table = tmp_path / "reference.csv"
+    table.write_text("\n".join([",".join(("time", *REFERENCE)), "0" + ",0" * 15, "1" + ",0" * 15]))
+    scenario = Scenario(stop_time=0.1, reference=ReferenceChoice(file=table))
+    fly_until(scenario, 0.05, tmp_path / "paused")
+    table.write_text(table.read_text() + "\n2" + ",0" * 15)
+    with pytest.raises(UsageError, match="the reference is not as when the run was paused"):
+        resume(tmp_path / "paused")
+
+
+@pytest.mark.parametrize("paused", [True, False], ids=["a paused run", "a run"])
+def test_a_pause_replaces_nothing(paused: bool, tmp_path: Path) -> None:
+    scenario = Scenario(stop_time=0.1)
+    if paused:
+        fly_until(scenario, 0.05, tmp_path / "there")
+    else:
+        orchestration.save_run(orchestration.run(scenario), tmp_path / "there", figures=False)
+    before = contents(tmp_path / "there")
+    with pytest.raises(UsageError, match=r"there: expected a new or empty directory$"):
+        fly_until(scenario, 0.05, tmp_path / "there")
+    assert contents(tmp_path / "there") == before
+
+
+def test_a_paused_run_is_replaced_by_its_own_end_only(tmp_path: Path) -> None:
+    fly_until(Scenario(stop_time=0.1), 0.05, tmp_path / "paused")
+    before = contents(tmp_path / "paused")
+    with pytest.raises(UsageError, match="expected a new or empty directory, or that of an earlier run"):
+        orchestration.save_run(orchestration.run(Scenario(stop_time=0.1)), tmp_path / "paused")
+    assert contents(tmp_path / "paused") == before
+    resumed = resume(tmp_path / "paused", tmp_path / "paused", figures=False)
+    assert equal(orchestration.load_run(tmp_path / "paused"), resumed)
 
 
 @pytest.mark.parametrize("at", [-0.1, 0.1, 1.0])

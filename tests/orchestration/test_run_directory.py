@@ -1,10 +1,12 @@
 """A run's directory: complete or not there, whatever happens while it is written."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +16,18 @@ import pyarrow.parquet as pq
 import pytest
 
 import orchestration
-from orchestration import Result, Scenario, Timing, UsageError, load_run, plots, save_run
+from orchestration import (
+    FlightInterrupted,
+    QuadcosimError,
+    Result,
+    Scenario,
+    Timing,
+    UsageError,
+    load_run,
+    plots,
+    save_run,
+)  # fmt: skip
+from orchestration.run_directory import keep_flight
 
 FILES = {"signals.parquet", "events.parquet", "metrics.json", "scenario.toml"}
 FIGURES = {"path.png", "errors.png", "commands.png", "energy.png"}
@@ -230,13 +243,19 @@ orchestration.save_run(orchestration.run(orchestration.Scenario(stop_time=0.05))
 """
 
 
-def kill_while_writing(folder: Path) -> None:
-    """Start to write a run in another process, and kill that when all but the figures is on disk."""
+@contextmanager
+def writing(folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """Another process that has written all of a run but the figures."""
     with subprocess.Popen([sys.executable, "-c", WRITER, str(folder)], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
-        line = process.stdout.readline()
+        assert process.stdout.readline() == "writing\n"
+        yield process
+
+
+def kill_while_writing(folder: Path) -> None:
+    """Start to write a run in another process, and kill that when all but the figures is on disk."""
+    with writing(folder) as process:
         process.kill()
-    assert line == "writing\n"
     assert process.returncode == (-signal.SIGKILL if sys.platform != "win32" else 1)
 
 
@@ -255,3 +274,107 @@ def test_a_killed_process_leaves_the_earlier_run_as_it_was(result: Result, folde
     assert [path for path in folder.parent.iterdir() if looks_whole(path)] == [folder]
     save_run(result, folder, figures=False)  # what is left over is not in the way
     assert load_run(folder).events == result.events
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="folders have no locks there")
+def test_what_a_killed_process_leaves_is_gone_after_the_next_start(result: Result, folder: Path) -> None:
+    kill_while_writing(folder)
+    other = folder.with_name("other")
+    with writing(folder) as living:
+        save_run(result, other, figures=False)
+        hidden = [path for path in folder.parent.iterdir() if path != other]
+        assert len(hidden) == 1  # the living one's
+        living.kill()
+    save_run(result, other, figures=False)
+    assert list(folder.parent.iterdir()) == [other]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="folders have no locks there")
+@pytest.mark.parametrize("renames", [1, 2])
+def test_a_process_killed_between_two_renames_leaves_one_that_the_next_finishes(
+    renames: int, result: Result, folder: Path
+) -> None:
+    new = save_run(result, folder.with_name("new"), figures=False)
+    old = save_run(orchestration.run(Scenario(stop_time=0.1)), folder.with_name("old"), figures=False)
+    new.rename(folder.parent / ".run.0123456789ab.new" if renames == 1 else folder)
+    old.rename(folder.parent / ".run.0123456789ab.old")
+    save_run(result, folder.with_name("other"), figures=False)
+    assert load_run(folder).rows.tobytes() == result.rows.tobytes()
+    assert {path.name for path in folder.parent.iterdir()} == {"run", "other"}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no umask")
+@pytest.mark.parametrize("mask", [0o022, 0o027, 0o002])
+def test_a_directory_follows_the_umask(mask: int, result: Result, folder: Path) -> None:
+    before = os.umask(mask)
+    try:
+        save_run(result, folder, figures=False)
+    finally:
+        os.umask(before)
+    assert folder.stat().st_mode & 0o777 == 0o777 & ~mask
+
+
+# -- a flight that goes into its directory ----------------------------------------------------------------
+
+
+def never(_: Path) -> Result:
+    raise AssertionError("flown")
+
+
+def test_a_directory_that_cannot_be_is_refused_before_the_flight(folder: Path) -> None:
+    folder.parent.mkdir()
+    (folder.parent / "file").write_text("years of work")
+    with pytest.raises(UsageError, match="expected a directory that can be written"):
+        keep_flight(folder.parent / "file" / "run", never)
+    with pytest.raises(UsageError, match="expected a new or empty directory, or that of an earlier run"):
+        keep_flight(folder.parent, never)
+    assert [path.name for path in folder.parent.iterdir()] == ["file"]
+
+
+def test_a_flight_whose_place_is_taken_meanwhile_is_kept_beside(result: Result, folder: Path) -> None:
+    def fly(_: Path) -> Result:
+        folder.mkdir()
+        (folder / "thesis.tex").write_text("years of work")
+        folder.with_name("run.1").mkdir()
+        return result
+
+    with pytest.raises(QuadcosimError, match=r"expected a new .*; what was written is in .*run\.2$"):
+        keep_flight(folder, fly, figures=False)
+    assert contents(folder) == {"thesis.tex": b"years of work"}
+    assert load_run(folder.with_name("run.2")).rows.tobytes() == result.rows.tobytes()
+    assert {path.name for path in folder.parent.iterdir()} == {"run", "run.1", "run.2"}
+
+
+def test_a_flight_that_cannot_be_written_whole_is_kept_beside(
+    result: Result, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(plots, "draw", fail)
+    with pytest.raises(QuadcosimError, match=r"no space left on device; what was written is in .*run\.1$"):
+        keep_flight(folder, lambda _: result)
+    assert load_run(folder.with_name("run.1")).rows.tobytes() == result.rows.tobytes()
+
+
+@pytest.mark.parametrize("there", [False, True], ids=["nothing there", "a run there"])
+def test_what_was_recorded_before_an_interruption_is_kept_but_replaces_nothing(
+    there: bool, result: Result, folder: Path
+) -> None:
+    if there:
+        save_run(result, folder, figures=False)
+    place = folder.with_name("run.1") if there else folder
+
+    def progress(share: float) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(FlightInterrupted, match=r"^at t = 0\.5\d+ s of 3 s; what was recorded is in ") as stop:
+        keep_flight(folder, lambda _: orchestration.run(Scenario(stop_time=3.0), progress=progress), figures=False)
+    assert str(stop.value).endswith(str(place))
+    kept = load_run(place)
+    assert kept.interrupted_at == kept.signals["time"][-1] == kept.metrics["horizon"]
+    assert max(event.time for event in kept.events) <= kept.interrupted_at * 1e9
+    whole = orchestration.run(Scenario(stop_time=0.6))
+    assert kept.rows.tobytes() == whole.rows[: len(kept.rows)].tobytes()
+    if there:
+        assert load_run(folder).interrupted_at is None

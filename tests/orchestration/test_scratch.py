@@ -1,0 +1,64 @@
+"""What a killed process leaves in the folder for temporary files is gone when the next one has started."""
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from orchestration import scratch
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="folders have no locks there")
+
+WAITER = """
+import sys, time
+from orchestration.fmpy_adapter import FmuSimulator
+from pathlib import Path
+fmu = FmuSimulator(Path(sys.argv[1]), "plant")
+print("loaded", flush=True)
+time.sleep(60)
+"""
+
+
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder for temporary files, of this process and of its children."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    monkeypatch.setenv("TMPDIR", str(folder))
+    return folder
+
+
+def start(fmu: Path) -> subprocess.Popen[str]:
+    """Another process that has loaded an FMU."""
+    process = subprocess.Popen([sys.executable, "-c", WAITER, str(fmu)], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "loaded\n"
+    return process
+
+
+def test_fmus_unpacked_by_the_dead_are_cleared_and_those_of_the_living_are_not(
+    built: dict[str, Path], temporary: Path
+) -> None:
+    with start(built["QuadrotorPlant"]) as killed:
+        (left,) = temporary.iterdir()
+        with start(built["QuadrotorPlant"]) as living:
+            (used,) = set(temporary.iterdir()) - {left}
+            killed.kill()
+            killed.wait()
+            assert list((left / "resources").iterdir())
+            (temporary / "thesis.scratch").mkdir()
+            mine = scratch.temporary()
+            assert set(temporary.iterdir()) == {used, mine.path, temporary / "thesis.scratch"}
+            assert list((used / "resources").iterdir())
+            mine.remove()
+            living.kill()
+    assert not mine.path.exists()
+
+
+def test_others_cannot_enter_it(temporary: Path) -> None:
+    folder = scratch.temporary()
+    assert folder.path.stat().st_mode & 0o777 == 0o700
+    folder.remove()
