@@ -1,9 +1,13 @@
-"""What the texts of the repository must not say again."""
+"""What the texts of the repository must not say again, and what their examples do."""
 
+import json
 import re
+import shlex
 from pathlib import Path
 
 import pytest
+
+from orchestration.cli import main
 
 ROOT = Path(__file__).parents[2]
 TEXTS = (
@@ -24,3 +28,20 @@ ONE_WEIGHT_OF_THE_PROOF = re.compile(
 def test_no_text_says_that_the_proof_needs_one_coupling(path: Path) -> None:
     """The energy has its rate for every κ: `test_energy_has_the_rate_of_the_proof_for_every_weight`."""
     assert not ONE_WEIGHT_OF_THE_PROOF.search(path.read_text(encoding="utf-8", errors="ignore"))
+
+
+def outcome(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    with pytest.raises(SystemExit) as ended:
+        main([*arguments, "--stop-time", "15", "--json"])
+    assert not ended.value.code
+    return str(json.loads(capsys.readouterr().out)["outcome"])
+
+
+def test_limit_of_the_readme_is_that_of_one_start(capsys: pytest.CaptureFixture[str]) -> None:
+    """From the farther start, the period that the paper's own start stands is too long; without coupling it is not."""
+    (line,) = re.findall(r"^    quadcosim (run --period 0.04 .*initial.*)$", TEXTS[0].read_text(encoding="utf-8"), re.M)
+    command = shlex.split(line)
+    assert outcome(capsys, *command) == "diverged"
+    assert outcome(capsys, *command, "--period", "0.07") == "diverged"
+    assert outcome(capsys, *command, "--period", "0.07", "--set", "controller.coupling=0") == "settled"
+    assert outcome(capsys, "run", "--period", "0.07", "--plant-interval", "0.002") == "settled"
