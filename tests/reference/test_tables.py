@@ -46,7 +46,7 @@ def test_law_is_that_of_the_table(name: str) -> None:
     assert difference(rows, given[1]) <= 1e-12
 
 
-@pytest.mark.parametrize(("name", "stop"), [("closed_loop_10ms.csv", 4.0), ("closed_loop_20ms_delay_5ms.csv", 4.0),
+@pytest.mark.parametrize(("name", "stop"), [("closed_loop_10ms.csv", 2.0), ("closed_loop_20ms_delay_5ms.csv", 2.0),
                                             ("closed_loop_50ms.csv", 30.0)])  # fmt: skip
 def test_flight_is_that_of_the_table(name: str, stop: float) -> None:
     """`python -m tests.reference` flies all of them to their end."""
