@@ -1,6 +1,7 @@
 """The command `quadcosim`."""
 
 import json
+import math
 import sys
 import traceback
 from dataclasses import asdict
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 import typer.core
 
-from orchestration.errors import QuadcosimError, SimulatorError, UsageError
+from orchestration.errors import QuadcosimError, SimulatorError, UsageError, shown
 from orchestration.flags import FlightFlags, flies, scenario_from
 from orchestration.interop import cli as interop
 from orchestration.studies import cli as studies
@@ -128,9 +129,12 @@ def plot(
     last = float(result.signals["time"][-1])
     window = None
     if start is not None or end is not None:
-        window = (start or 0.0, last if end is None else end)
-        if not 0.0 <= window[0] < window[1]:
-            raise UsageError(f"--from {window[0]:g} --to {window[1]:g}: expected 0 <= from < to")
+        window = (0.0 if start is None else start, last if end is None else end)
+        if not 0.0 <= window[0] < window[1] < math.inf or window[0] >= last:
+            raise UsageError(
+                f"--from {shown(window[0])} --to {shown(window[1])}: expected 0 <= from < to, and from before the "
+                f"run's end at {shown(last)} s"
+            )
     for path in plots.draw(result, directory, window):
         print(path)
 

@@ -1,5 +1,8 @@
 """Failures that a user sees as one line."""
 
+import difflib
+from collections.abc import Sequence
+
 LONGEST = 4000
 """Characters of a message; what a message names may come from a file and be of any length."""
 
@@ -25,6 +28,10 @@ class SimulatorError(QuadcosimError):
         """The FMU's own traceback, for `--debug`."""
 
 
+class RefusedValueError(SimulatorError, UsageError):
+    """An FMU refused a value that the request sets; the text is the FMU's own, after the side it is on."""
+
+
 def one_line(text: str) -> str:
     """`text` in one line of printable characters, cut where it is longer than a message may be."""
     if not text.isprintable():
@@ -32,6 +39,13 @@ def one_line(text: str) -> str:
             c if c.isprintable() else c.encode("unicode_escape").decode() for c in " ".join(text.split("\n"))
         )
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
+
+
+def expected_name(name: str, known: Sequence[str]) -> str:
+    """The end of a message about a name that is none: the closest of those that are, and all of them."""
+    close = difflib.get_close_matches(name, known, n=1)
+    hint = f"did you mean {close[0]}? " if close else ""
+    return f"{hint}expected one of {', '.join(known)}"
 
 
 def shown(value: object) -> str:

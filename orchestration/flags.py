@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from orchestration.errors import UsageError
+from orchestration.timing import TIMING_KEYS
 
 if TYPE_CHECKING:
     from orchestration.scenario import Parameter, Scenario
@@ -139,11 +140,11 @@ class FlightFlags:
         if self.loss is not None:
             timing.setdefault("measurement_loss", self.loss)
             timing.setdefault("command_loss", self.loss)
-        for name in ("noise", "quantisation"):
+        for name in _BY_MEASUREMENT:
             given = getattr(self, name)
             if given:
                 old: Mapping[str, float] = getattr(scenario.timing, name)
-                timing[name] = {**old, **{key: _number(f"--{name}", text) for key, text in _pairs(name, given)}}
+                timing[name] = {**old, **{key: _number(f"--{name} {key} =", text) for key, text in _pairs(name, given)}}
         top = {
             name: value
             for name in ("seed", "stop_time", "model_mismatch")
@@ -153,11 +154,8 @@ class FlightFlags:
         return scenario.with_changes(timing=timing, parameters=parameters, **top)
 
 
-_TOP_FLAGS = ("seed", "stop_time", "model_mismatch")
-_TIMING_FLAGS = (
-    "period", "offset", "plant_interval", "order", "hold", "clock", "delay", "delay_jitter", "jitter",
-    "jitter_distribution", "measurement_loss", "command_loss", "burst_length", "clock_ratio",
-)  # fmt: skip
+_BY_MEASUREMENT = ("noise", "quantisation")
+_TIMING_FLAGS = tuple(key for key in TIMING_KEYS if key not in _BY_MEASUREMENT)
 
 
 def flies(command: Callable[..., None]) -> Callable[..., None]:
@@ -190,6 +188,11 @@ def _pairs(flag: str, given: list[str]) -> list[tuple[str, str]]:
     pairs = []
     for text in given:
         key, equals, value = text.partition("=")
+        if key.strip() in ("controller.fmu", "plant.fmu"):
+            side = key.strip().removesuffix(".fmu")
+            raise UsageError(
+                f'--{flag} {text}: expected a parameter; a scenario file names the FMU: [{side}] fmu = "…"'
+            )
         if not (key and equals and value):
             raise UsageError(f"--{flag} {text}: expected NAME=VALUE")
         pairs.append((key.strip(), value.strip()))

@@ -13,7 +13,7 @@ from typing import Any
 from fmu_kit.trajectory import Trajectory
 from orchestration import fmus, metrics, wiring
 from orchestration.clock import Clock, random_streams
-from orchestration.errors import UsageError
+from orchestration.errors import UsageError, expected_name
 from orchestration.fleet import Loader
 from orchestration.fmpy_adapter import FmuSimulator
 from orchestration.interrupt import Interrupt, Interrupted, interrupts_held_back
@@ -100,7 +100,12 @@ class Flight:
             divergence=master.divergence,
             interrupted_at=interrupted_at,
             provenance={**provenance(self.plant, self.controller), "wall_time": time.perf_counter() - self.started},
-            warnings=(*self._mismatch(), *self.plant.warnings, *self.controller.warnings),
+            warnings=(
+                *self._mismatch(),
+                *self.scenario.timing.warnings(self.scenario.stop_time),
+                *self.plant.warnings,
+                *self.controller.warnings,
+            ),
         )
         if self.interrupt.requested:
             raise FlightInterrupted(f"at t = {rows[-1, 0]:g} s of {self.scenario.stop_time:g} s", result)
@@ -128,6 +133,8 @@ def prepared(scenario: Scenario, announce: Announce | None = None, *, load: Load
         load(plant_path, "plant") as plant,
         load(controller_path, "controller") as controller,
     ):
+        for fmu in (plant, controller):
+            _expect_interface(fmu)
         _set_parameters(plant, scenario.plant)
         _set_parameters(controller, scenario.controller)
         _set_clock(controller, scenario)
@@ -176,6 +183,17 @@ def _version(package: str) -> str:
         return "not installed"
 
 
+def _expect_interface(fmu: FmuSimulator) -> None:
+    """Raise `UsageError` naming what the FMU lacks to be that side of the loop."""
+    missing = {
+        causality: [name for name in names if name not in fmu.names(causality)]
+        for causality, names in wiring.INTERFACE[fmu.name].items()
+    }
+    lacks = "; ".join(f"no {causality} {', '.join(names)}" for causality, names in missing.items() if names)
+    if lacks:
+        raise UsageError(f"{fmu.name}.fmu: {fmu.description.modelName} cannot be the {fmu.name}: it has {lacks}")
+
+
 def _set_parameters(fmu: FmuSimulator, choice: FmuChoice) -> None:
     for name, value in choice.parameters.items():
         causality = fmu.variable(name).causality
@@ -222,6 +240,5 @@ def _recorded(fmu: FmuSimulator, chosen: tuple[str, ...] | None) -> tuple[str, .
     recordable = fmu.names("output", "local")
     for name in chosen or ():
         if name not in recordable:
-            fmu.variable(name)
-            raise UsageError(f"record.{fmu.name}: {name} cannot be recorded; expected one of {', '.join(recordable)}")
+            raise UsageError(f"record.{fmu.name}: {name} cannot be recorded; {expected_name(name, recordable)}")
     return recordable if chosen is None else chosen

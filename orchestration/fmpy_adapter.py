@@ -2,6 +2,7 @@
 
 import ctypes
 import difflib
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription, ScalarVariable
 
 from orchestration import scratch
-from orchestration.errors import QuadcosimError, SimulatorError, UsageError, shown
+from orchestration.errors import QuadcosimError, RefusedValueError, SimulatorError, UsageError, shown
 from orchestration.messages import PYTHONFMU_ENTRY, WARNING, Message, collecting_callbacks, words
 from orchestration.scratch import Scratch
 from orchestration.simulator import Floats, Transfer
@@ -36,13 +37,14 @@ class FmuSimulator:
         self.failed = False
         """Whether a call has failed: the instance is then never called again."""
         self._messages: list[Message] = []
+        self._given: set[str] = set()  # until initialisation ends, as then the FMU has taken all of it
         self._folder: Scratch | None = None
-        if path.is_file() and fmpy.platform not in fmpy.supported_platforms(str(path)):
+        self.description = read_description(path)
+        if fmpy.platform not in fmpy.supported_platforms(str(path)):
             raise QuadcosimError(
                 f"{path}: has no binary for {fmpy.platform}; pythonfmu ships them for 64-bit Linux and Windows only"
             )
         try:
-            self.description: ModelDescription = fmpy.read_model_description(str(path))
             self._folder = scratch.temporary()
             fmpy.extract(str(path), str(self._folder.path))
             expect_readable_place(self._folder.path)
@@ -73,6 +75,7 @@ class FmuSimulator:
     def exit_initialization(self) -> None:
         """End initialisation."""
         self._call("exitInitializationMode")
+        self._given.clear()
         self._collect_warnings()
 
     def step(self, t: float, h: float) -> None:
@@ -85,6 +88,7 @@ class FmuSimulator:
     def reset(self) -> None:
         """Back to the state after instantiation, all parameters at their defaults."""
         self._call("reset")
+        self._given.clear()
         self.warnings.clear()
 
     def save(self) -> bytes:
@@ -133,6 +137,7 @@ class FmuSimulator:
         """Set one variable, converted to its type; raises `UsageError` for a value it cannot take."""
         variable = self.variable(name)
         reference = [variable.valueReference]
+        self._given.add(name)
         if variable.type == "Boolean":
             self._expect(isinstance(value, bool), name, value, "true or false")
             self._call("setBoolean", reference, [value])
@@ -202,11 +207,33 @@ class FmuSimulator:
         self.failed = True
         diverged = [m for m in self._messages if m[0] > WARNING and m[1] == DIVERGENCE_CATEGORY]
         summary, details = words(diverged or self._messages, "no message")
+        if not diverged and self._names_what_was_given(summary):
+            return RefusedValueError(f"{self.name}.{summary}", details=details)
         return SimulatorError(
             f"{self.name} ({self.description.modelName}): {function}: {summary}",
             divergence=bool(diverged),
             details=details,
         )
+
+    def _names_what_was_given(self, text: str) -> bool:
+        """Whether the message `NAME = VALUE: expected …` is about a variable, or a vector of one, that was set."""
+        name, equals, _ = text.partition(" = ")
+        vector = name.partition(".{")[0]
+        return bool(equals) and any(given == name or given.startswith(f"{vector}.") for given in self._given)
+
+
+def read_description(path: Path) -> ModelDescription:
+    """The description of an FMU; raises `UsageError` for a file that is no FMI 2.0 FMU for co-simulation."""
+    if not zipfile.is_zipfile(path):
+        raise UsageError(f"{path}: expected an FMU, which is a zip file")
+    try:
+        description: ModelDescription = fmpy.read_model_description(str(path))
+    except Exception as error:  # fmpy lets through whatever the readers of zip and XML raise
+        raise UsageError(f"{path}: expected an FMU with a modelDescription.xml of FMI 2.0: {error}") from error
+    if description.fmiVersion != "2.0" or description.coSimulation is None:
+        kind = "co-simulation" if description.coSimulation is not None else "model exchange only"
+        raise UsageError(f"{path}: FMI {description.fmiVersion}, {kind}; expected FMI 2.0 for co-simulation")
+    return description
 
 
 def uri_is_read(folder: Path) -> bool:

@@ -13,13 +13,13 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from xml.etree.ElementTree import Element, indent, register_namespace, tostring
 
-import fmpy
 from fmpy.model_description import ModelDescription, ScalarVariable
 
 from fmu_kit.model_description import generation_date
 from fmu_kit.packaging import write_archive
 from orchestration import fmus
 from orchestration.errors import UsageError
+from orchestration.fmpy_adapter import read_description
 from orchestration.scenario import FmuChoice, Parameter, Scenario
 from orchestration.timing import Timing
 from orchestration.wiring import COMMAND, MEASUREMENT, SAMPLE_OFFSET, SAMPLE_PERIOD
@@ -128,7 +128,7 @@ def _component(
     announce: Callable[[str], None] | None,
 ) -> Component:
     path = fmus.locate(choice.fmu, announce)
-    description = fmpy.read_model_description(str(path))
+    description = read_description(path)
     component = Component(name=name, fmu=path, description=description, parameters={}, inputs=inputs, outputs=outputs)
     given = {**choice.parameters, **clock}
     for key in given:

@@ -106,6 +106,17 @@ class Timing:
             "a whole number of nanoseconds with clock fmu, whose tolerance is 1e-6 of a period",
         )  # fmt: skip
 
+    def warnings(self, stop_time: float) -> tuple[str, ...]:
+        """What a run of this length [s] hardly shows of this timing."""
+        end = f"the run ends at {shown(stop_time)} s"
+        if self.offset / self.clock_ratio >= stop_time:
+            return (f"timing.offset = {shown(self.offset)}: {end}, so the controller never samples",)
+        if (self.offset + self.period) / self.clock_ratio >= stop_time:
+            return (f"timing.period = {shown(self.period)}: {end}, so the controller samples only once",)
+        if self.delay >= stop_time:
+            return (f"timing.delay = {shown(self.delay)}: {end}, so no command arrives",)
+        return ()
+
     def is_deterministic(self) -> bool:
         """Whether no random number is drawn."""
         return not (

@@ -37,6 +37,12 @@ USE_REFERENCE_INPUTS = "use_reference_inputs"
 SAMPLE_PERIOD = "sample_period"
 SAMPLE_OFFSET = "sample_offset"
 
+INTERFACE = {
+    "plant": {"input": COMMAND, "output": MEASUREMENT},
+    "controller": {"input": MEASUREMENT, "output": COMMAND, "parameter": (SAMPLE_PERIOD, SAMPLE_OFFSET)},
+}
+"""Real variables that an FMU needs to be a side of the loop, by causality."""
+
 TRAJECTORY = {f"trajectory.{name}": name for name in ("amplitude_x", "amplitude_y", "frequency", "start_z", "rate_z")}
 """Parameters of the controller's built-in trajectory, and the fields of `Trajectory` they are."""
 

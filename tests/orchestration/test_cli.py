@@ -214,8 +214,12 @@ def test_plot_zooms_on_a_window(main: Main, here: Path) -> None:
         "path.png", "errors.png", "commands.png", "energy.png",
     }  # fmt: skip
     assert (here / "run" / "commands.png").read_bytes() != before
-    backwards = main("plot", "run", "--from", "0.2", "--to", "0.1", code=2)
-    assert error_line(backwards) == "--from 0.2 --to 0.1: expected 0 <= from < to"
+    for start, end in (("0.2", "0.1"), ("50", "60"), ("0.5", "0.6"), ("-1", "0.1"), ("0.1", "inf"), ("nan", "0.1")):
+        line = error_line(main("plot", "run", "--from", start, "--to", end, code=2))
+        assert line.startswith(
+            f"--from {float(start)} --to {float(end)}: expected 0 <= from < to, and from before the "
+        )
+        assert line.endswith("run's end at 0.5 s")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are another matter there")
@@ -297,13 +301,14 @@ def test_a_run_paused_and_resumed_is_the_same_run(main: Main, here: Path) -> Non
         (["--stop-time", "0"], "stop_time = 0.0: expected a positive number"),
         (["--seed", "-1"], "seed = -1: expected a whole number"),
         (["--noise", "position"], "--noise position: expected NAME=VALUE"),
-        (["--noise", "position=much"], "--noise much: expected a number"),
+        (["--noise", "position=much"], "--noise position = much: expected a number"),
         (["--noise", "position=-1"], "timing.noise of position = -1.0"),
         (["--quantisation", "mass=0.1"], "timing.quantisation: mass is no measurement; expected one of position"),
         (["--set", "mass=1"], "mass: expected controller.NAME or plant.NAME"),
         (["--set", "plant.mass"], "--set plant.mass: expected NAME=VALUE"),
         (["--set", "plant.mass=heavy"], "--set plant.mass = heavy: expected a number"),
         (["--set", "plant.mas=1"], "did you mean mass?"),
+        (["--set", "controller.fmu="], 'expected a parameter; a scenario file names the FMU: [controller] fmu = "…"'),
         (["--set", "controller.sample_period=0.1"], "controller.sample_period: expected --period and --clock instead"),
         (["--preset", "arducopter"], "preset arducopter: expected one of px4"),
         (["none.toml"], "none.toml: expected a readable scenario file"),
@@ -337,15 +342,56 @@ def test_what_the_command_line_does_not_know_is_code_2(main: Main, arguments: li
     assert done.stderr.startswith("quadcosim: ")
 
 
-def test_a_failure_of_an_fmu_is_one_line_and_code_1() -> None:
-    line = error_line(quadcosim("run", *SHORT, "--set", "plant.mass=-1", code=1))
-    assert line.startswith("plant (QuadrotorPlant): ")
-    assert line.endswith("mass = -1.0: expected a finite value > 0")
+@pytest.mark.parametrize(
+    ("parameter", "line"),
+    [
+        ("plant.mass=-1", "plant.mass = -1.0: expected a finite value > 0"),
+        ("plant.external_force.x=nan", "plant.external_force.x = nan: expected a finite value"),
+        ("controller.boundary_layer=0", "controller.boundary_layer = 0.0: expected a finite value > 0"),
+        (
+            "plant.inertia.xy=5",
+            "plant.inertia.{xx,yy,zz,xy,xz,yz} = xx 1, yy 1, zz 1, xy 5, xz 0, yz 0: "
+            "expected a positive definite matrix",
+        ),
+    ],
+)
+def test_a_value_that_an_fmu_refuses_is_wrong_usage_in_its_own_words(main: Main, parameter: str, line: str) -> None:
+    assert error_line(main("run", *SHORT, "--set", parameter, code=2)) == line
+
+
+def test_an_fmu_on_the_wrong_side_is_told_what_it_lacks(main: Main, here: Path) -> None:
+    (here / "s.toml").write_text('[plant]\nfmu = "UnifiedController"')
+    line = error_line(main("run", "s.toml", code=2))
+    assert line.startswith("plant.fmu: UnifiedController cannot be the plant: it has no input thrust, torque.x, ")
+    assert "; no output position.x, position.y, " in line
+    (here / "s.toml").write_text('[controller]\nfmu = "QuadrotorPlant"')
+    line = error_line(main("run", "s.toml", code=2))
+    assert line.endswith("no output thrust, torque.x, torque.y, torque.z; no parameter sample_period, sample_offset")
+
+
+@pytest.mark.parametrize("command", ["run", "ssp"])
+def test_what_is_no_zip_is_no_fmu(main: Main, here: Path, command: str) -> None:
+    (here / "no.fmu").write_text("hello")
+    (here / "s.toml").write_text('[plant]\nfmu = "no.fmu"')
+    assert error_line(main(command, "s.toml", code=2)) == "no.fmu: expected an FMU, which is a zip file"
+
+
+@pytest.mark.parametrize(
+    ("flags", "warning"),
+    [
+        (["--period", "5"], "timing.period = 5.0: the run ends at 0.5 s, so the controller samples only once"),
+        (["--offset", "5"], "timing.offset = 5.0: the run ends at 0.5 s, so the controller never samples"),
+        (["--delay", "5"], "timing.delay = 5.0: the run ends at 0.5 s, so no command arrives"),
+    ],
+)
+def test_a_timing_that_the_run_is_too_short_for_is_warned_of(main: Main, flags: list[str], warning: str) -> None:
+    assert f"warning: {warning}" in main("run", *SHORT, "--json", *flags).stderr.splitlines()
+    assert "warning" not in main("run", *SHORT, "--json", flags[0], "0.01").stderr
 
 
 @pytest.mark.parametrize(
     ("parameter", "code", "text"),
-    [("plant.mas=1", 2, "UsageError"), ("plant.mass=-1", 1, "in the FMU:")],
+    [("plant.mas=1", 2, "UsageError"), ("plant.mass=-1", 2, "in the FMU:")],
 )
 def test_debug_shows_where(main: Main, parameter: str, code: int, text: str) -> None:
     for arguments in (("--debug", "run", "--set", parameter), ("run", "--set", parameter, "--debug")):

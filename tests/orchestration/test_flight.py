@@ -340,7 +340,7 @@ def test_a_value_that_the_fmu_refuses_is_an_error_in_the_fmus_own_words(side: st
 def test_a_record_of_what_is_no_variable_is_refused() -> None:
     with pytest.raises(UsageError, match="did you mean tilt"):
         orchestration.run(Scenario(stop_time=0.05, record=Record(plant=("tild",))))
-    with pytest.raises(UsageError, match="mass cannot be recorded"):
+    with pytest.raises(UsageError, match=r"mass cannot be recorded; expected one of position.x, "):
         orchestration.run(Scenario(stop_time=0.05, record=Record(plant=("mass",))))
 
 

@@ -9,15 +9,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+import typer.main
 from hypothesis import given
 from hypothesis import strategies as st
 
+from orchestration import Scenario, cli
 from orchestration.clock import Clock, Grid, Instant, Sample, random_streams
 from orchestration.errors import UsageError
+from orchestration.flags import FlightFlags
 from orchestration.timing import TIMING_KEYS, Timing, nanoseconds
 from tests.orchestration.strategies import Case, cases
 
 SECOND = 10**9
+COMMANDS = typer.main.get_command(cli.app).commands  # type: ignore[attr-defined]
 
 
 def clock_of(case: Case) -> Clock:
@@ -403,11 +407,16 @@ def test_the_defaults_are_those_of_the_contract() -> None:
 
 
 def test_every_key_has_the_name_of_its_flag() -> None:
-    flags = (
-        "--period --offset --plant-interval --delay --delay-jitter --jitter --jitter-distribution --measurement-loss "
-        "--command-loss --burst-length --clock-ratio --noise --quantisation --order --hold --clock"
-    )
-    assert set(TIMING_KEYS) == {flag.removeprefix("--").replace("-", "_") for flag in flags.split()}
+    values = {"order": "jacobi", "hold": "first", "clock": "fmu", "jitter_distribution": "normal"}
+    for key in TIMING_KEYS:
+        for command in ("run", "limit", "ssp"):
+            (parameter,) = (p for p in COMMANDS[command].params if f"--{key.replace('_', '-')}" in p.opts)
+            assert parameter.name == key
+        by_name = key in ("noise", "quantisation")
+        given = ["position=0.25"] if by_name else values.get(key, 1.0 if key == "burst_length" else 0.005)
+        timing = FlightFlags(**{key: given}).applied_to(Scenario()).timing
+        assert timing == Timing(**{key: {"position": 0.25} if by_name else given})
+        assert timing != Timing()
 
 
 @pytest.mark.parametrize("cause", [*({key: value} for key, value in CAUSES.items()), {"noise": {"position": 0.1}}])
