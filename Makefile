@@ -3,7 +3,10 @@
 # Each makes its own environment first.
 PYTHON ?= python3
 BIN := .venv/bin
+COFMUPY := .venv-cofmupy/bin/python
 export CI
+# Other people's masters that need an environment of their own are flown where they are: make interop makes it.
+export QUADCOSIM_COFMUPY ?= $(abspath $(wildcard $(COFMUPY)))
 
 .PHONY: demo test bench figures findings interop clean
 
@@ -39,8 +42,13 @@ figures: .venv/.base
 findings: .venv/.test
 	$(BIN)/python docs/make_findings.py
 
-interop: .venv/.test
-	$(BIN)/python -m docs.make_interop
+interop: .venv/.test .venv-cofmupy/.made
+	QUADCOSIM_COFMUPY=$(abspath $(COFMUPY)) $(BIN)/python -m docs.make_interop
+
+.venv-cofmupy/.made:
+	$(PYTHON) -m venv .venv-cofmupy
+	$(COFMUPY) -m pip install --quiet cofmupy==1.0.0
+	touch $@
 
 clean:
-	rm -rf .venv results fmus/*.fmu fmus/*.ssp
+	rm -rf .venv .venv-cofmupy results fmus/*.fmu fmus/*.ssp

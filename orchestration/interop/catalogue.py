@@ -2,9 +2,13 @@
 
 import importlib
 import importlib.metadata
+import os
+import subprocess
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
+from orchestration import child
 from orchestration.errors import UsageError
 from orchestration.interop.job import Job, Rows
 
@@ -19,10 +23,44 @@ class Tool:
     call: str
     """module:function in `orchestration.interop.tools`"""
     components: tuple[str, ...] = ("controller", "plant")
+    python: str | None = None
+    """environment variable that names a Python with its packages, where they do not go with those of this project"""
 
     def versions(self) -> dict[str, str]:
-        """Of its packages; raises `ModuleNotFoundError`, naming the package, if one is not installed."""
-        return {package: importlib.metadata.version(package) for package in self.packages}
+        """Of its packages; raises `ModuleNotFoundError`, naming the package, if one is not installed.
+
+        Raises `UsageError` if the Python that it needs is not named, or has not got them.
+        """
+        if self.python is None:
+            return {package: importlib.metadata.version(package) for package in self.packages}
+        ask = "import importlib.metadata, sys; print(*map(importlib.metadata.version, sys.argv[1:]))"
+        try:
+            done = subprocess.run(
+                [self._other_python(), "-I", "-c", ask, *self.packages], capture_output=True, text=True, check=True
+            )
+        except (OSError, subprocess.CalledProcessError):
+            raise self._no_python() from None
+        return dict(zip(self.packages, done.stdout.split(), strict=True))
+
+    def command(self, job: Path, rows: Path) -> list[str]:
+        """What flies a job in a process of its own and writes the rows."""
+        if self.python is None:
+            return child.command("orchestration.interop.child", self.name, job, rows)
+        module, _, function = self.call.partition(":")
+        script = Path(__file__).parent / "tools" / f"{module}.py"
+        return [self._other_python(), "-I", str(script), function, str(job), str(rows)]
+
+    def _other_python(self) -> str:
+        path = os.environ.get(self.python or "")
+        if not path:
+            raise self._no_python()
+        return str(Path(path).absolute())  # not resolved: a link is what makes an environment
+
+    def _no_python(self) -> UsageError:
+        return UsageError(
+            f"--tool {self.name}: expected in {self.python} the path of a Python of its own environment, "
+            f"with {', '.join(self.packages)} installed there by pip"
+        )
 
     def function(self) -> Callable[[Job], Rows]:
         """The call."""
@@ -32,6 +70,9 @@ class Tool:
         )
         return function
 
+
+COFMUPY = "QUADCOSIM_COFMUPY"
+"""Names a Python with cofmupy, which insists on other versions of fmpy and pythonfmu than this project."""
 
 TOOLS = {
     tool.name: tool
@@ -43,6 +84,8 @@ TOOLS = {
         Tool(name="fmpy, SSP", packages=("fmpy",), call="fmpy:fly_ssp"),
         Tool(name="fmucontainer", packages=("fmu-manipulation-toolbox",), call="container:fly_jacobi"),
         Tool(name="fmucontainer -sequential", packages=("fmu-manipulation-toolbox",), call="container:fly_sequential"),
+        Tool(name="cofmupy", packages=("cofmupy",), call="cofmupy:fly_jacobi", python=COFMUPY),
+        Tool(name="cofmupy gauss_seidel", packages=("cofmupy",), call="cofmupy:fly_gauss_seidel", python=COFMUPY),
         Tool(name="fmpy, plant alone", packages=("fmpy",), call="fmpy:fly_plant", components=("plant",)),
         Tool(name="fmpy, controller alone", packages=("fmpy",), call="fmpy:fly_controller", components=("controller",)),
     )
@@ -50,8 +93,13 @@ TOOLS = {
 
 
 def chosen(names: Sequence[str] | None) -> list[Tool]:
-    """The tools of these names, each once, all if there are none; raises `UsageError` naming those that exist."""
+    """The tools of these names, each once; raises `UsageError` naming those that exist.
+
+    Without names, all but those that need a Python of their own which no environment variable names.
+    """
     for name in names or ():
         if name not in TOOLS:
             raise UsageError(f"--tool {name}: expected one of {'; '.join(TOOLS)}")
-    return [TOOLS[name] for name in dict.fromkeys(names or TOOLS)]
+    if not names:
+        return [tool for tool in TOOLS.values() if tool.python is None or os.environ.get(tool.python)]
+    return [TOOLS[name] for name in dict.fromkeys(names)]

@@ -69,7 +69,7 @@ class Flights:
         )
         (folder / "job.json").write_text(job.to_json(), encoding="utf-8")
         done = subprocess.run(
-            child.command("orchestration.interop.child", tool.name, folder / "job.json", folder / "rows.npy"),
+            tool.command(folder / "job.json", folder / "rows.npy"),
             capture_output=True, text=True, errors="replace", check=False,
             env=child.environment(**dict.fromkeys(_TEMPORARY, str(folder))),
             cwd=folder,  # not this process's: fmpy changes that while it loads an FMU, in another thread

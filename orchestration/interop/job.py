@@ -51,12 +51,13 @@ class Job:
         return {"controller": self.controller, "plant": self.plant}
 
     def to_json(self) -> str:
-        """For a process of its own."""
-        return json.dumps(asdict(self), default=str)
+        """For a process of its own, which need not know this package: signals and connections are in it."""
+        return json.dumps({**asdict(self), "signals": SIGNALS, "connections": CONNECTIONS}, default=str)
 
     @classmethod
     def from_json(cls, text: str) -> "Job":
         """What `to_json` gave."""
         given = json.loads(text)
+        del given["signals"], given["connections"]
         paths = {name: Path(given[name]) for name in ("controller", "plant", "ssp", "recorded", "folder")}
         return cls(**{**given, **paths})

@@ -37,6 +37,9 @@ FACTS = {
     "fmpy, SSP": Fact(controller="zeros", plant="zeros", drifts=True),
     "fmucontainer": Fact(plant="start values"),
     "fmucontainer -sequential": Fact(order="gauss-seidel"),
+    "cofmupy": Fact(controller="zeros", plant="zeros", drifts=True),
+    # The controller's answer to zeros is hover, which is what the plant starts with.
+    "cofmupy gauss_seidel": Fact(order="gauss-seidel", controller="zeros", plant="start values", drifts=True),
     "fmpy, plant alone": Fact(order="alone"),
     "fmpy, controller alone": Fact(order="alone"),
 }
@@ -48,8 +51,9 @@ def flown(request: pytest.FixtureRequest, paper: Scenario) -> tuple[Scenario, di
     step, stop = request.param
     scenario = paper.with_changes(timing={"plant_interval": step}, stop_time=stop)
     heard: list[float] = []
-    found = agreements(scenario, chosen(None), progress=heard.append)
-    assert heard == [(i + 1) / (2 * len(TOOLS)) for i in range(2 * len(TOOLS))]  # each flies twice
+    tools = chosen(None)
+    found = agreements(scenario, tools, progress=heard.append)
+    assert heard == [(i + 1) / (2 * len(tools)) for i in range(2 * len(tools))]  # each flies twice
     return scenario, {agreement.tool.name: agreement for agreement in found}
 
 
@@ -59,6 +63,8 @@ Flown = tuple[Scenario, dict[str, Agreement]]
 @pytest.fixture(params=FACTS)
 def one(request: pytest.FixtureRequest, flown: Flown) -> tuple[Scenario, Agreement, Fact]:
     """Each tool of the table."""
+    if request.param not in flown[1]:
+        pytest.skip(f"{request.param} needs an environment of its own: make interop makes it")
     return flown[0], flown[1][request.param], FACTS[request.param]
 
 
@@ -66,7 +72,8 @@ One = tuple[Scenario, Agreement, Fact]
 
 
 def test_the_table_has_every_tool_in_order(flown: Flown) -> None:
-    assert list(flown[1]) == list(TOOLS) == list(FACTS)
+    assert list(TOOLS) == list(FACTS)
+    assert list(flown[1]) == [tool.name for tool in chosen(None)]
 
 
 def test_the_page_has_the_table_that_was_found(flown: Flown) -> None:
@@ -80,7 +87,9 @@ def test_the_page_has_the_table_that_was_found(flown: Flown) -> None:
         lines = [line.split("|") for line in text.strip().splitlines()]
         return [[cell.strip() for cell in line[columns]] for line in (lines[0], *lines[2:])]
 
-    assert rows(block) == rows(table.text(list(found.values())))
+    there = rows(block)
+    assert [row[0] for row in there[1:]] == list(TOOLS)
+    assert [row for row in there if row[0] in {"tool", *found}] == rows(table.text(list(found.values())))
 
 
 def test_the_order_of_each_tool_is_as_stated(one: One) -> None:
