@@ -1,4 +1,4 @@
-"""The loop a second time, written from `docs/timing.md` alone: nothing of the project is imported here.
+"""The loop a second time, as `docs/timing.md` says it: nothing of the project is imported here.
 
 It makes all instants before it flies, where the project's clock makes each from the one before.
 """

@@ -1,4 +1,4 @@
-"""Two people compute the same bits: the project's loop against one that was written from `docs/timing.md` alone."""
+"""Two people compute the same bits: the project's loop against another that does what `docs/timing.md` says."""
 
 import ast
 import math
