@@ -1,4 +1,4 @@
-"""What a number of trials says about a share: its interval."""
+"""What a number of trials says about a share: its interval, and what it refutes."""
 
 import math
 from statistics import NormalDist
@@ -25,3 +25,12 @@ def wilson(successes: int, trials: int, confidence: float = 0.95) -> tuple[float
     low = 0.0 if successes == 0 else (middle - half) / scale
     high = 1.0 if successes == trials else (middle + half) / scale
     return low, high
+
+
+def refutes(successes: int, trials: int, share: float, confidence: float) -> bool:
+    """Whether `successes` in `trials` are too few for a share that large, by the exact binomial test at `confidence`.
+
+    That is, with such a share so few or fewer would be seen with a probability of at most 1 - confidence.
+    """
+    tail = sum(math.comb(trials, k) * share**k * (1.0 - share) ** (trials - k) for k in range(successes + 1))
+    return tail <= 1.0 - confidence

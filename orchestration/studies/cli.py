@@ -83,9 +83,15 @@ def limit(
     tolerance: Annotated[
         float | None, typer.Option("--tolerance", help="Width of the last bracket.", show_default=False)
     ] = None,
+    scan: Annotated[
+        float | None, typer.Option("--scan", help="Step of the scan upward.", metavar="STEP", show_default=False)
+    ] = None,
     confidence: Annotated[
         float, typer.Option("--confidence", help="For random quantities: that nine seeds in ten fly.")
     ] = 0.95,
+    continuous: Annotated[
+        bool, typer.Option("--continuous", help="Fly near continuous time too (as long as ten flights at 1 ms).")
+    ] = False,
     workers: Annotated[int, typer.Option("--workers", help="Processes for the seeds.", metavar="N")] = 1,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
     out: Annotated[
@@ -99,7 +105,8 @@ def limit(
 
     chosen = scenario_from(scenario, flags)
     found = limits.find(
-        chosen, of, tolerance=tolerance, confidence=confidence, workers=workers, announce=say
+        chosen, of, tolerance=tolerance, scan=scan, confidence=confidence, continuous=continuous, workers=workers,
+        announce=say,
     )  # fmt: skip
     if out is not None:
         from orchestration.studies.drawing import draw_limit
@@ -108,8 +115,8 @@ def limit(
     if as_json:
         print(json.dumps(dataclasses.asdict(found), indent=2))
         return
-    for name, value in dataclasses.asdict(found).items():
-        print(f"{name:<18}  {'-' if value is None else value}")
+    for name, value in limits.as_text(found).items():
+        print(f"{name:<19}  {value}")
 
 
 def register(app: typer.Typer) -> None:

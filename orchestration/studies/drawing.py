@@ -9,8 +9,9 @@ from orchestration.scenario import Scenario
 from orchestration.simulator import Floats
 from orchestration.studies import figures, sensitivity
 from orchestration.studies.axes import Axis, unit_points
-from orchestration.studies.limit import Limit, radius
+from orchestration.studies.limit import Limit
 from orchestration.studies.linear import HoverLoop
+from orchestration.studies.local import radius
 from orchestration.studies.store import METRICS
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import store_path

@@ -46,7 +46,7 @@ class Pool:
         self._stack.close()
 
     def fly(self, scenarios: Sequence[Scenario], stop: Callable[[Any], bool]) -> list[Any]:
-        """The metrics of the runs, up to the first whose metrics `stop`; in order with one worker.
+        """The metrics of the runs in their order, up to the first whose metrics `stop`, with any number of workers.
 
         Raises `QuadcosimError` if a run fails.
         """
@@ -71,7 +71,7 @@ class Pool:
             return
         futures = [self._executor.submit(fly_local_chunk, [task]) for task in tasks]
         try:
-            for future in concurrent.futures.as_completed(futures):
+            for future in futures:
                 yield from future.result()
         except BrokenProcessPool as error:
             raise QuadcosimError("a worker process died while it flew; start again") from error

@@ -1,34 +1,41 @@
 """The largest period, delay, jitter or loss that still flies: measured, and beside it what linear theory says."""
 
+import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import get_args
 
 from orchestration.errors import UsageError
-from orchestration.scenario import Scenario
+from orchestration.metrics import Outcome
+from orchestration.scenario import Record, Scenario
 from orchestration.studies.engine import Pool
-from orchestration.studies.linear import HoverLoop
-from orchestration.studies.study import changed, locate_fmus
+from orchestration.studies.local import local_limits
+from orchestration.studies.ranges import Quantity, Range, range_of
+from orchestration.studies.search import Bracket, bisected, first_failure
+from orchestration.studies.study import locate_fmus
+from orchestration.studies.trials import RELIABILITY, Trials, Tried, said
+from orchestration.timing import Timing
 
-Quantity = Literal["period", "delay", "jitter", "loss"]
-
-RELIABILITY = 0.9
-"""For random quantities: the share of seeds that fly, which the stated confidence is in."""
 GAP = 0.1
 """of the local limit: a larger difference to the large-signal one is worth saying"""
+FINER = 5
+"""parts of the step of the scan within the bracket"""
+BEYOND = 4
+"""values of the scan that are tried beyond the first that fails"""
+CONTINUOUS = 1e-4
+"""[s], the period of the flight that stands for continuous time"""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Range:
-    """How a quantity is scanned: `before`, then from `first` in steps to `last`; then bisected to `tolerance`."""
+class Continuous:
+    """The same flight near continuous time, everything digital taken away: what it does is not due to sampling."""
 
-    before: tuple[float, ...] = ()
-    first: float
-    step: float
-    last: float
-    tolerance: float
-    unit: str = " s"
+    period: float
+    """[s]"""
+    outcome: Outcome
+    settling_time: float | None
+    """[s]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,20 +45,30 @@ class Limit:
     of: str
     local_limit: float | None
     """where the spectral radius about hover first crosses one from below; None: not defined, or not reached"""
+    local_limit_outside: float | None
+    """likewise, with the gain that the law has just outside its boundary layer; None also without such a layer"""
     large_signal_limit: float | None
     """from the scenario's own initial state; None: nothing in the range failed, or the first value did"""
+    refuted_limit: float | None
+    """for random quantities: the lowest value found at which so many seeds do not fly that `RELIABILITY` is refuted
+    at the confidence; None: nothing is random, or none in the range"""
+    horizon: float
+    """[s], the stop time: what does not settle by it does not fly"""
     tolerance: float
+    scan: float
+    """step of the scan; what flies or fails between two of its values is not seen"""
     confidence: float | None
-    """that at least `RELIABILITY` of all seeds fly; None: nothing is random"""
+    """that at least `RELIABILITY` of all seeds fly; None: nothing is random. Of each value, not of the search"""
     seeds: int
     """runs for each value, all of which must fly"""
+    flies_above: tuple[float, ...]
+    """values tried above the limit that fly again"""
+    continuous: Continuous | None
+    """None: not asked for"""
+    tried: tuple[Tried, ...]
+    """all values that were flown, upward"""
     note: str
     """what the figures mean together"""
-
-
-def flies(metrics: dict[str, Any]) -> bool:
-    """The criterion: settled, which is not diverged and within 5 cm in the last third of the run."""
-    return bool(metrics["outcome"] == "settled")
 
 
 def find(
@@ -59,129 +76,116 @@ def find(
     of: str,
     *,
     tolerance: float | None = None,
+    scan: float | None = None,
     confidence: float = 0.95,
+    continuous: bool = False,
     workers: int = 1,
     announce: Callable[[str], None] | None = None,
 ) -> Limit:
-    """The limit of `scenario` in one quantity, all else as it is.
+    """The limit of `scenario` in one quantity, all else as it is; `scan` is the step, `continuous` adds that flight.
 
-    Raises `UsageError` for a quantity, tolerance or confidence that cannot be.
+    Raises `UsageError` for a quantity, tolerance, step or confidence that cannot be.
     """
-    if of not in get_args(Quantity):
-        raise UsageError(f"--of {of}: expected one of {', '.join(get_args(Quantity))}")
-    span = range_of(scenario, of)
-    tolerance = span.tolerance if tolerance is None else tolerance
-    if not tolerance > 0.0:
-        raise UsageError(f"--tolerance {tolerance}: expected a positive number")
+    span = _range_asked_for(scenario, of, tolerance, scan)
     if not 0.0 < confidence < 1.0:
         raise UsageError(f"--confidence {confidence}: expected a number between 0 and 1")
     random = of in ("jitter", "loss") or not scenario.timing.is_deterministic()
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
-    local, reason = _local(scenario, of)
+    local, outside, reason = local_limits(scenario, of)
     with Pool(locate_fmus(scenario), workers) as pool:
-
-        def fails(value: float) -> bool:
-            varied = changed(scenario, {f"timing.{of}": value})
-            runs = [varied.with_changes(seed=scenario.seed + i) for i in range(seeds)]
-            failed = not all(flies(metrics) for metrics in pool.fly(runs, stop=lambda metrics: not flies(metrics)))
-            if announce is not None:
-                announce(f"{of} {value:.6g}{span.unit}: {'fails' if failed else 'flies'}")
-            return failed
-
-        bracket = first_failure(fails, _scan(span), tolerance)
-    large = bracket[0] if bracket is not None else None
+        trials = Trials(
+            scenario, of, span, seeds, confidence if random else None, pool, announce or (lambda line: None)
+        )
+        values = span.values()
+        bracket = first_failure(trials.fails, values, span.tolerance, parts=FINER)
+        above = [value for value in values if bracket is not None and value >= bracket.bad]
+        refuted = _refuted(trials, bracket, above) if random else None
+        if not random:
+            for value in [value for value in above if value not in trials.tried][:BEYOND]:
+                trials.fails(value)
+        ideal = _near_continuous(scenario, pool) if continuous else None
+    tried = tuple(trials.tried[value] for value in sorted(trials.tried))
     return Limit(
-        of=of, local_limit=local, large_signal_limit=large, tolerance=tolerance,
-        confidence=confidence if random else None, seeds=seeds, note=_note(span, bracket, local, reason),
+        of=of, local_limit=local, local_limit_outside=outside,
+        large_signal_limit=None if bracket is None else bracket.good, refuted_limit=refuted,
+        horizon=scenario.stop_time, tolerance=span.tolerance, scan=span.step,
+        confidence=confidence if random else None, seeds=seeds,
+        flies_above=tuple(
+            one.value for one in tried if bracket is not None and one.value > bracket.bad and one.flew == seeds
+        ),
+        continuous=ideal, tried=tried,
+        note="; ".join(_note(span, bracket, trials, refuted, local, reason)),
     )  # fmt: skip
 
 
-def first_failure(
-    fails: Callable[[float], bool], values: Sequence[float], tolerance: float
-) -> tuple[float | None, float] | None:
-    """The last value that does not fail and the first that does, at most `tolerance` apart.
+def as_text(found: Limit) -> dict[str, str]:
+    """The fields of a limit in words; of the values tried, those for which the share of seeds is known."""
+    shown = {name: "-" if value is None else str(value) for name, value in vars(found).items()}
+    shown["flies_above"] = ", ".join(f"{value:.6g}" for value in found.flies_above) or "-"
+    if (ideal := found.continuous) is not None:
+        settles = "" if ideal.settling_time is None else f", within 5 cm from {ideal.settling_time:.6g} s on"
+        shown["continuous"] = f"{ideal.outcome} at a period of {ideal.period:g} s{settles}"
+    known = [f"{one.value:.6g}: {said(one)}" for one in found.tried if one.share is not None]
+    shown["tried"] = "; ".join(known) or f"{len(found.tried)} values"
+    return shown
 
-    Goes up through `values` and bisects the first bracket that fails; the set that does not fail need not
-    be an interval. None if none fails; a first part of None if the first value does.
-    """
-    good = None
-    for value in values:
-        if not fails(value):
-            good = value
-            continue
-        if good is None:
-            return None, value
-        bad = value
-        while bad - good > tolerance:
-            middle = 0.5 * (good + bad)
-            if fails(middle):
-                bad = middle
-            else:
-                good = middle
-        return good, bad
+
+def _range_asked_for(scenario: Scenario, of: str, tolerance: float | None, scan: float | None) -> Range:
+    if of not in get_args(Quantity):
+        raise UsageError(f"--of {of}: expected one of {', '.join(get_args(Quantity))}")
+    for flag, value in (("tolerance", tolerance), ("scan", scan)):
+        if value is not None and not (value > 0.0 and math.isfinite(value)):
+            raise UsageError(f"--{flag} {value}: expected a positive number")
+    span = range_of(scenario, of)
+    return dataclasses.replace(
+        span,
+        tolerance=span.tolerance if tolerance is None else tolerance,
+        step=span.step if scan is None else scan,
+    )
+
+
+def _refuted(trials: Trials, bracket: Bracket | None, above: list[float]) -> float | None:
+    """The lowest value found at which it is refuted that `RELIABILITY` of the seeds fly."""
+    if bracket is None:
+        return None
+    below = bracket.good
+    for value in above:
+        if trials.is_refuted(value):
+            return value if below is None else bisected(trials.is_refuted, below, value, trials.tolerance).bad
+        below = value
     return None
 
 
-def range_of(scenario: Scenario, of: str) -> Range:
-    """The range in which a quantity of this scenario is looked for."""
-    period = scenario.timing.period
-    if of == "period":
-        shortest = scenario.timing.jitter * scenario.timing.clock_ratio
-        before = tuple(value for value in (0.001, 0.002, 0.003, 0.004) if value > shortest)
-        first = 0.005 * (math.floor(shortest / 0.005) + 1)
-        return Range(before=before, first=first, step=0.005, last=0.5, tolerance=0.0005)
-    if of == "delay":
-        return Range(first=0.0, step=0.005, last=0.5, tolerance=0.0005)
-    if of == "jitter":
-        return Range(first=0.0, step=period / 10.0, last=0.999 * period, tolerance=period / 100.0)
-    length = scenario.timing.burst_length
-    return Range(first=0.0, step=0.05, last=1.0 if length is None else length / (length + 1.0), tolerance=0.01, unit="")
+def _near_continuous(scenario: Scenario, pool: Pool) -> Continuous:
+    """`scenario` with a period of `CONTINUOUS` and nothing late, lost or noisy."""
+    ideal = dataclasses.replace(
+        scenario,
+        timing=Timing(period=CONTINUOUS, plant_interval=scenario.timing.plant_interval),
+        record=Record(plant=(), controller=()),
+    )
+    (metrics,) = pool.fly([ideal], stop=lambda metrics: False)
+    return Continuous(period=CONTINUOUS, outcome=metrics["outcome"], settling_time=metrics["settling_time"])
 
 
-def local_limit(loop: HoverLoop, scenario: Scenario, of: str) -> float | None:
-    """Where the spectral radius first crosses one from below, in period or delay [s]; None: nowhere in the range."""
-    span = range_of(scenario, of)
-    low = min((*span.before, span.first))
-    fine = [low + 0.001 * i for i in range(int((span.last - low) / 0.001))]
-    bracket = first_failure(lambda value: radius(loop, scenario, of, value) >= 1.0, fine, 1e-6)
-    return bracket[0] if bracket is not None else None
-
-
-def radius(loop: HoverLoop, scenario: Scenario, of: str, value: float) -> float:
-    """The spectral radius of `scenario` about hover with another period or delay [s]."""
-    timing = scenario.timing
-    period = (value if of == "period" else timing.period) / timing.clock_ratio
-    delay = (value if of == "delay" else timing.delay) + (period if timing.order == "jacobi" else 0.0)
-    return loop.spectral_radius(period, delay)
-
-
-def _local(scenario: Scenario, of: str) -> tuple[float | None, str]:
-    """The local limit, or None and why there is none."""
-    if of not in ("period", "delay"):
-        return None, f"linear theory has no local limit of {of}"
-    if scenario.timing.hold != "zero":
-        return None, "the linear loop is for zero-order hold only"
-    try:
-        loop = HoverLoop.of(scenario)
-    except UsageError as error:
-        return None, str(error)
-    return local_limit(loop, scenario, of), "the spectral radius about hover stays below one in the range, or above"
-
-
-def _scan(span: Range) -> list[float]:
-    count = math.floor((span.last - span.first) / span.step + 1e-9)
-    return [*span.before, *(float(f"{span.first + i * span.step:.12g}") for i in range(count + 1))]
-
-
-def _note(span: Range, bracket: tuple[float | None, float] | None, local: float | None, reason: str) -> str:
+def _note(
+    span: Range, bracket: Bracket | None, trials: Trials, refuted: float | None, local: float | None, reason: str
+) -> list[str]:
     if bracket is None:
-        measured = f"flies throughout the range, to {span.last:g}{span.unit}"
-    elif bracket[0] is None:
-        measured = f"does not fly at {bracket[1]:g}{span.unit}, the first value of the range"
+        parts = [f"flies throughout the range, to {span.last:g}{span.unit}"]
+    elif bracket.good is None:
+        fell = said(trials.tried[bracket.bad])
+        parts = [f"does not fly at {bracket.bad:g}{span.unit}, the first value of the range ({fell})"]
     else:
-        measured = f"flies at {bracket[0]:.6g}{span.unit} and not at {bracket[1]:.6g}{span.unit}"
+        fell = said(trials.tried[bracket.bad])
+        parts = [f"flies at {bracket.good:.6g}{span.unit} and not at {bracket.bad:.6g}{span.unit} ({fell})"]
+    if refuted is not None:
+        parts.append(
+            f"that nine seeds in ten fly is refuted at {refuted:.6g}{span.unit}: {said(trials.tried[refuted])}"
+        )
+    parts.append(f"what is narrower than the scan, {span.step:g}{span.unit}, is not seen")
     if local is None:
-        return f"{measured}; {reason}"
-    if bracket is None or bracket[0] is None or abs(bracket[0] - local) > GAP * local:
-        return f"{measured}; more than a tenth from the local limit of {local:.6g}{span.unit}: large signals decide"
-    return f"{measured}; within a tenth of the local limit of {local:.6g}{span.unit}"
+        return [*parts, reason]
+    measured = None if bracket is None else bracket.good
+    if measured is None or abs(measured - local) > GAP * local:
+        return [*parts, f"more than a tenth from the local limit of {local:.6g}{span.unit}: large signals decide"]
+    return [*parts, f"within a tenth of the local limit of {local:.6g}{span.unit}"]

@@ -51,20 +51,24 @@ def hover_of(scenario: Scenario) -> Scenario:
     )
 
 
-def at_edge(scenario: Scenario) -> Scenario:
+def at_edge(scenario: Scenario) -> Scenario | None:
     """`scenario` with the gain everywhere that its law has just outside the boundary layer.
 
-    That is the slope of k_s |e|^β_t sgn(e) at |e| = ε. Raises `UsageError` for a controller without these names.
+    That is the slope of k_s |e|^β_t sgn(e) at |e| = ε. None for a controller without parameters of these names.
     """
-    starts, given = locate_fmus(scenario).starts, scenario.controller.parameters
-    values = []
-    for name in (wiring.SURFACE_GAIN, wiring.SURFACE_EXPONENT, wiring.BOUNDARY_LAYER):
-        if name not in given and f"controller.{name}" not in starts:
-            raise UsageError(f"the controller has no {name}: there is no local limit outside a boundary layer")
-        values.append(float(given.get(name, starts.get(f"controller.{name}", 0.0))))
-    gain, exponent, layer = values
-    slope = exponent * gain * layer ** (exponent - 1.0)
-    return scenario.with_changes(parameters={f"controller.{wiring.SURFACE_GAIN}": slope})
+    known = {**locate_fmus(scenario).starts}
+    known |= {f"controller.{name}": float(value) for name, value in scenario.controller.parameters.items()}
+    names = [f"controller.{name}" for name in (wiring.SURFACE_GAIN, wiring.SURFACE_EXPONENT, wiring.BOUNDARY_LAYER)]
+    if any(name not in known for name in names):
+        return None
+    gain, exponent, layer = (known[name] for name in names)
+    return scenario.with_changes(parameters={names[0]: exponent * gain * layer ** (exponent - 1.0)})
+
+
+def _located(hover: Scenario) -> Scenario:
+    """`hover` with its FMUs by their paths."""
+    fmus = locate_fmus(hover)
+    return hover.with_fmus(plant=fmus.plant, controller=fmus.controller)
 
 
 class HoverLoop:
@@ -77,10 +81,14 @@ class HoverLoop:
     @classmethod
     def of(cls, scenario: Scenario) -> "HoverLoop":
         """The loop of `scenario`; raises `UsageError` if hover is not an equilibrium of it."""
-        fmus = locate_fmus(scenario)
-        hover, fleet = hover_of(scenario).with_fmus(plant=fmus.plant, controller=fmus.controller), Fleet()
+        hover, fleet = _located(hover_of(scenario)), Fleet()
         trim, feedback = _controller_at_hover(hover, fleet)
         return cls(feedback, PlantStep(hover, fleet, trim))
+
+    def with_law(self, scenario: Scenario) -> "HoverLoop":
+        """The loop of the same plant with the controller of `scenario`, whose command at hover must be the same."""
+        _, feedback = _controller_at_hover(_located(hover_of(scenario)), Fleet())
+        return HoverLoop(feedback, self._step)
 
     def spectral_radius(self, period: float, delay: float) -> float:
         """The largest modulus of the eigenvalues of one sample period [s] with a delay [s]."""
@@ -112,6 +120,7 @@ class PlantStep:
     def __init__(self, hover: Scenario, fleet: Fleet, trim: Floats) -> None:
         self._hover, self._fleet, self._trim = hover, fleet, trim
         self._interval = hover.timing.plant_interval
+        self._lags = True  # until the differences say otherwise
         at_hover = self._saved({}, trim)
         self._expect_equilibrium(at_hover)
         vehicle = [[(self._saved(_displaced(name, size), trim), trim) for size in _BOTH_WAYS] for name in COORDINATES]
@@ -139,16 +148,17 @@ class PlantStep:
     def _one(self, h: float) -> Floats:
         """The derivative of one step of `h` [s], the command as further states that stay."""
         if h not in self._known:
-            after, later = np.vsplit(self._differences(h), 2)
+            found = self._differences(h)
             result = np.eye(self.size + _COMMANDS)
-            result[: len(COORDINATES)] = after
+            result[: len(COORDINATES)] = after = found[: len(COORDINATES)]
             if self._lags:
+                later = found[len(COORDINATES) :]
                 result[len(COORDINATES) : self.size] = self._seen @ (later - self._next[:, : len(COORDINATES)] @ after)
             self._known[h] = result
         return self._known[h]
 
     def _differences(self, h: float) -> Floats:
-        """d(vehicle after `h`, vehicle a plant interval later under the command of hover)/d(what is moved)."""
+        """d(vehicle after `h` [s])/d(what is moved), below it a plant interval later if the actuators lag."""
         with self._plant() as plant:
             flown = [[self._after(plant, *start, h) for start in pair] for pair in self._moved]
         return np.column_stack([(plus - minus) / (2.0 * STEP) for plus, minus in flown])
@@ -166,10 +176,10 @@ class PlantStep:
             return plant.save()
 
     def _after(self, plant: FmuSimulator, state: bytes, command: Floats, h: float) -> Floats:
-        """The vehicle after `h` [s] under `command`, and a plant interval later under that of hover."""
+        """The vehicle after `h` [s] under `command`, and if the actuators lag a plant interval later under the trim."""
         plant.restore(state)
         found = []
-        for start, duration, held in ((0.0, h, command), (h, self._interval, self._trim)):
+        for start, duration, held in ((0.0, h, command), (h, self._interval, self._trim))[: 1 + self._lags]:
             plant.writer(wiring.COMMAND, held)()
             plant.step(start, duration)
             measured: Floats = np.zeros(len(wiring.MEASUREMENT))

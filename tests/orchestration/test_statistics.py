@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestration import UsageError
-from orchestration.statistics import wilson
+from orchestration.statistics import refutes, wilson
 
 
 @given(st.integers(1, 2000), st.data(), st.sampled_from([0.5, 0.9, 0.95, 0.99]))
@@ -39,6 +39,14 @@ def test_the_interval_covers_the_share_about_as_often_as_it_says(share: float) -
         if wilson(k, trials)[0] <= share <= wilson(k, trials)[1]
     )
     assert 0.93 < covered < 0.98
+
+
+def test_a_share_is_refuted_where_so_few_are_seen_too_rarely() -> None:
+    """Of 29 with a share of 0.9, at most 23 are seen with probability 0.064, at most 22 with 0.022."""
+    assert not refutes(23, 29, 0.9, 0.95)
+    assert refutes(22, 29, 0.9, 0.95)
+    assert refutes(23, 29, 0.9, 0.93)
+    assert not refutes(29, 29, 0.9, 0.05)
 
 
 @pytest.mark.parametrize(

@@ -186,7 +186,8 @@ def test_the_spectral_radius_is_drawn_with_the_limits_that_there_are(
 
 def limit(of: str) -> Limit:
     return Limit(
-        of=of, local_limit=0.08, large_signal_limit=0.05, tolerance=0.001, confidence=None, seeds=1, note=""
+        of=of, local_limit=0.08, local_limit_outside=0.08, large_signal_limit=0.05, refuted_limit=None, horizon=30.0,
+        tolerance=0.001, scan=0.005, confidence=None, seeds=1, flies_above=(), continuous=None, tried=(), note="",
     )  # fmt: skip
 
 

@@ -20,9 +20,13 @@ from orchestration.fleet import Fleet
 from orchestration.flight import prepared
 from orchestration.scenario import FmuChoice
 from orchestration.simulator import Floats
+from orchestration.statistics import wilson
 from orchestration.studies import limit as limits
-from orchestration.studies.limit import find, first_failure, flies, local_limit
-from orchestration.studies.linear import COORDINATES, HoverLoop, at_edge, hover_of
+from orchestration.studies.limit import Continuous, find
+from orchestration.studies.linear import COORDINATES, HoverLoop, hover_of
+from orchestration.studies.local import local_limit, local_limits
+from orchestration.studies.search import first_failure
+from orchestration.studies.trials import flies
 from orchestration.timing import NANOSECONDS
 from orchestration.wiring import COMMAND
 from tests.fmus import source_tree
@@ -80,6 +84,26 @@ def test_with_islands_of_failure_the_bracket_is_a_true_one_below_the_first_value
     assert bad - good <= 1e-3
     assert fails(bad)
     assert not fails(good)
+
+
+def test_an_island_of_failure_within_the_bracket_is_seen_by_the_finer_steps() -> None:
+    def fails(value: float) -> bool:
+        return 1.15 < value < 1.35 or value > 1.75
+
+    assert first_failure(fails, [0.0, 1.0, 2.0], 0.01, parts=1) == pytest.approx((1.75, 1.76), abs=0.01)
+    good, bad = first_failure(fails, [0.0, 1.0, 2.0], 0.01, parts=5) or (None, math.nan)
+    assert (good, bad) == pytest.approx((1.15, 1.16), abs=0.01)
+
+
+def test_steps_finer_than_the_tolerance_are_not_taken() -> None:
+    tried = []
+
+    def fails(value: float) -> bool:
+        tried.append(value)
+        return value > 1.4
+
+    assert first_failure(fails, [1.0, 2.0], 0.5, parts=5) == (1.0, 1.5)
+    assert tried == [1.0, 2.0, 1.5]
 
 
 def test_nothing_above_the_first_value_that_fails_is_tried() -> None:
@@ -245,10 +269,10 @@ def test_the_lag_that_an_fmu_has_by_itself_is_in_the_loop(tmp_path: Path) -> Non
     assert set_to[12:16, 12:16] == pytest.approx(math.exp(-0.04 / 0.05) * np.eye(4), abs=1e-6)
 
 
-@pytest.mark.parametrize(("exponent", "limit"), [(0.5, 0.0085), (0.99, 0.0801), (1.0, 0.0801)])
+@pytest.mark.parametrize(("exponent", "limit"), [(0.5, 0.0085), (0.99, 0.0801)])
 def test_at_the_edge_of_the_boundary_layer_the_exponent_matters(exponent: float, limit: float) -> None:
     scenario = scenario_of().with_changes(parameters={"controller.surface_exponent": exponent})
-    inside, outside = (local_limit(HoverLoop.of(each), each, "period") for each in (scenario, at_edge(scenario)))
+    inside, outside, _ = known_local_limits(scenario, "period")
     assert inside == theory()
     assert outside == pytest.approx(limit, abs=1e-4)
 
@@ -319,8 +343,16 @@ class StubPool:
         return None
 
     def fly(self, scenarios: Sequence[Scenario], stop: Any) -> list[dict[str, Any]]:
-        self.flown.extend(scenarios)
-        return [{"outcome": "settled" if self.bound(scenario) < 0.05 else "bounded"} for scenario in scenarios]
+        found: list[dict[str, Any]] = []
+        for scenario in scenarios:
+            self.flown.append(scenario)
+            bound = self.bound(scenario)
+            outcome = "settled" if bound < 0.05 else "bounded" if bound < math.inf else "diverged"
+            divergence_time = 3.25 if outcome == "diverged" else None
+            found.append({"outcome": outcome, "divergence_time": divergence_time, "settling_time": 1.5})
+            if stop(found[-1]):
+                break
+        return found
 
     @staticmethod
     def bound(scenario: Scenario) -> float:
@@ -330,7 +362,19 @@ class StubPool:
 @pytest.fixture
 def stubbed(monkeypatch: pytest.MonkeyPatch) -> type[StubPool]:
     monkeypatch.setattr(limits, "Pool", StubPool)
+    monkeypatch.setattr(limits, "local_limits", known_local_limits)
     return StubPool
+
+
+_KNOWN: dict[str, tuple[float | None, float | None, str]] = {}
+
+
+def known_local_limits(scenario: Scenario, of: str) -> tuple[float | None, float | None, str]:
+    """Those of linear theory, once for the many tests with the same scenario."""
+    key = f"{of} {scenario}"
+    if key not in _KNOWN:
+        _KNOWN[key] = local_limits(scenario, of)
+    return _KNOWN[key]
 
 
 @pytest.mark.usefixtures("stubbed")
@@ -387,8 +431,9 @@ def test_of_random_quantities_so_many_seeds_fly_that_nine_in_ten_do_at_the_confi
     found = find(base, of, confidence=confidence)
     assert (found.seeds, found.confidence) == (seeds, confidence)
     assert 0.9**seeds <= 1.0 - confidence < 0.9 ** (seeds - 1)  # the success run
-    for _, group in itertools.groupby(stubbed.flown, key=lambda scenario: scenario.timing):
-        assert [flown.seed for flown in group] == list(range(5, 5 + seeds))
+    flown = [[one.seed for one in group] for _, group in itertools.groupby(stubbed.flown, key=lambda one: one.timing)]
+    assert flown[0] == list(range(5, 5 + seeds))
+    assert {seed for group in flown for seed in group} == set(flown[0])
 
 
 def test_one_seed_that_does_not_fly_is_enough_to_fail(stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -400,6 +445,79 @@ def test_one_seed_that_does_not_fly_is_enough_to_fail(stubbed: type[StubPool], m
     assert found.large_signal_limit == pytest.approx(0.222, abs=0.01)
     assert found.local_limit is None
     assert "linear theory has no local limit of loss" in found.note
+
+
+def test_what_flies_again_above_the_limit_is_told(stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch) -> None:
+    def bound(self: StubPool, scenario: Scenario) -> float:
+        return 1.0 if 0.0317 < scenario.timing.period < 0.042 else 0.01
+
+    monkeypatch.setattr(stubbed, "bound", bound)
+    found = find(scenario_of(), "period")
+    assert found.large_signal_limit == pytest.approx(0.0317, abs=0.0005)
+    assert found.flies_above == (0.045, 0.05, 0.055)
+    assert [one.value for one in found.tried if one.value >= 0.035] == [0.035, 0.04, 0.045, 0.05, 0.055]
+    assert found.scan == 0.005
+    assert "narrower than the scan, 0.005 s, is not seen" in found.note
+    coarse = find(scenario_of(), "period", scan=0.05)
+    assert (coarse.scan, coarse.large_signal_limit) == (0.05, None), "as its help says, it sees no gap that small"
+
+
+@pytest.mark.parametrize(
+    ("bound", "said"), [(1.0, "(fails, bounded)"), (math.inf, "(fails, diverged at 3.25 s)")],
+)  # fmt: skip
+def test_what_the_value_that_fails_did_is_told(
+    stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch, bound: float, said: str
+) -> None:
+    monkeypatch.setattr(stubbed, "bound", lambda self, scenario: 0.01 if scenario.timing.period < 0.03 else bound)
+    found = find(scenario_of(), "period")
+    assert said in found.note
+    assert found.horizon == 30.0
+
+
+def test_of_a_random_quantity_the_value_at_which_nine_in_ten_is_refuted_is_told_with_its_interval(
+    stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def bound(self: StubPool, scenario: Scenario) -> float:  # the more is lost, the fewer of the 29 seeds fly
+        return 1.0 if scenario.seed % 29 < 100.0 * (scenario.timing.measurement_loss - 0.26) else 0.01
+
+    monkeypatch.setattr(stubbed, "bound", bound)
+    found = find(scenario_of(), "loss")
+    assert found.large_signal_limit == pytest.approx(0.26, abs=0.01)
+    assert found.refuted_limit == pytest.approx(0.32, abs=0.011)  # 6 of 29 down is not enough, 7 are
+    at = {one.value: one for one in found.tried}[found.refuted_limit or 0.0]
+    assert (at.flew, at.runs) == (22, 29)
+    assert at.share == wilson(22, 29)
+    assert "22 of 29 seeds fly, a share of 0.58 to 0.88" in found.note
+    passed = {one.value: one for one in found.tried}[0.25]
+    assert (passed.flew, passed.share) == (29, wilson(29, 29))
+
+
+def test_where_the_first_value_fails_for_some_seeds_it_may_still_fly_for_nine_in_ten(
+    stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stubbed, "bound", lambda self, scenario: 1.0 if scenario.seed == 3 else 0.01)
+    found = find(scenario_of(), "loss")
+    assert (found.large_signal_limit, found.refuted_limit) == (None, None)
+    assert found.tried[0].share == wilson(28, 29)
+
+
+def test_near_continuous_time_nothing_digital_is_left(stubbed: type[StubPool]) -> None:
+    base = scenario_of(
+        period=0.02, delay=0.005, command_loss=0.1, hold="first", order="jacobi", noise={"position": 0.1}
+    )
+    base = base.with_changes(parameters={"plant.mass": 1.0, "plant.actuator_time_constant": 0.02})
+    found = find(base, "delay", continuous=True)
+    ideal = [flown for flown in stubbed.flown if flown.timing.period == 1e-4]
+    assert [flown.timing for flown in ideal] == [Timing(period=1e-4, plant_interval=0.02)]
+    assert (ideal[0].plant, ideal[0].controller, ideal[0].stop_time) == (base.plant, base.controller, base.stop_time)
+    assert found.continuous == Continuous(period=1e-4, outcome="settled", settling_time=1.5)
+    assert find(base, "delay").continuous is None
+
+
+def test_the_limit_at_the_edge_of_the_boundary_layer_stands_beside_the_other(stubbed: type[StubPool]) -> None:
+    del stubbed
+    found = find(scenario_of().with_changes(parameters={"controller.surface_exponent": 0.5}), "period")
+    assert (found.local_limit, found.local_limit_outside) == pytest.approx((0.0801, 0.0085), abs=1e-4)
 
 
 @pytest.mark.usefixtures("stubbed")
@@ -414,7 +532,7 @@ def test_each_value_is_announced() -> None:
     find(scenario_of(), "period", announce=said.append)
     assert said[0] == "period 0.001 s: flies"
     assert "period 0.03 s: flies" in said
-    assert "period 0.035 s: fails" in said
+    assert "period 0.035 s: fails, bounded" in said
 
 
 @pytest.mark.usefixtures("stubbed")
@@ -439,13 +557,19 @@ def test_find_flies_the_scenario_and_its_result_is_json() -> None:
     found = find(base, "period", tolerance=0.02)
     fields = json.loads(json.dumps(dataclasses.asdict(found)))
     assert fields.keys() == {
-        "of", "local_limit", "large_signal_limit", "tolerance", "confidence", "seeds", "note"
+        "of", "local_limit", "local_limit_outside", "large_signal_limit", "refuted_limit", "horizon", "tolerance",
+        "scan", "confidence", "seeds", "flies_above", "continuous", "tried", "note",
     }  # fmt: skip
     limit = found.large_signal_limit
     assert limit is not None
     assert flies(orchestration.run(base.with_changes(timing={"period": limit})).metrics)
     assert fields["local_limit"] == pytest.approx(0.080, abs=0.0005)
     assert (fields["of"], fields["tolerance"], fields["confidence"]) == ("period", 0.02, None)
+    assert (fields["horizon"], fields["scan"], fields["continuous"]) == (2.0, 0.005, None)
+    assert [one["value"] for one in fields["tried"]][:5] == [0.001, 0.002, 0.003, 0.004, 0.005]
+    assert fields["tried"][0] == {
+        "value": 0.001, "outcome": "settled", "divergence_time": None, "flew": 1, "runs": 1, "share": None,
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -463,6 +587,8 @@ def test_find_of_a_random_quantity_is_the_same_with_any_number_of_workers(worker
         ({"tolerance": 0.0}, "--tolerance 0.0: expected a positive number"),
         ({"tolerance": -1.0}, "--tolerance -1.0: expected a positive number"),
         ({"tolerance": math.nan}, "--tolerance nan: expected a positive number"),
+        ({"scan": 0.0}, "--scan 0.0: expected a positive number"),
+        ({"scan": math.inf}, "--scan inf: expected a positive number"),
         ({"confidence": 0.0}, "--confidence 0.0: expected a number between 0 and 1"),
         ({"confidence": 1.0}, "--confidence 1.0: expected a number between 0 and 1"),
         ({"confidence": math.nan}, "--confidence nan: expected a number between 0 and 1"),

@@ -127,7 +127,8 @@ def test_limit_prints_json_alone_on_standard_output_and_what_it_tries_on_standar
     assert found["confidence"] is None
     assert 0.0 < found["local_limit"] < 0.1
     assert found["large_signal_limit"] is None, "the paper's flight begins two metres away"
-    assert done.stderr == "delay 0 s: fails\n"
+    assert done.stderr.splitlines() == [f"delay {value:g} s: fails, bounded" for value in (0, 0.005, 0.01, 0.015, 0.02)]
+    assert [one["outcome"] for one in found["tried"]] == ["bounded"] * 5
 
 
 def test_limit_takes_the_flags_of_a_flight(tmp_path: Path) -> None:
@@ -145,7 +146,8 @@ def test_limit_prints_both_figures_and_says_that_they_differ(tmp_path: Path) -> 
     lines = quadcosim(*LIMIT, cwd=tmp_path).stdout.splitlines()
     found = {line.split()[0]: line.split(maxsplit=1)[1] for line in lines}
     assert float(found["local_limit"]) == pytest.approx(0.080, abs=0.0005)
-    assert found["large_signal_limit"] == "-"
+    assert found["large_signal_limit"] == found["continuous"] == found["flies_above"] == "-"
+    assert (float(found["horizon"]), float(found["scan"]), found["tried"]) == (0.05, 0.005, "5 values")
     assert "more than a tenth from the local limit" in found["note"]
 
 
