@@ -100,7 +100,9 @@ def run(
             result = pause.fly_until(chosen, pause_at, out, figures=figures, progress=progress, announce=say)
         elif out is not None:
             chosen = scenario_from(scenario, flags)
-            result = keep_flight(out, lambda _: fly(chosen, progress=progress, announce=say), figures=figures)
+            result = keep_flight(
+                out, lambda to: fly(chosen, recorder=to, progress=progress, announce=say), figures=figures
+            )
         else:
             result = fly(scenario_from(scenario, flags), progress=progress, announce=say)
     if result is None:
@@ -126,7 +128,7 @@ def plot(
     from orchestration.run_directory import load_run
 
     result = load_run(directory)
-    last = float(result.signals["time"][-1])
+    last = result.end
     window = None
     if start is not None or end is not None:
         window = (0.0 if start is None else start, last if end is None else end)

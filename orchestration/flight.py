@@ -17,8 +17,9 @@ from orchestration.errors import UsageError, expected_name
 from orchestration.fleet import Loader
 from orchestration.fmpy_adapter import FmuSimulator
 from orchestration.interrupt import Interrupt, Interrupted, interrupts_held_back
-from orchestration.master import Event, Master, Signals
+from orchestration.master import Master, Signals
 from orchestration.nominal_model import mismatch
+from orchestration.recording import InMemory, Recorder, Recording
 from orchestration.reference import BuiltIn, FromFile, ReferencePath
 from orchestration.result import Result, rows_of
 from orchestration.scenario import FmuChoice, Parameter, Scenario
@@ -32,14 +33,20 @@ Announce = Callable[[str], None]
 
 
 def run(
-    scenario: Scenario | None = None, *, progress: Progress | None = None, announce: Announce | None = None
+    scenario: Scenario | None = None,
+    *,
+    recorder: Recorder | None = None,
+    progress: Progress | None = None,
+    announce: Announce | None = None,
 ) -> Result:
     """Fly a scenario, the paper's if none is given; divergence is a result, not an error.
+
+    Its rows are kept in memory unless a `recorder` takes them.
 
     Raises `UsageError` for an FMU, variable or value that does not exist, `SimulatorError` if an FMU
     refuses a call for another reason than divergence, `FlightInterrupted` after Ctrl-C.
     """
-    with prepared(scenario or Scenario(), announce) as flight:
+    with prepared(scenario or Scenario(), announce, recorder=recorder) as flight:
         flight.master.initialise()
         flight.master.run(progress=progress)
         return flight.result()
@@ -62,35 +69,27 @@ class Flight:
     controller: FmuSimulator
     reference: ReferencePath
     master: Master
+    recorder: Recorder
     interrupt: Interrupt
     started: float
     """on the performance counter [s]"""
 
     def result(self) -> Result:
         """What was recorded so far, with its metrics; raises `FlightInterrupted` with it if that is why it ended."""
-        master, columns = self.master, self.master.board.columns
-        rows = master.rows()
-        events = tuple(sorted(map(Event._make, master.events), key=lambda event: event.time))
-        desired = self.reference.positions(rows[:, 0])
-        lost = rows_of(rows[:, 0], events, "lost", "measurement")
+        master, recording = self.master, self.recorder.finish()
         computed = metrics.compute(
-            {name: rows[:, i] for i, name in enumerate(columns)},
-            desired,
-            measured=rows_of(rows[:, 0], events, "sampled") & ~lost,
-            arrived=rows_of(rows[:, 0], events, "arrived"),
+            lambda: _spans(recording),
             hold=self.scenario.timing.hold,
             thrust_max=_parameter(self.plant, self.scenario.plant, wiring.THRUST_MAX, math.inf),
             torque_max=_parameter(self.plant, self.scenario.plant, wiring.TORQUE_MAX, math.inf),
         )
         diverged_at = None if master.divergence_time is None else master.divergence_time / NANOSECONDS
-        horizon = float(rows[-1, 0]) if diverged_at is None else self.scenario.stop_time
+        end = float(master.board.row[0])
+        horizon = end if diverged_at is None else self.scenario.stop_time
         interrupted_at = None if master.interrupted_at is None else master.interrupted_at / NANOSECONDS
         result = Result(
             scenario=self.scenario,
-            columns=columns,
-            rows=rows,
-            desired=desired,
-            events=events,
+            recording=recording,
             metrics={
                 **metrics.judged(computed, horizon=horizon, divergence_time=diverged_at),
                 "diverged": diverged_at is not None,
@@ -108,7 +107,7 @@ class Flight:
             ),
         )
         if self.interrupt.requested:
-            raise FlightInterrupted(f"at t = {rows[-1, 0]:g} s of {self.scenario.stop_time:g} s", result)
+            raise FlightInterrupted(f"at t = {end:g} s of {self.scenario.stop_time:g} s", result)
         return result
 
     def _mismatch(self) -> tuple[str, ...]:
@@ -119,13 +118,31 @@ class Flight:
         return () if found is None else (found,)
 
 
+def _spans(recording: Recording) -> Iterator[metrics.Span]:
+    for chunk in recording.chunks(metrics.COLUMNS):
+        t, events = chunk.rows[:, 0], chunk.events
+        yield metrics.Span(
+            signals=chunk.signals,
+            desired=chunk.desired,
+            measured=rows_of(t, events, "sampled") & ~rows_of(t, events, "lost", "measurement"),
+            arrived=rows_of(t, events, "arrived"),
+        )
+
+
 @contextmanager
-def prepared(scenario: Scenario, announce: Announce | None = None, *, load: Loader = FmuSimulator) -> Iterator[Flight]:
+def prepared(
+    scenario: Scenario,
+    announce: Announce | None = None,
+    *,
+    load: Loader = FmuSimulator,
+    recorder: Recorder | None = None,
+) -> Iterator[Flight]:
     """Both FMUs of `scenario`, built if need be, instantiated by `load` and with their parameters.
 
     Ctrl-C ends the flight at its next instant.
     """
     started = time.perf_counter()
+    recorder = InMemory() if recorder is None else recorder
     plant_path = fmus.locate(scenario.plant.fmu, announce)
     controller_path = fmus.locate(scenario.controller.fmu, announce)
     with (
@@ -145,6 +162,7 @@ def prepared(scenario: Scenario, announce: Announce | None = None, *, load: Load
             plant=plant,
             controller=controller,
             reference=reference,
+            recorder=recorder,
             interrupt=interrupt,
             started=started,
             master=Master(
@@ -158,6 +176,7 @@ def prepared(scenario: Scenario, announce: Announce | None = None, *, load: Load
                     plant=_recorded(plant, scenario.record.plant),
                     controller=_recorded(controller, scenario.record.controller),
                 ),
+                recorder=recorder,
                 interrupted=lambda: interrupt.requested,
             ),
         )

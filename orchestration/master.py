@@ -8,12 +8,13 @@ after its instant, and at the end the controller is not stepped.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from orchestration.clock import Clock, Sample
 from orchestration.errors import SimulatorError
+from orchestration.recording import ROWS, Chunk, Event, Recorder
 from orchestration.reference import FromFile, ReferencePath
 from orchestration.sensors import Sensors
 from orchestration.simulator import Floats, Simulator, Transfer
@@ -24,19 +25,6 @@ FARTHEST = 100.0
 """[m] of position error, beyond which the loop counts as diverged"""
 FASTEST = 1000.0
 """[rad/s] of angular speed, likewise"""
-
-
-class Event(NamedTuple):
-    """Something that happened to one sample, its measurement or its command."""
-
-    time: int
-    """[ns]"""
-    kind: str
-    """sampled, sent, arrived or lost"""
-    what: str
-    """measurement or command"""
-    sample: int
-    """index of the sample"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,6 +66,7 @@ class Master:
         sensors: Sensors,
         reference: ReferencePath,
         signals: Signals,
+        recorder: Recorder,
         interrupted: Callable[[], bool] = lambda: False,
     ) -> None:
         self.board = board = Board(signals)
@@ -90,7 +79,11 @@ class Master:
         self._plant, self._controller = plant, controller
         self._interrupted = interrupted
         self._clock, self._timing, self._sensors, self._reference = clock, timing, sensors, reference
-        self._rows = bytearray()
+        self._recorder = recorder
+        self._rows = bytearray()  # not handed over yet, and the times of `events` may lie before them
+        self._chunk = ROWS * board.row.nbytes
+        self._handed_over = False
+        recorder.begin(board.columns)
         self._received: Floats = np.zeros(len(MEASUREMENT))
         self._in_flight: dict[int, Floats] = {}
         self._applied: list[tuple[int, Floats]] = []  # the last two, with their times
@@ -127,8 +120,12 @@ class Master:
 
         So it is at the first instant after an interruption, but not at its end.
         """
-        if self.divergence is not None:
-            return True
+        over = self.divergence is not None or self._fly(pause_at, progress)
+        if over:
+            self._finish()
+        return over
+
+    def _fly(self, pause_at: int | None, progress: Callable[[float], None] | None) -> bool:
         count = 0
         try:
             for time, sample, arrivals in self._clock:
@@ -155,12 +152,20 @@ class Master:
             progress(1.0)
         return True
 
-    def rows(self) -> Floats:
-        """All recorded rows, shape (number of instants, number of `board.columns`)."""
-        return np.frombuffer(bytes(self._rows), dtype=np.float64).reshape(-1, len(self.board.columns))
+    def pending(self) -> Chunk:
+        """What was recorded since the last chunk was handed over; commands that go out later are left out."""
+        columns = self.board.columns
+        rows = np.frombuffer(bytes(self._rows), dtype=np.float64).reshape(-1, len(columns))
+        events = sorted((event for event in self.events if event[0] <= self.now), key=lambda event: event[0])
+        return Chunk(
+            columns=columns,
+            rows=rows,
+            desired=self._reference.positions(rows[:, 0]),
+            events=tuple(map(Event._make, events)),
+        )
 
     def state(self) -> dict[str, Any]:
-        """All that the rest of the run depends on, and what was recorded so far."""
+        """All that the rest of the run depends on, and what the recorder does not have yet."""
         return {
             "plant": self._plant.save(),
             "controller": self._controller.save(),
@@ -169,6 +174,7 @@ class Master:
             "steps": self.steps,
             "row": self.board.row.tobytes(),
             "rows": bytes(self._rows),
+            "handed_over": self._handed_over,
             "received": self._received.tobytes(),
             "in_flight": [(index, command.tolist()) for index, command in self._in_flight.items()],
             "applied": [(time, command.tolist()) for time, command in self._applied],
@@ -182,7 +188,7 @@ class Master:
         self._clock.restore(state["clock"])
         self.now, self.steps = state["now"], state["steps"]
         self.board.row[:] = np.frombuffer(state["row"])
-        self._rows = bytearray(state["rows"])
+        self._rows, self._handed_over = bytearray(state["rows"]), state["handed_over"]
         self._received[:] = np.frombuffer(state["received"])
         self._in_flight = {index: np.array(command) for index, command in state["in_flight"]}
         self._applied = [(time, np.array(command)) for time, command in state["applied"]]
@@ -283,6 +289,18 @@ class Master:
         row = self.board.row
         row[0] = time / NANOSECONDS
         self._rows += row.data
+        if len(self._rows) == self._chunk:
+            self._hand_over()
+
+    def _hand_over(self) -> None:
+        self._recorder.take(self.pending())
+        self.events = [event for event in self.events if event[0] > self.now]
+        self._rows.clear()
+        self._handed_over = True
+
+    def _finish(self) -> None:
+        if self._rows or self.events or not self._handed_over:
+            self._hand_over()
 
     def _reference_writer(self) -> Callable[[float], None]:
         """Feeds the reference inputs, if the reference is a file."""

@@ -9,10 +9,12 @@ import numpy as np
 
 from orchestration.errors import UsageError
 from orchestration.flight import Announce, Flight, Progress, prepared
+from orchestration.recording import InMemory, Recorder
 from orchestration.result import Result
 from orchestration.run_directory import METRICS, SCENARIO, STATE, keep_flight
 from orchestration.scenario import Scenario
 from orchestration.scenario_file import load_scenario
+from orchestration.tables import InFolder, ToFolder
 from orchestration.timing import nanoseconds
 
 _ARRAYS = ("plant", "controller", "row", "rows", "received")
@@ -37,12 +39,13 @@ def fly_until(
             f"pause at {pause_at:g} s: expected a time from 0 to before stop_time {scenario.stop_time:g} s"
         )
 
-    def fly(new: Path) -> Result | None:
-        with prepared(scenario, announce) as flight:
+    def fly(recorder: ToFolder) -> Result | None:
+        with prepared(scenario, announce, recorder=recorder) as flight:
             flight.master.initialise()
             if flight.master.run(pause_at=nanoseconds(pause_at), progress=progress):
                 return flight.result()
-            _write(flight, new)
+            recorder.finish()
+            _write(flight, recorder.folder)
             return None
 
     return keep_flight(folder, fly, figures=figures, replaces=())
@@ -69,15 +72,17 @@ def resume(
         state: dict[str, Any] = json.loads(str(archive["json"]))
         state |= {name: archive[name].tobytes() for name in _ARRAYS}
 
-    def fly(new: Path | None = None) -> Result:
-        with prepared(scenario, announce) as flight:
+    def fly(recorder: Recorder) -> Result:
+        with prepared(scenario, announce, recorder=recorder) as flight:
             _expect_same(state.pop("of"), flight, folder)
+            for chunk in InFolder(folder).chunks():
+                recorder.take(chunk)
             flight.master.restore(state)
             flight.master.run(progress=progress)
             return flight.result()
 
     if out is None:
-        return fly()
+        return fly(InMemory())
     same = folder.resolve() == Path(out).resolve()
     result = keep_flight(out, fly, figures=figures, replaces=(METRICS, STATE) if same else (METRICS,))
     assert result is not None

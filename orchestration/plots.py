@@ -1,6 +1,7 @@
 """Figures of one run: the path, the errors, the commands with what happened when, the energy."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
@@ -8,7 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration.metrics import position_error
+from orchestration.metrics import COLUMNS, position_error
+from orchestration.recording import thinned
 from orchestration.result import Result
 from orchestration.simulator import Floats
 from orchestration.wiring import COMMAND, ENERGY, POSITION, components
@@ -29,12 +31,28 @@ BLUE, ORANGE, GREEN, RED, GREY = "#1f6f9f", "#e0812b", "#2f8f5b", "#b5323e", "#8
 FIGURES = ("path", "errors", "commands", "energy")
 """The figures of a run, in the order in which they are drawn; the last where the controller has an energy."""
 
+_ERRORS = (
+    (r"velocity  [m/s]", ORANGE, components("velocity_error")),
+    (r"attitude  $\|\tilde q\|$  [1]", GREEN, components("attitude_error")),
+    (r"angular velocity  [rad/s]", RED, components("angular_velocity_error")),
+)
+_DRAWN = {*COLUMNS, *(f"controller.{name}" for _, _, names in _ERRORS for name in names)}
+
 Window = tuple[float, float]
 """A span of time [s]."""
 
 
+MOST = 2**16
+"""rows that are drawn of the whole of a longer run, beside all in the window"""
+
+
 def draw(result: Result, folder: Path, window: Window | None = None) -> list[Path]:
-    """Write the figures of a run as PNG; `window` is what the commands are zoomed on. Returns their paths."""
+    """Write the figures of a run as PNG; `window` is what the commands are zoomed on. Returns their paths.
+
+    Of a run of more than `MOST` rows every n-th is drawn.
+    """
+    window = window or (0.0, min(1.0, result.end))
+    result = replace(result, recording=thinned(result.recording, _DRAWN, window, MOST))
     makers: tuple[Callable[[], Figure | None], ...] = (
         lambda: path(result),
         lambda: errors(result),
@@ -74,11 +92,7 @@ def errors(result: Result) -> Figure:
     axes = figure.add_subplot()
     t = result.signals["time"]
     _log_line(axes, t, position_error(result.signals, result.desired), BLUE, "position  [m]")
-    for label, color, names in (
-        (r"velocity  [m/s]", ORANGE, components("velocity_error")),
-        (r"attitude  $\|\tilde q\|$  [1]", GREEN, components("attitude_error")),
-        (r"angular velocity  [rad/s]", RED, components("angular_velocity_error")),
-    ):
+    for label, color, names in _ERRORS:
         columns = [result.signals.get(f"controller.{name}") for name in names]
         if all(column is not None for column in columns):
             _log_line(axes, t, np.linalg.norm(np.array(columns), axis=0), color, label)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from orchestration.master import Event
 from orchestration.metrics import Metrics
+from orchestration.recording import Event, Recording
 from orchestration.scenario import Scenario
 from orchestration.simulator import Floats
 
@@ -18,14 +18,8 @@ class Result:
     """One run: what was asked, what was recorded, what it comes to."""
 
     scenario: Scenario
-    columns: tuple[str, ...]
-    """`time`, then `plant.NAME` and `controller.NAME`"""
-    rows: Floats
-    """shape (n, number of columns); a row is the value just after its instant"""
-    desired: Floats
-    """P_d at the rows [m], inertial, shape (n, 3)"""
-    events: tuple[Event, ...]
-    """in order of time"""
+    recording: Recording
+    """rows and events in chunks; what follows has them whole"""
     metrics: Metrics
     divergence: str | None
     """what diverged, if it did"""
@@ -35,6 +29,31 @@ class Result:
     """versions, the GUID of each FMU, and `wall_time`, what the run took [s]"""
     warnings: tuple[str, ...] = ()
     """what the FMUs warned of"""
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """`time`, then `plant.NAME` and `controller.NAME`."""
+        return self.recording.columns
+
+    @cached_property
+    def rows(self) -> Floats:
+        """Shape (n, number of columns); a row is the value just after its instant."""
+        return np.concatenate([chunk.rows for chunk in self.recording.chunks()])
+
+    @cached_property
+    def desired(self) -> Floats:
+        """P_d at the rows [m], inertial, shape (n, 3)."""
+        return np.concatenate([chunk.desired for chunk in self.recording.chunks(("time",))])
+
+    @cached_property
+    def events(self) -> tuple[Event, ...]:
+        """In order of time."""
+        return tuple(event for chunk in self.recording.chunks(("time",)) for event in chunk.events)
+
+    @property
+    def end(self) -> float:
+        """Time of the last row [s]."""
+        return [float(t) for chunk in self.recording.chunks(("time",)) for t in chunk.rows[-1:, 0]][-1]
 
     @cached_property
     def signals(self) -> dict[str, Floats]:

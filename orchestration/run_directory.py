@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable, Container
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 
 from orchestration import plots, tables
@@ -11,8 +12,9 @@ from orchestration.flight import FlightInterrupted
 from orchestration.folder import NewFolder, new_folder
 from orchestration.result import Result
 from orchestration.scenario_file import load_scenario
+from orchestration.tables import ToFolder
 
-SIGNALS, EVENTS = "signals.parquet", "events.parquet"
+SIGNALS, EVENTS = tables.SIGNALS, tables.EVENTS
 METRICS, SCENARIO, PROVENANCE = "metrics.json", "scenario.toml", "provenance.json"
 STATE = "paused.npz"
 """of a run that has been paused"""
@@ -24,19 +26,19 @@ def save_run(result: Result, folder: str | Path, *, figures: bool = True) -> Pat
     Raises `UsageError` if `folder` holds something else.
     """
     with run_folder(Path(folder), (METRICS,)) as new:
+        tables.copy(result.recording, new.path)
         _write(result, new.path, figures=figures)
     return Path(folder)
 
 
 def _write(result: Result, folder: Path, *, figures: bool) -> None:
+    """All that is in the directory of a run but its recording."""
     notes = {
         **result.provenance,
         "divergence": result.divergence,
         "interrupted_at": result.interrupted_at,
         "warnings": list(result.warnings),
     }
-    tables.write_signals(folder / SIGNALS, result.columns, result.rows, result.desired)
-    tables.write_events(folder / EVENTS, result.events)
     (folder / METRICS).write_text(json.dumps(result.metrics, indent=2) + "\n", encoding="utf-8")
     (folder / SCENARIO).write_text(result.scenario.to_toml(), encoding="utf-8")
     (folder / PROVENANCE).write_text(json.dumps(notes, indent=2) + "\n", encoding="utf-8")
@@ -50,14 +52,10 @@ def load_run(folder: str | Path) -> Result:
     missing = [name for name in (SIGNALS, EVENTS, METRICS, SCENARIO, PROVENANCE) if not (folder / name).is_file()]
     if missing:
         raise UsageError(f"{folder}: expected the directory of a run; it has no {', '.join(missing)}")
-    columns, rows, desired = tables.read_signals(folder / SIGNALS)
     notes = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
     return Result(
         scenario=load_scenario(folder / SCENARIO),
-        columns=columns,
-        rows=rows,
-        desired=desired,
-        events=tables.read_events(folder / EVENTS),
+        recording=tables.InFolder(folder),
         metrics=json.loads((folder / METRICS).read_text(encoding="utf-8")),
         divergence=notes.pop("divergence"),
         interrupted_at=notes.pop("interrupted_at"),
@@ -68,23 +66,23 @@ def load_run(folder: str | Path) -> Result:
 
 def keep_flight(
     folder: str | Path,
-    fly: Callable[[Path], Result | None],
+    fly: Callable[[ToFolder], Result | None],
     *,
     figures: bool = True,
     replaces: Container[str] = (METRICS,),
 ) -> Result | None:
     """Fly, and write the directory of the run, whose place is made sure of before; the result.
 
-    `fly` is given the new directory; if it comes to no result, it has written there what is to be kept. The
-    directory takes the place of an earlier one that has a file of `replaces`. If that cannot be after all, it
-    is kept beside `folder`, and `QuadcosimError` says where. After Ctrl-C what was recorded is kept too, but
-    not in place of anything: `FlightInterrupted` says where. Raises `UsageError` if `folder` holds something
-    else or cannot be written.
+    `fly` is given what records in the new directory as the flight goes on; if it comes to no result, it has
+    written there what is to be kept. The directory takes the place of an earlier one that has a file of
+    `replaces`. If that cannot be after all, it is kept beside `folder`, and `QuadcosimError` says where. After
+    Ctrl-C what was recorded is kept too, but not in place of anything: `FlightInterrupted` says where. Raises
+    `UsageError` if `folder` holds something else or cannot be written.
     """
     interrupted: FlightInterrupted | None = None
     with run_folder(Path(folder), replaces) as new:
         try:
-            result = fly(new.path)
+            result = fly(ToFolder(new.path))
         except FlightInterrupted as stop:
             interrupted, result = stop, stop.result
             new.replaces = result.interrupted_at is None
@@ -92,8 +90,9 @@ def keep_flight(
         if result is not None:
             _write(result, new.path, figures=figures)
     if interrupted is not None:
-        raise FlightInterrupted(f"{interrupted}; what was recorded is in {new.place}", interrupted.result)
-    return result
+        result = replace(interrupted.result, recording=tables.InFolder(new.place))
+        raise FlightInterrupted(f"{interrupted}; what was recorded is in {new.place}", result)
+    return result and replace(result, recording=tables.InFolder(new.place))
 
 
 def run_folder(folder: Path, replaces: Container[str] = ()) -> AbstractContextManager[NewFolder]:

@@ -1,47 +1,111 @@
-"""Signals and events as Parquet files."""
+"""Signals and events as Parquet files, a row group for each chunk."""
 
+from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from orchestration.master import Event
+from orchestration.recording import Chunk, Event, Recording
 from orchestration.simulator import Floats
 from orchestration.wiring import POSITION_REFERENCE
 
-
-def write_signals(path: Path | BinaryIO, columns: tuple[str, ...], rows: Floats, desired: Floats) -> None:
-    """One column each for the recorded values (n, m) and for P_d (n, 3), all float64."""
-    arrays = {name: rows[:, i] for i, name in enumerate(columns)}
-    arrays |= {name: desired[:, i] for i, name in enumerate(POSITION_REFERENCE)}
-    pq.write_table(pa.table(arrays), path)
+SIGNALS, EVENTS = "signals.parquet", "events.parquet"
+_EVENT = pa.schema([("time", pa.float64()), ("event", pa.string()), ("what", pa.string()), ("sample", pa.int64())])
 
 
-def read_signals(path: Path) -> tuple[tuple[str, ...], Floats, Floats]:
-    """Columns, rows (n, m) and P_d (n, 3) as they were written."""
-    table = pq.read_table(path)
-    columns = tuple(name for name in table.column_names if name not in POSITION_REFERENCE)
-    return columns, _matrix(table, columns), _matrix(table, POSITION_REFERENCE)
+class ToFolder:
+    """A recorder that writes each chunk to the files of a folder as it comes."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._writers: tuple[Any, Any] | None = None
+
+    def begin(self, columns: tuple[str, ...]) -> None:
+        """As `Recorder`."""
+        self._writers = (
+            pq.ParquetWriter(self.folder / SIGNALS, _signals_schema(columns)),
+            pq.ParquetWriter(self.folder / EVENTS, _EVENT),
+        )
+
+    def take(self, chunk: Chunk) -> None:
+        """As `Recorder`."""
+        assert self._writers is not None
+        signals, events = self._writers
+        signals.write_table(_signals_table(chunk))
+        events.write_table(_events_table(chunk.events))
+
+    def finish(self) -> "InFolder":
+        """As `Recorder`; the files are complete then."""
+        for writer in self._writers or ():
+            writer.close()
+        self._writers = None
+        return InFolder(self.folder)
 
 
-def _matrix(table: pa.Table, names: tuple[str, ...]) -> Floats:
+class InFolder:
+    """A recording in the files of a folder, of which a chunk at a time is read."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        with pq.ParquetFile(folder / SIGNALS) as signals:
+            self._count: int = signals.metadata.num_rows
+            self.columns = tuple(name for name in signals.schema_arrow.names if name not in POSITION_REFERENCE)
+
+    def __len__(self) -> int:
+        return self._count
+
+    def chunks(self, columns: Collection[str] | None = None) -> Iterator[Chunk]:
+        """As `Recording`."""
+        names = tuple(name for name in self.columns if columns is None or name in columns)
+        with pq.ParquetFile(self._folder / SIGNALS) as signals, pq.ParquetFile(self._folder / EVENTS) as events:
+            for group in range(signals.num_row_groups):
+                table = signals.read_row_group(group, [*names, *POSITION_REFERENCE])
+                yield Chunk(
+                    columns=names,
+                    rows=_matrix(table, names),
+                    desired=_matrix(table, POSITION_REFERENCE),
+                    events=_events(events.read_row_group(group)),
+                )
+
+
+def copy(recording: Recording, folder: Path) -> None:
+    """Write the files of `folder`."""
+    recorder = ToFolder(folder)
+    recorder.begin(recording.columns)
+    for chunk in recording.chunks():
+        recorder.take(chunk)
+    recorder.finish()
+
+
+def write_signals(path: Path | BinaryIO, recording: Recording) -> None:
+    """One column each for the recorded values and for P_d, all float64."""
+    with pq.ParquetWriter(path, _signals_schema(recording.columns)) as writer:
+        for chunk in recording.chunks():
+            writer.write_table(_signals_table(chunk))
+
+
+def _signals_schema(columns: tuple[str, ...]) -> Any:
+    return pa.schema([(name, pa.float64()) for name in (*columns, *POSITION_REFERENCE)])
+
+
+def _signals_table(chunk: Chunk) -> Any:
+    desired = {name: chunk.desired[:, i] for i, name in enumerate(POSITION_REFERENCE)}
+    return pa.table({**chunk.signals, **desired})
+
+
+def _matrix(table: Any, names: tuple[str, ...]) -> Floats:
     return np.column_stack([table[name].to_numpy() for name in names])
 
 
-def write_events(path: Path, events: tuple[Event, ...]) -> None:
+def _events_table(events: tuple[Event, ...]) -> Any:
     """`time` [s], `event`, `what` and `sample`, in order of time."""
-    table = {
-        "time": pa.array([event.time / 1e9 for event in events], pa.float64()),
-        "event": pa.array([event.kind for event in events], pa.string()),
-        "what": pa.array([event.what for event in events], pa.string()),
-        "sample": pa.array([event.sample for event in events], pa.int64()),
-    }
-    pq.write_table(pa.table(table), path)
+    columns = list(zip(*((event.time / 1e9, *event[1:]) for event in events))) or [()] * 4
+    return pa.table([pa.array(c, field.type) for c, field in zip(columns, _EVENT, strict=True)], schema=_EVENT)
 
 
-def read_events(path: Path) -> tuple[Event, ...]:
-    """The events as they were written."""
-    table = pq.read_table(path).to_pylist()
-    return tuple(Event(round(row["time"] * 1e9), row["event"], row["what"], row["sample"]) for row in table)
+def _events(table: Any) -> tuple[Event, ...]:
+    time, *others = (table[name].to_pylist() for name in _EVENT.names)
+    return tuple(map(Event._make, zip([round(t * 1e9) for t in time], *others, strict=True)))

@@ -122,5 +122,5 @@ def _parquet(result: Result) -> bytes:
     from orchestration import tables  # pyarrow loads only where signals are kept
 
     buffer = io.BytesIO()
-    tables.write_signals(buffer, result.columns, result.rows, result.desired)
+    tables.write_signals(buffer, result.recording)
     return buffer.getvalue()

@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from orchestration.clock import Clock, random_streams
 from orchestration.errors import SimulatorError
-from orchestration.master import Event, Master, Signals
+from orchestration.master import Master, Signals
+from orchestration.recording import Chunk, Event, InMemory
 from orchestration.reference import ReferencePath
 from orchestration.sensors import Sensors
 from orchestration.simulator import Floats, Simulator, Transfer
@@ -170,6 +171,7 @@ class Flown:
         self.plant = plant or Plant(**{"position.x": 1.0})
         self.controller: Any = controller or Counting()
         streams = random_streams(seed)
+        self.recorder = InMemory()
         self.master = Master(
             self.plant,
             self.controller,
@@ -178,6 +180,7 @@ class Flown:
             sensors=Sensors(MEASUREMENT, timing, streams["noise"]),
             reference=reference or AtOrigin(),
             signals=Signals(plant=(), controller=()),
+            recorder=self.recorder,
         )
         self.over: bool | None = None
         if start:
@@ -185,16 +188,25 @@ class Flown:
             self.over = self.master.run()
 
     def column(self, name: str) -> npt.NDArray[np.float64]:
-        return self.master.rows()[:, self.master.board.columns.index(name)]
+        return self.rows()[:, self.master.board.columns.index(name)]
+
+    def chunks(self) -> list[Chunk]:
+        """What was handed over, and what was not yet."""
+        return [*self.recorder.chunks(), self.master.pending()]
+
+    def rows(self) -> Floats:
+        return np.concatenate([chunk.rows for chunk in self.chunks()])
+
+    def all_events(self) -> list[Event]:
+        return [event for chunk in self.chunks() for event in chunk.events]
 
     def nanoseconds(self) -> list[int]:
         return [round(t * 1e9) for t in self.column("time")]
 
     def events(self, kind: str, what: str | None = None) -> list[Event]:
-        """In the order in which they were written down."""
-        events = [Event(*event) for event in self.master.events]
-        return [event for event in events if event.kind == kind and what in (None, event.what)]
+        """In order of time."""
+        return [event for event in self.all_events() if event.kind == kind and what in (None, event.what)]
 
     def bits(self) -> tuple[bytes, list[tuple[Any, ...]]]:
         """All that was recorded."""
-        return self.master.rows().tobytes(), [tuple(event) for event in self.master.events]
+        return self.rows().tobytes(), [tuple(event) for event in self.all_events()]

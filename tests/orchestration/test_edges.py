@@ -8,7 +8,7 @@ import pytest
 
 from orchestration.clock import Clock, random_streams
 from orchestration.errors import UsageError
-from orchestration.run_directory import replaced_folder
+from orchestration.run_directory import run_folder
 from orchestration.scenario import Scenario
 from orchestration.scenario_file import load_scenario
 from orchestration.timing import Timing
@@ -82,7 +82,7 @@ def test_changing_a_key_that_does_not_exist_says_which_do() -> None:
 
 def test_no_command_is_sent_after_the_end() -> None:
     flown = Flown(Timing(period=0.01, order="jacobi"), 0.025)
-    assert max(event[0] for event in flown.master.events) <= 25_000_000
+    assert max(event[0] for event in flown.all_events()) <= 25_000_000
 
 
 def test_a_state_that_was_taken_does_not_change_while_the_run_goes_on() -> None:
@@ -102,14 +102,14 @@ def test_a_folder_with_something_beside_a_run_is_not_replaced(tmp_path: Path) ->
     folder.mkdir()
     (folder / "scenario.toml").write_text("")
     (folder / "notes.txt").write_text("precious")
-    with pytest.raises(UsageError, match="nothing else in it"), replaced_folder(folder):
+    with pytest.raises(UsageError, match="nothing else in it"), run_folder(folder, ("metrics.json",)):
         pass
     assert (folder / "notes.txt").read_text() == "precious"
 
 
 def test_the_folder_one_is_in_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(UsageError, match="another directory"), replaced_folder(Path()):
+    with pytest.raises(UsageError, match="another directory"), run_folder(Path()):
         pass
     assert list(tmp_path.parent.glob(f".{tmp_path.name}*")) == []
 

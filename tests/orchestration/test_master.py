@@ -90,7 +90,7 @@ def test_the_first_exchange_is_neither_lost_nor_late_nor_noisy() -> None:
 
 def test_the_first_exchange_is_no_sample() -> None:
     flown = Flown(Timing(offset=0.5), 0.1)
-    assert flown.master.events == []
+    assert flown.all_events() == []
     assert flown.controller.steps() == []
 
 
@@ -277,7 +277,7 @@ def test_every_sample_is_sent_and_then_arrives_or_is_lost_or_is_still_on_its_way
 
 def test_events_name_what_they_are_about() -> None:
     flown = Flown(Timing(period=0.01, delay=0.002), 0.005)
-    assert [tuple(event) for event in flown.master.events] == [
+    assert [tuple(event) for event in flown.all_events()] == [
         (0, "sampled", "measurement", 0),
         (0, "sent", "command", 0),
         (2 * MS, "arrived", "command", 0),
@@ -308,7 +308,7 @@ def test_leaving_the_region_ends_the_run_with_its_time(sudden: dict[str, float])
     assert flown.master.divergence_time == 12 * MS
     assert "expected a" in str(flown.master.divergence)
     assert flown.nanoseconds() == [k * MS for k in range(12)]  # what diverged is not recorded
-    assert np.isfinite(flown.master.rows()).all()
+    assert np.isfinite(flown.rows()).all()
     assert flown.plant.steps()[-1] == (0.011, 0.001)
 
 
@@ -323,7 +323,7 @@ def test_divergence_at_a_sampling_instant_is_noticed_before_the_controller_hears
 def test_in_jacobi_order_nothing_is_sent_or_lost_after_a_run_has_diverged(loss: float) -> None:
     flown = Flown(Timing(order="jacobi", command_loss=loss), 0.1, Straying(time=0.012, position__x=math.nan))
     assert flown.events("sampled")[-1].time == 10 * MS
-    assert max(event[0] for event in flown.master.events) == 10 * MS < (flown.master.divergence_time or 0)
+    assert max(event[0] for event in flown.all_events()) == 10 * MS < (flown.master.divergence_time or 0)
 
 
 def test_what_is_just_inside_the_region_flies_on() -> None:

@@ -1,7 +1,8 @@
 """Each metric against a signal of which it is known in closed form, or against another way to compute it."""
 
+import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from orchestration import metrics
+from orchestration import metrics, wiring
 from orchestration.timing import Hold
 from orchestration.wiring import COMMAND, POSITION
 
@@ -30,6 +31,7 @@ def measured(
     hold: Hold = "zero",
     thrust_max: float = math.inf,
     torque_max: float = math.inf,
+    cuts: Sequence[int] = (),
     **controller: Array,
 ) -> metrics.Metrics:
     """The metrics of a flight whose position error has this norm, spread over the axes as 2:-3:6."""
@@ -43,9 +45,20 @@ def measured(
         **{f"controller.{name}": values for name, values in controller.items()},
     }
     marks = [np.ones(len(t), dtype=bool) if rows is None else rows.astype(bool) for rows in (sampled, arrived)]
-    return metrics.compute(
-        signals, desired, measured=marks[0], arrived=marks[1], hold=hold, thrust_max=thrust_max, torque_max=torque_max
-    )
+    whole = metrics.Span(signals=signals, desired=desired, measured=marks[0], arrived=marks[1])
+    return metrics.compute(lambda: parts(whole, cuts), hold=hold, thrust_max=thrust_max, torque_max=torque_max)
+
+
+def parts(whole: metrics.Span, cuts: Sequence[int]) -> Iterator[metrics.Span]:
+    """The spans between the cuts."""
+    for start, end in itertools.pairwise((0, *cuts, None)):
+        rows = slice(start, end)
+        yield metrics.Span(
+            signals={name: values[rows] for name, values in whole.signals.items()},
+            desired=whole.desired[rows],
+            measured=whole.measured[rows],
+            arrived=whole.arrived[rows],
+        )
 
 
 # -- position ---------------------------------------------------------------------------------------------
@@ -134,8 +147,9 @@ def test_an_error_that_comes_back_settles_after_the_last_time() -> None:
     assert measured(bump)["settling_time"] == pytest.approx(1.501)
 
 
-def test_an_error_of_exactly_the_tolerance_is_settled() -> None:
-    assert metrics._settling_time(np.array([0.0, 1.0, 2.0]), np.array([1.0, 0.05, 0.05])) == 1.0
+def test_an_error_of_exactly_the_tolerance_is_settled(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(metrics, "position_error", lambda *_: np.array([1.0, 0.05, 0.05]))
+    assert measured(t=np.array([0.0, 1.0, 2.0]))["settling_time"] == 1.0
 
 
 # -- attitude and energy, at samples ----------------------------------------------------------------------
@@ -274,3 +288,22 @@ def test_a_run_of_one_row_has_finite_metrics() -> None:
 def test_metrics_are_plain_numbers_of_python() -> None:
     m = measured(0.1, energy=TIME, **{"attitude_error.w": np.ones(len(TIME))})
     assert {type(value) for value in m.values()} <= {float, int, bool, type(None)}
+
+
+@pytest.mark.parametrize("hold", ["zero", "first"])
+@pytest.mark.parametrize("cuts", [(1,), (1500,), (7, 8, 1000, 2999, 3000, 3001)], ids=str)
+def test_metrics_do_not_depend_on_where_a_flight_is_cut(hold: Hold, cuts: tuple[int, ...]) -> None:
+    random = np.random.default_rng(1)
+    walk = {name: np.repeat(random.normal(size=301), 10)[:3001] for name in COMMAND}
+    flight: dict[str, Any] = {
+        "command": walk,
+        "sampled": random.random(3001) < 0.1,
+        "arrived": np.arange(3001) % 10 == 0,
+        "hold": hold,
+        "thrust_max": 1.0,
+        "torque_max": 1.5,
+        wiring.ATTITUDE_ERROR_SCALAR: np.cos(TIME),
+        wiring.ENERGY: np.exp(-TIME) * (1.0 + 0.1 * random.normal(size=3001)),
+    }
+    error = np.exp(-2.0 * TIME) * (1.0 + 0.3 * np.sin(40.0 * TIME))
+    assert measured(error, cuts=cuts, **flight) == pytest.approx(measured(error, **flight), rel=1e-12)

@@ -7,7 +7,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 import matplotlib.image
@@ -19,6 +18,7 @@ import orchestration
 from orchestration import (
     FlightInterrupted,
     QuadcosimError,
+    Record,
     Result,
     Scenario,
     Timing,
@@ -27,6 +27,7 @@ from orchestration import (
     plots,
     save_run,
 )  # fmt: skip
+from orchestration.recording import Recorder
 from orchestration.run_directory import keep_flight
 
 FILES = {"signals.parquet", "events.parquet", "metrics.json", "scenario.toml"}
@@ -139,9 +140,9 @@ def test_a_run_without_samples_can_be_drawn(tmp_path: Path) -> None:
     assert {path.name for path in plots.draw(without, tmp_path)} == FIGURES - {"energy.png"}
 
 
-def test_no_energy_is_drawn_of_a_controller_that_has_none(result: Result, tmp_path: Path) -> None:
-    columns = tuple(name if name != "controller.energy" else "controller.other" for name in result.columns)
-    written = plots.draw(replace(result, columns=columns), tmp_path)
+def test_no_energy_is_drawn_of_a_controller_that_has_none(tmp_path: Path) -> None:
+    recorded = Record(controller=("attitude_error.w",))
+    written = plots.draw(orchestration.run(Scenario(stop_time=0.1, record=recorded)), tmp_path)
     assert {path.name for path in written} == {path.name for path in tmp_path.iterdir()} == FIGURES - {"energy.png"}
 
 
@@ -195,7 +196,7 @@ def test_what_is_not_there_is_no_run(folder: Path) -> None:
 # -- when writing does not end well -----------------------------------------------------------------------
 
 
-@pytest.fixture(params=["tables.write_signals", "tables.write_events", "plots.draw"])
+@pytest.fixture(params=["tables.ToFolder.take", "tables.copy", "plots.draw"])
 def failing(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """One of the steps of writing fails as on a full disk."""
 
@@ -317,7 +318,7 @@ def test_a_directory_follows_the_umask(mask: int, result: Result, folder: Path) 
 # -- a flight that goes into its directory ----------------------------------------------------------------
 
 
-def never(_: Path) -> Result:
+def never(_: Recorder) -> Result:
     raise AssertionError("flown")
 
 
@@ -332,11 +333,11 @@ def test_a_directory_that_cannot_be_is_refused_before_the_flight(folder: Path) -
 
 
 def test_a_flight_whose_place_is_taken_meanwhile_is_kept_beside(result: Result, folder: Path) -> None:
-    def fly(_: Path) -> Result:
+    def fly(recorder: Recorder) -> Result:
         folder.mkdir()
         (folder / "thesis.tex").write_text("years of work")
         folder.with_name("run.1").mkdir()
-        return result
+        return orchestration.run(result.scenario, recorder=recorder)
 
     with pytest.raises(QuadcosimError, match=r"expected a new .*; what was written is in .*run\.2$"):
         keep_flight(folder, fly, figures=False)
@@ -353,7 +354,7 @@ def test_a_flight_that_cannot_be_written_whole_is_kept_beside(
 
     monkeypatch.setattr(plots, "draw", fail)
     with pytest.raises(QuadcosimError, match=r"no space left on device; what was written is in .*run\.1$"):
-        keep_flight(folder, lambda _: result)
+        keep_flight(folder, lambda to: orchestration.run(result.scenario, recorder=to))
     assert load_run(folder.with_name("run.1")).rows.tobytes() == result.rows.tobytes()
 
 
@@ -369,7 +370,9 @@ def test_what_was_recorded_before_an_interruption_is_kept_but_replaces_nothing(
         os.kill(os.getpid(), signal.SIGINT)
 
     with pytest.raises(FlightInterrupted, match=r"^at t = 0\.5\d+ s of 3 s; what was recorded is in ") as stop:
-        keep_flight(folder, lambda _: orchestration.run(Scenario(stop_time=3.0), progress=progress), figures=False)
+        keep_flight(
+            folder, lambda to: orchestration.run(Scenario(stop_time=3.0), recorder=to, progress=progress), figures=False
+        )
     assert str(stop.value).endswith(str(place))
     kept = load_run(place)
     assert kept.interrupted_at == kept.signals["time"][-1] == kept.metrics["horizon"]

@@ -61,9 +61,9 @@ def both(case: Case) -> tuple[second_clock.Seen, second_clock.Seen]:
     count = len(COMMAND)
     rows = [
         second_clock.Row(t, values[:count], values[count:-count], values[-count:])
-        for t, *values in flown.master.rows().tolist()
+        for t, *values in flown.rows().tolist()
     ]
-    ours = second_clock.Seen(rows, plant.steps(), controller.steps(), sorted(flown.master.events))
+    ours = second_clock.Seen(rows, plant.steps(), controller.steps(), sorted(flown.all_events()))
     theirs = second_clock.fly(
         asdict(case.timing), case.stop_time, case.seed, moved, start, answered, answered(0.0, 0.0, start)
     )

@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 import orchestration
-from orchestration import QuadcosimError, Timing, UsageError, tables
+from orchestration import QuadcosimError, Timing, UsageError
 from orchestration.fmpy_adapter import FmuSimulator
 from orchestration.scenario import Scenario
 from orchestration.studies import engine, worker
@@ -23,6 +24,7 @@ from orchestration.studies.study import Fmus, Study, locate_fmus
 from orchestration.studies.study_file import load_study
 from orchestration.studies.sweep import store_path, sweep
 from orchestration.studies.worker import Hangar, Outcome, Task
+from orchestration.wiring import POSITION_REFERENCE
 from tests.studies.common import (
     GRID,
     NOISY,
@@ -300,11 +302,11 @@ def test_signals_of_the_chosen_runs_are_kept_and_are_those_of_a_direct_run(tmp_p
     kept = sorted((tmp_path / "signals").iterdir())
     assert [path.name for path in kept] == ["000001.parquet", "000002.parquet"]
     for index, path in zip((1, 2), kept, strict=True):
-        columns, rows, desired = tables.read_signals(path)
+        table = pq.read_table(path)
         direct = orchestration.run(chosen.scenario(index, starts()))
-        assert columns == direct.columns
-        assert np.array_equal(rows, direct.rows)
-        assert np.array_equal(desired, direct.desired)
+        assert tuple(table.column_names) == (*direct.columns, *POSITION_REFERENCE)
+        kept_rows = np.column_stack([table[name].to_numpy() for name in table.column_names])
+        assert np.array_equal(kept_rows, np.hstack([direct.rows, direct.desired]))
 
 
 def test_no_signals_are_kept_unless_told(tmp_path: Path) -> None:

@@ -1,0 +1,93 @@
+"""Rows and events that go to disk as the flight goes on are those of a flight that is kept in memory."""
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+import orchestration
+from orchestration import Result, Scenario, Timing, load_run, plots
+from orchestration.pause import fly_until, resume
+from orchestration.recording import InMemory, thinned
+from orchestration.run_directory import keep_flight
+
+JACOBI = Timing(order="jacobi", delay=0.003, jitter=0.004, command_loss=0.3, hold="first")
+SCENARIO = Scenario(stop_time=0.5, timing=JACOBI, seed=5)
+
+
+@pytest.fixture
+def whole() -> Result:
+    return orchestration.run(SCENARIO)
+
+
+@pytest.fixture(autouse=True)
+def _few_rows(whole: Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In each chunk, once the flight to compare with is over."""
+    monkeypatch.setattr("orchestration.master.ROWS", 64)
+
+
+def expect_equal(found: Result, whole: Result) -> None:
+    assert found.columns == whole.columns
+    assert found.rows.tobytes() == whole.rows.tobytes()
+    assert found.desired.tobytes() == whole.desired.tobytes()
+    assert found.events == whole.events
+    assert found.metrics.keys() == whole.metrics.keys()
+    for name, value in whole.metrics.items():  # sums over chunks differ in their last bits
+        near = pytest.approx(value, rel=1e-12) if isinstance(value, float) else value
+        assert found.metrics[name] == near
+
+
+def test_what_is_on_disk_is_what_was_flown_chunk_by_chunk(whole: Result, tmp_path: Path) -> None:
+    keep_flight(tmp_path / "run", lambda to: orchestration.run(SCENARIO, recorder=to), figures=False)
+    groups = pq.ParquetFile(tmp_path / "run" / "signals.parquet").metadata
+    sizes = [groups.row_group(i).num_rows for i in range(groups.num_row_groups)]
+    assert sizes[:-1] == [64] * (len(whole.rows) // 64)
+    found = load_run(tmp_path / "run")
+    expect_equal(found, whole)
+    for chunk, after in zip(found.recording.chunks(), [*list(found.recording.chunks())[1:], None]):
+        assert after is None or chunk.events[-1].time <= chunk.rows[-1, 0] * 1e9 < after.events[0].time
+
+
+def test_rows_are_on_disk_before_the_flight_is_over(tmp_path: Path) -> None:
+    sizes: list[int] = []
+
+    def look(share: float) -> None:
+        (hidden,) = tmp_path.iterdir()
+        sizes.append((hidden / "signals.parquet").stat().st_size)
+
+    scenario = SCENARIO.with_changes(stop_time=1.5)
+    keep_flight(tmp_path / "run", lambda to: orchestration.run(scenario, recorder=to, progress=look), figures=False)
+    assert 0 < sizes[0] < sizes[1] < sizes[2]
+
+
+@pytest.mark.parametrize("at", [0.01, 0.2, 0.4])
+def test_a_pause_between_chunks_changes_nothing(at: float, whole: Result, tmp_path: Path) -> None:
+    fly_until(SCENARIO, at, tmp_path / "paused")
+    expect_equal(resume(tmp_path / "paused", tmp_path / "done", figures=False), whole)
+    expect_equal(resume(tmp_path / "paused"), whole)
+
+
+def test_a_diverged_run_is_the_same_in_chunks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = Scenario(stop_time=3.0, timing=Timing(period=0.3, order="jacobi"))
+    chunks = orchestration.run(scenario)
+    monkeypatch.setattr("orchestration.master.ROWS", 10**6)
+    expect_equal(chunks, orchestration.run(scenario))
+
+
+def test_a_long_run_is_drawn_with_fewer_rows_but_all_of_the_window(tmp_path: Path) -> None:
+    result = orchestration.run(SCENARIO)
+    few = thinned(result.recording, {"time", "plant.thrust"}, (0.1, 0.2), 100)
+    t = np.concatenate([chunk.rows[:, 0] for chunk in few.chunks()])
+    inside = (t >= 0.1) & (t <= 0.2)
+    whole = result.rows[:, 0]
+    assert t[inside].tolist() == whole[(whole >= 0.1) & (whole <= 0.2)].tolist()
+    assert 50 < (~inside).sum() < 100
+    assert isinstance(few, InMemory)
+    events = {event for chunk in few.chunks() for event in chunk.events}
+    assert {event for event in result.events if 1e8 <= event.time <= 2e8} <= events < set(result.events)
+
+
+def test_figures_of_a_long_run_are_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(plots, "MOST", 100)
+    assert len(plots.draw(orchestration.run(SCENARIO), tmp_path)) == len(plots.FIGURES)
