@@ -12,7 +12,7 @@ from orchestration.studies.axes import Axis, unit_points
 from orchestration.studies.limit import Limit
 from orchestration.studies.linear import HoverLoop
 from orchestration.studies.local import radius
-from orchestration.studies.store import METRICS
+from orchestration.studies.store import METRICS, TEXTS
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import store_path
 from orchestration.studies.table import frame
@@ -23,8 +23,9 @@ def draw_study(study: Study, folder: Path | None, metric: str) -> list[Path]:
 
     Raises `UsageError` for a metric that does not exist, or axes that no figure here is for.
     """
-    if metric not in METRICS:
-        raise UsageError(f"--metric {metric}: expected one of {', '.join(METRICS)}")
+    numbers = [name for name in METRICS if name not in TEXTS]
+    if metric not in numbers:
+        raise UsageError(f"--metric {metric}: expected one of {', '.join(numbers)}; every figure shows the outcome")
     path = store_path(study.name, folder)
     table = frame(path)
     if study.method in sensitivity.METHODS and any(axis.values is None for axis in study.axes):

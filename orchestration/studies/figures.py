@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
-from matplotlib.colors import LogNorm
+from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
-from orchestration.metrics import SETTLED
+from orchestration.metrics import OUTCOMES, SETTLED
 from orchestration.plots import BLUE, GREY, ORANGE, RED, STYLE
 from orchestration.simulator import Floats
 from orchestration.studies.axes import Axis
@@ -22,7 +23,10 @@ if TYPE_CHECKING:
 
 
 def lines(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str) -> Figure:
-    """A metric against the first axis, one line for each value of the second; runs that do not fly are crossed."""
+    """A metric against the first axis, one line for each value of the second; what is bounded is crossed.
+
+    What diverged has no metric; it is marked along the lower edge.
+    """
     figure = Figure(figsize=(8.0, 4.8))
     panel = figure.add_subplot()
     x = axes[0]
@@ -34,7 +38,12 @@ def lines(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str) -> Figure:
         at, y = ordered[x.name].to_numpy(float), ordered[metric].to_numpy(float)
         panel.plot(at, np.where(fell, np.nan, y), ".-", color=color, label=None if value is None else f"{value:g}")
         panel.plot(at[fell], y[fell], "x", color=color, markersize=5)
-    panel.plot([], [], "x", color=GREY, label="does not fly")
+        down = at[(ordered["outcome"] == "diverged").to_numpy()]
+        panel.plot(
+            down, np.full(len(down), 0.02), "v", color=color, markersize=4, transform=panel.get_xaxis_transform()
+        )
+    panel.plot([], [], "x", color=GREY, label="bounded")
+    panel.plot([], [], "v", color=GREY, markersize=4, label="diverged")
     panel.set(xlabel=_label(x), ylabel=metric, yscale=_scale(table[metric]))
     panel.set_xscale("log" if x.scale == "logarithmic" else "linear")
     if metric == "ultimate_bound":
@@ -47,39 +56,46 @@ def lines(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str) -> Figure:
 
 
 def scatter(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str) -> Figure:
-    """A metric against each of many axes; runs that do not fly are crossed."""
+    """A metric against each of many axes; what is bounded is crossed, what diverged marked along the lower edge."""
     figure = Figure(figsize=(8.0, 2.4 * math.ceil(len(axes) / 2)))
     panels = figure.subplots(math.ceil(len(axes) / 2), 2, squeeze=False, sharey=True).ravel()
     fell = ~flew(table)
     for panel, axis in zip(panels, axes, strict=False):
         for chosen, marker, color in ((table[~fell], ".", BLUE), (table[fell], "x", RED)):
             panel.plot(chosen[axis.name], chosen[metric], marker, color=color, markersize=4, alpha=0.7)
+        down = table.loc[table["outcome"] == "diverged", axis.name]
+        panel.plot(down, np.full(len(down), 0.02), "v", color=RED, markersize=3, transform=panel.get_xaxis_transform())
         panel.set(xlabel=_label(axis), yscale=_scale(table[metric]))
         panel.set_xscale("log" if axis.scale == "logarithmic" else "linear")
     for panel in panels[len(axes) :]:
         panel.set_visible(False)
     figure.supylabel(metric)
-    figure.suptitle(
-        f"{len(table)} runs, {int((~fell).sum())} fly (dots), {int(fell.sum())} do not (crosses)", fontsize=10
-    )
+    counts = [f"{int((table['outcome'] == kind).sum())} {kind} ({mark})" for kind, mark in _MARKS.items()]
+    figure.suptitle(f"{len(table)} runs: {', '.join(counts)}{_by_horizon(table)}", fontsize=10)
     return figure
 
 
 def heat_map(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str) -> Figure:
-    """A metric over two axes, with the boundary of what flies."""
+    """A metric over two axes where it flies, the outcome where it does not, and the boundary between the two."""
     x, y = axes[0], axes[1]
-    values = table.pivot_table(index=y.name, columns=x.name, values=metric, dropna=False)
-    flying = table.assign(flew=flew(table).astype(float)).pivot_table(index=y.name, columns=x.name, values="flew")
+    coded = table.assign(flew=flew(table).astype(float), code=table["outcome"].map(_CODES).astype(float))
+    values, flying, codes = (
+        coded.pivot_table(index=y.name, columns=x.name, values=name, dropna=False) for name in (metric, "flew", "code")
+    )
     columns, index = values.columns.to_numpy(float), values.index.to_numpy(float)
     figure = Figure(figsize=(8.0, 5.0))
     panel = figure.add_subplot()
     shown = np.where(flying.to_numpy() > 0.5, values.to_numpy(float), np.nan)
+    fell = np.where(codes.to_numpy() > 0.0, codes.to_numpy(), np.nan)
+    panel.pcolormesh(columns, index, fell, cmap=ListedColormap(_FELL), vmin=0.5, vmax=2.5, shading="nearest")
     norm = LogNorm() if (shown > 0.0).any() else None
     mesh = panel.pcolormesh(columns, index, shown, norm=norm, cmap="viridis", shading="nearest")
     figure.colorbar(mesh, ax=panel, label=f"{metric}, where it flies")
     if 0.0 < float(np.nanmean(flying.to_numpy())) < 1.0:
         panel.contour(columns, index, flying.to_numpy(), levels=[0.5], colors=RED, linewidths=1.5)
-    panel.set(xlabel=_label(x), ylabel=_label(y), title="red: boundary of what flies")
+    panel.set(xlabel=_label(x), ylabel=_label(y), title=f"red: boundary of what flies{_by_horizon(table)}")
+    kinds = [Patch(color=color, label=kind) for kind, color in zip(OUTCOMES[1:], _FELL, strict=True)]
+    figure.legend(handles=kinds, loc="outside lower center", ncols=len(kinds), fontsize=8)
     panel.grid(False)
     return figure
 
@@ -137,6 +153,18 @@ def save(make: Callable[[], Figure], path: Path) -> Path:
     with matplotlib.rc_context(STYLE):
         make().savefig(path)
     return path
+
+
+def _by_horizon(table: "pd.DataFrame") -> str:
+    """The time by which the outcomes are judged, if it is one for all."""
+    horizons = set(table["horizon"].dropna()) if "horizon" in table else set()
+    return f", by {horizons.pop():g} s" if len(horizons) == 1 else ""
+
+
+_FELL = ("#d9d9d9", "#6e6e6e")
+"""Colours of bounded and diverged."""
+_CODES = {kind: code for code, kind in enumerate(OUTCOMES)}
+_MARKS = {"settled": "dots", "bounded": "crosses", "diverged": "below"}
 
 
 def _scale(values: "pd.Series") -> str:

@@ -99,7 +99,7 @@ def test_more_axes_are_drawn_as_dots_over_each(tmp_path: Path) -> None:
 
 
 def test_a_metric_that_does_not_exist_is_told_with_those_that_do(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="--metric beauty: expected one of outcome, horizon, position_rmse"):
+    with pytest.raises(UsageError, match="--metric beauty: expected one of horizon, position_rmse"):
         draw_study(invented(tmp_path, study(PERIODS)), tmp_path, "beauty")
 
 
@@ -156,7 +156,7 @@ def test_the_axes_of_time_have_their_unit_and_the_others_none() -> None:
 def test_a_map_has_a_cell_for_each_run_and_the_boundary_of_what_flies() -> None:
     runs = pd.concat([table().assign(**{"timing.delay": delay}) for delay in (0.0, 0.01, 0.02)])
     figure = figures.heat_map(runs, (axis("timing.period", 1), axis("timing.delay", 1)), "ultimate_bound")
-    mesh, boundary = figure.axes[0].collections
+    _, mesh, boundary = figure.axes[0].collections
     values = np.ma.filled(mesh.get_array(), np.nan).reshape(3, 5)
     assert np.isnan(values).tolist() == [[False] * 4 + [True]] * 3
     assert values[0, :4] == pytest.approx([0.01, 0.02, 0.03, 0.04])
@@ -164,10 +164,30 @@ def test_a_map_has_a_cell_for_each_run_and_the_boundary_of_what_flies() -> None:
     assert crossings[:, 0] == pytest.approx(0.045)
 
 
+def test_a_map_tells_bounded_from_diverged_with_the_horizon_beside_them() -> None:
+    runs = pd.concat([table().assign(**{"timing.delay": delay}) for delay in (0.0, 0.01)])
+    runs["outcome"] = ["settled", "bounded", "diverged", None, "settled"] * 2  # periods from 0.05 down
+    runs.loc[runs["outcome"] == "diverged", "ultimate_bound"] = np.nan
+    runs["horizon"] = 30.0
+    figure = figures.heat_map(runs, (axis("timing.period", 1), axis("timing.delay", 1)), "ultimate_bound")
+    fell = np.ma.filled(figure.axes[0].collections[0].get_array(), np.nan).reshape(2, 5)[0]
+    assert fell == pytest.approx([np.nan, np.nan, 2.0, 1.0, np.nan], nan_ok=True)
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["bounded", "diverged"]
+    assert figure.axes[0].get_title().endswith("by 30 s")
+
+
+def test_a_line_marks_what_diverged_where_it_has_no_value() -> None:
+    runs = table()
+    runs["outcome"] = ["diverged", *runs["outcome"][1:]]
+    runs.loc[runs["outcome"] == "diverged", "ultimate_bound"] = np.nan
+    _, _, down, *_ = lines_of(figures.lines(runs, (axis("timing.period", 1),), "ultimate_bound"))
+    assert (down.get_marker(), down.get_xdata().tolist()) == ("v", pytest.approx([0.05]))
+
+
 def test_where_everything_flies_a_map_has_no_boundary() -> None:
     runs = pd.concat([table(4).assign(**{"timing.delay": delay}) for delay in (0.0, 0.01)])
     figure = figures.heat_map(runs, (axis("timing.period", 1), axis("timing.delay", 1)), "ultimate_bound")
-    assert len(figure.axes[0].collections) == 1
+    assert len(figure.axes[0].collections) == 2, "what fell, and what flies"
 
 
 @pytest.mark.parametrize(("local", "large", "marks"), [(0.08, 0.05, 2), (None, 0.05, 1), (0.08, None, 1)])
@@ -208,7 +228,7 @@ def test_dots_of_many_axes_are_apart_by_what_flies() -> None:
     axes = (axis("timing.period", 1), axis("plant.mass", 1), axis("timing.delay", 1))
     figure = figures.scatter(runs, axes, "ultimate_bound")
     for panel in figure.axes[:3]:
-        dots, crosses = panel.get_lines()
+        dots, crosses, _ = panel.get_lines()
         assert (len(dots.get_xdata()), len(crosses.get_xdata())) == (4, 1)
     assert not figure.axes[3].get_visible()
 
