@@ -1,0 +1,93 @@
+"""A confined process is ended at its limits, with all that it started."""
+
+import os
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from orchestration import confined
+from orchestration.confined import Ending, Limits
+
+linux_only = pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="no /proc")
+
+FORK = """
+import os, sys, time
+if os.fork() == 0:
+    os.setsid()
+    with open(sys.argv[1], "w") as file:
+        file.write(str(os.getpid()))
+    time.sleep(600)
+while not (os.path.exists(sys.argv[1]) and open(sys.argv[1]).read()):
+    time.sleep(0.01)
+{then}
+"""
+
+
+def python(program: str, *arguments: object, **limits: float) -> Ending:
+    return confined.run([sys.executable, "-c", program, *map(str, arguments)], os.environ, Limits(**limits))
+
+
+def gone(pid: int) -> bool:
+    """Whether a process has ended, perhaps only after a moment."""
+    for _ in range(100):
+        try:
+            state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+        except OSError:
+            return True
+        if state == "Z":
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def test_a_process_that_keeps_its_limits_ends_itself() -> None:
+    ending = python("import sys; print('first'); print('last', file=sys.stderr); sys.exit(3)")
+    assert (ending.code, ending.reached, ending.out_of_time) == (3, None, False)
+    assert ending.said in ("first", "last")
+
+
+@pytest.mark.parametrize(
+    ("program", "limits", "reached"),
+    [
+        ("import time; time.sleep(60)", {"time": 1.0}, "it takes longer than the limit of 1 s"),
+        (
+            "while True: print('x' * 1000)", {"output": 0.5},
+            "it writes more than the limit of 0.5 MB to its standard output and error",
+        ),
+        pytest.param(
+            "a = bytearray(b'x' * 300_000_000)\nwhile True: pass", {"memory": 200.0},
+            "it takes more memory than the limit of 200 MB", marks=linux_only,
+        ),
+    ],
+)  # fmt: skip
+def test_a_process_is_stopped_at_its_limits(program: str, limits: dict[str, float], reached: str) -> None:
+    ending = python(program, **limits)
+    assert (ending.code, ending.reached, ending.out_of_time) == (None, reached, "time" in limits)
+
+
+@linux_only
+@pytest.mark.parametrize("then", ["sys.exit(0)", "time.sleep(600)"])
+def test_what_a_process_has_started_does_not_outlive_it(then: str, tmp_path: Path) -> None:
+    file = tmp_path / "pid"
+    ending = python(FORK.format(then=then), file, time=2.0)
+    assert ending.code == (0 if then == "sys.exit(0)" else None)
+    assert gone(int(file.read_text()))
+
+
+@linux_only
+def test_the_memory_of_what_a_process_has_started_counts(tmp_path: Path) -> None:
+    grow = "a = b'x' * 300_000_000\n"
+    program = FORK.format(then="time.sleep(600)").replace(
+        "    time.sleep(600)\nwhile", f"    {grow}    time.sleep(600)\nwhile"
+    )
+    ending = python(program, tmp_path / "pid", memory=200.0)
+    assert ending.reached == "it takes more memory than the limit of 200 MB"
+
+
+def test_no_file_may_grow_beyond_its_limit(tmp_path: Path) -> None:
+    program = "import sys; from orchestration.confined import restrict; restrict(1.0)\n" + (
+        "with open(sys.argv[1], 'wb') as file: file.write(bytes(2_000_000))"
+    )
+    assert "File too large" in python(program, tmp_path / "file").said
