@@ -4,7 +4,10 @@ import os
 import sys
 from pathlib import Path
 
-_ROOT = Path(__file__).resolve().parent.parent
+ROOT = str(Path(__file__).resolve().parent.parent)
+"""The folder in which the packages of the project lie"""
+
+_MISLEADING = ("PYTHONHOME", "PYTHONPATH")
 
 
 def command(module: str, *arguments: object) -> list[str]:
@@ -14,5 +17,16 @@ def command(module: str, *arguments: object) -> list[str]:
 
 def environment(**variables: str) -> dict[str, str]:
     """This process's environment, with which the child finds the project's packages, and `variables`."""
-    path = os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH"))))
+    path = os.pathsep.join(filter(None, (ROOT, os.environ.get("PYTHONPATH"))))
     return {**os.environ, "PYTHONPATH": path, **variables}
+
+
+def misleading_variables() -> dict[str, str]:
+    """Those of this process's environment that may have a Python take modules of another one."""
+    return {name: os.environ[name] for name in _MISLEADING if os.environ.get(name)}
+
+
+def undisturbed_environment() -> dict[str, str]:
+    """`environment` without them."""
+    kept = {name: value for name, value in os.environ.items() if name not in _MISLEADING}
+    return {**kept, "PYTHONPATH": ROOT}

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 import typer.core
 
+from orchestration.child import misleading_variables
 from orchestration.errors import QuadcosimError, SimulatorError, UsageError, shown
 from orchestration.flags import FlightFlags, flies, scenario_from
 from orchestration.interop import cli as interop
+from orchestration.limit_flags import MemoryLimit, OutputLimit, SizeLimit, TimeLimit, limits_from
 from orchestration.studies import cli as studies
 from orchestration.terminal import progress_bar, say
 
@@ -145,36 +147,38 @@ def plot(
 def validate(
     fmu: Annotated[list[Path] | None, typer.Argument(help="FMUs; without any, those of this project.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
-    time_limit: Annotated[
-        float, typer.Option("--time-limit", help="For what an FMU does, before it is stopped.", metavar="SECONDS")
-    ] = 60.0,
+    time_limit: TimeLimit = 60.0,
+    memory_limit: MemoryLimit = 2000.0,
+    size_limit: SizeLimit = 1000.0,
+    output_limit: OutputLimit = 10.0,
 ) -> None:
     """Check FMUs: archive, description, and what they do when they run; exit code 1 if there is any problem.
 
     Any FMI 2.0 co-simulation FMU will do; those that quadcosim built must keep the rules of this project too.
+    All of it is done in a process of its own within limits.
     """
     from orchestration import fmus
     from orchestration.validation import validate as findings_of
     from orchestration.wiring import MODELS
 
-    if not time_limit > 0.0:
-        raise UsageError(f"--time-limit {time_limit:g}: expected a positive number of seconds")
+    limits = limits_from(time_limit, memory_limit, size_limit, output_limit)
     paths = fmu or [fmus.locate(name, say) for name in MODELS]
     for path in paths:
         if not path.is_file():
             raise UsageError(f"{path}: expected an .fmu file")
-    results = []
+    results, problems = [], 0
     for path in paths:
-        findings = findings_of(path, time_limit=time_limit)
+        findings = findings_of(path, limits=limits)
         results.append({"fmu": str(path), "findings": [asdict(finding) for finding in findings]})
+        count = sum(not finding.note for finding in findings)
+        problems += count
         if not as_json:
-            count = len(findings) or "no"
-            print(f"{path}: {count} problem{'' if count == 1 else 's'}{'' if findings else ' found'}")
+            print(f"{path}: {count or 'no'} problem{'' if count == 1 else 's'}{'' if count else ' found'}")
             for finding in findings:
                 print(f"  {finding}")
     if as_json:
         print(json.dumps(results, indent=2))
-    if any(result["findings"] for result in results):
+    if problems:
         raise typer.Exit(1)
 
 
@@ -182,6 +186,10 @@ def validate(
 def doctor(
     fmu: Annotated[list[Path] | None, typer.Argument(help="FMUs; without any, those of this project.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the same facts as JSON.")] = False,
+    time_limit: TimeLimit = 60.0,
+    memory_limit: MemoryLimit = 2000.0,
+    size_limit: SizeLimit = 1000.0,
+    output_limit: OutputLimit = 10.0,
 ) -> None:
     """Say what FMUs need to load, what of it this machine has, and try; exit code 1 if anything is missing."""
     from orchestration import fmus
@@ -189,7 +197,8 @@ def doctor(
     from orchestration.doctor.text import as_text
     from orchestration.wiring import MODELS
 
-    report = examine(fmu or [fmus.locate(name, say) for name in MODELS])
+    limits = limits_from(time_limit, memory_limit, size_limit, output_limit)
+    report = examine(fmu or [fmus.locate(name, say) for name in MODELS], limits)
     print(json.dumps(as_tables(report), indent=2) if as_json else as_text(report))
     if not report.good:
         raise typer.Exit(1)
@@ -262,6 +271,8 @@ def _fail(error: Exception, debug: bool) -> None:
         sys.exit(2)
     elif isinstance(error, ModuleNotFoundError) and (extra := _extra_of(error.name)) is not None:
         say(f"quadcosim: {error.name} is not installed; this command needs: pip install 'quadcosim[{extra}]'")
+    elif isinstance(error, ImportError) and (given := misleading_variables()):
+        say(f"quadcosim: {error}; try without {' '.join(given)}, which may have Python take modules of another one")
     else:
         say(f"quadcosim: {type(error).__name__}: {error} (an error of quadcosim itself; --debug shows where)")
     sys.exit(2 if isinstance(error, UsageError) else 1)

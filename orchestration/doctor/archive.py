@@ -1,6 +1,7 @@
 """What an .fmu file says of what it needs: its description, its binaries, the Python sources in it."""
 
 import io
+import math
 import posixpath
 import zipfile
 import zlib
@@ -47,6 +48,10 @@ class Fmu:
 
     path: Path
     kinds: tuple[str, ...]
+    model_identifier: str
+    guid: str
+    start_time: float
+    """[s]; of the default experiment, 0 if it has none"""
     needs_tool: str | None
     """The tool that must be installed because the FMU says so (needsExecutionTool)."""
     platforms: tuple[PlatformBinary, ...]
@@ -56,25 +61,29 @@ class Fmu:
     """None if it is not made by pythonfmu."""
 
 
-def open_fmu(path: Path) -> Fmu:
-    """Read an .fmu file; raises `UsageError` if it is not an FMI 2.0 FMU."""
+def open_fmu(path: Path, size_limit: float = math.inf) -> Fmu:
+    """Read an .fmu file; raises `UsageError` if it is not an FMI 2.0 FMU, or unpacks to more than `size_limit` MB."""
     if not path.is_file():
         raise UsageError(f"{path}: expected an .fmu file")
     try:
         with zipfile.ZipFile(path) as archive:
+            size = sum(entry.file_size for entry in archive.infolist()) / 1e6
+            if size > size_limit:
+                raise UsageError(f"{path}: unpacks to {size:.0f} MB: expected at most {size_limit:g} MB (--size-limit)")
             if DESCRIPTION not in archive.namelist():
                 raise UsageError(f"{path}: expected an FMU; it has no {DESCRIPTION}")
             description = ElementTree.fromstring(archive.read(DESCRIPTION))
             return _read(path, archive, description)
-    except (zipfile.BadZipFile, zlib.error) as error:
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
         raise UsageError(f"{path}: expected an FMU, which is a zip file: {error}") from error
     except ElementTree.ParseError as error:
         raise UsageError(f"{path}: expected XML in {DESCRIPTION}: {error}") from error
 
 
 def _read(path: Path, archive: zipfile.ZipFile, description: ElementTree.Element) -> Fmu:
-    if description.get("fmiVersion") != "2.0":
-        raise UsageError(f"{path}: fmiVersion = {description.get('fmiVersion')}: expected 2.0")
+    version = description.get("fmiVersion")
+    if version != "2.0":
+        raise UsageError(f"{path}: an FMU of FMI {version}: expected one of FMI 2.0")
     kinds = tuple(kind for kind in (CO_SIMULATION, MODEL_EXCHANGE) if description.find(kind) is not None)
     chosen = description.find(kinds[0]) if kinds else None
     if chosen is None:
@@ -84,11 +93,22 @@ def _read(path: Path, archive: zipfile.ZipFile, description: ElementTree.Element
     return Fmu(
         path=path,
         kinds=kinds,
+        model_identifier=chosen.get("modelIdentifier", ""),
+        guid=description.get("guid", ""),
+        start_time=_start_time(description),
         needs_tool=tool if chosen.get("needsExecutionTool") in ("true", "1") else None,
         platforms=_platforms(archive, chosen.get("modelIdentifier", "")),
         requires_python=None if declared is None else declared.get("requires"),
         python=sources.read(archive),
     )
+
+
+def _start_time(description: ElementTree.Element) -> float:
+    experiment = description.find("DefaultExperiment")
+    try:
+        return float("0" if experiment is None else experiment.get("startTime", "0"))
+    except ValueError:  # which is for `validate` to say
+        return 0.0
 
 
 def _platforms(archive: zipfile.ZipFile, identifier: str) -> tuple[PlatformBinary, ...]:

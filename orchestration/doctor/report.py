@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from orchestration.doctor import trial
-from orchestration.doctor.archive import CO_SIMULATION, Fmu, open_fmu
+from orchestration.confined import Limits
 from orchestration.doctor.binaries import newest
 from orchestration.doctor.dependencies import part_for
 from orchestration.doctor.machine import Library, Machine, this_machine
+from orchestration.doctor.trial import attempt
 from orchestration.doctor.verdict import Verdict, judge
 
 
@@ -27,18 +27,11 @@ class Report:
         return all(verdict.good for verdict in self.verdicts)
 
 
-def examine(paths: Iterable[Path]) -> Report:
-    """Read the FMUs, look at this machine, and try; raises `UsageError` for a file that is no FMI 2.0 FMU."""
-    fmus = [open_fmu(path) for path in paths]
-    machine = this_machine(fmus)
-    return Report(machine=machine, verdicts=tuple(judge(fmu, machine, _tried(fmu)) for fmu in fmus))
-
-
-def _tried(fmu: Fmu) -> str | None:
-    if CO_SIMULATION not in fmu.kinds:
-        return "not tried: it is for model exchange only"
-    failure = trial.attempt(fmu.path)
-    return None if failure is None else failure.removeprefix(f"{fmu.path}: ")
+def examine(paths: Iterable[Path], limits: Limits) -> Report:
+    """Read the FMUs and try them within `limits`, look at this machine; `UsageError` for what is no FMI 2.0 FMU."""
+    trials = [attempt(path, limits) for path in paths]
+    machine = this_machine([trial.fmu for trial in trials])
+    return Report(machine=machine, verdicts=tuple(judge(trial.fmu, machine, trial.failure) for trial in trials))
 
 
 def as_tables(report: Report) -> dict[str, Any]:
@@ -60,6 +53,7 @@ def _verdict_table(verdict: Verdict, machine: Machine) -> dict[str, Any]:
         "loads": verdict.failure is None,
         "failure": verdict.failure,
         "problems": list(verdict.problems),
+        "elsewhere": list(verdict.elsewhere),
         "good": verdict.good,
     }
 

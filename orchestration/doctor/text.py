@@ -47,6 +47,8 @@ def _fmu_rows(verdict: Verdict, machine: Machine) -> Iterator[Row]:
         yield "tool", f"{fmu.needs_tool}, says the FMU (needsExecutionTool)", False
     for problem in verdict.problems:
         yield "file", problem, True
+    for problem in verdict.elsewhere:
+        yield "elsewhere", problem, False
     yield _host_row("Python host", "fmpy and others", verdict.python_host)
     yield _host_row("other host", "Simulink, Modelica tools, C", verdict.other_host)
     yield "tried here", "loads" if verdict.failure is None else verdict.failure, verdict.failure is not None

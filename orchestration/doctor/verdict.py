@@ -36,6 +36,8 @@ class Verdict:
     """An FMU on a machine."""
 
     fmu: Fmu
+    platform: str
+    """The folder in `binaries/` that is for the machine."""
     python_host: Host
     other_host: Host
     failure: str | None
@@ -43,8 +45,8 @@ class Verdict:
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """What is wrong with the file itself, for whatever machine."""
-        parts = [f"{part.platform}: {part.problem}" for part in self.fmu.platforms if part.problem is not None]
+        """What is wrong with the file itself, as far as it concerns this machine."""
+        parts = self._of_parts(here=True)
         if self.fmu.python is not None:
             parts += self.fmu.python.problems
         requires = self.fmu.requires_python
@@ -53,15 +55,24 @@ class Verdict:
         return tuple(parts)
 
     @property
+    def elsewhere(self) -> tuple[str, ...]:
+        """What is wrong with the file for other machines."""
+        return tuple(self._of_parts(here=False))
+
+    @property
     def good(self) -> bool:
         """Whether it loads and nothing is missing."""
         return self.python_host.ready and self.other_host.ready and self.failure is None and not self.problems
+
+    def _of_parts(self, *, here: bool) -> list[str]:
+        parts = [part for part in self.fmu.platforms if (part.platform == self.platform) == here]
+        return [f"{part.platform}: {part.problem}" for part in parts if part.problem is not None]
 
 
 def judge(fmu: Fmu, machine: Machine, failure: str | None) -> Verdict:
     """Compare; `failure` is what trying to load it here gave."""
     hosts = python_host(fmu, machine), other_host(fmu, machine)
-    return Verdict(fmu=fmu, python_host=hosts[0], other_host=hosts[1], failure=failure)
+    return Verdict(fmu=fmu, platform=machine.platform, python_host=hosts[0], other_host=hosts[1], failure=failure)
 
 
 def python_host(fmu: Fmu, machine: Machine) -> Host:

@@ -3,7 +3,7 @@
 import zipfile
 import zlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
@@ -25,21 +25,51 @@ class Archive:
     path: Path
     entries: tuple[zipfile.ZipInfo, ...]
     """As they are listed, one name perhaps more than once"""
-    files: dict[str, bytes]
+    files: Mapping[str, bytes]
     """Content by name"""
 
 
-def read_archive(path: Path) -> Archive:
-    """All of the file; raises `UnreadableError` if it is no archive, or damaged, or has no model description."""
+class _Files(Mapping[str, bytes]):
+    """The files of an archive, each read when it is asked for: together they may be larger than the memory."""
+
+    def __init__(self, archive: zipfile.ZipFile) -> None:
+        self._archive = archive
+        self._names = dict.fromkeys(archive.namelist())
+
+    def __getitem__(self, name: str) -> bytes:
+        if name not in self._names:
+            raise KeyError(name)
+        return self._archive.read(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
+def read_archive(path: Path, size_limit: float) -> Archive:
+    """The file, found whole; it is kept open.
+
+    Raises `UnreadableError` if it is no archive, or damaged, or unpacks to more than `size_limit` MB, or has no
+    model description.
+    """
     try:
-        with zipfile.ZipFile(path) as archive:
-            entries = tuple(archive.infolist())
-            files = {entry.filename: archive.read(entry) for entry in entries}
+        archive = zipfile.ZipFile(path)
+        size = sum(entry.file_size for entry in archive.infolist())
+        if size > size_limit * 1e6:
+            raise UnreadableError(
+                f"{path.name}: unpacks to {size / 1e6:.0f} MB: expected at most {size_limit:g} MB (--size-limit)"
+            )
+        damaged = archive.testzip()
     except (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, ValueError) as error:
         raise UnreadableError(f"{path.name}: expected a zip archive that is whole: {error}") from error
+    if damaged is not None:
+        raise UnreadableError(f"{path.name}: expected a zip archive that is whole: wrong CRC or header of {damaged}")
+    files = _Files(archive)
     if DESCRIPTION not in files:
         raise UnreadableError(f"{path.name}: expected an FMU, with {DESCRIPTION} at the top of the archive")
-    return Archive(path, entries, files)
+    return Archive(path, tuple(archive.infolist()), files)
 
 
 def can_be_unpacked(archive: Archive) -> bool:

@@ -3,16 +3,27 @@
 import functools
 import itertools
 import math
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from orchestration.messages import Message
+from orchestration.validation.finding import Note
 from orchestration.validation.fmu import Fmu, Variable
 from orchestration.validation.instance import Instance, RefusedError, Row, Value, Values, same
 from orchestration.validation.variables import limits
 
 STEPS = 100
 """Communication steps of a run"""
+FEWEST = 3
+"""Steps of a run of an FMU however slow it is"""
+SHARE = 0.02
+"""Of the time there is for an FMU that one run may take; a slow FMU gets fewer steps"""
+MOST_WATCHED = 1000
+"""Variables that are compared between runs, of an FMU that has many more"""
+TOLERANCE = 1e-4
+"""Between runs of an FMU that is not ours, relative to the largest value of a variable in the run"""
 UNEVEN = (0.4, 0.6, 1.0, 0.3, 0.7)
 """Lengths of variable steps, of that of the default experiment: between samples, on them and across them"""
 
@@ -35,17 +46,32 @@ PLAIN = Plan()
 """At start values, by the default experiment"""
 
 
+@dataclass(frozen=True, kw_only=True, slots=True)
+class FirstRun:
+    """The first run at start values."""
+
+    steps: int
+    whole: bool
+    """Whether it went through all steps that it was meant to"""
+    seconds: float
+    messages: tuple[Message, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Bench:
     """An FMU and the folder that it is unpacked in."""
 
     fmu: Fmu
     folder: Path
+    budget: float
+    """[s] for all that is done with it"""
+    beat: Callable[[], None] = lambda: None
+    """Hears that a call of the FMU begins or returns"""
     _numbers: Iterator[int] = field(default_factory=itertools.count)
 
     def instance(self) -> Instance:
         """A fresh one, of a name of its own."""
-        return Instance(self.fmu, self.folder, f"{self.fmu.model_identifier} {next(self._numbers)}")
+        return Instance(self.fmu, self.folder, f"{self.fmu.model_identifier} {next(self._numbers)}", self.beat)
 
     # -- time -----------------------------------------------------------------------------------------------
 
@@ -64,8 +90,11 @@ class Bench:
     def points(self, plan: Plan) -> list[tuple[float, float]]:
         """Communication point and step size of each step, up to the end of the default experiment.
 
-        Nothing is accumulated.
+        Nothing is accumulated. No more steps than an FMU of its pace has time for.
         """
+        return self._points(plan)[: self.first.steps]
+
+    def _points(self, plan: Plan) -> list[tuple[float, float]]:
         shares = UNEVEN if plan.uneven else (1.0,)
         stop = self.fmu.experiment.get("stopTime", math.inf) + 1e-6 * self.step
         points: list[tuple[float, float]] = []
@@ -119,7 +148,39 @@ class Bench:
             return [value, *(_within(v, value + sign * _scale(v) / 16.0) for sign in (1.0, -1.0))]
         return [value, *(int(_within(v, value + sign)) for sign in (1, -1))]
 
+    @functools.cached_property
+    def watched(self) -> tuple[Variable, ...]:
+        """Variables that are compared between runs: all; of very many the outputs and some of the others."""
+        every = self.fmu.variables
+        if len(every) <= MOST_WATCHED or self.fmu.is_ours:
+            return every
+        some = every[:: math.ceil(len(every) / MOST_WATCHED)]
+        return tuple({v.index: v for v in (*self.outputs[:MOST_WATCHED], *some)}.values())
+
     # -- runs -----------------------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def first(self) -> FirstRun:
+        """The first run, which tells how many steps there is time for; raises `RefusedError`."""
+        started = time.monotonic()
+        points = self._points(PLAIN)
+        with self.instance() as instance:
+            self.begin(instance, PLAIN)
+            done, goes_on = 0, True
+            for t, h in points:
+                if done >= FEWEST and time.monotonic() - started > SHARE * self.budget:
+                    break
+                goes_on = instance.step(t, h)
+                done += 1
+                if not goes_on:
+                    break
+            instance.terminate()
+            return FirstRun(
+                steps=max(done, 1) if done < len(points) and goes_on else STEPS,
+                whole=done == len(points) or not goes_on,
+                seconds=time.monotonic() - started,
+                messages=tuple(instance.messages),
+            )
 
     def begin(self, instance: Instance, plan: Plan) -> None:
         """Through initialisation."""
@@ -133,7 +194,7 @@ class Bench:
                 instance.set(self.inputs_at(k))
             if not instance.step(t, h):
                 break
-            rows.append(instance.get(self.fmu.variables))
+            rows.append(instance.get(self.watched))
         return rows
 
     def flown(self, plan: Plan) -> list[Row]:
@@ -170,16 +231,47 @@ class Bench:
         """The rich run of an instance alone."""
         return self._rich[1]
 
+    @functools.cached_property
+    def repeats(self) -> str | None:
+        """Where an equal run of another fresh instance parts from the first; None if it does not."""
+        return difference(self.flown(self.rich), self.expected)
 
-def difference(found: list[Row], expected: list[Row]) -> str | None:
-    """Where two runs part: step, variable and both values; None if they are the same to the last bit."""
+    def parted(self, found: list[Row], expected: list[Row], text: str) -> Iterator[str]:
+        """Where two runs that should be the same part, put into `text`; of an FMU that is not ours a little is noted.
+
+        FMI asks that a simulation can go on, not for the last bit.
+        """
+        exact = difference(found, expected)
+        if exact is None:
+            return
+        large = exact if self.fmu.is_ours else difference(found, expected, TOLERANCE)
+        if large is not None:
+            yield text.format(large)
+        else:
+            yield Note(f"{text.format(exact)}: less than {TOLERANCE:g} of the largest value in the run")
+
+
+def difference(found: list[Row], expected: list[Row], tolerance: float = 0.0) -> str | None:
+    """Where two runs part: step, variable and both values; None if they are the same.
+
+    To the last bit, or within `tolerance` of the largest value of a variable in the run.
+    """
     if len(found) != len(expected):
         return f"the run ends after {len(found)} steps, expected {len(expected)}"
+    largest: dict[str, float] = {}
+    for row in expected if tolerance else ():
+        for name, value in row.items():
+            if isinstance(value, float):
+                largest[name] = max(largest.get(name, 0.0), abs(value))
     for k, (a, b) in enumerate(zip(found, expected)):
         for name, value in a.items():
-            if not same(value, b[name]):
+            if not (same(value, b[name]) or _near(value, b[name], tolerance * largest.get(name, 0.0))):
                 return f"{name} = {value!r} after step {k + 1} of {len(found)}, expected {b[name]!r}"
     return None
+
+
+def _near(a: Value, b: Value, distance: float) -> bool:
+    return isinstance(a, float) and isinstance(b, float) and abs(a - b) <= distance and distance > 0.0
 
 
 def _scale(v: Variable) -> float:

@@ -1,58 +1,80 @@
-"""The process in which an FMU under validation runs: `python -m orchestration.validation.child FMU FOLDER REPORT`.
+"""The confined process that does all that touches the FMU.
 
-It writes a line of JSON to the report before each rule, for each finding and at the end, so that the report
-is of use however far the process gets.
+`python -m orchestration.validation.child FMU FOLDER SECONDS MB` unpacks the FMU in the folder, an empty one, and
+writes what is found to it (see `progress`).
 """
 
-import json
 import sys
-from collections.abc import Iterable
 from pathlib import Path
-from typing import IO
 
+import fmpy
+
+from orchestration.confined import Limits, restrict
+from orchestration.fmpy_adapter import expect_readable_place
 from orchestration.validation import rules, runs
-from orchestration.validation.archive import read_archive
+from orchestration.validation.archive import UnreadableError, can_be_unpacked, read_archive
 from orchestration.validation.bench import Bench
-from orchestration.validation.finding import Rule, name_of
-from orchestration.validation.fmu import read_fmu
+from orchestration.validation.description import standard
+from orchestration.validation.fmu import read_fmu, read_root
 from orchestration.validation.instance import RefusedError
+from orchestration.validation.own_description import own_description
+from orchestration.validation.progress import PULSE, REPORT, Pulse, Report
 
-END = "end"
-"""Stands where a rule would, when all have been tried"""
-ERROR = "error"
-
-
-def main(path: str, folder: str, report: str) -> None:
-    """Try every rule on behaviour that is meant for the FMU."""
-    bench = Bench(read_fmu(read_archive(Path(path))), Path(folder))
-    with Path(report).open("a", encoding="utf-8", buffering=1) as out:
-        try:
-            if not any(_tried([rule], bench, out) for rule in runs.FIRST):
-                _tried((*rules.OF_RUNS, *(rules.OUR_RUNS if bench.fmu.is_ours else ())), bench, out)
-            _write(out, rule=END)
-        except Exception as error:
-            _write(out, **{ERROR: f"{type(error).__name__}: {error}"})
-            raise
+READABLE, PLATFORM = "readable", "platform"
+"""Rules that are kept here: there is an FMI 2.0 FMU to look at, and this machine can run it"""
 
 
-def _tried(chosen: Iterable[Rule[Bench]], bench: Bench, out: IO[str]) -> int:
-    """How many findings there were."""
-    count = 0
-    for rule in chosen:
-        _write(out, rule=name_of(rule))
-        try:
-            for text in rule(bench):
-                _write(out, text=text)
-                count += 1
-        except RefusedError as error:
-            _write(out, text=str(error))
-            count += 1
-    return count
+def main(path: Path, folder: Path, limits: Limits) -> None:
+    """Try every rule that is meant for the FMU."""
+    restrict(limits.size)
+    report = Report(folder / REPORT)
+    try:
+        report.rule(READABLE)
+        _look(path, folder, limits, report)
+        report.end()
+    except UnreadableError as error:
+        report.rule(READABLE)
+        report.found(str(error))
+        report.end()
+    except Exception as error:
+        report.failed(error)
+        raise
 
 
-def _write(out: IO[str], **line: str) -> None:
-    out.write(json.dumps(line) + "\n")
+def _look(path: Path, folder: Path, limits: Limits, report: Report) -> None:
+    archive = read_archive(path, limits.size)
+    report.tried(rules.OF_ARCHIVES, archive, RefusedError)
+    root = read_root(archive)
+    report.tried((standard,), archive, RefusedError)
+    fmu = read_fmu(archive, root)
+    report.tried((*rules.OF_DESCRIPTIONS, *(rules.OUR_DESCRIPTIONS if fmu.is_ours else ())), fmu, RefusedError)
+    if can_be_unpacked(archive):
+        place = folder / "fmu"
+        fmpy.extract(str(path), str(place))
+        expect_readable_place(place)
+        pulse = Pulse(folder / PULSE)
+        _run(Bench(fmu, place, limits.time, pulse.beat), report)
+
+
+def _run(bench: Bench, report: Report) -> None:
+    fmu = bench.fmu
+    if fmu.is_ours:
+        report.tried((own_description,), bench, RefusedError)
+    platforms = fmpy.supported_platforms(str(fmu.archive.path))
+    if fmpy.platform not in platforms:
+        report.rule(PLATFORM)
+        missing = f"expected a binary for {fmpy.platform}, found {', '.join(platforms) or 'none'}"
+        report.found(f"what the FMU does was not checked: {missing}")
+        return
+    if any(report.tried([rule], bench, RefusedError) for rule in runs.FIRST):
+        return
+    report.tried(rules.OF_RUNS, bench, RefusedError)
+    if bench.repeats is None:
+        report.tried(rules.OF_EQUAL_RUNS, bench, RefusedError)
+    if fmu.is_ours:
+        report.tried(rules.OUR_RUNS, bench, RefusedError)
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    _path, _folder, _time, _size = sys.argv[1:]
+    main(Path(_path), Path(_folder), Limits(time=float(_time), size=float(_size)))

@@ -16,7 +16,11 @@ def standard(archive: Archive) -> list[str]:
     """All that fmpy finds: the schema, names, required starts, combinations of attributes, units, structure."""
     from fmpy.validation import validate_fmu
 
-    return [" ".join(str(problem).split()) for problem in validate_fmu(str(archive.path))]
+    try:
+        problems = validate_fmu(str(archive.path))
+    except Exception as error:  # it reads attributes strictly, and trips over damage in its own ways
+        problems = [f"fmpy does not read it: {type(error).__name__}: {error}"]
+    return [" ".join(str(problem).split()) for problem in problems]
 
 
 def guid(fmu: Fmu) -> Iterator[str]:

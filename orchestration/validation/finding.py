@@ -9,17 +9,25 @@ Rule = Callable[[Subject], Iterable[str]]
 """Texts of what it finds wrong with a subject; the rule goes by the name of the function."""
 
 
+class Note(str):
+    """The text of a finding that breaks no rule of the standard, but that one should know."""
+
+    __slots__ = ()
+
+
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that is wrong with an FMU."""
+    """One thing that is wrong with an FMU, or worth a note."""
 
     rule: str
     """The rule that is broken, as `start-values`"""
     text: str
     """The variable or file, what was found and what was expected"""
+    note: bool = False
+    """Whether it is no problem: what the standard allows, or what could not be looked at"""
 
     def __str__(self) -> str:
-        return f"{self.rule}: {self.text}"
+        return f"{'note: ' if self.note else ''}{self.rule}: {self.text}"
 
 
 def name_of(rule: Callable[..., object]) -> str:
@@ -29,4 +37,4 @@ def name_of(rule: Callable[..., object]) -> str:
 
 def check(rules: Iterable[Rule[Subject]], subject: Subject) -> list[Finding]:
     """Everything that the rules find."""
-    return [Finding(name_of(rule), text) for rule in rules for text in rule(subject)]
+    return [Finding(name_of(rule), str(text), note=isinstance(text, Note)) for rule in rules for text in rule(subject)]

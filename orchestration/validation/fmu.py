@@ -114,16 +114,22 @@ class Fmu:
         return element
 
 
-def read_fmu(archive: Archive) -> Fmu:
-    """The view of an archive; raises `UnreadableError` if it is not of FMI 2.0 for co-simulation."""
+def read_root(archive: Archive) -> Element:
+    """The description of an FMU; raises `UnreadableError` if it is not of FMI 2.0 for co-simulation."""
     try:
         root = ElementTree.fromstring(archive.files[DESCRIPTION])
     except ElementTree.ParseError as error:
         raise UnreadableError(f"{DESCRIPTION}: expected well-formed XML: {error}") from error
-    if root.get("fmiVersion") != "2.0":
-        raise UnreadableError(f"fmiVersion = {root.get('fmiVersion')}: expected 2.0, nothing else was checked")
+    version = root.get("fmiVersion")
+    if version != "2.0":
+        raise UnreadableError(f"fmiVersion = {version}: expected 2.0; an FMU of FMI {version} is not checked")
     if root.find("CoSimulation") is None:
         raise UnreadableError(f"{DESCRIPTION}: expected a CoSimulation element, nothing else was checked")
+    return root
+
+
+def read_fmu(archive: Archive, root: Element) -> Fmu:
+    """The view of an archive and its description; raises `UnreadableError` for a number that is none."""
     types = {element.get("name"): element[0] for element in root.iterfind("TypeDefinitions/SimpleType") if len(element)}
     structure = {
         name: tuple(_unknown(e) for e in root.iterfind(f"ModelStructure/{name}/Unknown"))

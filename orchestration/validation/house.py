@@ -15,7 +15,7 @@ _DATE = "%Y-%m-%dT%H:%M:%SZ"
 
 def guid_of_content(fmu: Fmu) -> Iterator[str]:
     """The GUID says which files, to the byte, the FMU was built with."""
-    expected = content_guid(fmu.archive.files)
+    expected = content_guid(dict(fmu.archive.files))
     if fmu.guid != expected:
         yield f"guid = {fmu.guid}: expected {expected}, that of the content"
 

@@ -31,11 +31,13 @@ class RefusedError(QuadcosimError):
 class Instance:
     """One instance; after a call that failed it is never called again, not even to free it."""
 
-    def __init__(self, fmu: Fmu, folder: Path, name: str) -> None:
+    def __init__(self, fmu: Fmu, folder: Path, name: str, beat: Callable[[], None]) -> None:
         self.fmu = fmu
         self.messages: list[Message] = []
         self._variables = {v.name: v for v in fmu.variables}
         self._failed = True
+        self._beat = beat
+        beat()
         try:
             self._slave = fmi2.FMU2Slave(
                 guid=fmu.guid, unzipDirectory=str(folder), modelIdentifier=fmu.model_identifier, instanceName=name
@@ -44,6 +46,7 @@ class Instance:
         except Exception as error:
             raise RefusedError(f"fmi2Instantiate: {words(self.messages, str(error))[0]}") from error
         release_interpreter_state(self._slave.dll)
+        beat()
         self._failed = False
 
     def __enter__(self) -> "Instance":
@@ -73,12 +76,14 @@ class Instance:
         """From `t` to `t + h` seconds; whether the run goes on, for an FMU may say that it ends it here."""
         if self._failed:
             raise RefusedError("fmi2DoStep: the instance has failed and is not called again")
+        self._beat()
         try:
             self._slave.doStep(currentCommunicationPoint=t, communicationStepSize=h)
         except FMICallException as error:
             if error.status == fmi2.fmi2Discard and self._call("getBooleanStatus", fmi2.fmi2Terminated):
                 return False
             raise self._refusal(error) from None
+        self._beat()
         return True
 
     def terminate(self) -> None:
@@ -135,10 +140,13 @@ class Instance:
     def _call(self, method: str, *args: Any, **kwargs: Any) -> Any:
         if self._failed:
             raise RefusedError(f"{method}: the instance has failed and is not called again")
+        self._beat()
         try:
             return getattr(self._slave, method)(*args, **kwargs)
         except FMICallException as error:
             raise self._refusal(error) from None
+        finally:
+            self._beat()
 
     def _refusal(self, error: FMICallException) -> RefusedError:
         self._failed = True

@@ -8,12 +8,11 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterator
-from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
+from orchestration.validation.bench import Bench
 from orchestration.validation.description import SLAVE_MODULE
-from orchestration.validation.fmu import Fmu
 
 _DIFFERS = {"guid", "generationDateAndTime"}
 """Attributes that packaging and the calendar decide."""
@@ -34,17 +33,14 @@ sys.stdout.buffer.write(text.encode("utf-8"))
 """Runs with nothing but the standard library and the resources of the FMU, so no other package can answer."""
 
 
-def own_description(fmu: Fmu, folder: Path, time_limit: float) -> Iterator[str]:
-    """The description is the one that the slave gives of itself, run from the FMU that was unpacked to `folder`."""
+def own_description(bench: Bench) -> Iterator[str]:
+    """The description is the one that the bundled slave gives of itself."""
+    fmu = bench.fmu
     if SLAVE_MODULE not in fmu.archive.files:
         return  # for which there is a rule
     name = fmu.archive.files[SLAVE_MODULE].decode("utf-8", "replace").strip()
-    command = [sys.executable, "-I", "-c", _PROGRAM, str(folder / "resources"), name]
-    try:
-        done = subprocess.run(command, capture_output=True, stdin=subprocess.DEVNULL, timeout=time_limit, check=False)
-    except subprocess.TimeoutExpired:
-        yield f"the bundled slave did not describe itself within {time_limit:g} s"
-        return
+    command = [sys.executable, "-I", "-c", _PROGRAM, str(bench.folder / "resources"), name]
+    done = subprocess.run(command, capture_output=True, stdin=subprocess.DEVNULL, check=False)
     if done.returncode != 0:
         lines = done.stderr.decode("utf-8", "replace").strip().splitlines() or [f"exit code {done.returncode}"]
         yield f"the bundled slave does not describe itself: {lines[-1]}"

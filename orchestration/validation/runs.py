@@ -4,23 +4,23 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
-from orchestration.validation.bench import PLAIN, Bench, Plan, difference
+from orchestration.messages import WARNING
+from orchestration.validation.bench import PLAIN, Bench, Plan
+from orchestration.validation.finding import Note
 from orchestration.validation.fmu import Variable
-from orchestration.validation.instance import RefusedError, Row, same
+from orchestration.validation.instance import RefusedError, Row, Value, same
 
-_WARNING = 1  # fmi2Status
+_DIGITS = 5e-15
+"""Relative; what a text of 15 digits may be away from the number that it was made of"""
 
 
 def runs(bench: Bench) -> Iterator[str]:
     """From instantiation to its end at start values, by the default experiment, without an error in its log."""
-    with bench.instance() as instance:
-        bench.begin(instance, PLAIN)
-        for t, h in bench.points(PLAIN):
-            if not instance.step(t, h):
-                break
-        instance.terminate()
-    for status, message in dict.fromkeys((status, message) for status, _, message in instance.messages):
-        if status > _WARNING:
+    first = bench.first
+    if not first.whole:
+        yield Note(f"slow: {first.steps} steps take {first.seconds:.2g} s; all runs are of as many steps at most")
+    for status, message in dict.fromkeys((status, message) for status, _, message in first.messages):
+        if status > WARNING:
             text = message.decode("utf-8", "replace").partition("\n")[0]
             yield f"it logs with status {status} though no call failed: {text}"
 
@@ -42,7 +42,7 @@ def getters(bench: Bench) -> Iterator[str]:
 
 
 def start_values(bench: Bench) -> Iterator[str]:
-    """What is declared to start at a value has it, to the last bit: after initialisation, and from the beginning."""
+    """What is declared to start at a value has it to 15 digits; in FMUs of this project to the last bit."""
     declared = [v for v in bench.fmu.variables if v.keeps_start]
     with bench.instance() as instance:
         moments = {"freshly instantiated": instance.get(declared)} if bench.fmu.is_ours else {}
@@ -50,9 +50,16 @@ def start_values(bench: Bench) -> Iterator[str]:
         moments["after initialisation"] = instance.get(declared)
     for v in declared:
         for moment, row in moments.items():
-            if not same(row[v.name], v.start_value):
+            if not _starts(row[v.name], v.start_value, exactly=bench.fmu.is_ours):
                 yield f"{v.name}: start = {v.start}, but {moment} it is {row[v.name]!r}"
                 break
+
+
+def _starts(found: Value, declared: Value, *, exactly: bool) -> bool:
+    """Whether a value is the declared one; of FMUs of this project to the last bit."""
+    if exactly or not (isinstance(found, float) and isinstance(declared, float)):
+        return same(found, declared)
+    return math.isclose(found, declared, rel_tol=_DIGITS)
 
 
 def finite_outputs(bench: Bench) -> Iterator[str]:
@@ -97,11 +104,17 @@ def variable_steps(bench: Bench) -> Iterator[str]:
             yield f"{v.name} = {b!r} after halved steps, expected {a!r} as after whole ones"
 
 
+def repeatable(bench: Bench) -> Iterator[str]:
+    """Two fresh instances run the same; without that, as with `rand()`, the rules that compare runs are not tried."""
+    if bench.repeats is not None:
+        text = f"{bench.repeats}, as in an equal run before; what compares runs is not tried"
+        yield text if bench.fmu.is_ours else Note(text)
+
+
 def inputs_set_twice(bench: Bench) -> Iterator[str]:
     """Setting an input again to what it is changes nothing."""
-    differs = difference(bench.flown(replace(bench.rich, times_set=2)), bench.expected)
-    if differs:
-        yield f"{differs}, as with inputs set once"
+    twice = bench.flown(replace(bench.rich, times_set=2))
+    yield from bench.parted(twice, bench.expected, "{}, as with inputs set once")
 
 
 def reset(bench: Bench) -> Iterator[str]:
@@ -111,9 +124,11 @@ def reset(bench: Bench) -> Iterator[str]:
     with bench.instance() as instance:
         for plan, expected in ((bench.rich, bench.expected), (short, fresh), (bench.rich, bench.expected)):
             bench.begin(instance, plan)
-            differs = difference(bench.fly(instance, plan), expected)
-            if differs:
-                yield f"{differs}, as without the run and reset before it"
+            texts = list(
+                bench.parted(bench.fly(instance, plan), expected, "{}, as without the run and reset before it")
+            )
+            if texts:
+                yield from texts
                 return
             instance.reset()
 
@@ -130,9 +145,7 @@ def instances(bench: Bench) -> Iterator[str]:
         for k in range(len(bench.expected)):
             rows += bench.fly(first, plan, k, k + 1)
             bench.fly(second, other, k, k + 1)
-    differs = difference(rows, bench.expected)
-    if differs:
-        yield f"{differs}, as without a second instance"
+    yield from bench.parted(rows, bench.expected, "{}, as without a second instance")
 
 
 def saved_state(bench: Bench) -> Iterator[str]:
@@ -144,13 +157,11 @@ def saved_state(bench: Bench) -> Iterator[str]:
         bench.begin(instance, plan)
         bench.fly(instance, plan, 0, half)
         state = instance.state()
-        differs = difference(bench.fly(instance, plan, half), bench.expected[half:])
-        if differs:
-            yield f"after the state was taken at step {half}: {differs}"
+        after = bench.fly(instance, plan, half)
+        yield from bench.parted(after, bench.expected[half:], f"after the state was taken at step {half}: {{}}")
         instance.put_back(state)
-        differs = difference(bench.fly(instance, plan, half), bench.expected[half:])
-    if differs:
-        yield f"from the state of step {half}: {differs}"
+        after = bench.fly(instance, plan, half)
+    yield from bench.parted(after, bench.expected[half:], f"from the state of step {half}: {{}}")
 
 
 def serialised_state(bench: Bench) -> Iterator[str]:
@@ -164,20 +175,13 @@ def serialised_state(bench: Bench) -> Iterator[str]:
         content = instance.serialised()
     with bench.instance() as other:
         other.put_back_bytes(content)
-        differs = difference(bench.fly(other, plan, half), bench.expected[half:])
-    if differs:
-        yield f"another instance, from the bytes of the state of step {half}: {differs}"
+        after = bench.fly(other, plan, half)
+    text = f"another instance, from the bytes of the state of step {half}: {{}}"
+    yield from bench.parted(after, bench.expected[half:], text)
 
 
 FIRST = (runs, getters)
 """Without these the others cannot be tried"""
-RULES = (
-    start_values,
-    finite_outputs,
-    variable_steps,
-    inputs_set_twice,
-    reset,
-    instances,
-    saved_state,
-    serialised_state,
-)
+RULES = (start_values, finite_outputs, variable_steps, repeatable)
+COMPARED = (inputs_set_twice, reset, instances, saved_state, serialised_state)
+"""For FMUs whose runs can be repeated"""

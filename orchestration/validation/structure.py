@@ -24,9 +24,12 @@ def outputs(fmu: Fmu) -> Iterator[str]:
 
 
 def initial_unknowns(fmu: Fmu) -> Iterator[str]:
-    """InitialUnknowns lists, in order, what initialisation calculates and others may ask for."""
-    states = {v.derivative_of for v in fmu.variables if v.derivative_of is not None} if fmu.derivatives else set()
+    """InitialUnknowns lists, in order, what initialisation calculates and others may ask for.
+
+    Of what has a derivative only that of a derivative under Derivatives is a state (FMI 2.0.4, section 2.2.8).
+    """
     listed_derivatives = {unknown.index for unknown in fmu.derivatives}
+    states = {v.derivative_of for v in map(fmu.variable, listed_derivatives) if v is not None}
     expected = [
         v
         for v in fmu.variables

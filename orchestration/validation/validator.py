@@ -1,51 +1,50 @@
-"""All rules, in the order in which one needs what the ones before it found out."""
+"""All rules, tried in a confined process: a crash is a finding, and so is no answer in time."""
 
 import tempfile
 from pathlib import Path
 
-from orchestration.validation import rules
-from orchestration.validation.archive import UnreadableError, can_be_unpacked, read_archive
-from orchestration.validation.finding import Finding, check, name_of
-from orchestration.validation.fmu import Fmu, read_fmu
+from orchestration import child, confined
+from orchestration.confined import Ending, Limits
+from orchestration.errors import QuadcosimError
+from orchestration.validation.finding import Finding
+from orchestration.validation.progress import PULSE, REPORT, Told, since_last_beat
 
-READABLE = "readable"
-TIME_LIMIT = 60.0
-"""[s]; for what the FMU does"""
+PROCESS = "process"
+"""Rule that is kept here: the process of the FMU lives to its end"""
+_HANGS = 0.5
+"""Share of the time limit that one call may take before it is taken for one that does not return"""
 
 
-def validate(path: str | Path, *, time_limit: float = TIME_LIMIT) -> list[Finding]:
+def validate(path: str | Path, *, limits: Limits | None = None) -> list[Finding]:
     """What is wrong with the FMU for co-simulation (FMI 2.0) at `path`; nothing for one that is as it should be.
 
-    The FMU is run, in a process of its own that gets `time_limit` seconds. Rules that are this project's and
-    not the standard's are for FMUs that quadcosim built. Raises `QuadcosimError` if the validation fails itself.
+    All that touches the file is done, and the FMU is run, in a process of its own within `limits`. Rules that are
+    this project's and not the standard's are for FMUs that quadcosim built. Raises `QuadcosimError` if the
+    validation fails itself.
     """
-    findings: list[Finding] = []
-    try:
-        content = read_archive(Path(path))
-        findings += check(rules.OF_ARCHIVES, content)
-        fmu = read_fmu(content)
-    except UnreadableError as error:
-        return [*findings, Finding(READABLE, str(error))]
-    findings += check(rules.OF_DESCRIPTIONS, fmu)
-    if fmu.is_ours:
-        findings += check(rules.OUR_DESCRIPTIONS, fmu)
-    if can_be_unpacked(content):
-        findings += _of_what_it_does(fmu, time_limit)
-    return findings
+    path, limits = Path(path), limits or Limits()
+    with tempfile.TemporaryDirectory(prefix="quadcosim-", ignore_cleanup_errors=True) as place:
+        folder = Path(place)
+        (folder / REPORT).touch()
+        command = child.command("orchestration.validation.child", path.resolve(), folder, limits.time, limits.size)
+        ending = confined.run(command, child.environment(), limits)
+        silent = since_last_beat(folder / PULSE)
+        told = Told(folder / REPORT)
+    if told.error is not None or (told.rule is None and ending.code is not None):
+        raise QuadcosimError(f"{path}: it is the validation that failed: {told.error or ending.said}")
+    return [*told.findings, *_of_ending(told, ending, silent, limits)]
 
 
-def _of_what_it_does(fmu: Fmu, time_limit: float) -> list[Finding]:
-    import fmpy
-
-    from orchestration.fmpy_adapter import expect_readable_place
-    from orchestration.validation.behaviour import behaviour
-    from orchestration.validation.own_description import own_description
-
-    with tempfile.TemporaryDirectory(prefix="quadcosim-", ignore_cleanup_errors=True) as folder:
-        fmpy.extract(str(fmu.archive.path), folder)
-        expect_readable_place(Path(folder))
-        own = own_description(fmu, Path(folder), time_limit) if fmu.is_ours else ()
-        return [
-            *(Finding(name_of(own_description), text) for text in own),
-            *behaviour(fmu, Path(folder), time_limit),
-        ]
+def _of_ending(told: Told, ending: Ending, silent: float | None, limits: Limits) -> list[Finding]:
+    """What the end of the process says of the FMU; `silent`: seconds since a call of it began or returned."""
+    moment = "after the last rule" if told.ended else f"in {told.rule or 'reading'}"
+    if ending.code is None:
+        hangs = silent is not None and silent > _HANGS * limits.time
+        why = ""
+        if ending.out_of_time and silent is not None:
+            why = "a call does not return" if hangs else "its calls return, it is slow"
+        text = "; ".join(filter(None, (f"stopped {moment}: {ending.reached}", why, "the rest was not checked")))
+        return [Finding(PROCESS, text)]
+    if ending.code == 0 and told.ended:
+        return []
+    return [Finding(PROCESS, f"the process of the FMU {ending.described} {moment}")]

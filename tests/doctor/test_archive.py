@@ -161,6 +161,9 @@ def test_a_file_that_is_no_fmu_is_refused_in_one_line(plant: Path, tmp_path: Pat
     assert refusal(changed(plant, path, {"modelDescription.xml": b"<a>"})).startswith(
         "expected XML in modelDescription.xml"
     )
-    assert refusal(described(plant, path, 'fmiVersion="2.0"', 'fmiVersion="3.0"')) == "fmiVersion = 3.0: expected 2.0"
+    assert (
+        refusal(described(plant, path, 'fmiVersion="2.0"', 'fmiVersion="3.0"'))
+        == "an FMU of FMI 3.0: expected one of FMI 2.0"
+    )
     neither = described(plant, path, "<CoSimulation", "<CoSim")
     assert refusal(neither) == "expected CoSimulation or ModelExchange in modelDescription.xml"

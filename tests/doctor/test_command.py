@@ -2,15 +2,18 @@
 
 import json
 import sys
+import zipfile
 from pathlib import Path
 from subprocess import CompletedProcess
 from typing import Any
 
 import pytest
 
+from orchestration.confined import Limits
 from orchestration.doctor import trial
 from tests.doctor.common import AARCH64, LINUX64, changed, described, files_of, for_machine, requiring
-from tests.fmus.process import run
+from tests.fmus.foreign import lag, needs_compiler
+from tests.fmus.process import ROOT, run
 
 
 @pytest.fixture
@@ -128,7 +131,7 @@ def test_an_fmu_that_fails_to_initialise_is_told_in_its_own_words(plant: Path, t
     (interface,) = (name for name in files if name.endswith("/plant_fmu/interface.py"))
     light = files[interface].replace(b'"kg", _BODY.mass', b'"kg", -1.0')
     table = examined(changed(plant, tmp_path / "light.fmu", {interface: light}))
-    text = "doctor (QuadrotorPlant): fmi2ExitInitializationMode: mass = -1.0: expected a finite value > 0"
+    text = "fmi2ExitInitializationMode: mass = -1.0: expected a finite value > 0"
     assert table["failure"] == text
 
 
@@ -139,16 +142,80 @@ def test_model_exchange_alone_is_not_tried(plant: Path, tmp_path: Path) -> None:
     assert table["failure"] == "not tried: it is for model exchange only"
 
 
-def test_an_fmu_that_takes_its_process_down_does_not_take_the_doctor_along(
-    plant: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def failure(path: Path, **limits: float) -> str | None:
+    return trial.attempt(path, Limits(**limits)).failure
+
+
+def test_an_fmu_that_takes_its_process_down_does_not_take_the_doctor_along(plant: Path, tmp_path: Path) -> None:
     crash = b"import os, signal\nos.kill(os.getpid(), signal.SIGSEGV)\n"
     (entry,) = (name for name in files_of(plant) if name.endswith("_entry.py"))
-    assert trial.attempt(changed(plant, tmp_path / "a.fmu", {entry: crash})) == (
-        "took its process down: Segmentation fault"
-    )
-    monkeypatch.setattr(trial, "PATIENCE", 0.1)
-    assert trial.attempt(plant) == "no answer within 0.1 s"
+    assert failure(changed(plant, tmp_path / "a.fmu", {entry: crash})) == ("took its process down: it ended by SIGSEGV")
+
+
+@needs_compiler
+def test_an_fmu_that_ends_its_process_in_good_order_does_not_load(tmp_path: Path) -> None:
+    assert failure(lag(tmp_path / "lag.fmu")) is None
+    assert failure(lag(tmp_path / "lag.fmu", "EXIT_AT_ONCE")) == "took its process down: it ended with exit code 0"
+
+
+@needs_compiler
+def test_an_fmu_that_takes_too_much_is_stopped(tmp_path: Path) -> None:
+    talks, hoards = (lag(tmp_path / f"{macro}.fmu", macro) for macro in ("TALKS", "HOARDS"))
+    start = "its process was stopped: it "
+    assert failure(talks, output=1.0) == f"{start}writes more than the limit of 1 MB to its standard output and error"
+    assert failure(hoards, memory=500.0) == f"{start}takes more memory than the limit of 500 MB"
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    "odd",
+    [
+        {'stopTime="1"': 'stopTime="late"'},
+        {'<Real start="1"/>': '<Real start="1" nominal="large"/>'},
+        {'causality="output"><Real/>': 'causality="result"><Real derivative="x"/>'},
+        {'<Unknown index="2"/></Outputs>': '<Unknown index="seven"/></Outputs>'},
+    ],
+)
+def test_what_loading_does_not_need_may_be_odd(odd: dict[str, str], tmp_path: Path) -> None:
+    assert failure(lag(tmp_path / "lag.fmu", described=odd)) is None
+
+
+@needs_compiler
+def test_a_wrong_file_for_another_platform_is_said_and_is_no_fault_here(tmp_path: Path) -> None:
+    path = lag(tmp_path / "lag.fmu")
+    table = examined(changed(path, tmp_path / "a.fmu", {"binaries/win64/Lag.dll": b"version https://"}))
+    assert table["problems"] == []
+    assert table["elsewhere"] == [
+        "win64: binaries/win64/Lag.dll: begins with b'vers', expected an ELF, PE or Mach-O file"
+    ]
+    assert table["good"]
+
+
+@needs_compiler
+def test_a_foreign_pythonhome_or_pythonpath_is_what_the_doctor_finds(tmp_path: Path) -> None:
+    path = lag(tmp_path / "lag.fmu")
+    for module in ("typer", "pydantic"):
+        (tmp_path / f"{module}.py").write_text("raise ImportError('of another Python')")
+    environment = {"PYTHONPATH": f"{tmp_path}:{ROOT}"}
+    start = (sys.executable, "-m", "orchestration.start")
+    done = run(*start, "doctor", str(path), environment=environment)
+    assert done.returncode == 1, done.stderr
+    said = done.stdout.splitlines()[-1]
+    assert said.startswith(f"! tried here   loads without PYTHONPATH={tmp_path}:{ROOT}, not with it: ")
+    assert said.endswith("ImportError: of another Python")
+    done = run(*start, "--help", environment=environment)
+    assert (done.returncode, done.stderr) == (
+        1, f"quadcosim: it does not start with PYTHONPATH={tmp_path}:{ROOT}: ImportError: of another Python\n",
+    )  # fmt: skip
+
+
+def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(plant: Path, tmp_path: Path) -> None:
+    path = changed(plant, tmp_path / "a.fmu", {})
+    with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("resources/zeros", bytes(20_000_000))
+    done = doctor(path, "--size-limit", "10")
+    assert done.returncode == 2
+    assert done.stderr == f"quadcosim: {path}: unpacks to 21 MB: expected at most 10 MB (--size-limit)\n"
 
 
 @pytest.mark.parametrize(

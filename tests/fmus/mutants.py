@@ -310,6 +310,10 @@ BEHAVIOUR = (
         damage=source("fmu_kit/slave.py", "[reals[vr] for vr", "[reals[vr] + (vr == 8) * reals[0] for vr"),
     ),
     Mutant(
+        name="runs by chance", rule="repeatable", words=("as in an equal run before",),
+        damage=source("plant_fmu/slave.py", _TILT, f'{_TILT}\n        self.put("tilt", __import__("random").random())'),
+    ),
+    Mutant(
         name="state kept over reset", rule="reset", words=("without the run and reset before it",),
         damage=every(
             source("plant_fmu/slave.py", _TILT, f"{_TILT}\n        _KEPT[self.instance_name] = state.velocity"),
@@ -379,7 +383,7 @@ BEHAVIOUR = (
         damage=source("plant_fmu/slave.py", _STEP, f"__import__('ctypes').string_at(0)\n        {_STEP}"),
     ),
     Mutant(
-        name="step without end", rule="process", words=("limit of 3 s",), time_limit=3.0,
+        name="step without end", rule="process", words=("limit of 8 s; a call does not return",), time_limit=8.0,
         damage=source("plant_fmu/slave.py", _STEP, f"while True:\n            pass\n        {_STEP}"),
     ),
     Mutant(

@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 
 from orchestration import cli
+from orchestration.confined import Limits
 from orchestration.validation import Finding, rules, validate
-from orchestration.validation.behaviour import PLATFORM, PROCESS
+from orchestration.validation.child import PLATFORM, READABLE
 from orchestration.validation.finding import name_of
-from orchestration.validation.validator import READABLE
+from orchestration.validation.validator import PROCESS
 from orchestration.wiring import MODELS
 from tests.fmus.damage import Mutant
 from tests.fmus.mutants import MUTANTS
@@ -29,7 +30,7 @@ def findings(built: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -
     folder = tmp_path_factory.mktemp("mutants")
 
     def found(mutant: Mutant) -> list[Finding]:
-        return validate(mutant.write(built[mutant.model], folder), time_limit=mutant.time_limit)
+        return validate(mutant.write(built[mutant.model], folder), limits=Limits(time=mutant.time_limit))
 
     with ThreadPoolExecutor(2) as pool:
         under_way = {mutant: pool.submit(found, mutant) for mutant in MUTANTS}
@@ -100,7 +101,7 @@ def test_the_command_gives_findings_as_json(
     first, second = json.loads(capsys.readouterr().out)
     assert first["fmu"] == str(damaged)
     text = "needsExecutionTool = true: expected false"
-    assert {"rule": "execution-tool", "text": text} in first["findings"]
+    assert {"rule": "execution-tool", "text": text, "note": False} in first["findings"]
     assert second == {"fmu": str(sound), "findings": []}
 
 
@@ -108,7 +109,7 @@ def test_the_command_stops_an_fmu_at_the_time_limit(make: Make, capsys: pytest.C
     with pytest.raises(SystemExit) as end:
         cli.main(["validate", "--time-limit", "2", str(make("step without end"))])
     assert end.value.code == 1
-    assert "process: no end within the limit of 2 s" in capsys.readouterr().out
+    assert "it takes longer than the limit of 2 s" in capsys.readouterr().out
 
 
 # -- what others say ------------------------------------------------------------------------------------

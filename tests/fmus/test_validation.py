@@ -1,29 +1,30 @@
 """Validation of FMUs that are sound, of this project and of others, and rules that no damage of ours can reach."""
 
-import json
-import subprocess
 import sys
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import IO
 from xml.etree.ElementTree import Element, SubElement, fromstring
 
 import pytest
 
-from orchestration import cli
+from orchestration import cli, confined
+from orchestration.confined import Ending, Limits
 from orchestration.errors import QuadcosimError
 from orchestration.validation import Finding, child, runs, validate
 from orchestration.validation.archive import Archive
 from orchestration.validation.bench import Bench
 from orchestration.validation.finding import check
-from orchestration.validation.fmu import Fmu, read_fmu
+from orchestration.validation.fmu import Fmu, read_fmu, read_root
 from orchestration.validation.own_description import differences, elements
+from orchestration.validation.progress import REPORT, Told
 from orchestration.validation.structure import initial_unknowns, known_dependencies, outputs
 from orchestration.validation.units import dimensions, unit_meaning
 from orchestration.validation.variables import aliases
 from orchestration.wiring import MODELS
 from tests.fmus.archive import files_of
-from tests.fmus.damage import DESCRIPTION, Damage, description, source, without, write_fmu
+from tests.fmus.damage import DESCRIPTION, Damage, description, root, source, without, write_fmu
+from tests.fmus.foreign import lag, needs_compiler
 from tests.fmus.process import ROOT, run
 
 # -- sound FMUs -----------------------------------------------------------------------------------------
@@ -88,7 +89,7 @@ def test_what_a_foreign_fmu_does_is_looked_at_too(low_pass: Path, tmp_path: Path
         source("low_pass.py", f"self.y += {lag}", f"SHARED[0] += {lag}; self.y = SHARED[0]"),
     )  # fmt: skip
     found = validate(path)
-    assert {"reset", "instances"} <= {finding.rule for finding in found}
+    assert [(finding.rule, finding.note) for finding in found] == [("repeatable", True)]
     assert all("y = " in finding.text for finding in found)
 
 
@@ -98,6 +99,104 @@ def test_an_fmu_that_cannot_run_here_is_not_said_to_be_sound(low_pass: Path, tmp
     )
     rules = [finding.rule for finding in validate(path)]
     assert rules == ["binaries", "platform"]
+
+
+# -- FMUs in C, as other tools make them ----------------------------------------------------------------
+
+
+def summary(path: Path, **limits: float) -> list[tuple[str, bool]]:
+    """Rule of each finding, and whether it is a note only."""
+    return [(finding.rule, finding.note) for finding in validate(path, limits=Limits(**limits))]
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("macro", "found"),
+    [
+        ("PLAIN", []),
+        ("NOISY", [("repeatable", True)]),  # rand() breaks no rule
+        ("SHIFT=1e-9", [("saved-state", True), ("serialised-state", True)]),  # the simulation can go on
+        ("SHIFT=1e-2", [("saved-state", False), ("serialised-state", False)]),
+        ("FORKS", []),
+    ],
+)
+def test_only_what_breaks_the_standard_is_a_problem(macro: str, found: list[tuple[str, bool]], tmp_path: Path) -> None:
+    assert summary(lag(tmp_path / "lag.fmu", macro)) == found
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("start", "found"),
+    [("0.1", []), ("0.10000000000000002", []), ("0.1000000001", [("start-values", False)])],
+)
+def test_a_start_may_be_off_by_what_15_digits_leave_open(start: str, found: list[object], tmp_path: Path) -> None:
+    path = lag(tmp_path / "lag.fmu", described={'<Real start="0.1"/>': f'<Real start="{start}"/>'})
+    assert summary(path) == found
+
+
+@needs_compiler
+def test_a_slow_fmu_is_checked_with_fewer_steps_and_is_not_taken_for_one_that_hangs(tmp_path: Path) -> None:
+    assert summary(lag(tmp_path / "lag.fmu", "SLOW=10000"), time=15.0) == [("runs", True)]
+    slow, stopped = validate(lag(tmp_path / "slower.fmu", "SLOW=200000"), limits=Limits(time=4.0))
+    assert (slow.rule, slow.note) == ("runs", True)
+    assert (stopped.rule, stopped.note) == ("process", False)
+    assert "its calls return, it is slow" in stopped.text
+
+
+@needs_compiler
+def test_what_an_fmu_logs_is_formatted(tmp_path: Path) -> None:
+    (found,) = validate(lag(tmp_path / "lag.fmu", "REFUSES"))
+    assert found == Finding("runs", "fmi2DoStep: Lag 0: 7 of 0 at 100%")
+
+
+@needs_compiler
+@pytest.mark.parametrize("macro", ["EXITS", "EXIT_AT_ONCE"])
+def test_an_fmu_that_ends_its_process_in_good_order_does_not_pass(macro: str, tmp_path: Path) -> None:
+    assert validate(lag(tmp_path / "lag.fmu", macro)) == [
+        Finding("process", "the process of the FMU ended with exit code 0 in runs")
+    ]
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("macro", "limits", "words"),
+    [
+        ("TALKS", {"output": 1.0}, "it writes more than the limit of 1 MB to its standard output and error"),
+        ("HOARDS", {"memory": 500.0}, "it takes more memory than the limit of 500 MB"),
+    ],
+)
+def test_an_fmu_that_takes_too_much_is_stopped(
+    macro: str, limits: dict[str, float], words: str, tmp_path: Path
+) -> None:
+    assert validate(lag(tmp_path / "lag.fmu", macro), limits=Limits(**limits)) == [
+        Finding("process", f"stopped in runs: {words}; the rest was not checked")
+    ]
+
+
+def test_the_time_limit_holds_for_the_description_too(low_pass: Path, tmp_path: Path) -> None:
+    def swell(root: Element) -> None:
+        variables = root.find("ModelVariables")
+        assert variables is not None
+        for i in range(100_000):
+            v = SubElement(variables, "ScalarVariable", name=f"v{i}", valueReference=str(100 + i))
+            SubElement(v, "Real")
+
+    path = damaged(low_pass, tmp_path / "large.fmu", description(swell))
+    (found,) = (finding for finding in validate(path, limits=Limits(time=1.5)) if finding.rule == "process")
+    assert found.text.endswith("it takes longer than the limit of 1.5 s; the rest was not checked")
+
+
+def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(low_pass: Path, tmp_path: Path) -> None:
+    path = damaged(low_pass, tmp_path / "zeros.fmu")
+    with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("resources/zeros", bytes(20_000_000))
+    (found,) = validate(path, limits=Limits(size=10.0))
+    assert found == Finding("readable", "zeros.fmu: unpacks to 21 MB: expected at most 10 MB (--size-limit)")
+
+
+def test_an_fmu_of_fmi_3_is_told_by_its_version(low_pass: Path, tmp_path: Path) -> None:
+    path = damaged(low_pass, tmp_path / "three.fmu", root(fmiVersion="3.0"), without("binaries/"))
+    assert validate(path) == [Finding("readable", "fmiVersion = 3.0: expected 2.0; an FMU of FMI 3.0 is not checked")]
 
 
 # -- the command ----------------------------------------------------------------------------------------
@@ -128,12 +227,11 @@ def test_a_time_limit_must_be_positive(limit: str, capsys: pytest.CaptureFixture
 def test_an_error_of_the_validation_itself_is_no_finding(
     report: str, words: str, low_pass: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(command: list[str], *, stderr: IO[bytes], **options: object) -> subprocess.CompletedProcess[bytes]:
-        Path(command[-1]).write_text(report)
-        stderr.write(b"Traceback\nno such module")
-        return subprocess.CompletedProcess(command, 1)
+    def fail(command: list[str], environment: object, limits: Limits) -> Ending:
+        Path(command[-3], REPORT).write_text(report)
+        return Ending(code=1, reached=None, out_of_time=False, said="no such module")
 
-    monkeypatch.setattr(subprocess, "run", fail)
+    monkeypatch.setattr(confined, "run", fail)
     with pytest.raises(QuadcosimError, match=f"LowPass.fmu: it is the validation that failed: {words}"):
         validate(low_pass)
 
@@ -143,10 +241,11 @@ def test_the_child_reports_an_error_in_a_rule(low_pass: Path, monkeypatch: pytes
         raise KeyError(3)
 
     monkeypatch.setattr(runs, "FIRST", (odd,))
+    monkeypatch.setattr(child, "restrict", lambda size: None)  # which would hold for the process of the test
     with pytest.raises(KeyError):
-        child.main(str(low_pass), str(tmp_path), str(tmp_path / "report"))
-    lines = (tmp_path / "report").read_text().splitlines()
-    assert [json.loads(line) for line in lines] == [{"rule": "odd"}, {"error": "KeyError: 3"}]
+        child.main(low_pass, tmp_path, Limits())
+    told = Told(tmp_path / REPORT)
+    assert (told.rule, told.error, told.ended) == ("odd", "KeyError: 3", False)
 
 
 # -- units ----------------------------------------------------------------------------------------------
@@ -185,7 +284,12 @@ def fmu(variables: str, structure: str = "", units: str = "", tool: str = "anoth
         <CoSimulation modelIdentifier="M"/><UnitDefinitions>{units}</UnitDefinitions>
         <ModelVariables>{variables}</ModelVariables><ModelStructure>{structure}</ModelStructure>
     </fmiModelDescription>"""
-    return read_fmu(Archive(Path("m.fmu"), (), {DESCRIPTION: text.encode()}))
+    return read(text)
+
+
+def read(text: str) -> Fmu:
+    archive = Archive(Path("m.fmu"), (), {DESCRIPTION: text.encode()})
+    return read_fmu(archive, read_root(archive))
 
 
 def scalar(name: str, reference: int, attributes: str = "", real: str = "") -> str:
@@ -236,6 +340,7 @@ def lists(outputs: str, derivatives: str, initial: str) -> str:
     ("structure", "texts"),
     [
         (lists("3", "2", "2 3 4"), []),
+        (lists("3", "6", "3 4 6"), []),  # x is no state: its derivative is not under Derivatives
         (lists("3", "", "3 4"), []),  # without derivatives there are no states to speak of
         (lists("3", "2", "3 2 4"), ["InitialUnknowns: expected the entries in the order of their indices"]),
         (lists("3", "2", "2 3"), ["InitialUnknowns: p is there 0 times, expected once"]),
@@ -281,7 +386,7 @@ def test_types_give_variables_their_attributes() -> None:
         <ScalarVariable name="a" valueReference="0"><Real declaredType="Angle" max="2"/></ScalarVariable>
         <ScalarVariable name="g" valueReference="0"><Enumeration declaredType="Gear" start="1"/></ScalarVariable>
         </ModelVariables></fmiModelDescription>"""
-    a, g = read_fmu(Archive(Path("m.fmu"), (), {DESCRIPTION: text.encode()})).variables
+    a, g = read(text).variables
     assert (a.unit, a.minimum, a.maximum) == ("rad", "-1", "2")
     assert (g.items, g.start_value) == ((-1, 1), 1)
 

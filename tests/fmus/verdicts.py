@@ -8,6 +8,7 @@ from pathlib import Path
 
 from fmpy.validation import validate_fmu
 
+from orchestration.confined import Limits
 from orchestration.validation import Finding, validate
 from tests.fmus.damage import Mutant
 
@@ -57,7 +58,7 @@ def verdicts(mutants: Iterable[Mutant], built: dict[str, Path], folder: Path) ->
     """What quadcosim, fmpy and fmutool say of mutants, which are written to `folder`."""
     paths = {mutant: mutant.write(built[mutant.model], folder) for mutant in mutants}
     with ThreadPoolExecutor() as pool:
-        own = pool.map(lambda mutant: validate(paths[mutant], time_limit=mutant.time_limit), paths)
+        own = pool.map(lambda mutant: validate(paths[mutant], limits=Limits(time=mutant.time_limit)), paths)
         return [
             Verdict(
                 mutant=mutant,
