@@ -2,24 +2,29 @@
 
 import ctypes
 import difflib
-import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import fmpy
+import numpy as np
+import numpy.typing as npt
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription, ScalarVariable
 
 from orchestration import scratch
 from orchestration.errors import QuadcosimError, RefusedValueError, SimulatorError, UsageError, shown
+from orchestration.fmi.model import read_model
 from orchestration.messages import PYTHONFMU_ENTRY, WARNING, Message, collecting_callbacks, words
 from orchestration.scratch import Scratch
 from orchestration.simulator import Floats, Transfer
 from orchestration.timing import is_number
 
 DIVERGENCE_CATEGORY = b"divergence"
+
+_STORED = {"Real": np.float64, "Integer": np.int32, "Boolean": np.int32, "Enumeration": np.int32}
+_CALLED = {"Real": "Real", "Integer": "Integer", "Boolean": "Boolean", "Enumeration": "Integer"}
 
 
 class FmuSimulator:
@@ -39,7 +44,10 @@ class FmuSimulator:
         self._messages: list[Message] = []
         self._given: set[str] = set()  # until initialisation ends, as then the FMU has taken all of it
         self._folder: Scratch | None = None
-        self.description = read_description(path)
+        self.model = read_model(path)
+        self.description: ModelDescription = self.model.description
+        if self.model.version != 2:
+            raise UsageError(f"{path}: FMI {self.description.fmiVersion}; expected FMI 2.0 for co-simulation")
         if fmpy.platform not in fmpy.supported_platforms(str(path)):
             raise QuadcosimError(
                 f"{path}: has no binary for {fmpy.platform}; pythonfmu ships them for 64-bit Linux and Windows only"
@@ -126,14 +134,53 @@ class FmuSimulator:
         return tuple(v.name for v in self.variables.values() if v.type == kind and v.causality in causalities)
 
     def reader(self, names: Sequence[str], into: Floats) -> Transfer:
-        """A call that puts the values of the Real variables `names` into `into`."""
-        return self._transfer("fmi2GetReal", names, into)
+        """A call that puts the values of the variables `names` into `into`; a Boolean is 0 or 1."""
+        parts = self._by_kind(names)
+        if [kind for kind, _ in parts] in ([], ["Real"]):
+            return self._transfer("fmi2GetReal", names, into)
+        reads = []
+        for kind, places in parts:
+            values = np.zeros(len(places), dtype=_STORED[kind])
+            call = self._transfer(f"fmi2Get{_CALLED[kind]}", [names[i] for i in places], values)
+            reads.append((call, values, np.array(places)))
+
+        def read() -> None:
+            for call, values, places in reads:
+                call()
+                into[places] = values
+
+        return read
 
     def writer(self, names: Sequence[str], source: Floats) -> Transfer:
-        """A call that sets the Real variables `names` from `source`."""
-        return self._transfer("fmi2SetReal", names, source)
+        """A call that sets the variables `names` from `source`.
 
-    def set(self, name: str, value: float | bool) -> None:
+        A Boolean is true for what is not 0; an Integer or Enumeration takes the nearest whole number.
+        """
+        parts = self._by_kind(names)
+        if [kind for kind, _ in parts] in ([], ["Real"]):
+            return self._transfer("fmi2SetReal", names, source)
+        writes = []
+        for kind, places in parts:
+            values = np.zeros(len(places), dtype=_STORED[kind])
+            call = self._transfer(f"fmi2Set{_CALLED[kind]}", [names[i] for i in places], values)
+            writes.append((call, values, np.array(places), kind))
+
+        def write() -> None:
+            for call, values, places, kind in writes:
+                chosen = source[places]
+                values[:] = chosen if kind == "Real" else chosen != 0.0 if kind == "Boolean" else np.rint(chosen)
+                call()
+
+        return write
+
+    def _by_kind(self, names: Sequence[str]) -> list[tuple[str, list[int]]]:
+        """Places in `names` by type."""
+        found: dict[str, list[int]] = {}
+        for i, name in enumerate(names):
+            found.setdefault(self.model.variable(name, self.name).kind, []).append(i)
+        return list(found.items())
+
+    def set(self, name: str, value: float | bool | str) -> None:
         """Set one variable, converted to its type; raises `UsageError` for a value it cannot take."""
         variable = self.variable(name)
         reference = [variable.valueReference]
@@ -174,12 +221,13 @@ class FmuSimulator:
         if not condition:
             raise UsageError(f"{self.name}.{name} = {shown(value)}: expected {expected}")
 
-    def _transfer(self, function: str, names: Sequence[str], array: Floats) -> Transfer:
+    def _transfer(self, function: str, names: Sequence[str], array: npt.NDArray[Any]) -> Transfer:
         count = len(names)
         if array.shape != (count,):
             raise ValueError(f"{function}: expected an array of {count} values, got shape {array.shape}")
         references = (ctypes.c_uint32 * count)(*(self.variable(name).valueReference for name in names))
-        values = (ctypes.c_double * count).from_buffer(array)  # type: ignore[arg-type]
+        kind = ctypes.c_double if array.dtype == np.float64 else ctypes.c_int32
+        values = (kind * count).from_buffer(array)  # type: ignore[arg-type]
         call, component, failure = getattr(self._fmu.dll, function), self._component, self._failure
 
         def transfer() -> None:
@@ -220,20 +268,6 @@ class FmuSimulator:
         name, equals, _ = text.partition(" = ")
         vector = name.partition(".{")[0]
         return bool(equals) and any(given == name or given.startswith(f"{vector}.") for given in self._given)
-
-
-def read_description(path: Path) -> ModelDescription:
-    """The description of an FMU; raises `UsageError` for a file that is no FMI 2.0 FMU for co-simulation."""
-    if not zipfile.is_zipfile(path):
-        raise UsageError(f"{path}: expected an FMU, which is a zip file")
-    try:
-        description: ModelDescription = fmpy.read_model_description(str(path))
-    except Exception as error:  # fmpy lets through whatever the readers of zip and XML raise
-        raise UsageError(f"{path}: expected an FMU with a modelDescription.xml of FMI 2.0: {error}") from error
-    if description.fmiVersion != "2.0" or description.coSimulation is None:
-        kind = "co-simulation" if description.coSimulation is not None else "model exchange only"
-        raise UsageError(f"{path}: FMI {description.fmiVersion}, {kind}; expected FMI 2.0 for co-simulation")
-    return description
 
 
 def uri_is_read(folder: Path) -> bool:

@@ -19,7 +19,7 @@ from fmu_kit.model_description import generation_date
 from fmu_kit.packaging import write_archive
 from orchestration import fmus
 from orchestration.errors import UsageError
-from orchestration.fmpy_adapter import read_description
+from orchestration.fmi.model import read_description
 from orchestration.scenario import FmuChoice, Parameter, Scenario
 from orchestration.timing import Timing
 from orchestration.wiring import COMMAND, MEASUREMENT, SAMPLE_OFFSET, SAMPLE_PERIOD

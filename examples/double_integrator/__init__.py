@@ -1,0 +1,1 @@
+"""A double integrator under state feedback: the smallest loop with a known largest sampling period."""

@@ -1,0 +1,204 @@
+"""The grammar of expressions: Python's, cut down to arithmetic, comparisons, logic, names and known functions."""
+
+import ast
+import difflib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from orchestration.errors import UsageError
+
+LONGEST, DEEPEST = 10_000, 60
+"""Characters and nesting of an expression"""
+
+POINTWISE = {
+    "abs": (1, 1), "sqrt": (1, 1), "exp": (1, 1), "log": (1, 1), "sin": (1, 1), "cos": (1, 1), "tan": (1, 1),
+    "asin": (1, 1), "acos": (1, 1), "atan2": (2, 2), "tanh": (1, 1), "hypot": (1, 99), "norm": (1, 99),
+}  # fmt: skip
+"""Functions of values at one instant, with the fewest and most arguments."""
+OVER_RUN = {
+    "min": (1, 99), "max": (1, 99), "mean": (1, 1), "rms": (1, 1), "last": (1, 1), "first": (1, 1),
+    "integral": (1, 1), "peak_time": (1, 1), "settling_time": (2, 2), "total_variation": (1, 1), "share": (1, 1),
+    "growth_share": (2, 2),
+}  # fmt: skip
+"""Functions over a run; `min` and `max` of several arguments are of values at one instant."""
+
+
+SAMPLED = "sampled"
+"""`sampled(CONNECTION, x)`: the values of x at the rows at which a message of that connection arrived"""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A literal."""
+
+    value: float
+
+
+@dataclass(frozen=True)
+class Name:
+    """A signal, an objective, `time` or `stop_time`."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Operation:
+    """An operator with its operands: + - * / ** < <= > >= == != and or not, and `neg`."""
+
+    sign: str
+    operands: tuple["Node", ...]
+
+
+@dataclass(frozen=True)
+class Call:
+    """A function with its arguments."""
+
+    function: str
+    arguments: tuple["Node", ...]
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """The values of an expression where messages of a connection arrived."""
+
+    connection: str
+    argument: "Node"
+
+
+Node: TypeAlias = Number | Name | Operation | Call | Sampled
+
+
+def parse(text: str) -> Node:
+    """The tree of an expression; raises `UsageError` naming what is not part of the language."""
+    if not isinstance(text, str) or len(text) > LONGEST:
+        raise UsageError(f"expected an expression of at most {LONGEST} characters")
+    try:
+        tree = ast.parse(text.strip(), mode="eval")
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        problem = error.msg if isinstance(error, SyntaxError) else type(error).__name__
+        raise UsageError(f"{_short(text)}: expected an expression: {problem}") from None
+    return _node(tree.body, text, 0)
+
+
+def names(node: Node) -> Iterator[str]:
+    """Every name in an expression, as often as it is there."""
+    if isinstance(node, Name):
+        yield node.text
+    for child in children(node):
+        yield from names(child)
+
+
+def text(node: Node) -> str:
+    """An expression as it could have been written."""
+    match node:
+        case Number(value):
+            return f"{value:g}"
+        case Name(name):
+            return name
+        case Sampled(connection, argument):
+            return f"{SAMPLED}({connection}, {text(argument)})"
+        case Call(function, arguments):
+            return f"{function}({', '.join(map(text, arguments))})"
+        case Operation("neg" | "not" as sign, (operand,)):
+            return f"{'-' if sign == 'neg' else 'not '}{_bracketed(operand)}"
+        case Operation(sign, operands):
+            return f" {sign} ".join(map(_bracketed, operands))
+
+
+def _bracketed(node: Node) -> str:
+    return f"({text(node)})" if isinstance(node, Operation) else text(node)
+
+
+def is_over_run(node: Call) -> bool:
+    """Whether a call makes one number of a whole run."""
+    return node.function in OVER_RUN and not (node.function in ("min", "max") and len(node.arguments) > 1)
+
+
+def children(node: Node) -> tuple[Node, ...]:
+    """What an expression is made of."""
+    if isinstance(node, Operation):
+        return node.operands
+    if isinstance(node, Sampled):
+        return (node.argument,)
+    return node.arguments if isinstance(node, Call) else ()
+
+
+_BINARY: dict[type, str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
+_COMPARISONS: dict[type, str] = {
+    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
+}  # fmt: skip
+
+
+def _node(tree: ast.expr, text: str, depth: int) -> Node:
+    if depth > DEEPEST:
+        raise UsageError(f"{_short(text)}: expected an expression nested at most {DEEPEST} deep")
+    build: Callable[[ast.expr], Node] = lambda child: _node(child, text, depth + 1)  # noqa: E731
+    match tree:
+        case ast.Constant(value=bool(value)):
+            return Number(float(value))
+        case ast.Constant(value=int() | float() as value):
+            try:
+                return Number(float(value))
+            except OverflowError:
+                raise UsageError(f"{_short(text)}: expected numbers that a float can hold") from None
+        case ast.Name() | ast.Attribute() | ast.Subscript():
+            return Name(_dotted(tree, text))
+        case ast.BinOp(op=op) if type(op) in _BINARY:
+            return Operation(_BINARY[type(op)], (build(tree.left), build(tree.right)))
+        case ast.UnaryOp(op=ast.USub()):
+            return Operation("neg", (build(tree.operand),))
+        case ast.UnaryOp(op=ast.UAdd()):
+            return build(tree.operand)
+        case ast.UnaryOp(op=ast.Not()):
+            return Operation("not", (build(tree.operand),))
+        case ast.BoolOp(op=op):
+            return Operation("and" if isinstance(op, ast.And) else "or", tuple(map(build, tree.values)))
+        case ast.Compare() if all(type(op) in _COMPARISONS for op in tree.ops):
+            sides = [build(side) for side in (tree.left, *tree.comparators)]
+            pairs = [
+                Operation(_COMPARISONS[type(op)], (left, right)) for op, left, right in zip(tree.ops, sides, sides[1:])
+            ]
+            return pairs[0] if len(pairs) == 1 else Operation("and", tuple(pairs))
+        case ast.Call(func=ast.Name(id="sampled"), args=[ast.Name(id=connection), argument], keywords=[]):
+            return Sampled(connection, build(argument))
+        case ast.Call(func=ast.Name(id=function), keywords=[]):
+            return Call(_known(function, len(tree.args), text), tuple(map(build, tree.args)))
+    raise UsageError(
+        f"{_short(text)}: {_short(ast.unparse(tree))} is not part of the language; expected numbers, names, "
+        "+ - * / **, comparisons, and, or, not, and functions"
+    )
+
+
+def _dotted(tree: ast.expr, text: str) -> str:
+    """COMPONENT.VARIABLE, also with indices as in `motor.u[1]`."""
+    match tree:
+        case ast.Name(id=name):
+            return name
+        case ast.Attribute(value=value, attr=attribute):
+            return f"{_dotted(value, text)}.{attribute}"
+        case ast.Subscript(value=value, slice=ast.Constant(value=int(index))):
+            return f"{_dotted(value, text)}[{index}]"
+        case ast.Subscript(value=value, slice=ast.Tuple(elts=elements)) if all(
+            isinstance(e, ast.Constant) and isinstance(e.value, int) for e in elements
+        ):
+            return f"{_dotted(value, text)}[{','.join(str(e.value) for e in elements if isinstance(e, ast.Constant))}]"
+    raise UsageError(f"{_short(text)}: {_short(ast.unparse(tree))}: expected the name of a signal")
+
+
+def _known(function: str, count: int, text: str) -> str:
+    functions = {**POINTWISE, **OVER_RUN, SAMPLED: (2, 2)}
+    if function not in functions:
+        near = difflib.get_close_matches(function, functions, n=1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise UsageError(f"{_short(text)}: no function {function}; expected one of {', '.join(functions)}{hint}")
+    fewest, most = functions[function]
+    if not fewest <= count <= most:
+        expected = str(fewest) if fewest == most else f"{fewest} or more"
+        raise UsageError(f"{_short(text)}: {function} of {count} arguments; expected {expected}")
+    return function
+
+
+def _short(text: str) -> str:
+    line = " ".join(str(text).split())
+    return line if len(line) <= 80 else f"{line[:77]}..."

@@ -1,0 +1,186 @@
+"""What an FMU says of itself, in one form for FMI 2.0 and FMI 3.0."""
+
+import difflib
+import itertools
+import math
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import fmpy
+from fmpy.model_description import ModelDescription, ModelVariable
+
+from orchestration.errors import UsageError
+
+Kind = Literal["Real", "Integer", "Boolean", "Enumeration", "String", "Binary", "Clock"]
+"""Types by their FMI 2.0 names; FMI 3.0's Float64 is a Real, its Int32 an Integer"""
+NUMERIC: tuple[Kind, ...] = ("Real", "Integer", "Boolean", "Enumeration")
+"""What can be connected and recorded: as numbers, a Boolean as 0 or 1"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variable:
+    """A scalar of an FMU; an element of an array has its indices in its name, as in `u[1]`."""
+
+    name: str
+    kind: Kind
+    type: str
+    """as the FMU says it: Real, Float64, Int32 …"""
+    causality: str
+    variability: str
+    unit: str | None
+    start: str | None
+    reference: int
+    element: int
+    """place within the array, 0 for a scalar"""
+    minimum: float | None
+    maximum: float | None
+
+    @property
+    def is_settable(self) -> bool:
+        """Whether it is a parameter or an input."""
+        return self.causality in ("parameter", "input", "structuralParameter")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Model:
+    """An FMU file and what its description says."""
+
+    path: Path
+    description: ModelDescription
+    variables: Mapping[str, Variable]
+    initial_dependencies: Mapping[str, frozenset[str] | None]
+    """by output, the inputs that it depends on at initialisation; None: all"""
+
+    @property
+    def name(self) -> str:
+        """The model's name."""
+        return str(self.description.modelName)
+
+    @property
+    def version(self) -> int:
+        """2 or 3, of FMI."""
+        return int(self.description.fmiMajorVersion)
+
+    @property
+    def varies_step(self) -> bool:
+        """Whether it takes communication steps of any length."""
+        return bool(self.description.coSimulation.canHandleVariableCommunicationStepSize)
+
+    @property
+    def saves_state(self) -> bool:
+        """Whether its state can be saved as bytes and restored."""
+        interface = self.description.coSimulation
+        return bool(interface.canGetAndSetFMUstate and interface.canSerializeFMUstate)
+
+    @property
+    def once_per_process(self) -> bool:
+        """Whether a process can have one instance only."""
+        return bool(self.description.coSimulation.canBeInstantiatedOnlyOncePerProcess)
+
+    def variable(self, name: str, place: str) -> Variable:
+        """A variable by name; raises `UsageError` naming those that are near."""
+        if name in self.variables:
+            return self.variables[name]
+        near = difflib.get_close_matches(name, list(self.variables), n=3)
+        hint = f"did you mean {' or '.join(near)}? " if near else ""
+        settable = [v.name for v in self.variables.values() if v.causality == "parameter"]
+        raise UsageError(f"{place}: {self.name} has no variable {name}; {hint}its parameters are {_listed(settable)}")
+
+    def names(self, *causalities: str, kinds: tuple[Kind, ...] = NUMERIC) -> tuple[str, ...]:
+        """Variables of these causalities and types, in the order of the description."""
+        return tuple(v.name for v in self.variables.values() if v.causality in causalities and v.kind in kinds)
+
+    def depends_on(self, output: str) -> frozenset[str] | None:
+        """The inputs that an output depends on at initialisation; None: on all, as far as is known."""
+        return self.initial_dependencies.get(output)
+
+
+def read_description(path: Path) -> ModelDescription:
+    """The description of an FMU; raises `UsageError` for a file that is no FMU for co-simulation."""
+    if not zipfile.is_zipfile(path):
+        raise UsageError(f"{path}: expected an FMU, which is a zip file")
+    try:
+        description: ModelDescription = fmpy.read_model_description(str(path), validate=False)
+    except Exception as error:  # fmpy lets through whatever the readers of zip and XML raise
+        raise UsageError(f"{path}: expected an FMU with a modelDescription.xml: {error}") from error
+    if description.fmiMajorVersion not in (2, 3) or description.coSimulation is None:
+        kind = "co-simulation" if description.coSimulation is not None else "model exchange only"
+        raise UsageError(f"{path}: FMI {description.fmiVersion}, {kind}; expected FMI 2.0 or 3.0 for co-simulation")
+    return description
+
+
+def read_model(path: Path) -> Model:
+    """Read what a co-simulation FMU says of itself; raises `UsageError` as `read_description` does."""
+    description = read_description(path)
+    variables = {v.name: v for declared in description.modelVariables for v in _scalars(declared)}
+    return Model(
+        path=path,
+        description=description,
+        variables=variables,
+        initial_dependencies=_dependencies(description, variables),
+    )
+
+
+_KINDS: dict[str, Kind] = {
+    "Real": "Real", "Float64": "Real", "Float32": "Real", "Boolean": "Boolean", "Enumeration": "Enumeration",
+    "String": "String", "Binary": "Binary", "Clock": "Clock", "Integer": "Integer",
+}  # fmt: skip
+
+
+def _scalars(declared: ModelVariable) -> list[Variable]:
+    """The elements of a variable: itself, or every `name[i,j]`, counted from 1, the last index first."""
+    kind: Kind = _KINDS.get(declared.type, "Integer")
+    shape = tuple(declared.shape or ())
+    starts = (declared.start or "").split() if shape else [declared.start]
+    found = []
+    for element, index in enumerate(itertools.product(*(range(1, n + 1) for n in shape))):
+        start = starts[element] if element < len(starts) else (starts[-1] if starts else None)
+        found.append(
+            Variable(
+                name=declared.name + (f"[{','.join(map(str, index))}]" if shape else ""),
+                kind=kind,
+                type=declared.type,
+                causality=declared.causality or "local",
+                variability=declared.variability or "continuous",
+                unit=declared.unit or getattr(declared.declaredType, "unit", None),
+                start=start,
+                reference=declared.valueReference,
+                element=element,
+                minimum=_number(declared.min),
+                maximum=_number(declared.max),
+            )
+        )
+    return found
+
+
+def _number(text: str | None) -> float | None:
+    try:
+        value = float(text) if text is not None else math.nan
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _dependencies(description: ModelDescription, variables: Mapping[str, Variable]) -> dict[str, frozenset[str] | None]:
+    """Declared dependencies of outputs at initialisation, on inputs; what is not listed depends on nothing."""
+    names: dict[int, list[str]] = {}
+    for variable in variables.values():
+        names.setdefault(variable.reference, []).append(variable.name)
+    inputs = {v.name for v in variables.values() if v.causality == "input"}
+    listed = description.initialUnknowns
+    nothing: frozenset[str] | None = frozenset() if listed else None
+    found: dict[str, frozenset[str] | None] = {v.name: nothing for v in variables.values() if v.causality == "output"}
+    for unknown in listed:
+        needed = unknown.dependencies
+        which = None if needed is None else frozenset(n for v in needed for n in names[v.valueReference]) & inputs
+        for name in names.get(unknown.variable.valueReference, ()):
+            found[name] = which
+    return found
+
+
+def _listed(names: list[str], most: int = 20) -> str:
+    shown = ", ".join(names[:most]) or "(none)"
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"

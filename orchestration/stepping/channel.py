@@ -1,0 +1,140 @@
+"""A connection at work: what of the sender's values reaches the receiver, with noise, rounding, and a hold."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from orchestration.errors import UsageError
+from orchestration.simulator import Floats, Transfer
+from orchestration.system.model import Connection, variable_of
+
+Indices: TypeAlias = npt.NDArray[np.intp]
+
+
+class Channel:
+    """One connection of a run: takes values from the board, and sets the receiver's inputs."""
+
+    def __init__(
+        self,
+        connection: Connection,
+        *,
+        row: Floats,
+        places: slice | Indices,
+        received: Floats,
+        write: Transfer,
+        noise: np.random.Generator,
+    ) -> None:
+        names = [variable_of(start) for start in connection.start]
+        self.received = received
+        """what the receiver has been told, in place"""
+        self._row, self._places, self._write = row, places, write
+        self._sigma = expand("noise", connection.noise, names)
+        self._quantum = expand("quantisation", connection.quantisation, names)
+        self._noisy = bool(self._sigma.any())
+        self._rounded = np.flatnonzero(self._quantum)
+        self._quantum = self._quantum[self._rounded]
+        self._noise: Floats = np.zeros(len(names))
+        self._stream = noise
+        self._scale, self._offset = connection.scale, connection.offset
+        self._plain = connection.scale == 1.0 and connection.offset == 0.0
+        self._extrapolates = connection.hold == "first"
+        self._in_flight: dict[int, Floats] = {}
+        self._applied: list[tuple[int, Floats]] = []  # the last two, with their times, of a first-order hold
+
+    def pass_on(self) -> None:
+        """The sender's values as they are reach the receiver: at initialisation, and over a plain wire."""
+        self.received[:] = self._row[self._places]
+        if not self._plain:
+            self._convert(self.received)
+        self._write()
+
+    def start(self) -> None:
+        """What initialisation exchanged is the first that was applied."""
+        self._applied = [(0, self.received.copy())]
+
+    def take(self) -> Floats:
+        """The sender's values as a message carries them."""
+        self.skip()
+        value: Floats = self._row[self._places].copy()
+        if self._noisy:
+            self._noise *= self._sigma
+            value += self._noise
+        if len(self._rounded):
+            multiples = value[self._rounded] / self._quantum
+            np.rint(multiples, out=multiples)
+            value[self._rounded] = multiples * self._quantum
+        if not self._plain:
+            self._convert(value)
+        return value
+
+    def skip(self) -> None:
+        """Noise is drawn for each variable of each message, lost or not, so that nothing shifts another's numbers."""
+        if self._noisy:
+            self._stream.standard_normal(out=self._noise)
+
+    def send(self, k: int, *, lost: bool) -> None:
+        """Keep message `k` until it arrives."""
+        if lost:
+            self.skip()
+        else:
+            self._in_flight[k] = self.take()
+
+    def deliver(self, k: int, time: int) -> None:
+        """Message `k` arrives at `time` [ns]."""
+        self.apply(self._in_flight.pop(k), time)
+
+    def apply(self, value: Floats, time: int) -> None:
+        """Set the receiver's inputs; of several messages at one time, the last one stays."""
+        if self._extrapolates:
+            before = [past for past in self._applied if past[0] < time]
+            self._applied = [*before[-1:], (time, value)]
+        self.received[:] = value
+        self._write()
+
+    def extrapolate(self, time: int) -> None:
+        """First-order hold: the line through the last two that arrived, held until the next halt of the receiver."""
+        if len(self._applied) < 2:
+            return
+        (t0, before), (t1, last) = self._applied
+        if t0 == t1 or time == t1:
+            return
+        share = (time - t1) / (t1 - t0)
+        self.received[:] = last + share * (last - before)
+        self._write()
+
+    def state(self) -> dict[str, Any]:
+        """All that what it will pass on depends on, in JSON types."""
+        return {
+            "received": self.received.tolist(),
+            "in_flight": [(k, value.tolist()) for k, value in self._in_flight.items()],
+            "applied": [(time, value.tolist()) for time, value in self._applied],
+            "noise": self._stream.bit_generator.state,
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue where `state` was taken."""
+        self.received[:] = state["received"]
+        self._in_flight = {k: np.array(value) for k, value in state["in_flight"]}
+        self._applied = [(time, np.array(value)) for time, value in state["applied"]]
+        self._stream.bit_generator.state = state["noise"]
+
+    def _convert(self, value: Floats) -> None:
+        value *= self._scale
+        value += self._offset
+
+
+def expand(what: str, values: Mapping[str, float], names: Sequence[str]) -> Floats:
+    """One value for each of `names`, 0 where none is given; a vector's name stands for its components.
+
+    Raises `UsageError` for a name that is not among them.
+    """
+    result = np.zeros(len(names))
+    for given, value in values.items():
+        places = [i for i, name in enumerate(names) if given in (name, name.rpartition(".")[0])]
+        if not places:
+            vectors = dict.fromkeys(name.rpartition(".")[0] or name for name in names)
+            raise UsageError(f"{what}: {given} is not in the message; expected one of {', '.join(vectors)}")
+        result[places] = value
+    return result

@@ -1,0 +1,64 @@
+"""In which order outputs reach inputs before a run begins: that of what depends on what at initialisation."""
+
+from collections.abc import Callable, Collection, Sequence
+
+from orchestration.system.model import Connection, variable_of
+
+Dependencies = Callable[[str, str], Collection[str] | None]
+"""The inputs of a component that one of its outputs depends on at initialisation; None: on all of them"""
+
+
+def groups(connections: Sequence[Connection], dependencies: Dependencies) -> tuple[tuple[int, ...], ...]:
+    """Indices of connections in the order of the first exchange; those of one group depend on one another."""
+    before = {
+        i: [j for j, other in enumerate(connections) if _needs(x, other, dependencies)]
+        for i, x in enumerate(connections)
+    }
+    return _components(before)
+
+
+def is_loop(group: Sequence[int], connections: Sequence[Connection], dependencies: Dependencies) -> bool:
+    """Whether the values of a group have to be found by iteration."""
+    return len(group) > 1 or _needs(connections[group[0]], connections[group[0]], dependencies)
+
+
+def _needs(x: Connection, other: Connection, dependencies: Dependencies) -> bool:
+    """Whether what `x` carries depends on what `other` delivers."""
+    if other.receiver != x.sender:
+        return False
+    delivered = {variable_of(end) for end in other.end}
+    for start in x.start:
+        needed = dependencies(x.sender, variable_of(start))
+        if needed is None or delivered.intersection(needed):
+            return True
+    return False
+
+
+def _components(before: dict[int, list[int]]) -> tuple[tuple[int, ...], ...]:
+    """Strongly connected components of a graph, those that others need first (Tarjan), by a stack of one's own."""
+    index: dict[int, int] = {}
+    low: dict[int, int] = {}
+    path: list[int] = []
+    found: list[tuple[int, ...]] = []
+    for root in before:
+        work = [(root, iter(before[root]))] if root not in index else []
+        while work:
+            node, needed = work[-1]
+            if node not in index:
+                index[node] = low[node] = len(index)
+                path.append(node)
+            for other in needed:
+                if other not in index:
+                    work.append((other, iter(before[other])))
+                    break
+                if other in path:
+                    low[node] = min(low[node], index[other])
+            else:
+                work.pop()
+                if work:
+                    low[work[-1][0]] = min(low[work[-1][0]], low[node])
+                if low[node] == index[node]:
+                    place = path.index(node)
+                    found.append(tuple(sorted(path[place:])))
+                    del path[place:]
+    return tuple(found)

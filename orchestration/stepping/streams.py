@@ -1,0 +1,43 @@
+"""Random numbers: one seed for a run, and a stream of its own for every cause of every component and connection."""
+
+import hashlib
+from collections.abc import Mapping
+from statistics import NormalDist
+
+import numpy as np
+
+JITTER, DELAY_JITTER, LOSS, NOISE, VALUE = "jitter", "delay_jitter", "loss", "noise", "value"
+
+
+class Streams:
+    """The generators of one run, each made from the seed and the name of what it belongs to.
+
+    The key of `components.controller.jitter`, say, is the first four 32-bit words, big-endian, of the SHA-256
+    of that name, so that adding a component or a cause changes no number of another. `numbered` names streams
+    that have a whole number for a key instead: those that the quadrotor had before there were names.
+    """
+
+    def __init__(self, seed: int, numbered: Mapping[str, int] | None = None) -> None:
+        self._seed, self._numbered = seed, dict(numbered or {})
+
+    def of(self, owner: str, cause: str) -> np.random.Generator:
+        """A new generator at the start of the stream of a cause, `owner` as `components.NAME` or `connections.NAME`."""
+        name = f"{owner}.{cause}"
+        number = self._numbered.get(name)
+        key = (number,) if number is not None else _words(name)
+        return np.random.Generator(np.random.PCG64(np.random.SeedSequence(self._seed, spawn_key=key)))
+
+
+def _words(name: str) -> tuple[int, ...]:
+    digest = hashlib.sha256(name.encode()).digest()
+    return tuple(int.from_bytes(digest[i : i + 4], "big") for i in range(0, 16, 4))
+
+
+_NORMAL = NormalDist(0.5, 1.0 / 6.0)
+_LOWEST, _HIGHEST = 0.0013498980316301035, 0.9986501019683699
+"""`_NORMAL.cdf` of 0 and 1, written down: versions of Python compute it by formulas that differ in the last digits."""
+
+
+def cut_normal(uniform: float) -> float:
+    """A normal variate around 0.5 with standard deviation 1/6, cut to [0, 1], from a uniform one."""
+    return min(1.0, max(0.0, _NORMAL.inv_cdf(_LOWEST + uniform * (_HIGHEST - _LOWEST))))

@@ -1,0 +1,1 @@
+"""A system as data: components, connections, sources, objectives and a criterion."""

@@ -1,0 +1,157 @@
+"""Holds a system to what its FMUs say of themselves, before any of them is loaded."""
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping
+
+from orchestration.errors import UsageError
+from orchestration.fmi.model import NUMERIC, Kind, Model, Variable
+from orchestration.system.model import Connection, Parameter, System, component_of, variable_of
+
+
+def check(system: System, models: Mapping[str, Model]) -> None:
+    """Raise `UsageError` for the first thing that cannot be, in one line that names the place and what is valid."""
+    for name, component in system.components.items():
+        place = f"components.{name}"
+        fed = {variable_of(end) for x in system.connections for end in x.end if component_of(end) == name}
+        for parameter, value in component.parameters.items():
+            _check_parameter(f"{place}.parameters.{parameter}", models[name], parameter, value, parameter in fed)
+        for recorded in component.record or ():
+            variable = models[name].variable(recorded, f"{place}.record")
+            if variable.kind not in NUMERIC or variable.causality not in ("output", "local"):
+                raise UsageError(f"{place}.record: {recorded} is {_article(variable)}; expected an output or a local")
+    for x in system.connections:
+        for start, end in zip(x.start, x.end):
+            _check_pair(f"connections.{x.name}", x, _end(models, start), _end(models, end))
+    for name, source in system.sources.items():
+        for end in source.to:
+            _expect_input(f"sources.{name}.to", end, _end(models, end))
+        if source.trajectory is not None and source.trajectory not in system.components:
+            known = ", ".join(system.components)
+            raise UsageError(f"sources.{name}.trajectory = {source.trajectory}: expected one of the components {known}")
+
+
+def recorded(system: System, models: Mapping[str, Model]) -> dict[str, tuple[str, ...]]:
+    """What is recorded of each component beside what is exchanged: as the file says, or all outputs and local Reals."""
+    found = {}
+    for name, component in system.components.items():
+        model = models[name]
+        if component.record is not None:
+            found[name] = component.record
+            continue
+        chosen = [
+            v.name
+            for v in model.variables.values()
+            if (v.causality == "output" and v.kind in NUMERIC) or (v.causality == "local" and v.kind == "Real")
+        ]
+        found[name] = tuple(chosen)
+    return found
+
+
+def _end(models: Mapping[str, Model], end: str) -> tuple[str, Model, Variable | None]:
+    model = models[component_of(end)]
+    return end, model, model.variables.get(variable_of(end))
+
+
+End = tuple[str, Model, Variable | None]
+
+
+def _check_pair(place: str, x: Connection, start: End, end: End) -> None:
+    _, model, output = start
+    if output is None or output.causality not in ("output", "local"):
+        raise UsageError(f"{place}.from: {_wrong(start, 'output', model.names('output'))}")
+    if output.kind not in NUMERIC:
+        raise UsageError(f"{place}.from: {start[0]} is a {output.kind}; only {_list(NUMERIC)} can be connected")
+    receiver = _expect_input(f"{place}.to", end[0], end)
+    _check_kinds(place, start[0], output, end[0], receiver)
+    converted = x.scale != 1.0 or x.offset != 0.0
+    if output.unit and receiver.unit and output.unit != receiver.unit and not converted:
+        factor = _factor(model, output, end[1], receiver)
+        raise UsageError(
+            f"{place}: {start[0]} is in {output.unit}, {end[0]} in {receiver.unit}; expected the same unit{factor}"
+        )
+
+
+def _check_kinds(place: str, start: str, output: Variable, end: str, receiver: Variable) -> None:
+    """Anything becomes a Real; a Boolean becomes a number; a Real becomes nothing else by itself."""
+    allowed: dict[Kind, tuple[Kind, ...]] = {
+        "Real": ("Real",),
+        "Integer": ("Real", "Integer", "Enumeration"),
+        "Enumeration": ("Real", "Integer", "Enumeration"),
+        "Boolean": ("Real", "Integer", "Boolean"),
+    }
+    if receiver.kind not in allowed[output.kind]:
+        expected = _list(kind for kind in NUMERIC if kind in allowed[output.kind])
+        raise UsageError(f"{place}: {start} is a {output.kind}, {end} a {receiver.kind}; expected {expected}")
+
+
+def _expect_input(place: str, end: str, found: End) -> Variable:
+    _, model, variable = found
+    if variable is None or variable.causality != "input":
+        raise UsageError(f"{place}: {_wrong(found, 'input', model.names('input'))}")
+    if variable.kind not in NUMERIC:
+        raise UsageError(f"{place}: {end} is a {variable.kind}; only {_list(NUMERIC)} can be connected")
+    return variable
+
+
+def _wrong(end: End, expected: str, valid: Iterable[str]) -> str:
+    name, model, variable = end
+    owner, names = component_of(name), list(valid)
+    if variable is not None:
+        return f"{name} is {_article(variable)}; expected an {expected}: {_list(names)}"
+    near = difflib.get_close_matches(variable_of(name), names, n=1)
+    hint = f"; did you mean {owner}.{near[0]}?" if near else ""
+    return f"{model.name} has no {variable_of(name)}; its {expected}s are {_list(names)}{hint}"
+
+
+def _article(variable: Variable) -> str:
+    return f"a{'n' if variable.causality[0] in 'aeiou' else ''} {variable.causality}"
+
+
+def _check_parameter(place: str, model: Model, name: str, value: Parameter, is_fed: bool) -> None:
+    variable = model.variable(name, place.rpartition(f".{name}")[0])
+    if not variable.is_settable or is_fed:
+        expected = "a parameter or an input that nothing is connected to"
+        raise UsageError(f"{place}: is {'connected' if is_fed else _article(variable)}; expected {expected}")
+    fits, expected = {
+        "Boolean": (isinstance(value, bool), "true or false"),
+        "String": (isinstance(value, str), "a text"),
+        "Integer": (isinstance(value, int) and not isinstance(value, bool), "a whole number"),
+        "Enumeration": (isinstance(value, (int, str)) and not isinstance(value, bool), "a name or whole number of it"),
+    }.get(variable.kind, (_is_number(value), "a finite number"))
+    if not fits:
+        raise UsageError(f"{place} = {value}: expected {expected}")
+    low, high = variable.minimum, variable.maximum
+    outside = (low is not None and value < low) or (high is not None and value > high) if _is_number(value) else False  # type: ignore[operator]
+    if outside:
+        bounds = " and ".join(
+            f"{word} {bound:g}" for word, bound in (("at least", low), ("at most", high)) if bound is not None
+        )
+        raise UsageError(f"{place} = {value}: expected {bounds}")
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _factor(sender: Model, output: Variable, receiver: Model, into: Variable) -> str:
+    """The conversion to propose, where both units are defined by the same base units."""
+    ends = []
+    for model, variable in ((sender, output), (receiver, into)):
+        unit = next((u for u in model.description.unitDefinitions if u.name == variable.unit), None)
+        base = getattr(unit, "baseUnit", None)
+        if base is None:
+            return ", or scale and offset in the connection"
+        exponents = tuple(getattr(base, key) for key in ("kg", "m", "s", "A", "K", "mol", "cd", "rad"))
+        ends.append((exponents, float(base.factor), float(base.offset)))
+    (kinds, factor, offset), (others, by, plus) = ends
+    if kinds != others:
+        return "; they are of different quantities"
+    scale, added = factor / by, (offset - plus) / by
+    return f": scale = {scale:.12g}" + (f" and offset = {added:.12g}" if added else "") + " in the connection"
+
+
+def _list(names: Iterable[str], most: int = 12) -> str:
+    listed = list(names)
+    shown = ", ".join(listed[:most]) or "(none)"
+    return shown if len(listed) <= most else f"{shown} and {len(listed) - most} more"

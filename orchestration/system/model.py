@@ -1,0 +1,267 @@
+"""What a system is: frozen values, checked for what they mean by themselves; no FMU is opened here."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from orchestration.errors import UsageError
+from orchestration.system.times import exact_nanoseconds
+
+Order = Literal["gauss-seidel", "jacobi"]
+Hold = Literal["zero", "first"]
+Clock = Literal["master", "fmu"]
+Distribution = Literal["uniform", "normal"]
+Align = Literal["exact", "next"]
+Parameter = float | bool | str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sampling:
+    """When a digital task runs; times in seconds of the true clock, but for `period` and `offset` (its own)."""
+
+    period: float
+    """T; instant k is offset + kT"""
+    offset: float = 0.0
+    jitter: float = 0.0
+    """J, largest lateness of an instant"""
+    jitter_distribution: Distribution = "uniform"
+    """over [0, J]; normal is centred at J/2 with standard deviation J/6, cut to the range"""
+    clock_ratio: float = 1.0
+    """r, seconds that the component believes pass per true second"""
+    clock: Clock = "master"
+    """who decides when it samples: the master, or the FMU by its parameters sample_period and sample_offset"""
+
+    def __post_init__(self) -> None:
+        _positive(self, "period", "clock_ratio")
+        _not_negative(self, "offset", "jitter")
+        _choice(self, jitter_distribution=Distribution, clock=Clock)
+        _require(exact_nanoseconds(self.period) >= self.clock_ratio, "period", self.period, "at least a nanosecond")
+        longest = self.period / self.clock_ratio
+        _require(self.jitter < longest, "jitter", self.jitter, f"less than the period of {longest:g} s")
+        if self.clock == "fmu":
+            _require(self.jitter == 0.0, "jitter", self.jitter, "0 with clock fmu: only the master's clock can be late")
+            _require(self.clock_ratio == 1.0, "clock_ratio", self.clock_ratio, "1 with clock fmu")
+            whole = all(exact_nanoseconds(t).denominator == 1 for t in (self.period, self.offset))
+            _require(
+                whole or self.period >= 1e-3, "period", self.period,
+                "a whole number of nanoseconds with clock fmu, whose tolerance is 1e-6 of a period",
+            )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Component:
+    """An FMU, its parameters, and how it is stepped: at sampling instants if it has `sampling`, else continuously."""
+
+    fmu: str
+    """the name of one of this project's FMUs, or a path"""
+    parameters: Mapping[str, Parameter] = field(default_factory=dict)
+    step: float | None = None
+    """[s] between communication points of a component in continuous time"""
+    sampling: Sampling | None = None
+    align: Align = "exact"
+    """of a component that takes its own fixed step only: whether an instant between two of its points is an error
+    (exact) or moves to the next point (next)"""
+    record: tuple[str, ...] | None = None
+    """variables to record beside what is exchanged; None: all outputs and local Reals"""
+
+    def __post_init__(self) -> None:
+        _choice(self, align=Align)
+        if self.sampling is None:
+            _require(self.step is not None, "step", "none", "step (continuous time) or sampling (a digital task)")
+            _positive(self, "step")
+            _require(exact_nanoseconds(self.step or 0.0) >= 1, "step", self.step, "at least a nanosecond")
+        else:
+            _require(self.step is None, "step", self.step, "none beside sampling, whose period it follows")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Connection:
+    """One message from a component to another: its signals travel together; times in seconds."""
+
+    name: str
+    """as given, else its index"""
+    start: tuple[str, ...]
+    """`from`: outputs, as COMPONENT.VARIABLE, of one component"""
+    end: tuple[str, ...]
+    """`to`: as many inputs of one component"""
+    order: Order = "gauss-seidel"
+    delay: float = 0.0
+    """d, from sending to arrival; may exceed a period"""
+    delay_jitter: float = 0.0
+    """J_d, largest random addition to the delay; messages never overtake"""
+    jitter_distribution: Distribution = "uniform"
+    loss: float = 0.0
+    """probability that a message is lost"""
+    burst_length: float | None = None
+    """mean number of losses in a row (Gilbert-Elliott); None: independent losses"""
+    hold: Hold = "zero"
+    """between arrivals: constant, or the line through the last two"""
+    noise: Mapping[str, float] = field(default_factory=dict)
+    """standard deviation by variable of the sender (a vector's name stands for its components)"""
+    quantisation: Mapping[str, float] = field(default_factory=dict)
+    """quantum, likewise"""
+    scale: float = 1.0
+    offset: float = 0.0
+    """what arrives is scale · value + offset"""
+
+    def __post_init__(self) -> None:
+        _choice(self, order=Order, hold=Hold, jitter_distribution=Distribution)
+        _not_negative(self, "delay", "delay_jitter")
+        _require(0.0 <= self.loss <= 1.0, "loss", self.loss, "a probability in [0, 1]")
+        for what, values in (("noise", self.noise), ("quantisation", self.quantisation)):
+            for name, value in values.items():
+                _require(math.isfinite(value) and value >= 0.0, f"{what} of {name}", value, "zero or positive")
+        for what in ("scale", "offset"):
+            _require(math.isfinite(getattr(self, what)), what, getattr(self, what), "a finite number")
+        _require(
+            len(self.start) == len(self.end) > 0, "to", len(self.end), f"{len(self.start)} inputs, one for each output"
+        )
+        for what, ends in (("from", self.start), ("to", self.end)):
+            owners = {component_of(end) for end in ends}
+            _require(len(owners) == 1, what, ", ".join(ends), "variables of one component")
+        if self.burst_length is not None:
+            length = self.burst_length
+            _require(1.0 <= length < math.inf, "burst_length", length, "at least 1 loss")
+            possible = length / (length + 1.0)
+            _require(
+                self.loss <= possible or self.loss == 1.0, "loss", self.loss,
+                f"at most {possible:g} in bursts of {length:g}",
+            )  # fmt: skip
+
+    @property
+    def sender(self) -> str:
+        """The component that it comes from."""
+        return component_of(self.start[0])
+
+    @property
+    def receiver(self) -> str:
+        """The component that it goes to."""
+        return component_of(self.end[0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """What drives inputs from outside: a constant, a table over time, white noise or the built-in trajectory.
+
+    Exactly one of `constant`, `file`, `noise` and `trajectory` is given.
+    """
+
+    to: tuple[str, ...] = ()
+    """inputs, as COMPONENT.VARIABLE; may be empty for what only objectives need"""
+    constant: float | None = None
+    file: Path | None = None
+    """CSV: `time` and one column for each input, named as the input without its component; linear between rows"""
+    noise: float | None = None
+    """intensity [unit² s] of white noise: normal values with variance noise / period, each held over `period`"""
+    period: float | None = None
+    """[s], of noise"""
+    trajectory: str | None = None
+    """the component whose parameters trajectory.* say what the trajectory of `fmu_kit` is"""
+
+    def __post_init__(self) -> None:
+        kinds = ("constant", "file", "noise", "trajectory")
+        given = [kind for kind in kinds if getattr(self, kind) is not None]
+        _require(len(given) == 1, "source", " and ".join(given) or "nothing", f"one of {', '.join(kinds)}")
+        if self.noise is not None:
+            _not_negative(self, "noise")
+            _require(self.period is not None, "period", "none", "how long each value is held, in seconds")
+            _positive(self, "period")
+        else:
+            _require(self.period is None, "period", self.period, "none without noise")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Criterion:
+    """What a good run is, as expressions; None: not asked."""
+
+    good: str | None = None
+    """over objectives, at the end"""
+    diverged: str | None = None
+    """over signals, at every instant: ends the run"""
+    outcomes: tuple[str, str] = ("good", "bad")
+    """what a run is called that is good, and one that is not; one that diverged is called so"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class System:
+    """Components and what connects and drives them, what a run comes to and when it is good.
+
+    Raises `UsageError` for what cannot be whatever the FMUs are.
+    """
+
+    stop_time: float
+    """[s]"""
+    seed: int = 0
+    """of all random numbers"""
+    components: Mapping[str, Component]
+    """in the order of the file, which decides ties"""
+    connections: tuple[Connection, ...] = ()
+    sources: Mapping[str, Source] = field(default_factory=dict)
+    objectives: Mapping[str, str] = field(default_factory=dict)
+    """expressions by name"""
+    criterion: Criterion = field(default_factory=Criterion)
+    streams: Mapping[str, int] = field(default_factory=dict)
+    """random streams that have a number instead of a name, as `connections.NAME.CAUSE` and `components.NAME.jitter`"""
+    operating_point: Mapping[str, Any] = field(default_factory=dict)
+    """what to change, by path, to be at rest: where the local limit is taken"""
+
+    def __post_init__(self) -> None:
+        _positive(self, "stop_time")
+        _require(0 <= self.seed < 2**63, "seed", self.seed, "a whole number from 0 to 2^63 - 1")
+        _require(len(self.components) > 0, "components", "none", "at least one")
+        fed: dict[str, str] = {}
+        for place, start, end in self._feeds():
+            for what, given in (("from", start), ("to", end)):
+                if given is not None and component_of(given) not in self.components:
+                    known = ", ".join(self.components)
+                    raise UsageError(f"{place}.{what}: {given}: no such component; expected one of {known}")
+            if end in fed:
+                raise UsageError(f"{place}.to: {end} is fed by {fed[end]} already; expected one connection or source")
+            fed[end] = place
+        names = [x.name for x in self.connections]
+        for name in names:
+            _require(names.count(name) == 1, "connections", name, "a name of its own for each")
+
+    def _feeds(self) -> list[tuple[str, str | None, str]]:
+        feeds: list[tuple[str, str | None, str]] = [
+            (f"connections.{x.name}", start, end) for x in self.connections for start, end in zip(x.start, x.end)
+        ]
+        return feeds + [(f"sources.{name}", None, end) for name, source in self.sources.items() for end in source.to]
+
+
+def component_of(variable: str) -> str:
+    """The component of COMPONENT.VARIABLE."""
+    return variable.partition(".")[0]
+
+
+def variable_of(variable: str) -> str:
+    """The variable of COMPONENT.VARIABLE."""
+    return variable.partition(".")[2]
+
+
+def _require(condition: bool, name: str, value: object, expected: str) -> None:
+    if not condition:
+        raise UsageError(f"{name} = {value}: expected {expected}")
+
+
+def _positive(of: object, *names: str) -> None:
+    for name in names:
+        value = getattr(of, name)
+        _require(_is_number(value) and math.isfinite(value) and value > 0.0, name, value, "a positive number")
+
+
+def _not_negative(of: object, *names: str) -> None:
+    for name in names:
+        value = getattr(of, name)
+        _require(_is_number(value) and math.isfinite(value) and value >= 0.0, name, value, "zero or a positive number")
+
+
+def _choice(of: object, **choices: Any) -> None:
+    for name, kind in choices.items():
+        _require(getattr(of, name) in get_args(kind), name, getattr(of, name), f"one of {', '.join(get_args(kind))}")
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)

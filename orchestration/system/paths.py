@@ -1,0 +1,141 @@
+"""What can be changed of a system, by path: axes of studies, `limit --of`, flags and operating points."""
+
+import dataclasses
+import difflib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from orchestration.errors import UsageError
+from orchestration.system.model import Component, Connection, Sampling, Source, System
+
+TOP = ("stop_time", "seed")
+
+
+def changed(system: System, changes: Mapping[str, Any]) -> System:
+    """`system` with other values, by paths such as `components.tank.step`, `components.controller.sampling.period`,
+    `components.controller.parameters.maxlevel`, `connections.valve.delay`, `sources.wind.noise`, `stop_time`.
+
+    Raises `UsageError` for a path that does not exist, naming what does, or a value that cannot be.
+    """
+    grouped: dict[tuple[str, str], dict[str, Any]] = {}
+    top: dict[str, Any] = {}
+    for path, value in changes.items():
+        table, _, rest = path.partition(".")
+        if path in TOP:
+            top[path] = value
+            continue
+        name, key = _split(system, path, table, rest)
+        grouped.setdefault((table, name), {})[key] = value
+    components, sources = dict(system.components), dict(system.sources)
+    connections = {x.name: x for x in system.connections}
+    for (table, name), keys in grouped.items():
+        place = f"{table}.{name}"
+        if table == "components":
+            components[name] = _component(place, components[name], keys)
+        elif table == "connections":
+            connections[name] = _replaced(place, connections[name], _by_variable(connections[name], keys))
+        else:
+            sources[name] = _replaced(place, sources[name], keys)
+    result: System = _replaced(
+        "", system, {**top, "components": components, "connections": tuple(connections.values()), "sources": sources}
+    )
+    return result
+
+
+def value_at(system: System, path: str) -> Any:
+    """The value at a path, None where it is not set; raises `UsageError` as `changed` does."""
+    if path in TOP:
+        return getattr(system, path)
+    table, _, rest = path.partition(".")
+    name, key = _split(system, path, table, rest)
+    if table == "components":
+        component = system.components[name]
+        kind, _, inner = key.partition(".")
+        if kind == "parameters":
+            return component.parameters.get(inner)
+        return getattr(component.sampling, inner) if kind == "sampling" else getattr(component, kind)
+    owner: Any = system.sources[name] if table == "sources" else _connection(system, name)
+    kind, _, inner = key.partition(".")
+    found = getattr(owner, kind)
+    return found.get(inner) if inner else found
+
+
+def _connection(system: System, name: str) -> Connection:
+    return next(x for x in system.connections if x.name == name)
+
+
+def _split(system: System, path: str, table: str, rest: str) -> tuple[str, str]:
+    """Name and key of a path below one of the tables; a name may hold dots."""
+    tables: dict[str, Iterable[str]] = {
+        "components": system.components,
+        "connections": [x.name for x in system.connections],
+        "sources": system.sources,
+    }
+    if table not in tables:
+        raise UsageError(f"{path}: no such path; expected {', '.join(TOP)} or one that begins with {', '.join(tables)}")
+    known = list(tables[table])
+    names = [name for name in known if rest.startswith(f"{name}.")]
+    if not names:
+        raise UsageError(f"{path}: expected {table}.NAME.KEY with NAME one of {', '.join(known) or '(there is none)'}")
+    name = max(names, key=len)
+    key = rest[len(name) + 1 :]
+    _expect_key(path, table, system, name, key)
+    return name, key
+
+
+def _expect_key(path: str, table: str, system: System, name: str, key: str) -> None:
+    keys: list[str]
+    if table == "components":
+        digital = system.components[name].sampling is not None
+        keys = [f"sampling.{f.name}" for f in dataclasses.fields(Sampling)] if digital else ["step"]
+        keys += ["align", "fmu", "record", "parameters.NAME"]
+        known = key in keys or (key.startswith("parameters.") and key != "parameters.")
+    elif table == "connections":
+        fixed = ("name", "start", "end", "noise", "quantisation")
+        keys = [f.name for f in dataclasses.fields(Connection) if f.name not in fixed]
+        keys += ["noise", "quantisation", "noise.VARIABLE", "quantisation.VARIABLE"]
+        known = key in keys or key.partition(".")[0] in ("noise", "quantisation")
+    else:
+        keys = [f.name for f in dataclasses.fields(Source)]
+        known = key in keys
+    if not known:
+        near = difflib.get_close_matches(key, keys, n=1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise UsageError(f"{path}: no such key; expected {table}.{name}. and one of {', '.join(keys)}{hint}")
+
+
+def _component(place: str, component: Component, keys: Mapping[str, Any]) -> Component:
+    sampling = {key.partition(".")[2]: value for key, value in keys.items() if key.startswith("sampling.")}
+    parameters = {key.partition(".")[2]: value for key, value in keys.items() if key.startswith("parameters.")}
+    rest = {key: value for key, value in keys.items() if "." not in key}
+    if sampling:
+        rest["sampling"] = _replaced(f"{place}.sampling", component.sampling, sampling)
+    if parameters:
+        rest["parameters"] = {**component.parameters, **parameters}
+    return _replaced(place, component, rest) if rest else component
+
+
+def _by_variable(connection: Connection, keys: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys such as `noise.level` merged into their tables; a plain number is for every variable of the message."""
+    result: dict[str, Any] = {}
+    for key, value in keys.items():
+        kind, _, variable = key.partition(".")
+        if kind not in ("noise", "quantisation"):
+            result[key] = value
+        elif variable:
+            result[kind] = {**result.get(kind, getattr(connection, kind)), variable: value}
+        else:
+            result[kind] = for_each(connection.start, value)
+    return result
+
+
+def for_each(start: Iterable[str], value: Any) -> Any:
+    """A number for every variable of a message; a table is as it is."""
+    return value if isinstance(value, Mapping) else {end.partition(".")[2]: value for end in start}
+
+
+def _replaced(place: str, of: Any, keys: Mapping[str, Any]) -> Any:
+    try:
+        return dataclasses.replace(of, **dict(keys))
+    except UsageError as error:
+        raise UsageError(f"{place}.{error}" if place else str(error)) from error

@@ -1,0 +1,314 @@
+"""Reads and writes system files (TOML), and gives the JSON schema that editors complete them from."""
+
+import dataclasses
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import pydantic
+
+from orchestration.errors import UsageError
+from orchestration.expressions.syntax import parse
+from orchestration.system.model import (
+    Align,
+    Clock,
+    Component,
+    Connection,
+    Criterion,
+    Distribution,
+    Hold,
+    Order,
+    Sampling,
+    Source,
+    System,
+)
+from orchestration.system.paths import for_each
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+
+class _Table(pydantic.BaseModel):
+    """A table of the file: keys that are not named here are refused."""
+
+    model_config = pydantic.ConfigDict(extra="forbid", strict=True, populate_by_name=True, frozen=True)
+
+
+def _says(text: str, **options: Any) -> Any:
+    return pydantic.Field(description=text, **options)
+
+
+class SamplingTable(_Table):
+    """When a digital task runs."""
+
+    period: Annotated[float, _says("Sampling period in the component's own seconds; instant k is offset + k·period.")]
+    offset: Annotated[float, _says("Time of the first sample [s].")] = 0.0
+    jitter: Annotated[float, _says("Largest lateness of an instant [s]; less than the period.")] = 0.0
+    jitter_distribution: Annotated[Distribution, _says("Of the lateness over [0, jitter].")] = "uniform"
+    clock_ratio: Annotated[float, _says("Seconds that the component believes pass per true second.")] = 1.0
+    clock: Annotated[Clock, _says("Who decides when it samples: the master, or the FMU by its sample_period.")] = (
+        "master"
+    )
+
+
+class ComponentTable(_Table):
+    """An FMU, its parameters, and how it is stepped."""
+
+    fmu: Annotated[str, _says("Path of an .fmu, relative to this file, or the name of one of this project's.")]
+    parameters: Annotated[dict[str, Any], _says("Parameters by their names in the FMU.")] = {}
+    step: Annotated[float | None, _says("Of a component in continuous time: its communication step [s].")] = None
+    sampling: Annotated[SamplingTable | None, _says("Of a digital task: when it runs.")] = None
+    align: Annotated[
+        Align, _says("Of an FMU with a fixed step: an instant between its points is an error, or moves to the next.")
+    ] = "exact"
+    record: Annotated[
+        tuple[str, ...] | None, _says("Variables to record; without it, all outputs and local Reals.")
+    ] = None
+
+
+class ConnectionTable(_Table):
+    """One message: its signals travel together."""
+
+    start: Annotated[tuple[str, ...], _says("Outputs, as COMPONENT.VARIABLE, of one component.", alias="from")]
+    end: Annotated[tuple[str, ...], _says("As many inputs of one component.", alias="to")]
+    name: Annotated[str | None, _says("By which paths and events name it; without one, its index.")] = None
+    order: Annotated[Order | None, _says("Whether it is there at its instant or at the next one of its sender.")] = None
+    delay: Annotated[float, _says("From sending to arrival [s]; may exceed a period.")] = 0.0
+    delay_jitter: Annotated[float, _says("Largest random addition to the delay [s].")] = 0.0
+    jitter_distribution: Annotated[Distribution, _says("Of the delay's jitter.")] = "uniform"
+    loss: Annotated[float, _says("Probability that a message is lost.")] = 0.0
+    burst_length: Annotated[float | None, _says("Mean number of losses in a row; independent without it.")] = None
+    hold: Annotated[Hold, _says("Between arrivals: constant, or the line through the last two.")] = "zero"
+    noise: Annotated[float | dict[str, Any], _says("Standard deviation, for all signals or by variable.")] = {}
+    quantisation: Annotated[float | dict[str, Any], _says("Quantum, for all signals or by variable.")] = {}
+    scale: Annotated[float, _says("What arrives is scale · value + offset.")] = 1.0
+    offset: Annotated[float, _says("Added after the scale.")] = 0.0
+
+
+class SourceTable(_Table):
+    """What drives inputs from outside."""
+
+    to: Annotated[tuple[str, ...], _says("Inputs, as COMPONENT.VARIABLE.")] = ()
+    constant: Annotated[float | None, _says("A constant value.")] = None
+    file: Annotated[str | None, _says("CSV with time and a column for each input; linear between rows.")] = None
+    noise: Annotated[float | None, _says("Intensity of white noise [unit² s].")] = None
+    period: Annotated[float | None, _says("How long each value of the noise is held [s].")] = None
+    trajectory: Annotated[
+        str | None, _says("The component whose parameters trajectory.* say what the built-in trajectory is.")
+    ] = None
+
+
+class CriterionTable(_Table):
+    """What a good run is."""
+
+    good: Annotated[str | None, _says("Expression over objectives, at the end of a run.")] = None
+    diverged: Annotated[str | None, _says("Expression over signals that ends a run.")] = None
+    outcomes: Annotated[
+        tuple[str, str], _says("What a run is called that is good, and one that is neither good nor diverged.")
+    ] = Criterion.outcomes
+
+
+class SystemTable(_Table):
+    """A system of FMUs under a digital clock."""
+
+    stop_time: Annotated[float, _says("End of a run [s].")]
+    seed: Annotated[int, _says("Of all random numbers.")] = 0
+    order: Annotated[Order, _says("Of every connection that does not say it itself.")] = "gauss-seidel"
+    components: Annotated[dict[str, ComponentTable], _says("By name; their order decides ties.")]
+    connections: Annotated[tuple[ConnectionTable, ...], _says("What is connected to what.")] = ()
+    sources: Annotated[dict[str, SourceTable], _says("What drives inputs from outside, by name.")] = {}
+    objectives: Annotated[dict[str, str], _says("What a run comes to: expressions by name.")] = {}
+    criterion: Annotated[CriterionTable, _says("When a run is good, and when it has diverged.")] = CriterionTable()
+    streams: Annotated[dict[str, int], _says("Random streams that have a number for a name.")] = {}
+    operating_point: Annotated[
+        dict[str, Any], _says("Values by path with which the system rests: where the local limit is taken.")
+    ] = {}
+
+
+def schema() -> dict[str, Any]:
+    """The JSON schema of a system file."""
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "quadcosim system",
+        **SystemTable.model_json_schema(by_alias=True),
+    }
+
+
+def load_system(path: str | Path) -> System:
+    """Read a system file; paths in it are relative to its folder.
+
+    Raises `UsageError` in one line that names the place and what is valid there.
+    """
+    path = Path(path)
+    try:
+        tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(f"{path}: expected a readable system file: {error}") from error
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise UsageError(f"{path}: expected TOML: {error}") from error
+    try:
+        return system_from_tables(tables, path.parent)
+    except UsageError as error:
+        raise UsageError(f"{path}: {error}") from error
+
+
+def is_system(tables: Mapping[str, Any]) -> bool:
+    """Whether a TOML document is a system file rather than a scenario of the quadrotor."""
+    return "components" in tables
+
+
+def system_from_tables(tables: Mapping[str, Any], folder: Path) -> System:
+    """The system of a TOML document whose relative paths start at `folder`; raises `UsageError`."""
+    try:
+        table = SystemTable.model_validate_json(json.dumps(tables, default=str))
+    except (pydantic.ValidationError, RecursionError) as error:
+        raise UsageError(_first_problem(error, tables)) from None
+    system = System(
+        stop_time=table.stop_time,
+        seed=table.seed,
+        components={name: _component(name, value, folder) for name, value in table.components.items()},
+        connections=tuple(_connection(i, value, table.order) for i, value in enumerate(table.connections)),
+        sources={name: _source(name, value, folder) for name, value in table.sources.items()},
+        objectives=table.objectives,
+        criterion=_made("criterion", Criterion, table.criterion.model_dump()),
+        streams=table.streams,
+        operating_point=dict(_flattened(table.operating_point)),
+    )
+    for place, text in expressions(system):
+        try:
+            parse(text)
+        except UsageError as error:
+            raise UsageError(f"{place}: {error}") from error
+    return system
+
+
+def expressions(system: System) -> list[tuple[str, str]]:
+    """Every expression of a system, with its place in the file."""
+    found = [(f"objectives.{name}", text) for name, text in system.objectives.items()]
+    criterion = system.criterion
+    return found + [
+        (f"criterion.{key}", text)
+        for key, text in (("good", criterion.good), ("diverged", criterion.diverged))
+        if text is not None
+    ]
+
+
+def _component(name: str, table: ComponentTable, folder: Path) -> Component:
+    place = f"components.{name}"
+    parameters = dict(_flattened(table.parameters))
+    for key, value in parameters.items():
+        if not isinstance(value, (int, float, str)):
+            raise UsageError(f"{place}.parameters.{key} = {value!r}: expected a number, true, false or a text")
+    sampling = None if table.sampling is None else _made(f"{place}.sampling", Sampling, table.sampling.model_dump())
+    fmu = str(folder / table.fmu) if table.fmu.endswith(".fmu") else table.fmu
+    rest = {"step": table.step, "align": table.align, "record": table.record}
+    return _made(place, Component, {"fmu": fmu, "parameters": parameters, "sampling": sampling, **rest})
+
+
+def _connection(index: int, table: ConnectionTable, order: Order) -> Connection:
+    keys = table.model_dump()
+    keys["name"] = table.name if table.name is not None else str(index)
+    keys["order"] = table.order or order
+    for what in ("noise", "quantisation"):
+        keys[what] = for_each(table.start, keys[what])
+        for variable, value in keys[what].items():
+            if isinstance(value, bool) or not isinstance(value, (int, float)):
+                raise UsageError(f"connections.{keys['name']}.{what}.{variable} = {value!r}: expected a number")
+    return _made(f"connections.{keys['name']}", Connection, keys)
+
+
+def _source(name: str, table: SourceTable, folder: Path) -> Source:
+    file = None if table.file is None else folder / table.file
+    return _made(f"sources.{name}", Source, {**table.model_dump(), "file": file})
+
+
+Made = TypeVar("Made")
+
+
+def _made(place: str, kind: type[Made], keys: Mapping[str, Any]) -> Made:
+    try:
+        return kind(**keys)
+    except UsageError as error:
+        raise UsageError(f"{place}.{error}") from error
+
+
+def _flattened(table: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
+    """Nested tables as dotted names: `gain.eta = 15` and `"gain.eta" = 15` mean the same."""
+    found: list[tuple[str, Any]] = []
+    for key, value in table.items():
+        found += _flattened(value, f"{prefix}{key}.") if isinstance(value, Mapping) else [(f"{prefix}{key}", value)]
+    return found
+
+
+def _first_problem(error: Exception, tables: Mapping[str, Any]) -> str:
+    """The first thing wrong with a document, in one line that names the place and what is valid there."""
+    if not isinstance(error, pydantic.ValidationError):
+        return "nested too deeply; expected the tables of a system file"
+    problem = error.errors()[0]
+    place = ".".join(str(part) for part in problem["loc"] if not str(part).startswith(("float", "dict[")))
+    if problem["type"] == "extra_forbidden":
+        return f"{place}: no such key; expected one of {', '.join(_keys_at(problem['loc'][:-1]))}"
+    if problem["type"] == "missing":
+        return f"{place}: expected to be given"
+    message = problem["msg"]
+    shown = str(problem["input"])
+    shown = shown if len(shown) <= 60 else f"{shown[:57]}..."
+    return f"{place} = {shown}: {message[:1].lower()}{message[1:]}"
+
+
+def _keys_at(place: tuple[Any, ...]) -> list[str]:
+    tables: dict[str, Any] = {
+        "components": ComponentTable, "connections": ConnectionTable, "sources": SourceTable,
+        "criterion": CriterionTable,
+    }  # fmt: skip
+    table: Any = tables.get(str(place[0]), SystemTable) if place else SystemTable
+    if len(place) > 2 and place[2] == "sampling":
+        table = SamplingTable
+    return [info.alias or name for name, info in table.model_fields.items()]
+
+
+def to_toml(system: System) -> str:
+    """The system file that loads as this system, wherever it lies."""
+    import tomli_w
+
+    tables: dict[str, Any] = {"stop_time": system.stop_time, "seed": system.seed}
+    tables["components"] = {
+        name: _without_defaults(component, keep=("fmu",)) for name, component in system.components.items()
+    }
+    for table in tables["components"].values():
+        if table["fmu"].endswith(".fmu"):
+            table["fmu"] = str(Path(table["fmu"]).absolute())
+    tables["connections"] = [_connection_table(x) for x in system.connections]
+    tables["sources"] = {name: _without_defaults(source) for name, source in system.sources.items()}
+    for table in tables["sources"].values():
+        if "file" in table:
+            table["file"] = str(Path(table["file"]).absolute())
+    for key in ("objectives", "streams", "operating_point"):
+        tables[key] = dict(getattr(system, key))
+    tables["criterion"] = _without_defaults(system.criterion)
+    return tomli_w.dumps({key: value for key, value in tables.items() if value not in ({}, [])})
+
+
+def _connection_table(x: Connection) -> dict[str, Any]:
+    keys = _without_defaults(x, keep=("name",))
+    return {"name": keys.pop("name"), "from": keys.pop("start"), "to": keys.pop("end"), **keys}
+
+
+def _without_defaults(of: Any, keep: tuple[str, ...] = ()) -> dict[str, Any]:
+    result = {}
+    for field in dataclasses.fields(of):
+        value = getattr(of, field.name)
+        if field.name in keep or (value is not None and value != field.default and value != {}):
+            is_table = dataclasses.is_dataclass(value)
+            result[field.name] = _without_defaults(value) if is_table else _plain(value)
+    return result
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return list(value)
+    return dict(value) if isinstance(value, Mapping) else value

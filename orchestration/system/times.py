@@ -1,0 +1,44 @@
+"""Time in integer nanoseconds, from the decimal form in which people write seconds."""
+
+import math
+from fractions import Fraction
+
+NANOSECONDS = 1_000_000_000
+
+
+def exact_nanoseconds(seconds: float) -> Fraction:
+    """The rational number that the decimal form of `seconds` means, in nanoseconds."""
+    return Fraction(repr(float(seconds))) * NANOSECONDS
+
+
+def nanoseconds(seconds: float) -> int:
+    """`seconds` rounded to the nanosecond, half to even."""
+    return round(exact_nanoseconds(seconds))
+
+
+class Grid:
+    """The instants round(offset + k·period), k = 0, 1, …, in nanoseconds; from exact rationals, never accumulated."""
+
+    def __init__(self, offset: Fraction, period: Fraction) -> None:
+        self._denominator = math.lcm(offset.denominator, period.denominator)
+        self._offset = int(offset * self._denominator)
+        self._period = int(period * self._denominator)
+
+    def __getitem__(self, k: int) -> int:
+        if self._denominator == 1:
+            return self._offset + k * self._period
+        return _round_ratio(self._offset + k * self._period, self._denominator)
+
+    def from_(self, time: int) -> int:
+        """The first instant of the grid that is not before `time` [ns]."""
+        k = max(0, (time * self._denominator - self._offset) // self._period - 1)
+        while self[k] < time:
+            k += 1
+        return self[k]
+
+
+def _round_ratio(numerator: int, denominator: int) -> int:
+    """round(numerator / denominator), half to even, in integers."""
+    quotient, rest = divmod(numerator, denominator)
+    twice = 2 * rest
+    return quotient + (twice > denominator or (twice == denominator and quotient % 2 == 1))

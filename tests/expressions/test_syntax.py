@@ -1,0 +1,106 @@
+"""The grammar: what is part of the language, and that nothing else ever runs."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orchestration.errors import UsageError
+from orchestration.expressions.syntax import Call, Name, Number, Operation, Sampled, names, parse, text
+
+
+def test_arithmetic_binds_as_in_python():
+    assert parse("1 + 2 * a.b ** 2") == Operation(
+        "+", (Number(1.0), Operation("*", (Number(2.0), Operation("**", (Name("a.b"), Number(2.0))))))
+    )
+
+
+def test_a_chain_of_comparisons_is_their_conjunction():
+    assert parse("0 < x.y <= 1") == parse("0 < x.y and x.y <= 1")
+
+
+def test_an_element_of_an_array_is_a_name():
+    assert parse("max(motor.u[1])") == Call("max", (Name("motor.u[1]"),))
+    assert parse("motor.u[1, 2]") == Name("motor.u[1,2]")
+
+
+def test_sampled_names_a_connection_not_a_signal():
+    tree = parse("rms(sampled(measurement, controller.e))")
+    assert tree == Call("rms", (Sampled("measurement", Name("controller.e")),))
+    assert list(names(tree)) == ["controller.e"]
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "__import__('os')", "().__class__", "[x for x in y]", "lambda: 1", "a if b else c", "f'{x}'", "x := 1",
+        "open('f')", "max(x, key=1)", "max(*x)", "a @ b", "a // b", "a & b", "{}", "'text'", "x.y()", "1j", "...",
+        "x[0:1]", "x['a']", "await x", "x is y", "x in y", "",
+    ],
+)  # fmt: skip
+def test_what_is_not_part_of_the_language_is_refused_in_one_line(source):
+    with pytest.raises(UsageError) as error:
+        parse(source)
+    assert "\n" not in str(error.value)
+    assert "expected" in str(error.value)
+
+
+def test_a_function_that_is_misspelt_is_answered_with_the_nearest():
+    with pytest.raises(UsageError, match=r"no function maxx; expected one of .*did you mean max"):
+        parse("maxx(a.b)")
+
+
+def test_a_wrong_number_of_arguments_is_refused():
+    with pytest.raises(UsageError, match="settling_time of 1 arguments; expected 2"):
+        parse("settling_time(a.b)")
+
+
+def test_what_is_nested_too_deeply_is_refused():
+    with pytest.raises(UsageError, match="nested"):
+        parse("-" * 200 + "1")
+    with pytest.raises(UsageError, match="expected"):
+        parse("(" * 5000 + "1" + ")" * 5000)
+
+
+def test_a_number_that_no_float_holds_is_refused():
+    with pytest.raises(UsageError, match="float"):
+        parse("1" + "0" * 400)
+
+
+@given(st.text(max_size=60))
+def test_any_text_is_an_expression_or_wrong_usage(source):
+    try:
+        tree = parse(source)
+    except UsageError:
+        return
+    assert list(names(tree)) is not None
+
+
+_trees = st.recursive(
+    st.one_of(
+        st.floats(0, 1e6, allow_nan=False).map(lambda v: Number(float(f"{v:g}"))),
+        st.sampled_from([Name("a.b"), Name("c.u[1]"), Name("peak")]),
+    ),
+    lambda inner: st.one_of(
+        st.tuples(st.sampled_from("+-*/"), inner, inner).map(lambda t: Operation(t[0], t[1:])),
+        st.tuples(st.sampled_from(["<", ">=", "and", "or"]), inner, inner).map(lambda t: Operation(t[0], t[1:])),
+        inner.map(lambda x: Operation("neg", (x,))),
+        inner.map(lambda x: Call("max", (x,))),
+    ),
+    max_leaves=8,
+)
+
+
+@given(_trees)
+def test_what_is_written_reads_as_what_it_was(tree):
+    assert _flat(parse(text(tree))) == _flat(tree)
+
+
+def _flat(node):
+    """`a and (b and c)` is written with brackets, and one side of a comparison may be a comparison."""
+    if isinstance(node, Operation):
+        return Operation(node.sign, tuple(map(_flat, node.operands)))
+    if isinstance(node, Call):
+        return Call(node.function, tuple(map(_flat, node.arguments)))
+    return node if not isinstance(node, Number) or not math.isnan(node.value) else Number(0.0)
