@@ -27,7 +27,7 @@ from typing import Any
 from xml.dom.minidom import parseString
 from xml.etree.ElementTree import ParseError, fromstring, tostring
 
-from fmu_kit import documentation
+from fmu_kit import documentation, loader
 from fmu_kit.model_description import GUID_PLACEHOLDER, PYTHON_REQUIRED
 
 SHARED_PACKAGES = ("fmu_kit", "controller_fmu", "plant_fmu", "pythonfmu")
@@ -131,9 +131,8 @@ def source_hash(target: Target) -> str:
     """The hash of all that decides the content of the FMU: its modules and other files, and the packaging itself."""
     digest = hashlib.sha256()
     sources = bundled_sources(target)
-    packaging = {
-        path.name: _text(path) for path in (Path(__file__), Path(documentation.__file__), documentation.TEMPLATE)
-    }
+    own = (Path(__file__), Path(documentation.__file__), documentation.TEMPLATE, Path(loader.__file__), loader.SOURCE)
+    packaging = {path.name: _text(path) for path in own} | {"compiler": str(loader.compiler() is not None)}
     for name, text in {**sources, **packaging, "fragment": _fragment(target)}.items():
         digest.update(f"{name}\0{text}\0".encode())
     for name, content in _unchanged_files(target).items():
@@ -163,7 +162,7 @@ def build(target: Target, folder: Path) -> Path:
     files[f"resources/{entry}.py"] = _entry(bundle, target).encode()
     files["resources/slavemodule.txt"] = entry.encode()
     files[SOURCE_HASH_FILE] = digest.encode()
-    files |= _unchanged_files(target)
+    files |= _with_loader(_unchanged_files(target), target.model)
     slave = _slave(target)
     source = f"../resources/{bundle}/{_place(target.module)}"
     files[PAGE] = documentation.to_html(slave, source, _well_formed_fragment(target)).encode()
@@ -174,7 +173,9 @@ def build(target: Target, folder: Path) -> Path:
         indent="  ", encoding="UTF-8"
     )
     files["modelDescription.xml"] = description
-    files["modelDescription.xml"] = description.replace(GUID_PLACEHOLDER.encode(), content_guid(files).encode())
+    guid = content_guid(files).encode()
+    files["modelDescription.xml"] = description.replace(GUID_PLACEHOLDER.encode(), guid)
+    files[loader.GUID_FILE] = guid
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{target.model}.fmu"
     temporary = path.with_suffix(f".{os.getpid()}.partial")
@@ -192,9 +193,9 @@ def _entry(bundle: str, target: Target) -> str:
 
 
 def content_guid(files: dict[str, bytes]) -> str:
-    """A GUID from the content of an FMU: all files, in the description all but the GUID and the date."""
+    """A GUID from the content of an FMU: all files but that of the GUID, in the description all but it and the date."""
     digest = hashlib.sha256()
-    for name in sorted(files):
+    for name in sorted(files.keys() - {loader.GUID_FILE}):
         content = files[name]
         if name == "modelDescription.xml":
             content = re.sub(rb'(guid|generationDateAndTime)="[^"]*"', rb"", content)
@@ -292,6 +293,18 @@ def _binaries(model: str) -> dict[str, bytes]:
         for path in sorted(folder.glob("*/*"))
         if path.suffix in (".so", ".dll", ".dylib")
     }
+
+
+def _with_loader(files: dict[str, bytes], model: str) -> dict[str, bytes]:
+    """The files with the loader before pythonfmu's library for Linux; as they are where it cannot be compiled."""
+    try:
+        return loader.packed(files, model)
+    except loader.LoaderError as error:
+        print(
+            f"{model}.fmu: packed without its loader ({error}); a host that is not Python must load Python itself",
+            file=sys.stderr,
+        )
+        return files
 
 
 def _unchanged_files(target: Target) -> dict[str, bytes]:

@@ -61,7 +61,7 @@ def build(
     from orchestration import fmus
     from orchestration.wiring import MODELS
 
-    for path in fmus.build(MODELS, out or fmus.default_folder()):
+    for path in fmus.build(MODELS, out or fmus.default_folder(), say):
         print(path)
 
 

@@ -13,6 +13,7 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription, ScalarVariable
 
+from fmu_kit import loader
 from orchestration import scratch
 from orchestration.errors import QuadcosimError, RefusedValueError, SimulatorError, UsageError, shown
 from orchestration.fmi.model import read_model
@@ -68,7 +69,8 @@ class FmuSimulator:
         except Exception as error:
             self.failed = True
             self.close()
-            raise QuadcosimError(f"{path}: expected a co-simulation FMU that loads here: {error}") from error
+            said, _ = words(self._messages, str(error))
+            raise QuadcosimError(f"{path}: expected a co-simulation FMU that loads here: {said}") from error
         self.variables: dict[str, ScalarVariable] = {v.name: v for v in self.description.modelVariables}
         self._component = self._fmu.component
         self._do_step = self._fmu.dll.fmi2DoStep
@@ -279,8 +281,12 @@ def uri_is_read(folder: Path) -> bool:
 
 
 def expect_readable_place(folder: Path) -> None:
-    """Raises `QuadcosimError` if pythonfmu would crash on the folder in which its FMU was unpacked."""
-    if (folder / PYTHONFMU_ENTRY).is_file() and not uri_is_read(folder):
+    """Raises `QuadcosimError` if pythonfmu would crash on the folder in which its FMU was unpacked.
+
+    Not so behind the loader of this project, which reads the URI before it.
+    """
+    decoded = fmpy.platform == "linux64" and (folder / loader.BESIDE).is_file()
+    if (folder / PYTHONFMU_ENTRY).is_file() and not decoded and not uri_is_read(folder):
         raise QuadcosimError(
             f"unpacked in {folder}; pythonfmu reads no path with other characters than ASCII letters, digits, "
             "spaces and - . _ ~: set TMPDIR (on Windows TEMP) to such a folder"

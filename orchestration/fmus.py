@@ -32,7 +32,7 @@ def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
         if out_of_date([fmu], folder):
             if announce is not None:
                 announce(f"building {folder / fmu}.fmu")
-            build([fmu], folder)
+            build([fmu], folder, announce)
         return folder / f"{fmu}.fmu"
     path = Path(fmu)
     if path.suffix == ".fmu" and path.is_file():
@@ -49,10 +49,11 @@ def out_of_date(names: Iterable[str], folder: Path) -> list[str]:
     ]
 
 
-def build(names: Iterable[str], folder: Path) -> list[Path]:
+def build(names: Iterable[str], folder: Path, announce: Callable[[str], None] | None = None) -> list[Path]:
     """Build FMUs of this project into `folder`, in a process of its own; their paths.
 
-    Raises `QuadcosimError` with what the build said if it fails.
+    `announce` hears, a line each, of what could not be packed. Raises `QuadcosimError` with what the build said if
+    it fails.
     """
     targets = [MODELS[name] for name in names]
     done = subprocess.run(
@@ -62,6 +63,9 @@ def build(names: Iterable[str], folder: Path) -> list[Path]:
     if done.returncode != 0:
         lines = done.stderr.strip().splitlines() or ["no output"]
         raise QuadcosimError(f"building {', '.join(targets)} in {folder} failed: {lines[-1]}")
+    if announce is not None:
+        for line in done.stderr.splitlines():
+            announce(line)
     return [Path(line) for line in done.stdout.splitlines()]
 
 

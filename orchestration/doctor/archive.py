@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
+from fmu_kit import loader
 from orchestration.doctor import sources
-from orchestration.doctor.binaries import LINUX, MACOS, WINDOWS, Binary, UnreadableError, origin_in, read
+from orchestration.doctor.binaries import LINUX, MACOS, WINDOWS, Binary, UnreadableError, joined, origin_in, read
 from orchestration.errors import UsageError
 
 DESCRIPTION = "modelDescription.xml"
@@ -37,6 +38,8 @@ class PlatformBinary:
     """The folder in `binaries/`."""
     binary: Binary | None = None
     """None if there is none to be read; `problem` says why."""
+    finds_python: bool = False
+    """Whether it is a loader of this project, which opens a libpython and then pythonfmu's library beside it."""
     bundled: frozenset[str] = frozenset()
     """Dependencies that the FMU brings along, where the loader looks."""
     problem: str | None = None
@@ -126,12 +129,17 @@ def _platform(archive: zipfile.ZipFile, folder: str, identifier: str) -> Platfor
         return PlatformBinary(platform=folder, problem=f"expected {' or '.join(expected)}")
     try:
         binary = read(io.BytesIO(archive.read(found)))
+        finds_python = folder == posixpath.basename(loader.PLATFORM) and loader.BESIDE in names
+        if finds_python:
+            binary = joined(binary, read(io.BytesIO(archive.read(loader.BESIDE))))
     except UnreadableError as error:
         return PlatformBinary(platform=folder, problem=f"{found}: {error}")
     looked_at = {f"binaries/{folder}"} if binary.system == WINDOWS else set(_inside(binary, folder))
     bundled = {name for name in binary.dependency_names for place in looked_at if f"{place}/{name}" in names}
     problem = _mismatch(folder, binary)
-    return PlatformBinary(platform=folder, binary=binary, bundled=frozenset(bundled), problem=problem)
+    return PlatformBinary(
+        platform=folder, binary=binary, finds_python=finds_python, bundled=frozenset(bundled), problem=problem
+    )
 
 
 def _inside(binary: Binary, folder: str) -> list[str]:

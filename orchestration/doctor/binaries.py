@@ -6,7 +6,7 @@ Headers and tables only, so that a library for any machine can be read on any ot
 import re
 import struct
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import BinaryIO
 
 LINUX, WINDOWS, MACOS = "Linux", "Windows", "macOS"
@@ -69,6 +69,15 @@ class Binary:
     def fits(self, system: str, architecture: str) -> bool:
         """Whether a process of this kind can load it."""
         return self.system == system and architecture in self.architectures
+
+
+def joined(first: Binary, second: Binary) -> Binary:
+    """What `first` needs to load and then to load `second`, both for the same machine."""
+    versions: dict[str, set[str]] = {}
+    for dependency in (*(first.dependencies or ()), *(second.dependencies or ())):
+        versions.setdefault(dependency.name, set()).update(dependency.versions)
+    dependencies = tuple(Dependency(name=name, versions=tuple(sorted(found))) for name, found in versions.items())
+    return replace(first, dependencies=dependencies, python_symbols=second.python_symbols)
 
 
 def read(stream: BinaryIO) -> Binary:

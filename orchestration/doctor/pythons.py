@@ -11,7 +11,7 @@ from pathlib import Path
 from orchestration.doctor.binaries import LINUX, WINDOWS
 from orchestration.doctor.loader import Loader
 
-THIS_PYTHON, PRELOADED, ON_PATH = "this Python", "LD_PRELOAD", "PATH"
+THIS_PYTHON, PRELOADED, ON_PATH, BY_LOADER = "this Python", "LD_PRELOAD", "PATH", "the loader"
 
 _LIBPYTHON = re.compile(r"libpython(3\.\d+)[dm]*\.so")
 """Without that of free-threaded Python, whose binary interface is another."""
@@ -68,7 +68,7 @@ def _loadable(loader: Loader) -> Iterator[PythonLibrary]:
     for path in (*_in_folders(loader.first), *cached, *_in_folders(loader.last)):
         match = _LIBPYTHON.match(path.name)
         if match:
-            yield PythonLibrary(path=path, version=match[1], found_by="the loader")
+            yield PythonLibrary(path=path, version=match[1], found_by=BY_LOADER)
 
 
 def _in_folders(folders: Iterable[Path]) -> Iterator[Path]:

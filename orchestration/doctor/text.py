@@ -73,7 +73,8 @@ def _platform_rows(part: PlatformBinary, machine: Machine, here: bool) -> Iterat
         yield "", f"needs {', '.join(_named(dependency) for dependency in needed(part))}", False
     if part.binary.python_symbols:
         count = len(part.binary.python_symbols)
-        yield "", f"needs a libpython that its host has loaded, globally visible ({count} symbols)", False
+        needs = "finds a libpython itself" if part.finds_python else "needs a libpython that its host has loaded"
+        yield "", f"{needs}, globally visible ({count} symbols)", False
 
 
 def _named(dependency: Dependency) -> str:

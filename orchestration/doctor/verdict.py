@@ -8,8 +8,11 @@ from orchestration.doctor.archive import Fmu, PlatformBinary
 from orchestration.doctor.binaries import LINUX, WINDOWS
 from orchestration.doctor.dependencies import PYTHON_DLL, lacking, part_for
 from orchestration.doctor.machine import Machine
-from orchestration.doctor.pythons import ON_PATH, PRELOADED, PythonLibrary
+from orchestration.doctor.pythons import BY_LOADER, ON_PATH, PRELOADED, PythonLibrary
 from orchestration.fmpy_adapter import uri_is_read
+
+TOLD = "QUADCOSIM_LIBPYTHON"
+"""The variable by which the loader in an FMU is told of a libpython."""
 
 INSTALL_LIBPYTHON = "apt install libpython3-dev (Debian, Ubuntu), dnf install python3-libs (Fedora)"
 
@@ -105,7 +108,7 @@ def other_host(fmu: Fmu, machine: Machine) -> Host:
         return Host(needs=(*needs, _python_to_install(fmu, machine)))
     packages = ", ".join(_imports(fmu))
     note = f"Python {library.version} must be able to import {packages}" if packages else None
-    return Host(needs=tuple(needs), start=_start(library), note=note)
+    return Host(needs=tuple(needs), start=_start(library, part), note=note)
 
 
 def python_library(fmu: Fmu, machine: Machine) -> PythonLibrary | None:
@@ -144,7 +147,8 @@ def _general_needs(fmu: Fmu, machine: Machine, part: PlatformBinary | None) -> l
     needs = []
     if part is None:
         needs.append(f"an FMU with a binary for {machine.system}, {machine.architecture}")
-    if fmu.python is not None and not uri_is_read(machine.temp_folder):
+    decoded = part is not None and part.finds_python
+    if fmu.python is not None and not decoded and not uri_is_read(machine.temp_folder):
         needs.append(
             "a temp folder (TMPDIR, TEMP) with a path of ASCII letters, digits, - . _ ~ and spaces; "
             f"pythonfmu crashes in {machine.temp_folder}"
@@ -163,10 +167,10 @@ def _python_to_install(fmu: Fmu, machine: Machine) -> str:
     return f"python3.dll of {wanted} on PATH"
 
 
-def _start(library: PythonLibrary) -> str | None:
-    if library.found_by in (PRELOADED, ON_PATH):
+def _start(library: PythonLibrary, part: PlatformBinary) -> str | None:
+    if library.found_by in (PRELOADED, ON_PATH) or (part.finds_python and library.found_by == BY_LOADER):
         return None
     if library.path.suffix == ".dll":
         return f'set "PATH={library.path.parent};%PATH%" && TOOL'
     home = "" if library.home is None else f"PYTHONHOME={library.home} "
-    return f"{home}LD_PRELOAD={library.path} TOOL"
+    return f"{home}{TOLD if part.finds_python else 'LD_PRELOAD'}={library.path} TOOL"

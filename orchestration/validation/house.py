@@ -3,6 +3,7 @@
 import datetime
 from collections.abc import Iterator
 
+from fmu_kit.loader import GUID_FILE
 from fmu_kit.packaging import ICON, content_guid
 from orchestration import wiring
 from orchestration.validation.fmu import Fmu, Variable
@@ -18,6 +19,9 @@ def guid_of_content(fmu: Fmu) -> Iterator[str]:
     expected = content_guid(dict(fmu.archive.files))
     if fmu.guid != expected:
         yield f"guid = {fmu.guid}: expected {expected}, that of the content"
+    known = fmu.archive.files.get(GUID_FILE, b"").decode(errors="replace")
+    if known != fmu.guid:
+        yield f"{GUID_FILE} = {known}: expected {fmu.guid}, the guid"
 
 
 def date(fmu: Fmu) -> Iterator[str]:

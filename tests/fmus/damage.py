@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element, fromstring, tostring
 
+from fmu_kit.loader import GUID_FILE
 from fmu_kit.packaging import content_guid
 from tests.fmus.archive import files_of
 
@@ -57,7 +58,8 @@ def write_fmu(path: Path, files: Files) -> None:
 def with_its_guid(files: Files) -> Files:
     """The files with the GUID that their content has."""
     guid = content_guid(files).encode()
-    return {**files, DESCRIPTION: re.sub(rb' guid="[^"]*"', b' guid="' + guid + b'"', files[DESCRIPTION], count=1)}
+    described = re.sub(rb' guid="[^"]*"', b' guid="' + guid + b'"', files[DESCRIPTION], count=1)
+    return {**files, DESCRIPTION: described, GUID_FILE: guid}
 
 
 def every(*damages: Damage) -> Damage:

@@ -336,7 +336,7 @@ BEHAVIOUR = (
     Mutant(
         name="serialised state rounded", rule="serialised-state", words=("from the bytes",),
         damage=source(
-            "fmu_kit/slave.py", 'json.loads(content.decode("utf-8"))',
+            "fmu_kit/saved_state.py", 'json.loads(content.decode("utf-8"))',
             'json.loads(content.decode("utf-8"), parse_float=lambda text: round(float(text), 9))',
         ),
     ),

@@ -3,15 +3,18 @@
 import shutil
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import fmpy
 import pytest
 
 from orchestration.doctor.archive import open_fmu
+from orchestration.doctor.dependencies import needed
 from orchestration.doctor.machine import this_machine
-from orchestration.doctor.pythons import PythonLibrary
+from orchestration.doctor.pythons import BY_LOADER, THIS_PYTHON, PythonLibrary
 from orchestration.doctor.verdict import INSTALL_LIBPYTHON, other_host, satisfies
+from tests.fmus.archive import without_loader
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
 from tests.fmus.instance import Instance
 from tests.fmus.loop import MOTION
@@ -105,12 +108,87 @@ def test_a_c_program_gets_the_command_of_the_law_without_numpy(
     assert not list(tmp_path.glob("trap/numpy/imported"))
 
 
+NOT_PYTHON = "libc.so.6"
+"""What the host opens in place of a libpython: what it then lacks is to be found without it."""
+
+
 @pytest.mark.usefixtures("library")
-def test_a_c_program_started_as_the_doctor_says_finds_python(
+def test_a_c_program_that_knows_nothing_of_python_flies_the_fmu(
     host: Path, built: dict[str, Path], tmp_path: Path
 ) -> None:
-    """The host opens the C library in place of Python: what it then lacks is what doctor must give."""
-    fmu = open_fmu(built["UnifiedController"])
+    done = run(str(host), NOT_PYTHON, *arguments(built["UnifiedController"], tmp_path / "unpacked", MEASUREMENT))
+    assert (done.returncode, done.stderr) == (0, "")
+    command = [float(line) for line in done.stdout.splitlines()]
+    assert command == pytest.approx(law_command((STEPS - 1) * H), rel=1e-12, abs=1e-12)
+
+
+def test_a_libpython_that_is_told_is_taken(
+    host: Path, library: PythonLibrary, environment: dict[str, str], built: dict[str, Path], tmp_path: Path
+) -> None:
+    given = arguments(built["UnifiedController"], tmp_path / "unpacked", MEASUREMENT)
+    done = run(str(host), NOT_PYTHON, *given, environment={**environment, "QUADCOSIM_LIBPYTHON": str(library.path)})
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+OLD = r"""
+const char *Py_GetVersion(void) { return "3.9.18 (main)"; }
+"""
+
+
+def test_without_a_python_that_will_do_the_host_is_told_which_one_would(
+    host: Path, built: dict[str, Path], tmp_path: Path
+) -> None:
+    given = arguments(built["UnifiedController"], tmp_path / "unpacked", {})
+    old = tmp_path / "libpython3.9.so"
+    (tmp_path / "old.c").write_text(OLD)
+    assert run("cc", "-shared", "-fPIC", str(tmp_path / "old.c"), "-o", str(old)).returncode == 0
+    too_old = "is Python 3.9.18: expected 3.10 or newer"
+    for variables, library, words in (
+        ({"QUADCOSIM_LIBPYTHON": str(old)}, NOT_PYTHON, f"{old} {too_old}"),
+        ({}, str(old), f"this process {too_old}"),
+        ({"QUADCOSIM_LIBPYTHON": "/no/such.so"}, NOT_PYTHON, "/no/such.so: cannot open shared object file"),
+        ({"PYTHONHOME": "/no/such"}, NOT_PYTHON, "no shared library of Python 3.10 or newer that fits PYTHONHOME, "),
+    ):
+        done = run(str(host), library, *given, environment=variables)
+        assert done.returncode == 3
+        assert done.stderr.startswith(f"controller, status 3, category none: {words}")
+        assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.usefixtures("library")
+@pytest.mark.parametrize(
+    ("place", "text", "words"),
+    [
+        (2, "{another}", "GUID = {another}: expected "),
+        (
+            1,
+            "file:///no/such/folder",
+            "fmuResourceLocation = file:///no/such/folder: expected the URI",
+        ),
+        (1, "", "fmuResourceLocation = : expected the URI"),
+        (1, "100%s%n", "fmuResourceLocation = 100%s%n: expected the URI"),
+    ],
+)
+def test_what_does_not_belong_to_the_fmu_is_refused(
+    place: int, text: str, words: str, host: Path, built: dict[str, Path], tmp_path: Path
+) -> None:
+    given = arguments(built["UnifiedController"], tmp_path / "unpacked", {})
+    given[place] = text
+    done = run(str(host), NOT_PYTHON, *given)
+    assert done.returncode == 3
+    assert done.stderr.startswith(f"controller, status 3, category none: {words}")
+
+
+@pytest.fixture
+def plain(built: dict[str, Path], tmp_path: Path) -> Path:
+    """The controller as pythonfmu's library makes it, without the loader: as where there was no compiler."""
+    return without_loader(built["UnifiedController"], tmp_path)
+
+
+@pytest.mark.usefixtures("library")
+def test_a_c_program_started_as_the_doctor_says_finds_python(host: Path, plain: Path, tmp_path: Path) -> None:
+    """Without the loader the host must have Python: what it lacks is what doctor must give."""
+    fmu = open_fmu(plain)
     given = arguments(fmu.path, tmp_path / "unpacked", MEASUREMENT)
     alone = run(str(host), "libc.so.6", *given)
     assert alone.returncode == 1
@@ -120,6 +198,25 @@ def test_a_c_program_started_as_the_doctor_says_finds_python(
     done = run(str(host), "libc.so.6", *given, environment=dict(pair.split("=", 1) for pair in variables))
     assert done.returncode == 0, done.stderr
     assert [float(line) for line in done.stdout.splitlines()] == pytest.approx(law_command((STEPS - 1) * H), rel=1e-12)
+
+
+@pytest.mark.parametrize("found_by", [BY_LOADER, THIS_PYTHON])
+def test_the_doctor_knows_what_the_loader_finds_and_what_it_must_be_told(
+    found_by: str, built: dict[str, Path], plain: Path
+) -> None:
+    fmu = open_fmu(built["UnifiedController"])
+    python = PythonLibrary(path=Path("/a/libpython3.11.so.1.0"), version="3.11", found_by=found_by)
+    machine = replace(this_machine([fmu]), python_libraries=(python,), temp_folder=Path("/tmp/Jürgen"))
+    host = other_host(fmu, machine)
+    assert host.start == (None if found_by == BY_LOADER else f"QUADCOSIM_LIBPYTHON={python.path} TOOL")
+    assert host.needs == ()
+    assert other_host(fmu, replace(machine, python_libraries=())).needs[0].startswith("a shared libpython")
+    (mine, plains) = (
+        {d.name: d.versions for part in one.platforms if part.platform == "linux64" for d in needed(part)}
+        for one in (fmu, open_fmu(plain))
+    )
+    assert mine.keys() >= plains.keys() >= {"libstdc++.so.6"}
+    assert all(set(mine[name]) >= set(versions) for name, versions in plains.items())
 
 
 def test_the_trap_would_have_caught_an_import_of_numpy(environment: dict[str, str], tmp_path: Path) -> None:

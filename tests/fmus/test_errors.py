@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -14,6 +15,7 @@ from fmpy.fmi1 import FMICallException
 from orchestration.errors import SimulatorError, UsageError
 from orchestration.fmpy_adapter import FmuSimulator
 from orchestration.wiring import MODELS
+from tests.fmus.archive import without_loader
 from tests.fmus.instance import Instance
 from tests.fmus.process import run, run_script
 
@@ -352,16 +354,27 @@ def loaded_in(folder: Path, fmu: Path) -> str:
 def test_a_temporary_folder_that_pythonfmu_cannot_find_is_refused(
     name: str, built: dict[str, Path], tmp_path: Path
 ) -> None:
-    said = loaded_in(tmp_path / name, built[PLANT])
-    assert said.startswith(
-        f"{built[PLANT]}: expected a co-simulation FMU that loads here: unpacked in {tmp_path / name}"
-    )
+    plain = without_loader(built[PLANT], tmp_path)
+    said = loaded_in(tmp_path / name, plain)
+    assert said.startswith(f"{plain}: expected a co-simulation FMU that loads here: unpacked in {tmp_path / name}")
     assert "other characters than ASCII letters, digits, spaces and - . _ ~: set TMPDIR" in said
     assert said.count("\n") == 1
 
 
-def test_a_temporary_folder_with_spaces_will_do(built: dict[str, Path], tmp_path: Path) -> None:
-    assert loaded_in(tmp_path / "with many spaces", built[PLANT]) == ""
+def test_a_temporary_folder_with_spaces_will_do_for_pythonfmu_alone(built: dict[str, Path], tmp_path: Path) -> None:
+    assert loaded_in(tmp_path / "with many spaces", without_loader(built[PLANT], tmp_path)) == ""
+
+
+@pytest.mark.parametrize("name", ["with many spaces", "Jürgen", "100% (2)"])
+def test_behind_the_loader_any_temporary_folder_will_do(name: str, built: dict[str, Path], tmp_path: Path) -> None:
+    assert loaded_in(tmp_path / name, built[PLANT]) == ""
+
+
+@pytest.mark.parametrize("name", [b"a%20b", b"J\xfcrgen"])
+def test_but_for_two_that_pythonfmu_cannot_be_given(name: bytes, built: dict[str, Path], tmp_path: Path) -> None:
+    said = loaded_in(tmp_path / os.fsdecode(name), built[PLANT])
+    assert "expected a path in UTF-8, without %20 and file:// in it" in said
+    assert said.count("\n") == 1
 
 
 # -- text and aftermath ---------------------------------------------------------------------------------

@@ -366,11 +366,6 @@ def test_an_instance_may_have_any_name(model: str, called: str, built: dict[str,
         second.step(0.0, 0.01)
 
 
-UNESCAPED = pytest.mark.xfail(
-    reason="pythonfmu 0.7.0 understands file:// and %20, no other form or escape, and crashes where it finds no FMU"
-)
-
-
 @pytest.mark.parametrize(
     ("folder", "form"),
     [
@@ -378,9 +373,13 @@ UNESCAPED = pytest.mark.xfail(
         ("folder with spaces", "URI with a slash at its end"),
         ("folder with spaces", "path"),
         ("Jürgen", "path"),
-        pytest.param("Jürgen", "URI", marks=UNESCAPED),
-        pytest.param("copy (2)", "URI", marks=UNESCAPED),
-        pytest.param("folder", "URI with one slash", marks=UNESCAPED),
+        ("Jürgen", "URI"),
+        ("copy (2)", "URI"),
+        ("copy (2)", "path with escapes"),
+        ("100% [四旋翼]", "URI"),
+        ("100% [四旋翼]", "path"),
+        ("folder", "URI with one slash"),
+        ("folder", "URI with a host"),
     ],
 )
 def test_an_fmu_finds_its_resources(folder: str, form: str, built: dict[str, Path], tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import ast
 import datetime
+import io
 import shutil
 import sys
 from collections.abc import Iterator
@@ -11,11 +12,14 @@ import fmpy
 import pytest
 
 from fmu_kit import packaging
+from fmu_kit.loader import BESIDE, GUID_FILE
 from orchestration import fmus
+from orchestration.doctor import binaries
 from orchestration.documents import tomllib
 from orchestration.errors import QuadcosimError
 from orchestration.wiring import MODELS
 from tests.fmus.archive import files_of
+from tests.fmus.instance import Instance
 from tests.fmus.process import ROOT, run
 from tests.fmus.source_tree import PACKAGES, build, copy_sources, python, replace, try_to_build
 
@@ -106,6 +110,7 @@ def test_the_guid_is_that_of_the_content(model: str, built: dict[str, Path]) -> 
 def test_the_guid_changes_with_any_file(built: dict[str, Path]) -> None:
     files = files_of(built["QuadrotorPlant"])
     guid = packaging.content_guid(files)
+    assert files.pop(GUID_FILE).decode() == guid
     for name in files:
         assert packaging.content_guid({**files, name: files[name] + b" "}) != guid, name
 
@@ -171,6 +176,42 @@ def test_the_archive_has_a_binary_named_after_the_model_for_linux_and_windows(
 ) -> None:
     binaries = {name for name in files_of(built[model]) if name.startswith("binaries/")}
     assert {f"binaries/linux64/{model}.so", f"binaries/win64/{model}.dll"} <= binaries
+
+
+@pytest.mark.parametrize("compiler", ["none", "one that fails"])
+def test_without_a_compiler_an_fmu_is_packed_without_a_loader_and_says_so(
+    compiler: str, built: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    if compiler != "none":
+        (tools / "cc").write_text("#!/bin/sh\necho no headers >&2\nexit 1\n")
+        (tools / "cc").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tools))
+    said: list[str] = []
+    (path,) = fmus.build(["QuadrotorPlant"], tmp_path, said.append)
+    why = "no C compiler that is called cc" if compiler == "none" else f"{tools}/cc: no headers"
+    assert said == [
+        f"QuadrotorPlant.fmu: packed without its loader ({why}); a host that is not Python must load Python itself"
+    ]
+    with_one, without = files_of(built["QuadrotorPlant"]), files_of(path)
+    assert {name for name in without if "quadcosim_" not in name} == {
+        name for name in with_one if "quadcosim_" not in name and name != BESIDE
+    }
+    assert without["binaries/linux64/QuadrotorPlant.so"] == with_one[BESIDE]
+    assert fmus.out_of_date(["QuadrotorPlant"], tmp_path) == []
+    with Instance(path) as instance:
+        instance.initialise({})
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_loader_asks_for_no_newer_c_library_than_its_calls_need(model: str, built: dict[str, Path]) -> None:
+    binary = binaries.read(io.BytesIO(files_of(built[model])[f"binaries/linux64/{model}.so"]))
+    (needed,) = binary.dependencies or ()
+    assert needed.name == "libc.so.6"
+    (newest,) = binaries.newest(needed.versions)
+    assert tuple(map(int, newest.removeprefix("GLIBC_").split("."))) <= (2, 34)
+    assert binary.python_symbols == ()
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -259,7 +300,9 @@ def test_the_source_hash_changes_with_a_source(sources: Path) -> None:
     assert hash_of(sources, "UnifiedController") == before["UnifiedController"]
 
 
-@pytest.mark.parametrize("file", ["packaging.py", "documentation.py", "page.html", "LICENSE", "slave.py", "units.py"])
+@pytest.mark.parametrize(
+    "file", ["packaging.py", "documentation.py", "page.html", "loader.py", "loader.c", "LICENSE", "slave.py"]
+)
 def test_the_source_hash_changes_with_what_both_fmus_stand_on(file: str, sources: Path) -> None:
     before = {model: hash_of(sources, model) for model in MODELS}
     with (sources / "fmu_kit" / file).open("a", encoding="utf-8") as source:

@@ -15,7 +15,9 @@ FORMS: dict[str, Callable[[Path], str]] = {
     "URI": Path.as_uri,
     "URI with a slash at its end": lambda path: path.as_uri() + "/",
     "URI with one slash": lambda path: path.as_uri().replace("file:///", "file:/"),  # as Java writes it
+    "URI with a host": lambda path: path.as_uri().replace("file://", "file://localhost"),
     "path": str,
+    "path with escapes": lambda path: path.as_uri().removeprefix("file://"),
 }
 
 
