@@ -10,7 +10,7 @@ from orchestration.scenario import Scenario
 from orchestration.studies.axes import Axis
 from orchestration.studies.study import Study, locate_fmus
 from orchestration.studies.sweep import sweep
-from orchestration.studies.worker import HANGAR, Task
+from orchestration.studies.worker import Hangar, Task
 
 RUNS, SECONDS = 200, 10.0
 """of the study that two workers are compared on"""
@@ -34,9 +34,9 @@ def many_short_runs() -> tuple[float, float]:
     fmus = locate_fmus(scenario)
     scenario = scenario.with_fmus(plant=fmus.plant, controller=fmus.controller)
     task = Task(index=0, key="", settings={}, scenario=scenario, keep_signals=False)
-    durations, memory = [], []
+    durations, memory, hangar = [], [], Hangar()
     for i in range(MANY):
-        durations.append(HANGAR.fly(dataclasses.replace(task, index=i)).row.duration)
+        durations.append(hangar.fly(dataclasses.replace(task, index=i)).row.duration)
         memory.append(resident())
     return statistics.median(durations) * 1e3, memory[-1] - memory[MANY // 2]
 

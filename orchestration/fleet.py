@@ -6,6 +6,7 @@ from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Protocol
 
+from orchestration.errors import SimulatorError
 from orchestration.fmpy_adapter import FmuSimulator
 
 
@@ -29,10 +30,8 @@ class Fleet:
         """The instance of the FMU at `path`, fresh or reset."""
         key = (path, instance_name)
         fmu = self._instances.pop(key, None)
-        if fmu is None:
+        if fmu is None or not _is_reset(fmu):
             fmu = FmuSimulator(path, instance_name)
-        else:
-            fmu.reset()
         try:
             yield fmu
         finally:
@@ -40,6 +39,16 @@ class Fleet:
                 fmu.close()
             else:
                 self._instances[key] = fmu
+
+
+def _is_reset(fmu: FmuSimulator) -> bool:
+    """Whether the instance could be reset; one that could not is given up, which is not the next run's failure."""
+    try:
+        fmu.reset()
+    except SimulatorError:
+        fmu.close()
+        return False
+    return True
 
 
 def _free(instances: dict[tuple[Path, str], FmuSimulator]) -> None:

@@ -1,10 +1,9 @@
 """The axes of a study and the points that they span."""
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, overload
 
 import numpy as np
 
@@ -16,6 +15,8 @@ Value = float | int | bool | str
 Scale = Literal["linear", "logarithmic"]
 Method = Literal["random", "latin-hypercube", "sobol", "morris", "saltelli"]
 """How sampled axes are: the last two for sensitivity (Morris screening, Sobol indices)."""
+MOST_POINTS = 1_000_000
+"""of a study"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +39,8 @@ class Axis:
     def __post_init__(self) -> None:
         if self.values is not None and not self.values:
             raise UsageError(f"axis {self.name}: expected at least one value")
+        if len({_kind(value) for value in self.values or ()}) > 1:
+            raise UsageError(f"axis {self.name}: expected values of one kind: numbers, texts, or true and false")
         if self.values is None:
             _check_range(self.name, self.low, self.high, self.scale)
 
@@ -53,34 +56,63 @@ def span(name: str, low: float, high: float, number: int, scale: Scale) -> tuple
     _check_range(name, low, high, scale)
     if number < 2:
         raise UsageError(f"axis {name}: number = {number}, expected at least 2")
+    if number > MOST_POINTS:
+        raise UsageError(f"axis {name}: number = {number}, expected at most {MOST_POINTS}")
     axis = Axis(name=name, targets=(), low=low, high=high, scale=scale)
     # Twelve digits: the steps of a decimal range are decimal numbers, 0.003 and not 0.0030000000000000005.
     inner = [float(f"{axis.at(i / (number - 1)):.12g}") for i in range(1, number - 1)]
     return (low, *inner, high)
 
 
-def points(axes: Sequence[Axis], method: Method, samples: int, seed: int) -> list[dict[str, Value]]:
+class Points(Sequence[dict[str, Value]]):
     """The design: every combination of the listed values, each with every sampled point, in that order.
 
-    Returns one value by axis name for each point; the last listed axis varies fastest, then the samples.
+    One value by axis name for each point, made when it is asked for; the last listed axis varies fastest, then
+    the samples. Raises `UsageError` for a design of more than `MOST_POINTS`, before anything is expanded.
     """
-    listed = [axis for axis in axes if axis.values is not None]
-    sampled = [axis for axis in axes if axis.values is None]
-    combinations = [
-        dict(zip([axis.name for axis in listed], combination, strict=True))
-        for combination in itertools.product(*(axis.values or () for axis in listed))
-    ]
-    if not sampled:
-        return combinations
-    shares = unit_points(method, len(sampled), samples, seed)
-    draws = [{axis.name: axis.at(float(share)) for axis, share in zip(sampled, row, strict=True)} for row in shares]
-    return [{**combination, **draw} for combination in combinations for draw in draws]
+
+    def __init__(self, axes: Sequence[Axis], method: Method, samples: int, seed: int) -> None:
+        self._axes = tuple(axes)
+        self._sampled = [axis for axis in axes if axis.values is None]
+        sizes = [len(axis.values) for axis in axes if axis.values is not None]
+        self._draws = 1
+        if self._sampled:
+            if samples < 1:
+                raise UsageError(f"design.samples = {samples}: expected at least 1 for sampled axes")
+            self._draws = samples * sensitivity.runs_a_sample(method, len(self._sampled))
+        self._number = math.prod(sizes) * self._draws
+        if self._number > MOST_POINTS:
+            factors = " x ".join(map(str, [*sizes, *([self._draws] if self._sampled else [])]))
+            raise UsageError(f"{factors} = {self._number} runs: expected at most {MOST_POINTS}")
+        if self._sampled:
+            self._shares = unit_points(method, len(self._sampled), samples, seed)
+
+    def __len__(self) -> int:
+        return self._number
+
+    @overload
+    def __getitem__(self, index: int) -> dict[str, Value]: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[dict[str, Value]]: ...
+    def __getitem__(self, index: int | slice) -> dict[str, Value] | list[dict[str, Value]]:
+        if isinstance(index, slice):
+            return [self._point(i) for i in range(*index.indices(self._number))]
+        return self._point(range(self._number)[index])
+
+    def _point(self, index: int) -> dict[str, Value]:
+        rest, draw = divmod(index, self._draws)
+        point: dict[str, Value] = {}
+        for axis in reversed(self._axes):
+            if axis.values is not None:
+                rest, place = divmod(rest, len(axis.values))
+                point[axis.name] = axis.values[place]
+        for axis, share in zip(self._sampled, self._shares[draw] if self._sampled else ()):
+            point[axis.name] = axis.at(float(share))
+        return {axis.name: point[axis.name] for axis in self._axes}
 
 
 def unit_points(method: Method, dimension: int, samples: int, seed: int) -> Floats:
     """Points of the unit cube, shape (n, dimension); n is `samples` but for the sensitivity designs."""
-    if samples < 1:
-        raise UsageError(f"design.samples = {samples}: expected at least 1 for sampled axes")
     if method in ("morris", "saltelli"):
         return sensitivity.shares(method, dimension, samples, seed)
     generator = np.random.default_rng(seed)
@@ -94,6 +126,10 @@ def unit_points(method: Method, dimension: int, samples: int, seed: int) -> Floa
     if 2**exponent != samples:
         raise UsageError(f"design.samples = {samples}: expected a power of two for a Sobol sequence")
     return np.asarray(qmc.Sobol(dimension, rng=generator).random_base2(exponent))
+
+
+def _kind(value: Value) -> str:
+    return "truth" if isinstance(value, bool) else "text" if isinstance(value, str) else "number"
 
 
 def _check_range(name: str, low: float, high: float, scale: Scale) -> None:

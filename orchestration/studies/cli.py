@@ -31,20 +31,25 @@ def sweep(
 
     with runs_bar() as progress:
         summary = fly(
-            load_study(study), folder=out, workers=workers, dask=dask, retry_failed=retry_failed, progress=progress
-        )
+            load_study(study), folder=out, workers=workers, dask=dask, retry_failed=retry_failed, progress=progress,
+            announce=say,
+        )  # fmt: skip
     failed = f", {summary.failed} failed (quadcosim export shows why; --retry-failed)" if summary.failed else ""
     print(f"{summary.path}: {summary.total} runs, {summary.flown} flown now{failed}")
+    if summary.failed:
+        raise typer.Exit(1)
 
 
 def status(study: StudyFile, out: Out = None) -> None:
     """Tell how far a study is, also while it runs in another process."""
     from orchestration.studies.store import open_for_reading
     from orchestration.studies.study_file import load_study
-    from orchestration.studies.sweep import TOTAL, store_path
+    from orchestration.studies.sweep import TOTAL, expect_current, store_path
 
-    path = store_path(load_study(study).name, out)
+    chosen = load_study(study)
+    path = store_path(chosen.name, out)
     with open_for_reading(path) as opened:
+        expect_current(opened, chosen)
         total, counts = int(opened.about().get(TOTAL, "0")), opened.counts()
     done, failed = counts.get("done", 0), counts.get("failed", 0)
     print(f"{path}: {done + failed} of {total} runs, {failed} failed, {total - done - failed} missing")
@@ -52,11 +57,9 @@ def status(study: StudyFile, out: Out = None) -> None:
 
 def export(study: StudyFile, out: Out = None) -> None:
     """Write the rows of a study as runs.parquet and runs.csv beside its store, sorted by design index."""
-    from orchestration.studies.study_file import load_study
-    from orchestration.studies.sweep import store_path
     from orchestration.studies.table import export as write
 
-    path = store_path(load_study(study).name, out)
+    path = _current_store(study, out)
     for written in write(path, path.parent):
         print(written)
 
@@ -70,6 +73,7 @@ def draw(
     from orchestration.studies.drawing import draw_study
     from orchestration.studies.study_file import load_study
 
+    _current_store(study, out)
     for written in draw_study(load_study(study), out, metric):
         print(written)
 
@@ -117,6 +121,19 @@ def limit(
         return
     for name, value in limits.as_text(found).items():
         print(f"{name:<19}  {value}")
+
+
+def _current_store(study: Path, out: Path | None) -> Path:
+    """The store of a study file that has not changed since it was flown."""
+    from orchestration.studies.store import open_for_reading
+    from orchestration.studies.study_file import load_study
+    from orchestration.studies.sweep import expect_current, store_path
+
+    chosen = load_study(study)
+    path = store_path(chosen.name, out)
+    with open_for_reading(path) as opened:
+        expect_current(opened, chosen)
+    return path
 
 
 def register(app: typer.Typer) -> None:

@@ -28,6 +28,11 @@ class Index:
     confidence: float
 
 
+def runs_a_sample(method: str, dimension: int) -> int:
+    """How many runs one sample of `dimension` axes takes: one but for the sensitivity designs."""
+    return {"morris": dimension + 1, "saltelli": dimension + 2}.get(method, 1)
+
+
 def shares(method: SensitivityMethod, dimension: int, samples: int, seed: int) -> Floats:
     """The design in the unit cube: Morris trajectories, n (d + 1) rows, or Saltelli's, n (d + 2) rows."""
     problem = _problem([f"axis {i}" for i in range(dimension)])

@@ -1,6 +1,8 @@
 """The rows of a study in one SQLite file: written by the coordinator alone, readable by anyone meanwhile."""
 
+import hashlib
 import json
+import math
 import shutil
 import sqlite3
 import tempfile
@@ -26,14 +28,23 @@ TEXTS = ("outcome",)
 """Metrics that are words; all others are numbers."""
 
 _TYPED = ", ".join(f'"{name}" {"TEXT" if name in TEXTS else "REAL"}' for name in METRICS)
-_COLUMNS = ("design_index", "key", "status", "message", "settings", "seed", "duration", *METRICS)
-_SCHEMA = f"""
-CREATE TABLE IF NOT EXISTS about (name TEXT PRIMARY KEY, value TEXT NOT NULL);
-CREATE TABLE IF NOT EXISTS runs (
-    design_index INTEGER PRIMARY KEY, key TEXT NOT NULL, status TEXT NOT NULL, message TEXT, settings TEXT NOT NULL,
-    seed INTEGER NOT NULL, duration REAL, {_TYPED}
-);
-"""
+_RUN = ("key", "status", "message", "seed", "duration", "machine", *METRICS)
+COLUMNS = ("design_index", *_RUN)
+"""Of the table of runs, beside the axes."""
+_ORIGINS = ("guid.", "version.")
+# Runs are found by what determines them, so that they stay when the design around them changes.
+_TABLES = {
+    "about": "CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL, checksum TEXT NOT NULL)",
+    "design": "CREATE TABLE design (design_index INTEGER PRIMARY KEY, key TEXT NOT NULL, settings TEXT NOT NULL, "
+    "checksum TEXT NOT NULL)",
+    "runs": "CREATE TABLE runs (key TEXT PRIMARY KEY, status TEXT NOT NULL, message TEXT, seed INTEGER NOT NULL, "
+    f"duration REAL, machine TEXT, {_TYPED}, checksum TEXT NOT NULL)",
+}
+
+
+def is_column(name: str) -> bool:
+    """Whether the table of runs has a column of that name, whatever the axes are."""
+    return name in COLUMNS or name.startswith(_ORIGINS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,11 +64,22 @@ class Row:
     """why it failed, or what diverged"""
     duration: float
     """wall-clock time of the run [s]"""
+    machine: str | None = None
+    """the kind of machine that flew it"""
 
     @property
     def status(self) -> str:
         """`done` or `failed`; divergence is a result."""
         return "failed" if self.metrics is None else "done"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """One place of a design: which run, and with which value of each axis."""
+
+    index: int
+    key: str
+    settings: Mapping[str, Any]
 
 
 class Store:
@@ -75,43 +97,63 @@ class Store:
         with _explained(self.path):
             return dict(self._connection.execute("SELECT name, value FROM about"))
 
-    def describe(self, about: Mapping[str, str]) -> None:
-        """Write what the store is about."""
+    def describe(self, about: Mapping[str, str], design: Iterable[Place] | None = None) -> None:
+        """Write what the store is about, and which runs its design has; those that are there stay."""
         with _explained(self.path), self._connection:
-            self._connection.executemany("INSERT OR REPLACE INTO about VALUES (?, ?)", about.items())
+            self._insert("about", about.items())
+            if design is not None:
+                self._connection.execute("DELETE FROM design")
+                self._insert("design", ((place.index, place.key, json.dumps(place.settings)) for place in design))
 
-    def statuses(self) -> dict[int, tuple[str, str]]:
-        """Key and status of every row, by design index."""
+    def missing(self, *, failed_too: bool = False) -> list[int]:
+        """The places of the design whose runs have no row, or a failed one; of equal runs the first."""
         with _explained(self.path):
-            found = self._connection.execute("SELECT design_index, key, status FROM runs")
-            return {index: (key, status) for index, key, status in found}
+            found = self._connection.execute(
+                "SELECT min(design_index) FROM design LEFT JOIN runs USING (key) "
+                "WHERE status IS NULL OR (? AND status = 'failed') GROUP BY key ORDER BY 1",
+                (failed_too,),
+            )
+            return [index for (index,) in found]
+
+    def statuses(self) -> dict[str, str]:
+        """The status of every row, by the key of its run."""
+        with _explained(self.path):
+            return dict(self._connection.execute("SELECT key, status FROM runs"))
 
     def counts(self) -> dict[str, int]:
-        """How many rows have which status."""
+        """How many places of the design have a row of which status."""
         with _explained(self.path):
-            return dict(self._connection.execute("SELECT status, count(*) FROM runs GROUP BY status"))
+            return dict(
+                self._connection.execute("SELECT status, count(*) FROM design JOIN runs USING (key) GROUP BY status")
+            )
 
     def add(self, rows: Iterable[Row]) -> None:
-        """Write rows in one transaction; a row of the same index is replaced."""
-        values = [
-            (
-                row.index, row.key, row.status, row.message, json.dumps(row.settings), row.seed, row.duration,
-                *((row.metrics or {}).get(name) for name in METRICS),
-            )
-            for row in rows
-        ]  # fmt: skip
-        marks = ", ".join("?" * len(_COLUMNS))
+        """Write rows in one transaction; a row of the same run is replaced."""
+        rows = list(rows)
         with _explained(self.path), self._connection:
-            self._connection.executemany(f"INSERT OR REPLACE INTO runs VALUES ({marks})", values)
+            self._insert("design", ((row.index, row.key, json.dumps(row.settings)) for row in rows))
+            self._insert("runs", map(_values, rows))
 
     def rows(self) -> Iterator[dict[str, Any]]:
-        """All rows sorted by design index, each a value by column; `settings` is a dictionary."""
+        """All rows of the design sorted by its index, each a value by column; `settings` is a dictionary."""
+        columns = ", ".join(f'runs."{name}"' for name in _RUN)
         with _explained(self.path):
-            cursor = self._connection.execute("SELECT * FROM runs ORDER BY design_index")
+            cursor = self._connection.execute(
+                f"SELECT design_index, {columns}, settings FROM design JOIN runs USING (key) ORDER BY design_index"
+            )
             for values in cursor:
-                row = dict(zip(_COLUMNS, values, strict=True))
+                row = dict(zip((*COLUMNS, "settings"), values, strict=True))
                 row["settings"] = json.loads(row["settings"])
                 yield row
+
+    def _insert(self, table: str, rows: Iterable[tuple[Any, ...]]) -> None:
+        summed = ((*row, _checksum(row)) for row in rows)
+        first = next(summed, None)
+        if first is not None:
+            marks = ", ".join("?" * len(first))
+            statement = f"INSERT OR REPLACE INTO {table} VALUES ({marks})"
+            self._connection.execute(statement, first)
+            self._connection.executemany(statement, summed)
 
 
 @contextmanager
@@ -131,7 +173,11 @@ def open_for_writing(path: Path) -> Iterator[Store]:
             with _explained(path):
                 connection.execute("PRAGMA journal_mode=WAL")
                 connection.execute("PRAGMA synchronous=NORMAL")
-                connection.executescript(_SCHEMA)
+                if not _schema(connection):
+                    with connection:
+                        for statement in _TABLES.values():
+                            connection.execute(statement)
+                _expect_whole(path, connection)
             yield Store(path, connection)
             with _explained(path):
                 connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
@@ -154,20 +200,74 @@ def open_for_reading(path: Path) -> Iterator[Store]:
                     if Path(f"{path}{suffix}").is_file():
                         shutil.copyfile(f"{path}{suffix}", f"{copy}{suffix}")
                 connection = _read_only(copy)
-        except sqlite3.DatabaseError as error:
-            raise QuadcosimError(f"{path}: expected the store of a study: {error}") from error
+        except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
+            raise QuadcosimError(f"{path}: expected the store of a study: {_line(error)}") from error
         with closing(connection):
+            with _explained(path):
+                _expect_whole(path, connection)
             yield Store(path, connection)
 
 
 def _read_only(path: Path) -> sqlite3.Connection:
     connection = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, timeout=10.0)
     try:
-        connection.execute("SELECT count(*) FROM about").fetchone()
+        _schema(connection)
     except BaseException:
         connection.close()
         raise
     return connection
+
+
+# -- damage -----------------------------------------------------------------------------------------------
+
+
+def _expect_whole(path: Path, connection: sqlite3.Connection) -> None:
+    """Raise `QuadcosimError` unless the file is sound and every row has the checksum that it was written with."""
+    if _schema(connection) != _TABLES:
+        raise QuadcosimError(
+            f"{path}: no store of this version of quadcosim; expected one: take another --out, or remove it"
+        )
+    found = connection.execute("PRAGMA integrity_check(1)").fetchone()[0]
+    if found != "ok":
+        raise QuadcosimError(f"{path}: the store is damaged ({' '.join(found.split())}); {_REMEDY}")
+    for table in _TABLES:
+        for *row, checksum in connection.execute(f"SELECT * FROM {table}"):
+            if _checksum(row) != checksum:
+                raise QuadcosimError(f"{path}: the store is damaged ({table}: {str(row[0])[:16]!r}); {_REMEDY}")
+
+
+_REMEDY = "expected it as it was written: put back a copy, or remove it"
+
+
+def _schema(connection: sqlite3.Connection) -> dict[str, str]:
+    return dict(connection.execute("SELECT name, sql FROM sqlite_master WHERE sql IS NOT NULL"))
+
+
+def _checksum(row: Iterable[Any]) -> str:
+    """Of the values as SQLite gives them back; `repr` has every bit of a float."""
+    return hashlib.sha256(repr(tuple(row)).encode("utf-8", "surrogatepass")).hexdigest()[:16]
+
+
+def _values(row: Row) -> tuple[Any, ...]:
+    measured = {name: (row.metrics or {}).get(name) for name in METRICS}
+    return (
+        row.key, row.status, row.message, row.seed, _real(row.duration), row.machine,
+        *(_text(value) if name in TEXTS else _real(value) for name, value in measured.items()),
+    )  # fmt: skip
+
+
+def _text(value: Any) -> str | None:
+    return None if value is None else str(value)
+
+
+def _real(value: Any) -> float | None:
+    """A number as SQLite keeps it: it has one zero, and NULL for what is none."""
+    return None if value is None or math.isnan(value) else float(value) + 0.0
+
+
+def _line(error: Exception) -> str:
+    """What SQLite says, which may quote what is damaged."""
+    return "".join(letter if letter.isprintable() else "?" for letter in str(error))
 
 
 @contextmanager
@@ -175,5 +275,5 @@ def _explained(path: Path) -> Iterator[None]:
     """Say what is wrong with the store, in one line."""
     try:
         yield
-    except (sqlite3.Error, OSError) as error:
-        raise QuadcosimError(f"{path}: the store cannot be used: {error}") from error
+    except (sqlite3.Error, OSError, ValueError, OverflowError) as error:
+        raise QuadcosimError(f"{path}: the store cannot be used: {_line(error)}") from error

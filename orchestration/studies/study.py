@@ -1,11 +1,10 @@
 """What a study is: a base scenario, axes, and the runs that they make."""
 
-import dataclasses
-import functools
 import hashlib
-import importlib.metadata
+import io
 import json
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,9 +13,10 @@ from typing import Any
 import fmpy
 
 from orchestration import fmus
-from orchestration.errors import UsageError
+from orchestration.errors import QuadcosimError, UsageError
 from orchestration.scenario import FmuChoice, Scenario
-from orchestration.studies.axes import Axis, Method, Value, points
+from orchestration.studies.axes import Axis, Method, Points, Value
+from orchestration.studies.store import is_column
 from orchestration.timing import TIMING_KEYS
 
 
@@ -31,7 +31,7 @@ class Study:
     samples: int = 0
     design_seed: int = 0
     vary_seed: bool = False
-    """whether each run has a seed of its own: that of the base plus its index"""
+    """whether each run has a seed of its own: made of that of the base and the values of the axes"""
     keep_signals: tuple[int, ...] | bool = False
     """indices of the runs whose signals are kept, or all"""
 
@@ -39,11 +39,18 @@ class Study:
         names = [axis.name for axis in self.axes]
         if len(set(names)) != len(names) or not names:
             raise UsageError(f"axes = {', '.join(names)}: expected at least one axis, each with a name of its own")
+        if not _NAME.fullmatch(self.name):
+            raise UsageError(
+                f"name = {self.name!r}: expected the name of a folder: at most 100 letters, digits, spaces and - _ . +"
+            )
+        for axis in self.axes:
+            if is_column(axis.name) and (axis.name, axis.targets, axis.multiplies) != ("seed", ("seed",), False):
+                raise UsageError(f"axis {axis.name}: the table of runs has a column of that name, expected another")
 
     @cached_property
-    def points(self) -> list[dict[str, Value]]:
-        """The value of each axis, run by run."""
-        return points(self.axes, self.method, self.samples, self.design_seed)
+    def points(self) -> Sequence[Mapping[str, Value]]:
+        """The value of each axis, run by run; made when it is asked for."""
+        return Points(self.axes, self.method, self.samples, self.design_seed)
 
     def scenario(self, index: int, starts: Mapping[str, float]) -> Scenario:
         """The scenario of one run; `starts` are the FMUs' own parameters, as `controller.NAME`, `plant.NAME`.
@@ -53,7 +60,7 @@ class Study:
         point = self.points[index]
         changes: dict[str, Any] = {}
         if self.vary_seed and "seed" not in point:
-            changes["seed"] = self.base.seed + index
+            changes["seed"] = _own_seed(self.base.seed, point)
         for axis in self.axes:
             value = point[axis.name]
             for target in axis.targets:
@@ -63,6 +70,15 @@ class Study:
     def keeps_signals(self, index: int) -> bool:
         """Whether the signals of a run are kept."""
         return self.keep_signals if isinstance(self.keep_signals, bool) else index in self.keep_signals
+
+
+_NAME = re.compile(r"[^\W_][\w .+-]{0,99}")
+
+
+def _own_seed(seed: int, point: Mapping[str, Value]) -> int:
+    """A seed that only the base's and the point determine, so that a design may grow."""
+    text = json.dumps([seed, dict(point)], sort_keys=True)
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:6], "big")
 
 
 def expect_target(target: str) -> None:
@@ -122,15 +138,31 @@ def _product(value: Value, target: str, base: Scenario, starts: Mapping[str, flo
 
 @dataclass(frozen=True, kw_only=True)
 class Fmus:
-    """The FMU files of a study, and what identifies them."""
+    """The FMU files of a study, read once: what is described, hashed and flown is this content."""
 
     plant: Path
     controller: Path
 
     @cached_property
+    def contents(self) -> dict[str, bytes]:
+        """The files by side."""
+        return {side: getattr(self, side).read_bytes() for side in ("plant", "controller")}
+
+    @cached_property
+    def hashes(self) -> dict[str, str]:
+        """The hash of each file by side."""
+        return {side: hashlib.sha256(content).hexdigest() for side, content in self.contents.items()}
+
+    @cached_property
     def descriptions(self) -> dict[str, Any]:
-        """Model descriptions by side."""
-        return {side: fmpy.read_model_description(str(getattr(self, side))) for side in ("plant", "controller")}
+        """Model descriptions by side; raises `QuadcosimError` for a file without one."""
+        found = {}
+        for side, content in self.contents.items():
+            try:
+                found[side] = fmpy.read_model_description(io.BytesIO(content))
+            except Exception as error:
+                raise QuadcosimError(f"{getattr(self, side)}: expected an FMU: {error}") from error
+        return found
 
     @cached_property
     def guids(self) -> dict[str, str]:
@@ -138,12 +170,16 @@ class Fmus:
         return {side: description.guid for side, description in self.descriptions.items()}
 
     @cached_property
+    def variables(self) -> dict[str, Any]:
+        """The variables of both FMUs, as `side.NAME`."""
+        return {f"{side}.{v.name}": v for side, found in self.descriptions.items() for v in found.modelVariables}
+
+    @cached_property
     def starts(self) -> dict[str, float]:
         """The start values of all Real parameters, as `side.NAME`."""
         return {
-            f"{side}.{v.name}": float(v.start)
-            for side, description in self.descriptions.items()
-            for v in description.modelVariables
+            name: float(v.start)
+            for name, v in self.variables.items()
             if v.type == "Real" and v.causality == "parameter"
         }
 
@@ -151,42 +187,3 @@ class Fmus:
 def locate_fmus(base: Scenario) -> Fmus:
     """The FMUs of a scenario, built if need be."""
     return Fmus(plant=fmus.locate(base.plant.fmu), controller=fmus.locate(base.controller.fmu))
-
-
-@functools.cache
-def versions() -> dict[str, str]:
-    """The software that a run's bits depend on."""
-    return {name: importlib.metadata.version(name) for name in ("quadcosim", "numpy", "fmpy")}
-
-
-def run_key(scenario: Scenario, guids: Mapping[str, str]) -> str:
-    """The hash of everything that determines a run."""
-    content: dict[str, Any] = {
-        "scenario": dataclasses.asdict(scenario),
-        "fmus": dict(guids),
-        "versions": versions(),
-    }
-    file = scenario.reference.file
-    content["scenario"]["reference"] = None if file is None else hashlib.sha256(file.read_bytes()).hexdigest()
-    content["scenario"].pop("model_mismatch")  # says something of the run, and changes none
-    for side in ("plant", "controller"):  # an FMU is its GUID, wherever the file lies
-        content["scenario"][side].pop("fmu")
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-
-
-def fingerprint(study: Study, guids: Mapping[str, str]) -> dict[str, str]:
-    """What the rows of a store belong to, part by part, so that a difference can be named."""
-    base = dataclasses.asdict(study.base)
-    file = study.base.reference.file
-    parts: dict[str, Any] = {
-        "reference": None if file is None else hashlib.sha256(file.read_bytes()).hexdigest(),
-        "axes": [axis.name for axis in study.axes],
-        "design": [study.method, study.samples, study.design_seed, study.vary_seed],
-        **{f"FMU of the {side}": guid for side, guid in guids.items()},
-        **{f"version of {name}": version for name, version in versions().items()},
-        **{f"axis {axis.name}": dataclasses.asdict(axis) for axis in study.axes},
-        **{f"timing.{key}": value for key, value in base["timing"].items()},
-        **{f"{side}.{name}": v for side in ("controller", "plant") for name, v in base[side]["parameters"].items()},
-        **{key: base[key] for key in ("stop_time", "seed", "record")},
-    }
-    return {name: json.dumps(value, sort_keys=True) for name, value in parts.items()}

@@ -1,21 +1,37 @@
 """Flies what is missing of a study, and nothing twice."""
 
-import hashlib
+import contextlib
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from orchestration.errors import UsageError
+from orchestration.interrupt import Interrupted
 from orchestration.studies import engine, store
-from orchestration.studies.study import Fmus, Study, fingerprint, locate_fmus, run_key, versions
+from orchestration.studies.checks import described, expect_flyable
+from orchestration.studies.crew import Package
+from orchestration.studies.identity import (
+    design_parts,
+    difference,
+    place_parts,
+    reference_content,
+    run_key,
+    study_parts,
+    versions,
+)
+from orchestration.studies.study import Fmus, Study, locate_fmus
 from orchestration.studies.worker import Outcome, Task
 
 Progress = Callable[[int, int], None]
 """Hears how many of how many runs are done."""
+Announce = Callable[[str], None]
+"""Hears of a run that failed."""
 
-TOTAL, STUDY_PARTS, AXES = "total", "study", "axes"
+TOTAL, STUDY_PARTS, DESIGN_PARTS, PLACE_PARTS, AXES = "total", "study", "design", "place", "axes"
+_TOLD = 3
+"""failed runs that are announced one by one"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,99 +59,155 @@ def sweep(
     dask: str | None = None,
     retry_failed: bool = False,
     progress: Progress | None = None,
+    announce: Announce | None = None,
 ) -> Summary:
     """Fly the runs of `study` that its store does not have, writing each row as it comes.
 
-    Raises `UsageError` if the store holds another study, saying what differs.
+    Raises `UsageError`, before anything is flown, for a design with a run that cannot be, or if the store holds
+    another study, saying what differs; `QuadcosimError` for what is not a run's own failure, without a row.
     """
     if workers < 1:
         raise UsageError(f"--workers {workers}: expected at least 1")
+    if dask is not None:
+        engine.expect_scheduler(dask)
     path = store_path(study.name, folder)
     fmus = locate_fmus(study.base)
+    reference = reference_content(study.base)
+    expect_flyable(study, fmus)
     with store.open_for_writing(path) as opened:
-        _expect_same_study(opened, study, fmus)
-        tasks = _missing(opened, study, fmus, retry_failed)
-        total = len(study.points)
-        done = total - len(tasks)
-        if progress is not None:
-            progress(done, total)
+        _describe(opened, study, fmus, reference)
+        missing = _missing(opened, study, retry_failed)
+        counted = _Counted(len(study.points), opened, progress, announce)
+        package = Package.of(fmus, reference)
+        tasks = (_task(study, index, fmus, reference) for index in missing)
         outcomes = (
-            engine.run_on_dask(tasks, fmus, dask) if dask is not None else engine.run_locally(tasks, fmus, workers)
+            engine.run_on_dask(tasks, package, dask)
+            if dask is not None
+            else engine.run_locally(tasks, package, workers)
         )
-        for chunk in outcomes:
-            _keep(chunk, opened)
-            done += len(chunk)
-            if progress is not None:
-                progress(done, total)
-        failed = opened.counts().get("failed", 0)
-    return Summary(total=total, flown=len(tasks), failed=failed, path=path)
-
-
-def _missing(opened: store.Store, study: Study, fmus: Fmus, retry_failed: bool) -> list[Task]:
-    """The runs without a row, or with a failed one that is to be tried again."""
-    present = opened.statuses()
-    tasks, impossible = [], []
-    for index, point in enumerate(study.points):
         try:
-            scenario = study.scenario(index, fmus.starts)
-        except UsageError as error:  # a point that cannot be is a run that failed
-            impossible.append(_impossible(index, point, study.base.seed, str(error)))
-            continue
-        key = run_key(scenario, fmus.guids)
-        keeps = study.keeps_signals(index)
-        stored, status = present.get(index, ("", ""))
-        there = stored == key and not (keeps and status == "done" and not _signals_path(opened, index).is_file())
-        if not there or (retry_failed and status == "failed"):
-            tasks.append(Task(index=index, key=key, settings=point, scenario=scenario, keep_signals=keeps))
-    opened.add(row for row in impossible if row.index not in present)
-    return tasks
+            with contextlib.closing(outcomes):
+                for outcome in outcomes if missing else ():
+                    _keep(outcome, opened)
+                    counted.add(outcome)
+        except KeyboardInterrupt:
+            raise Interrupted(f"with {counted.done} of {counted.total} runs done") from None
+        failed = opened.counts().get("failed", 0)
+    return Summary(total=counted.total, flown=len(missing), failed=failed, path=path)
 
 
-def _impossible(index: int, point: Mapping[str, Any], seed: int, message: str) -> store.Row:
-    key = hashlib.sha256(json.dumps([point, message]).encode()).hexdigest()
-    return store.Row(index=index, key=key, settings=point, seed=seed, metrics=None, message=message, duration=0.0)
-
-
-def _signals_path(opened: store.Store, index: int) -> Path:
-    return opened.path.parent / "signals" / f"{index:06d}.parquet"
-
-
-def _keep(outcomes: Iterable[Outcome], opened: store.Store) -> None:
-    """Signals first, then the row, so that a row never lacks what it promises."""
-    outcomes = list(outcomes)
-    for outcome in outcomes:
-        if outcome.signals is not None:
-            target = _signals_path(opened, outcome.row.index)
-            target.parent.mkdir(exist_ok=True)
-            partial = target.with_suffix(".partial")
-            partial.write_bytes(outcome.signals)
-            partial.replace(target)
-    opened.add(outcome.row for outcome in outcomes)
-
-
-def _expect_same_study(opened: store.Store, study: Study, fmus: Fmus) -> None:
-    """A store belongs to one study; a changed one is told what changed."""
-    parts = fingerprint(study, fmus.guids)
+def expect_current(opened: store.Store, study: Study) -> None:
+    """Raise `UsageError` if `study` is not, or no longer, the one whose rows are in the store."""
     about = opened.about()
     if STUDY_PARTS not in about:
-        opened.describe(
-            {
-                STUDY_PARTS: json.dumps(parts),
-                TOTAL: str(len(study.points)),
-                AXES: json.dumps([axis.name for axis in study.axes]),
-                "grid": json.dumps(
-                    {a.name: a.values for a in study.axes} if all(a.values for a in study.axes) else None
-                ),
-                "guids": json.dumps(fmus.guids),
-                "versions": json.dumps(versions()),
-            }
-        )
-        return
-    before = json.loads(about[STUDY_PARTS])
-    differing = [name for name in sorted({*before, *parts}) if before.get(name) != parts.get(name)]
-    if differing:
-        changes = "; ".join(f"{n} was {before.get(n, 'absent')}, is {parts.get(n, 'absent')}" for n in differing)
+        raise UsageError(f"{opened.path}: expected the store of a study that has begun")
+    changes = difference(
+        {**json.loads(about[STUDY_PARTS]), **json.loads(about[DESIGN_PARTS])},
+        {**study_parts(study), **design_parts(study)},
+    )
+    if changes:
         raise UsageError(
-            f"{opened.path}: holds another study ({changes}); expected the same one: take another --out, "
-            "or remove the store"
+            f"{opened.path}: the study file has changed since ({changes}); expected the study that was flown: "
+            "quadcosim sweep flies what is missing"
         )
+
+
+class _Counted:
+    """How far a sweep is, for those who want to hear of it."""
+
+    def __init__(self, total: int, opened: store.Store, progress: Progress | None, announce: Announce | None) -> None:
+        self.total, self.failed = total, 0
+        self._opened, self._progress, self._announce = opened, progress, announce
+        self.done = 0
+        self._recount()
+
+    def add(self, outcome: Outcome) -> None:
+        """One more run has a row."""
+        row = outcome.row
+        if row.status == "failed":
+            self.failed += 1
+            if self._announce is not None and self.failed <= _TOLD:
+                more = "; further ones are not told" if self.failed == _TOLD else ""
+                self._announce(f"{described(row.index, row.settings)} failed: {row.message}{more}")
+        self._recount()
+
+    def _recount(self) -> None:
+        self.done = sum(self._opened.counts().values())
+        if self._progress is not None:
+            self._progress(self.done, self.total)
+
+
+def _task(study: Study, index: int, fmus: Fmus, reference: bytes | None) -> Task:
+    scenario = study.scenario(index, fmus.starts)
+    return Task(
+        index=index, key=run_key(scenario, fmus, reference), settings=dict(study.points[index]), scenario=scenario,
+        keep_signals=study.keeps_signals(index),
+    )  # fmt: skip
+
+
+def _missing(opened: store.Store, study: Study, retry_failed: bool) -> list[int]:
+    """The places of the design that are to be flown: without a row, or without signals that are to be kept."""
+    missing = opened.missing(failed_too=retry_failed)
+    if not study.keep_signals:
+        return missing
+    lacking = [
+        row["design_index"]
+        for row in opened.rows()
+        if study.keeps_signals(row["design_index"])
+        and row["status"] == "done"
+        and not _signals_path(opened, row["key"]).is_file()
+    ]
+    return sorted({*missing, *lacking})
+
+
+def _signals_path(opened: store.Store, key: str) -> Path:
+    return opened.path.parent / "signals" / f"{key[:16]}.parquet"
+
+
+def _keep(outcome: Outcome, opened: store.Store) -> None:
+    """Signals first, then the row, so that a row never lacks what it promises."""
+    if outcome.signals is not None:
+        target = _signals_path(opened, outcome.row.key)
+        target.parent.mkdir(exist_ok=True)
+        partial = target.with_suffix(".partial")
+        partial.write_bytes(outcome.signals)
+        partial.replace(target)
+    opened.add([outcome.row])
+
+
+def _describe(opened: store.Store, study: Study, fmus: Fmus, reference: bytes | None) -> None:
+    """A store belongs to one study, whose design may grow; a changed one is told what changed."""
+    about = opened.about()
+    parts, place = study_parts(study), place_parts(fmus)
+    if STUDY_PARTS in about:
+        changes = difference(
+            {**json.loads(about[STUDY_PARTS]), **json.loads(about[PLACE_PARTS])}, {**parts, **place}
+        )  # fmt: skip
+        if changes:
+            raise UsageError(
+                f"{opened.path}: holds another study ({changes}); expected the same one: take another --out, "
+                "or remove the store"
+            )
+    design = json.dumps(design_parts(study))
+    if about.get(DESIGN_PARTS) == design:
+        return
+    grid: dict[str, Any] | None = {axis.name: axis.values for axis in study.axes}
+    opened.describe(
+        {
+            STUDY_PARTS: json.dumps(parts),
+            PLACE_PARTS: json.dumps(place),
+            DESIGN_PARTS: design,
+            TOTAL: str(len(study.points)),
+            AXES: json.dumps([axis.name for axis in study.axes]),
+            "grid": json.dumps(grid if all(axis.values is not None for axis in study.axes) else None),
+            "guids": json.dumps(fmus.guids),
+            "versions": json.dumps(versions()),
+        },
+        _places(study, fmus, reference),
+    )
+
+
+def _places(study: Study, fmus: Fmus, reference: bytes | None) -> Iterator[store.Place]:
+    for index, point in enumerate(study.points):
+        key = run_key(study.scenario(index, fmus.starts), fmus, reference)
+        yield store.Place(index=index, key=key, settings=point)

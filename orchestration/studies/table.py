@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from orchestration.errors import UsageError
-from orchestration.studies.store import METRICS, TEXTS, open_for_reading
+from orchestration.studies.store import COLUMNS, METRICS, TEXTS, open_for_reading
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def frame(path: Path) -> "pd.DataFrame":
-    """All rows sorted by design index: settings by axis, metrics, seed, status, duration, GUIDs, versions."""
+    """All rows sorted by design index: settings by axis, metrics, seed, status, duration, machine, GUIDs, versions."""
     import pandas as pd
 
     with open_for_reading(path) as opened:
@@ -23,11 +23,11 @@ def frame(path: Path) -> "pd.DataFrame":
         rows = list(opened.rows())
     axes = json.loads(about["axes"])
     settings = pd.DataFrame([row.pop("settings") for row in rows], columns=axes)
-    table = pd.DataFrame(rows, columns=["design_index", "key", "status", "message", "seed", "duration", *METRICS])
+    table = pd.DataFrame(rows, columns=list(COLUMNS))
     table["diverged"] = table["diverged"].astype("boolean")
     for name in ("steps", "design_index", "seed"):
         table[name] = table[name].astype("Int64")
-    settings = settings.drop(columns=[name for name in settings if name in table])  # an axis may be the seed
+    settings = settings.drop(columns=[name for name in settings if name in table])  # no axis but the seed's can be
     table = pd.concat([table[["design_index"]], settings, table.drop(columns="design_index")], axis=1)
     for kind, prefix in (("guids", "guid"), ("versions", "version")):
         for name, value in json.loads(about[kind]).items():

@@ -1,21 +1,17 @@
-"""What a worker process does: flies the runs that it is given, with FMUs that it has loaded once."""
+"""What a worker process is asked and answers, and how it flies: with FMUs that it has loaded once."""
 
-import dataclasses
-import hashlib
 import io
-import multiprocessing.util
-import os
-import tempfile
-import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from orchestration.errors import QuadcosimError
+from orchestration.errors import QuadcosimError, SimulatorError, UsageError
 from orchestration.fleet import Fleet
 from orchestration.flight import prepared
+from orchestration.fmpy_adapter import FmuSimulator
 from orchestration.result import Result
 from orchestration.scenario import Scenario
 from orchestration.studies.store import Row
@@ -23,7 +19,7 @@ from orchestration.studies.store import Row
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """One run of a study, its FMUs named by their hashes."""
+    """One run of a study, its files where the worker finds them."""
 
     index: int
     key: str
@@ -40,82 +36,87 @@ class Outcome:
     signals: bytes | None = None
 
 
-class Hangar:
-    """The FMUs of this process: unpacked once by content, instantiated once, one run at a time."""
+@dataclass(frozen=True, kw_only=True)
+class Ready:
+    """A worker process has started: its software and the kind of its machine."""
 
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
+    versions: dict[str, str]
+    machine: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Broken:
+    """Nothing can be flown here, which is no run's own failure."""
+
+    message: str
+
+
+class BrokenPlaceError(QuadcosimError):
+    """What failed is not the run but where it was to be flown: no space, no file, an FMU that does not load."""
+
+
+class Hangar:
+    """The FMUs of this process, instantiated once; one run at a time."""
+
+    def __init__(self, machine: str | None = None) -> None:
         self._fleet = Fleet()
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._machine = machine
 
     def fly(self, task: Task) -> Outcome:
-        """Fly one run; whatever goes wrong with it is its row."""
+        """Fly one run; what is wrong with it is its row.
+
+        Raises `BrokenPlaceError` for what is not the run's own failure.
+        """
         started = time.perf_counter()
         metrics, message, signals = None, None, None
-        with self._lock:  # dask may call from several threads; an FMU has one interpreter
-            try:
-                with prepared(task.scenario, load=self._fleet.load) as flight:
-                    flight.master.initialise()
-                    flight.master.run()
-                    result = flight.result()
-                    metrics, message = result.metrics, result.divergence
-                    signals = _parquet(result) if task.keep_signals else None
-            except QuadcosimError as error:
-                message = str(error)
-            except Exception as error:
-                message = f"{type(error).__name__}: {error}"
-        row = Row(
-            index=task.index, key=task.key, settings=task.settings, seed=task.scenario.seed, metrics=metrics,
-            message=message, duration=time.perf_counter() - started,
-        )  # fmt: skip
-        return Outcome(row=row, signals=signals)
+        _expect_files(task.scenario)
+        try:
+            with prepared(task.scenario, load=self._load) as flight:
+                flight.master.initialise()
+                flight.master.run()
+                result = flight.result()
+                metrics, message = result.metrics, result.divergence
+                signals = _parquet(result) if task.keep_signals else None
+        except (SimulatorError, UsageError) as error:
+            message = str(error)
+        except (QuadcosimError, OSError, MemoryError) as error:
+            raise BrokenPlaceError(str(error) or type(error).__name__) from error
+        except Exception as error:
+            message = f"{type(error).__name__}: {error}"
+        return Outcome(
+            row=row_of(task, metrics, message, time.perf_counter() - started, self._machine), signals=signals
+        )
 
-    def unpack(self, content: bytes) -> Path:
-        """The path of a file with this content, written the first time only."""
-        name = f"{hashlib.sha256(content).hexdigest()}.fmu"
-        with self._lock:
-            if self._folder is None:
-                self._folder = tempfile.TemporaryDirectory(prefix="quadcosim-")
-            path = Path(self._folder.name) / name
-            if not path.is_file():
-                path.write_bytes(content)
-            return path
+    @contextmanager
+    def _load(self, path: Path, instance_name: str) -> Iterator[FmuSimulator]:
+        """An FMU that does not load has not been told yet what run it is for."""
+        with ExitStack() as stack:
+            try:
+                fmu = stack.enter_context(self._fleet.load(path, instance_name))
+            except Exception as error:
+                raise BrokenPlaceError(str(error) or type(error).__name__) from error
+            yield fmu
 
     def close(self) -> None:
-        """Free the FMUs and what was unpacked for them."""
+        """Free the FMUs."""
         self._fleet.close()
-        if self._folder is not None:
-            self._folder.cleanup()
 
 
-HANGAR = Hangar()
+def _expect_files(scenario: Scenario) -> None:
+    """Raise `BrokenPlaceError` if a file of a run is no longer there."""
+    for file in (scenario.plant.fmu, scenario.controller.fmu, scenario.reference.file):
+        if file is not None and not Path(file).is_file():
+            raise BrokenPlaceError(f"{file}: is no longer there")
 
 
-def fly_chunk(tasks: Sequence[Task], plant: bytes, controller: bytes) -> list[Outcome]:
-    """Fly several runs with the FMUs of this content; called in a worker process."""
-    paths = {"plant": HANGAR.unpack(plant), "controller": HANGAR.unpack(controller)}
-    return [HANGAR.fly(dataclasses.replace(task, scenario=task.scenario.with_fmus(**paths))) for task in tasks]
-
-
-def prepare_process(plant: Path, controller: Path) -> None:
-    """Start of a local worker process: it will not outlive its parent."""
-    _CONTENTS["plant"], _CONTENTS["controller"] = plant.read_bytes(), controller.read_bytes()
-    multiprocessing.util.Finalize(HANGAR, HANGAR.close, exitpriority=1)  # worker processes run no atexit
-    threading.Thread(target=_end_with_parent, args=(os.getppid(),), daemon=True).start()
-
-
-def fly_local_chunk(tasks: Sequence[Task]) -> list[Outcome]:
-    """Fly several runs with the FMUs that the process was prepared with."""
-    return fly_chunk(tasks, _CONTENTS["plant"], _CONTENTS["controller"])
-
-
-_CONTENTS: dict[str, bytes] = {}
-
-
-def _end_with_parent(parent: int) -> None:
-    while os.getppid() == parent:
-        time.sleep(0.5)
-    os._exit(1)
+def row_of(
+    task: Task, metrics: dict[str, Any] | None, message: str | None, duration: float, machine: str | None
+) -> Row:
+    """The row of a task; without metrics it has failed."""
+    return Row(
+        index=task.index, key=task.key, settings=task.settings, seed=task.scenario.seed, metrics=metrics,
+        message=message, duration=duration, machine=machine,
+    )  # fmt: skip
 
 
 def _parquet(result: Result) -> bytes:

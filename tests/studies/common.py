@@ -175,7 +175,7 @@ def workers_of(parent: int) -> list[int]:
     for folder in Path("/proc").iterdir():
         try:
             is_child = folder.name.isdigit() and parent_of(folder) == parent
-            if is_child and b"spawn_main" in (folder / "cmdline").read_bytes():
+            if is_child and b"orchestration.studies.serve" in (folder / "cmdline").read_bytes():
                 found.append(int(folder.name))
         except OSError:  # has ended meanwhile
             continue

@@ -1,6 +1,7 @@
 """The points that axes span."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestration import UsageError
-from orchestration.studies.axes import Axis, Method, points, span, unit_points
+from orchestration.studies.axes import MOST_POINTS, Axis, Method, Points, span, unit_points
 
 LISTED = Axis(name="period", targets=("timing.period",), values=(0.02, 0.01))
 ORDERS = Axis(name="order", targets=("timing.order",), values=("gauss-seidel", "jacobi", "gauss-seidel"))
@@ -20,27 +21,58 @@ COUNTS: dict[Method, int] = {"random": 8, "latin-hypercube": 8, "sobol": 8, "mor
 
 
 def sampled(method: Method, seed: int = 0, samples: int = 8) -> list[dict[str, float]]:
-    return points([MASS, DELAY], method, samples, seed)  # type: ignore[return-value]
+    return list(Points([MASS, DELAY], method, samples, seed))  # type: ignore[arg-type]
 
 
 # -- grids ------------------------------------------------------------------------------------------------
 
 
 def test_a_grid_has_every_combination_once_and_the_last_axis_varies_fastest() -> None:
-    found = points([LISTED, ORDERS], "sobol", 0, 0)
+    found = Points([LISTED, ORDERS], "sobol", 0, 0)
     expected = [(p, o) for p in (0.02, 0.01) for o in ("gauss-seidel", "jacobi", "gauss-seidel")]
     assert [(point["period"], point["order"]) for point in found] == expected
 
 
 def test_the_values_of_a_list_keep_their_order_and_types() -> None:
-    mixed = Axis(name="x", targets=("seed",), values=(3, 1.5, True, "jacobi"))
-    found = [point["x"] for point in points([mixed], "sobol", 0, 0)]
-    assert found == [3, 1.5, True, "jacobi"]
-    assert [type(value) for value in found] == [int, float, bool, str]
+    for values in ((3, 1.5, 0), (True, False), ("jacobi", "gauss-seidel")):
+        found = [point["x"] for point in Points([Axis(name="x", targets=("seed",), values=values)], "sobol", 0, 0)]
+        assert tuple(found) == values
+        assert [type(value) for value in found] == [type(value) for value in values]
+
+
+@pytest.mark.parametrize("values", [(1, True), ("jacobi", 1.0), (False, "no")])
+def test_values_of_several_kinds_are_refused(values: tuple[Any, ...]) -> None:
+    with pytest.raises(UsageError, match="axis x: expected values of one kind: numbers, texts, or true and false"):
+        Axis(name="x", targets=("seed",), values=values)
+
+
+def test_a_design_is_counted_before_it_is_expanded() -> None:
+    axes = [Axis(name=f"x{i}", targets=("seed",), values=tuple(range(100))) for i in range(6)]
+    with pytest.raises(UsageError, match=rf"100 x 100 x .* = {100**6} runs: expected at most {MOST_POINTS}"):
+        Points(axes, "sobol", 0, 0)
+    with pytest.raises(UsageError, match=rf"number = 100000000, expected at most {MOST_POINTS}"):
+        span("x", 0.0, 1.0, 100_000_000, "linear")
+    with pytest.raises(UsageError, match=rf"2 x {2**40 * 3} = .* runs: expected at most"):
+        Points([LISTED, MASS], "saltelli", 2**40, 0)
+
+
+def test_a_design_of_the_largest_size_is_there_at_once_point_by_point() -> None:
+    axes = [Axis(name=f"x{i}", targets=("seed",), values=tuple(range(100))) for i in range(3)]
+    found = Points(axes, "sobol", 0, 0)
+    assert len(found) == MOST_POINTS
+    assert found[987654] == {"x0": 98, "x1": 76, "x2": 54}
+    assert found[-1] == {"x0": 99, "x1": 99, "x2": 99}
+    with pytest.raises(IndexError):
+        found[MOST_POINTS]
+
+
+@pytest.mark.parametrize("method", ["random", "sobol"])
+def test_more_samples_keep_those_before(method: Method) -> None:
+    assert sampled(method, samples=16)[:8] == sampled(method, samples=8)
 
 
 def test_each_combination_meets_every_sample_and_samples_vary_fastest() -> None:
-    found = points([MASS, LISTED], "random", 3, 0)
+    found = Points([MASS, LISTED], "random", 3, 0)
     assert [point["period"] for point in found] == [0.02] * 3 + [0.01] * 3
     assert [point["mass"] for point in found[:3]] == [point["mass"] for point in found[3:]]
 

@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import math
+import random
 import shutil
 import sqlite3
 import subprocess
@@ -18,8 +19,9 @@ from hypothesis import strategies as st
 from orchestration import QuadcosimError, Scenario, UsageError
 from orchestration.scenario import FmuChoice, ReferenceChoice
 from orchestration.studies import store as stores
-from orchestration.studies.store import METRICS, TEXTS, Row, open_for_reading, open_for_writing
-from orchestration.studies.study import locate_fmus, run_key
+from orchestration.studies.identity import flight_sources, reference_content, run_key, sources_hash, versions
+from orchestration.studies.store import METRICS, TEXTS, Place, Row, open_for_reading, open_for_writing
+from orchestration.studies.study import Fmus, locate_fmus
 from tests.studies.common import one_line, row
 
 NUMBERS = [name for name in METRICS if name not in TEXTS]
@@ -85,7 +87,7 @@ def test_a_run_that_failed_has_no_metrics_and_is_counted_as_failed(path: Path) -
     assert all(found[1][name] is None for name in METRICS)
     with open_for_reading(path) as store:
         assert store.counts() == {"done": 2, "failed": 1}
-        assert store.statuses() == {0: ("key 0", "done"), 1: ("key 1", "failed"), 2: ("key 2", "done")}
+        assert store.statuses() == {"key 0": "done", "key 1": "failed", "key 2": "done"}
 
 
 def test_rows_come_sorted_by_design_index_whatever_the_order_they_were_written_in(path: Path) -> None:
@@ -93,11 +95,24 @@ def test_rows_come_sorted_by_design_index_whatever_the_order_they_were_written_i
     assert indices(written(path, row(2), row(0))) == [0, 1, 2, 3, 5]
 
 
-def test_a_row_of_the_same_index_is_replaced(path: Path) -> None:
+def test_a_row_of_the_same_run_is_replaced_and_one_of_another_run_takes_its_place(path: Path) -> None:
     written(path, row(0, metrics=None, message="no"), row(1))
-    written(path, row(0, key="new"))
+    written(path, row(0), row(1, key="new"))
     with open_for_reading(path) as store:
-        assert store.statuses() == {0: ("new", "done"), 1: ("key 1", "done")}
+        assert store.statuses() == {"key 0": "done", "key 1": "done", "new": "done"}
+        assert [found["key"] for found in store.rows()] == ["key 0", "new"]
+        assert store.counts() == {"done": 2}
+
+
+def test_a_design_that_changes_keeps_the_rows_of_its_runs_wherever_they_are_in_it_now(path: Path) -> None:
+    with open_for_writing(path) as store:
+        store.add([row(0, seed=10), row(1, seed=11, metrics=None)])
+        places = [Place(index=i, key=key, settings={}) for i, key in enumerate(["new", "key 1", "key 0", "new"])]
+        store.describe({"name": "value"}, places)
+        assert [(found["design_index"], found["seed"]) for found in store.rows()] == [(1, 11), (2, 10)]
+        assert store.missing() == [0]
+        assert store.missing(failed_too=True) == [0, 1]
+        assert store.counts() == {"done": 1, "failed": 1}
 
 
 def test_what_a_store_is_about_is_replaced_by_name(path: Path) -> None:
@@ -113,7 +128,7 @@ def test_rows_that_cannot_be_written_together_are_not_written_at_all(path: Path)
     with open_for_writing(path) as store:
         with pytest.raises(QuadcosimError, match="NOT NULL"):
             store.add([row(1), bad])
-        assert list(store.statuses()) == [0]
+        assert list(store.statuses()) == ["key 0"]
 
 
 # -- writers and readers ----------------------------------------------------------------------------------
@@ -321,7 +336,10 @@ def test_a_database_of_something_else_is_one_line_for_a_reader(tmp_path: Path) -
     path = tmp_path / "other.sqlite"
     with contextlib.closing(sqlite3.connect(path)) as connection, connection:
         connection.execute("CREATE TABLE music (name TEXT)")
-    with pytest.raises(QuadcosimError, match="no such table: about") as caught, open_for_reading(path):
+    with (
+        pytest.raises(QuadcosimError, match="no store of this version of quadcosim; expected one") as caught,
+        open_for_reading(path),
+    ):
         pass
     one_line(caught.value)
 
@@ -342,15 +360,22 @@ def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
 
 # -- keys -------------------------------------------------------------------------------------------------
 
-GUIDS = {"plant": "{p}", "controller": "{c}"}
 BASE = Scenario()
+FMUS = locate_fmus(BASE)
+OTHER_FMUS = [dataclasses.replace(FMUS) for _ in FMUS.hashes]
+for changed, (side, content) in zip(OTHER_FMUS, FMUS.contents.items(), strict=True):
+    changed.__dict__["contents"] = {**FMUS.contents, side: content + b" "}
+
+
+def key_of(scenario: Scenario, fmus: Fmus = FMUS) -> str:
+    return run_key(scenario, fmus, reference_content(scenario))
 
 
 def different_keys(tmp_path: Path) -> Iterator[str]:
     """Keys of runs that each differ from the paper's in one thing, the paper's first."""
-    yield run_key(BASE, GUIDS)
-    yield run_key(dataclasses.replace(BASE, stop_time=29.0), GUIDS)
-    yield run_key(dataclasses.replace(BASE, seed=1), GUIDS)
+    yield key_of(BASE)
+    yield key_of(dataclasses.replace(BASE, stop_time=29.0))
+    yield key_of(dataclasses.replace(BASE, seed=1))
     timing: list[dict[str, Any]] = [
         {"period": 0.02}, {"offset": 0.001}, {"plant_interval": 0.002}, {"order": "jacobi"}, {"hold": "first"},
         {"clock": "fmu"}, {"delay": math.nextafter(0.0, 1.0)}, {"delay_jitter": 0.001}, {"jitter": 0.001},
@@ -359,16 +384,17 @@ def different_keys(tmp_path: Path) -> Iterator[str]:
         {"quantisation": {"position": 0.1}},
     ]  # fmt: skip
     for changed in timing:
-        yield run_key(BASE.with_changes(timing=changed), GUIDS)
-    for name in ("plant.mass", "controller.mass", "plant.initial.position.x"):
-        yield run_key(BASE.with_changes(parameters={name: 1.25}), GUIDS)
-        yield run_key(BASE.with_changes(parameters={name: math.nextafter(1.25, 2.0)}), GUIDS)
-    for side in GUIDS:
-        yield run_key(BASE, {**GUIDS, side: "{other}"})
+        yield key_of(BASE.with_changes(timing=changed))
+    for name in ("plant.mass", "controller.mass", "plant.initial.position.x"):  # none starts at 1.25
+        yield key_of(BASE.with_changes(parameters={name: 1.25}))
+        yield key_of(BASE.with_changes(parameters={name: math.nextafter(1.25, 2.0)}))
+    for fmus in OTHER_FMUS:  # to the byte, with the same GUID
+        fmus.__dict__["descriptions"] = FMUS.descriptions
+        yield key_of(BASE, fmus)
     for content in ("time\n0\n", "time\n1\n"):
         file = tmp_path / "reference.csv"
         file.write_text(content)
-        yield run_key(dataclasses.replace(BASE, reference=ReferenceChoice(file=file)), GUIDS)
+        yield key_of(dataclasses.replace(BASE, reference=ReferenceChoice(file=file)))
 
 
 def test_the_key_differs_with_everything_that_determines_a_run(tmp_path: Path) -> None:
@@ -378,9 +404,9 @@ def test_the_key_differs_with_everything_that_determines_a_run(tmp_path: Path) -
 
 
 def test_the_key_differs_with_the_versions_of_the_software(monkeypatch: pytest.MonkeyPatch) -> None:
-    before = run_key(BASE, GUIDS)
-    monkeypatch.setattr("orchestration.studies.study.versions", lambda: {"numpy": "0.1"})
-    assert run_key(BASE, GUIDS) != before
+    before = key_of(BASE)
+    monkeypatch.setattr("orchestration.studies.identity.versions", lambda: {"numpy": "0.1"})
+    assert key_of(BASE) != before
 
 
 def test_the_key_is_the_same_for_an_fmu_or_a_reference_that_lies_elsewhere(tmp_path: Path) -> None:
@@ -393,15 +419,83 @@ def test_the_key_is_the_same_for_an_fmu_or_a_reference_that_lies_elsewhere(tmp_p
         scenario = dataclasses.replace(
             BASE, plant=FmuChoice(fmu=str(plant)), reference=ReferenceChoice(file=folder / "reference.csv")
         )
-        found.append(run_key(scenario, locate_fmus(scenario).guids))
+        found.append(key_of(scenario, locate_fmus(scenario)))
     assert found[0] == found[1]
 
 
 def test_the_key_does_not_hang_on_whether_a_wrong_model_is_meant() -> None:
-    assert run_key(BASE.with_changes(model_mismatch=True), GUIDS) == run_key(BASE, GUIDS)
+    assert key_of(BASE.with_changes(model_mismatch=True)) == key_of(BASE)
 
 
 def test_the_key_does_not_hang_on_the_order_in_which_parameters_are_given() -> None:
     one = BASE.with_changes(parameters={"plant.mass": 1.0, "plant.gravity": 9.0})
     two = BASE.with_changes(parameters={"plant.gravity": 9.0, "plant.mass": 1.0})
-    assert run_key(one, GUIDS) == run_key(two, GUIDS)
+    assert key_of(one) == key_of(two)
+
+
+def test_a_parameter_given_as_its_fmu_has_it_is_the_same_run() -> None:
+    assert key_of(BASE.with_changes(parameters={"plant.mass": 1.0, "controller.coupling": 1})) == key_of(BASE)
+    heavy = BASE.with_changes(parameters={"plant.mass": 1.2})
+    assert key_of(heavy.with_changes(parameters={"plant.mass": 1.0})) == key_of(BASE) != key_of(heavy)
+
+
+@pytest.mark.parametrize(
+    "module", ["orchestration.master", "orchestration.clock", "orchestration.metrics", "fmu_kit.trajectory",
+               "orchestration.fmpy_adapter", "orchestration.studies.worker", "orchestration.wiring"],
+)  # fmt: skip
+def test_an_edited_source_on_the_path_of_the_flight_is_other_software(module: str, tmp_path: Path) -> None:
+    sources = flight_sources()
+    edited = tmp_path / "edited.py"
+    edited.write_bytes(sources[module].read_bytes() + b"\n")
+    assert sources_hash({**sources, module: edited}) != sources_hash(sources) == versions()["sources"]
+
+
+def test_sources_that_only_show_or_keep_results_are_not_on_the_path_of_the_flight() -> None:
+    aside = ("orchestration.plots", "orchestration.cli", "orchestration.studies.sweep", "orchestration.studies.store")
+    assert not {*aside} & {*flight_sources()}
+
+
+# -- damage -----------------------------------------------------------------------------------------------
+
+
+DAMAGE = [
+    "UPDATE runs SET position_rmse = 0.5000000000000001 WHERE key = 'key 1'",
+    "UPDATE runs SET status = 'failed' WHERE key = 'key 1'",
+    "UPDATE runs SET outcome = 'bounded' WHERE key = 'key 1'",
+    "UPDATE runs SET key = 'key 9' WHERE key = 'key 1'",
+    "UPDATE runs SET machine = 'elsewhere' WHERE key = 'key 1'",
+    "UPDATE design SET settings = '{}' WHERE design_index = 1",
+    "UPDATE design SET design_index = 7 WHERE design_index = 1",
+    "UPDATE about SET value = 'other'",
+    "ALTER TABLE runs RENAME COLUMN position_iae TO position_itea",
+    "DROP TABLE design",
+]
+
+
+@pytest.mark.parametrize("statement", DAMAGE)
+@pytest.mark.parametrize("open_it", [open_for_reading, open_for_writing])
+def test_a_value_that_was_not_written_by_the_store_is_noticed(path: Path, statement: str, open_it: Any) -> None:
+    written(path, row(0), row(1), row(2))
+    with contextlib.closing(sqlite3.connect(path)) as other, other:
+        other.execute(statement)
+    with pytest.raises(QuadcosimError, match=r"the store is damaged|no store of this version") as caught, open_it(path):
+        pass
+    one_line(caught.value)
+
+
+def test_no_damaged_byte_is_read_as_something_else(path: Path, tmp_path: Path) -> None:
+    whole = rows_of(written(path, *(row(i, metrics={"outcome": "settled", "position_rmse": i / 7}) for i in range(40))))
+    content, draw = path.read_bytes(), random.Random(0)
+    noticed = 0
+    for number in range(150):
+        damaged = bytearray(content)
+        for _ in range(draw.choice((1, 20))):
+            damaged[draw.randrange(len(damaged))] ^= draw.randrange(1, 256)
+        copy = tmp_path / f"{number}.sqlite"
+        copy.write_bytes(damaged)
+        try:
+            assert rows_of(copy) == whole, "expected the error, or what was written"
+        except QuadcosimError as error:
+            one_line(error)
+            noticed += 1
+    assert noticed > 50

@@ -61,12 +61,16 @@ def test_status_tells_how_far_a_sweep_in_another_process_is(folder: Path) -> Non
     assert done + missing == RUNS
 
 
-def test_failed_runs_are_told_and_do_not_fail_the_command(folder: Path) -> None:
-    (folder / "study.toml").write_text(GRID + '[[axes]]\nname = "plant.mass"\nvalues = [1.0, -1.0]\n')
-    done = quadcosim("sweep", "study.toml", cwd=folder)
+def test_failed_runs_are_told_at_once_and_fail_the_command(folder: Path) -> None:
+    (folder / "study.toml").write_text(GRID + '[[axes]]\nname = "plant.mass"\nvalues = [1.0, 0.0]\n')
+    done = quadcosim("sweep", "study.toml", cwd=folder, code=1)
     assert "12 runs, 12 flown now, 6 failed (quadcosim export shows why; --retry-failed)" in done.stdout
+    told = done.stderr.splitlines()
+    assert len(told) == 3
+    assert told[0].startswith("run 1 (period = 0.02, delay = 0.0, plant.mass = 0.0) failed: plant.mass = 0.0: ")
+    assert told[2].endswith("; further ones are not told")
     assert "12 of 12 runs, 6 failed, 0 missing" in quadcosim("status", "study.toml", cwd=folder).stdout
-    again = quadcosim("sweep", "study.toml", "--retry-failed", cwd=folder)
+    again = quadcosim("sweep", "study.toml", "--retry-failed", cwd=folder, code=1)
     assert "12 runs, 6 flown now, 6 failed" in again.stdout
 
 
@@ -86,6 +90,27 @@ def test_a_changed_study_is_wrong_usage(folder: Path) -> None:
     assert line.startswith(f"{STORE}: holds another study (stop_time was 0.1, is 0.2)")
 
 
+@pytest.mark.parametrize("command", ["status", "export", "draw"])
+def test_a_changed_study_file_is_told_and_its_old_rows_are_not_shown_for_its_own(folder: Path, command: str) -> None:
+    quadcosim("sweep", "study.toml", cwd=folder)
+    for text, said in (
+        (GRID.replace("stop_time = 0.1", "stop_time = 0.2"), "stop_time was 0.1, is 0.2"),
+        (GRID.replace("[0.02, 0.01]", "[0.02, 0.03]"), "axis period was "),
+    ):
+        (folder / "study.toml").write_text(text)
+        line = error_line(quadcosim(command, "study.toml", cwd=folder, code=2))
+        assert line.startswith(f"{STORE}: the study file has changed since ({said}")
+        assert len(line) < 400
+
+
+def test_a_study_cannot_be_named_out_of_the_folder_of_results(folder: Path) -> None:
+    for name in ("../evil", "/evil", "a/b", "..", "a\\\\b"):
+        (folder / "study.toml").write_text(f'name = "{name}"\n{GRID}')
+        line = error_line(quadcosim("sweep", "study.toml", cwd=folder, code=2))
+        assert "expected the name of a folder" in line, line
+    assert not (folder.parent / "evil").exists()
+
+
 @pytest.mark.parametrize("command", ["sweep", "status", "export", "draw"])
 def test_a_study_file_that_is_not_there_is_wrong_usage(tmp_path: Path, command: str) -> None:
     line = error_line(quadcosim(command, "nowhere.toml", cwd=tmp_path, code=2))
@@ -102,7 +127,7 @@ def test_a_study_that_was_never_flown_is_wrong_usage(folder: Path, command: str)
     ("arguments", "said"),
     [
         (("sweep", "study.toml", "--workers", "0"), "--workers 0: expected at least 1"),
-        (("draw", "study.toml", "--metric", "beauty"), "--metric beauty: expected one of position_rmse"),
+        (("draw", "study.toml", "--metric", "beauty"), "--metric beauty: expected one of outcome"),
     ],
 )
 def test_options_that_cannot_be_are_wrong_usage(folder: Path, arguments: tuple[str, ...], said: str) -> None:

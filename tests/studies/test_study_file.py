@@ -109,7 +109,10 @@ def test_each_run_has_the_seed_of_the_base_unless_seeds_vary(tmp_path: Path) -> 
     text = '[base]\nseed = 7\n[[axes]]\nname = "timing.period"\nvalues = [0.01, 0.02, 0.03]\n'
     assert [flown(tmp_path, text, i).seed for i in range(3)] == [7, 7, 7]
     varied = f"{text}[design]\nvary_seed = true\n"
-    assert [flown(tmp_path, varied, i).seed for i in range(3)] == [7, 8, 9]
+    seeds = [flown(tmp_path, varied, i).seed for i in range(3)]
+    assert len({7, *seeds}) == 4
+    assert [flown(tmp_path, varied.replace("[0.01, ", "[0.04, 0.01, "), i + 1).seed for i in range(3)] == seeds
+    assert flown(tmp_path, varied.replace("seed = 7", "seed = 8")).seed not in seeds
 
 
 def test_an_axis_of_seeds_wins_over_seeds_that_vary(tmp_path: Path) -> None:
@@ -143,7 +146,11 @@ def test_without_a_base_it_is_the_flight_of_the_paper(tmp_path: Path) -> None:
         ("nonsense = 1\n" + ONE, "nonsense", "name, scenario, base, axes, design, keep_signals"),
         (ONE + "steps = 3\n", "steps", "name, sets, multiplies, values, start, stop, number, scale"),
         (ONE + "[design]\nsteps = 3\n", "design.steps", "method, samples, seed, vary_seed"),
-        ("[base]\nduration = 3\n" + ONE, "duration", "stop_time, seed, controller, plant, timing, reference, record"),
+        (
+            "[base]\nduration = 3\n" + ONE,
+            "duration",
+            "stop_time, seed, model_mismatch, controller, plant, timing, reference, record",
+        ),
         ("[base.timing]\nrate = 3\n" + ONE, "timing.rate", ", ".join(TIMING_KEYS)),
     ],
 )
@@ -163,6 +170,10 @@ def test_a_target_that_does_not_exist_is_told_with_those_that_there_are(tmp_path
     ("text", "said"),
     [
         ("", "axes = : expected at least one axis"),
+        ('[[axes]]\nname = "steps"\nsets = ["timing.period"]\nvalues = [0.1]\n', "axis steps: the table of runs has"),
+        ('[[axes]]\nname = "seed"\nsets = ["timing.period"]\nvalues = [0.1]\n', "axis seed: the table of runs has"),
+        ('[[axes]]\nname = "x"\nsets = ["seed"]\nvalues = [1, true]\n', "axis x: expected values of one kind"),
+        ('name = "../evil"\n' + ONE, "name = '../evil': expected the name of a folder"),
         (ONE + ONE, "axes = seed, seed: expected at least one axis, each with a name of its own"),
         (ONE + "sets = ['seed']\nmultiplies = ['seed']\n", "axis seed: expected sets or multiplies, not both"),
         (ONE + "start = 1\nstop = 2\n", "axis seed: expected values, or start and stop"),

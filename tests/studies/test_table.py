@@ -11,8 +11,9 @@ import pytest
 import orchestration
 from orchestration import Scenario, UsageError
 from orchestration.studies.axes import Axis
+from orchestration.studies.identity import versions
 from orchestration.studies.store import METRICS, Row, open_for_reading, open_for_writing
-from orchestration.studies.study import Study, locate_fmus, versions
+from orchestration.studies.study import Study, locate_fmus
 from orchestration.studies.study_file import load_study
 from orchestration.studies.table import dataset, export, frame
 from tests.studies.common import GRID, axis, row, starts, study, swept
@@ -44,7 +45,17 @@ def stored(path: Path, rows: list[Row], grid: dict[str, list[Any]] | None) -> Pa
 def test_a_frame_has_settings_metrics_seeds_guids_and_versions(grid: tuple[Study, Path]) -> None:
     _, path = grid
     table = frame(path)
-    expected = {"design_index", "timing.period", "timing.delay", "key", "status", "message", "seed", "duration"}
+    expected = {
+        "design_index",
+        "timing.period",
+        "timing.delay",
+        "key",
+        "status",
+        "message",
+        "seed",
+        "duration",
+        "machine",
+    }
     guids, software = locate_fmus(Scenario()).guids, versions()
     origin = {f"guid.{side}" for side in guids} | {f"version.{name}" for name in software}
     assert set(table.columns) == expected | set(METRICS) | origin
@@ -57,7 +68,7 @@ def test_a_frame_is_sorted_by_design_index_with_the_settings_of_each_run(grid: t
     chosen, path = grid
     table = frame(path)
     assert table["design_index"].tolist() == list(range(6))
-    assert table[["timing.period", "timing.delay"]].to_dict("records") == chosen.points
+    assert table[["timing.period", "timing.delay"]].to_dict("records") == list(chosen.points)
 
 
 def test_a_frame_has_the_metrics_of_direct_runs(grid: tuple[Study, Path]) -> None:

@@ -1,0 +1,252 @@
+"""Worker processes as their coordinator sees them: who flies what, and what the death of one means."""
+
+import hashlib
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import tempfile
+import threading
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from orchestration import child, scratch
+from orchestration.errors import QuadcosimError
+from orchestration.scenario import ReferenceChoice
+from orchestration.studies.identity import versions
+from orchestration.studies.study import Fmus
+from orchestration.studies.worker import Broken, BrokenPlaceError, Outcome, Ready, Task, row_of
+
+ATTEMPTS = 3
+"""How often a run is flown, the later times first in a new process, before the death of its worker is its result."""
+_PATIENCE = 5.0
+"""[s], for a process that has closed its pipe"""
+_FROM_OUTSIDE = {-getattr(signal, name) for name in ("SIGKILL", "SIGTERM", "SIGHUP") if hasattr(signal, name)}
+"""Ends that no run brings upon its process, but a user, or a machine that is out of memory."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Package:
+    """What every run of a study needs, by content: this is what was hashed, wherever it is flown."""
+
+    plant: bytes
+    controller: bytes
+    reference: bytes | None
+    versions: dict[str, str]
+
+    @classmethod
+    def of(cls, fmus: Fmus, reference: bytes | None = None) -> "Package":
+        """The content of `fmus` and of a reference file."""
+        return cls(**fmus.contents, reference=reference, versions=versions())
+
+    @cached_property
+    def digest(self) -> str:
+        """A hash of the whole."""
+        return hashlib.sha256(pickle.dumps((self.plant, self.controller, self.reference, self.versions))).hexdigest()
+
+
+class Died(Exception):
+    """A worker process has ended without an answer."""
+
+    def __init__(self, code: int) -> None:
+        super().__init__(code)
+        self.code = code
+
+    def __str__(self) -> str:
+        if self.code < 0:
+            return f"ended by {signal.Signals(-self.code).name}"
+        return f"ended with exit code {self.code}"
+
+
+class InterruptedWorker(QuadcosimError):
+    """Somebody sent an interrupt to a worker process: it is meant for all."""
+
+
+class WorkerProcess:
+    """One worker process, its temporary files in a folder of its own."""
+
+    def __init__(self, root: Path) -> None:
+        self._stack = ExitStack()
+        folder = self._stack.enter_context(
+            tempfile.TemporaryDirectory(dir=root, prefix="worker-", ignore_cleanup_errors=True)
+        )
+        # A session of its own: an interrupt from the terminal is the coordinator's to handle.
+        self.process = subprocess.Popen(
+            child.command("orchestration.studies.serve", folder), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            env=child.environment(**dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder)), start_new_session=True,
+        )  # fmt: skip
+
+    def ask(self, task: Task) -> Any:
+        """The answer to a task; raises `Died`."""
+        assert self.process.stdin is not None
+        try:
+            pickle.dump(task, self.process.stdin)
+            self.process.stdin.flush()
+        except OSError:
+            raise Died(self._end()) from None
+        return self.listen()
+
+    def listen(self) -> Any:
+        """What it says next; raises `Died`."""
+        assert self.process.stdout is not None
+        try:
+            return pickle.load(self.process.stdout)
+        except (EOFError, OSError, ValueError, pickle.UnpicklingError):
+            raise Died(self._end()) from None
+
+    def _end(self) -> int:
+        """The exit code of a process that says no more, and should have ended."""
+        try:
+            return self.process.wait(timeout=_PATIENCE)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            return self.process.wait()
+
+    def close(self) -> None:
+        """End it and remove what it left."""
+        self.process.kill()
+        self.process.wait()
+        for pipe in (self.process.stdin, self.process.stdout):
+            with suppress(OSError):
+                if pipe is not None:
+                    pipe.close()
+        self._stack.close()
+
+
+class Pilot:
+    """Flies one run at a time in a worker process, which is made anew when it dies."""
+
+    def __init__(self, root: Path, package: Package) -> None:
+        self._root, self._package = root, package
+        self._lock = threading.Lock()
+        self._closed = False
+        self._worker: WorkerProcess | None = None
+        self._machine: str | None = None
+
+    def fly(self, task: Task) -> Outcome:
+        """The outcome of a run; a run that ends its process whenever it is flown alone has failed.
+
+        Raises `QuadcosimError` for what is not the run's own failure.
+        """
+        crashes = killed = 0
+        while True:
+            worker = self._ready()
+            try:
+                answer = worker.ask(task)
+            except Died as death:
+                self._drop()
+                if death.code == -signal.SIGINT:
+                    raise InterruptedWorker("a worker process was interrupted") from None
+                if death.code in _FROM_OUTSIDE:
+                    killed += 1
+                else:
+                    crashes += 1
+                if crashes == ATTEMPTS:
+                    message = f"its worker process {death}, {ATTEMPTS} times, the last ones with nothing else flown"
+                    return Outcome(row=row_of(task, None, message, 0.0, self._machine))
+                if killed == ATTEMPTS:
+                    raise QuadcosimError(
+                        f"the worker process of run {task.index} {death} {ATTEMPTS} times: not the run's doing, or too "
+                        "little memory; start the sweep again, with fewer workers"
+                    ) from None
+                continue
+            if isinstance(answer, Broken):
+                raise BrokenPlaceError(f"no run's own failure: {answer.message}")
+            assert isinstance(answer, Outcome)
+            return answer
+
+    def close(self) -> None:
+        """End the process; whoever waits for it is told."""
+        with self._lock:
+            self._closed = True
+        self._drop()
+
+    def _drop(self) -> None:
+        with self._lock:
+            worker, self._worker = self._worker, None
+        if worker is not None:
+            worker.close()
+
+    def _ready(self) -> WorkerProcess:
+        """The worker process, started if there is none; raises `QuadcosimError` if none can be started."""
+        for attempt in range(ATTEMPTS):
+            with self._lock:
+                if self._closed:
+                    raise QuadcosimError("the sweep has ended")
+                if self._worker is not None:
+                    return self._worker
+                self._worker = worker = WorkerProcess(self._root)
+            try:
+                ready = worker.listen()
+            except Died as death:
+                self._drop()
+                if death.code == -signal.SIGINT:
+                    raise InterruptedWorker("a worker process was interrupted") from None
+                if attempt == ATTEMPTS - 1:
+                    raise BrokenPlaceError(f"worker processes cannot start: the last one {death}") from None
+                continue
+            self._expect_same_software(ready)
+            self._machine = ready.machine
+        with self._lock:
+            if self._worker is not None:
+                return self._worker
+        raise QuadcosimError("the sweep has ended")
+
+    def _expect_same_software(self, ready: Ready) -> None:
+        other = [name for name, version in self._package.versions.items() if ready.versions.get(name) != version]
+        if other:
+            raise BrokenPlaceError(
+                f"{os.uname().nodename if hasattr(os, 'uname') else 'a worker'}: has another version of "
+                f"{', '.join(other)} than the coordinator; expected the same"
+            )
+
+
+class Crew:
+    """Pilots for one package: as many as fly at once."""
+
+    def __init__(self, package: Package) -> None:
+        self._scratch = scratch.temporary()
+        self._root = self._scratch.path
+        self._package = package
+        self._files = {name: self._unpack(name) for name in ("plant", "controller", "reference")}
+        self._idle: queue.SimpleQueue[Pilot] = queue.SimpleQueue()
+        self._pilots: list[Pilot] = []
+
+    def fly(self, task: Task) -> Outcome:
+        """The outcome of a run; called from any number of threads, each of which gets a process of its own."""
+        try:
+            pilot = self._idle.get_nowait()
+        except queue.Empty:
+            pilot = Pilot(self._root, self._package)
+            self._pilots.append(pilot)
+        try:
+            return pilot.fly(self._with_files(task))
+        finally:
+            self._idle.put(pilot)
+
+    def close(self) -> None:
+        """End all processes and remove what they left."""
+        for pilot in self._pilots:
+            pilot.close()
+        self._scratch.remove()
+
+    def _unpack(self, name: str) -> Path | None:
+        content = getattr(self._package, name)
+        if content is None:
+            return None
+        path = self._root / f"{name}.{'csv' if name == 'reference' else 'fmu'}"
+        path.write_bytes(content)
+        return path
+
+    def _with_files(self, task: Task) -> Task:
+        plant, controller, reference = self._files["plant"], self._files["controller"], self._files["reference"]
+        assert plant is not None
+        assert controller is not None
+        scenario = task.scenario.with_fmus(plant=plant, controller=controller)
+        if reference is not None:
+            scenario = replace(scenario, reference=ReferenceChoice(file=reference))
+        return replace(task, scenario=scenario)

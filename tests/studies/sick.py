@@ -1,0 +1,37 @@
+"""A plant that ends the process that flies it, or blames an interrupt, at chosen masses."""
+
+from pathlib import Path
+
+from orchestration.scenario import Scenario
+from orchestration.studies.study import locate_fmus
+from tests.fmus.archive import files_of
+from tests.fmus.damage import with_its_guid, write_fmu
+
+ABORTS, KILLED, SPENT = 1.11, 1.13, 1.14
+"""Masses at which the first step aborts, kills the process, or leaves it dying for the next run."""
+
+_BEFORE = "        body, wind, actuators = self._body, self._wind, self._actuators\n"
+_SICKNESS = f"""
+        import os
+        mass = self.real("mass")
+        if mass == {ABORTS}:
+            os.abort()
+        if mass == {KILLED}:
+            os.kill(os.getpid(), 9)
+        if mass != {SPENT} and "QUADCOSIM_SPENT" in os.environ:
+            os.abort()
+        if mass == {SPENT}:
+            os.environ["QUADCOSIM_SPENT"] = "the next run ends this process"
+"""
+
+
+def sick_plant(folder: Path) -> Path:
+    """The FMU, in `folder`."""
+    files = files_of(locate_fmus(Scenario()).plant)
+    (name,) = (name for name in files if name.endswith("plant_fmu/slave.py"))
+    text = files[name].decode()
+    assert _BEFORE in text
+    files[name] = text.replace(_BEFORE, _SICKNESS + _BEFORE).encode()
+    path = folder / "sick.fmu"
+    write_fmu(path, with_its_guid(files))
+    return path
