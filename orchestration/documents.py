@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from orchestration.errors import UsageError
+from orchestration.errors import UsageError, shown
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -21,6 +21,7 @@ else:
 
 LARGEST = 2**20
 """Characters of a TOML or JSON file."""
+LONGEST_NAME = 200
 DEEPEST = 20
 """Tables and lists in each other."""
 
@@ -95,7 +96,7 @@ def _expect_plain(value: Any, place: str) -> None:
     while waiting:
         place, depth, value = waiting.pop()
         if isinstance(value, str) and "\0" in value:
-            raise UsageError(f"{place} = {value!r}: expected text without NUL characters")
+            raise UsageError(f"{place} = {shown(repr(value))}: expected text without NUL characters")
         if isinstance(value, int) and not -(2**63) <= value < 2**63:
             raise UsageError(f"{place}: expected a whole number of at most 64 bits")
         if isinstance(value, Mapping):
@@ -107,6 +108,7 @@ def _expect_plain(value: Any, place: str) -> None:
         if depth == DEEPEST:
             raise UsageError(f"{place}: expected at most {DEEPEST} tables and lists in each other")
         for key, item in items:
-            if "\0" in key:
-                raise UsageError(f"{place}: {key!r}: expected a name without NUL characters")
+            if "\0" in key or len(key) > LONGEST_NAME:
+                expected = f"a name without NUL characters, of at most {LONGEST_NAME} characters"
+                raise UsageError(f"{place}: {shown(repr(key))}: expected {expected}")
             waiting.append((f"{place}: {key}" if depth == 0 else f"{place}.{key}", depth + 1, item))

@@ -68,9 +68,7 @@ def resume(
     if not (folder / STATE).is_file():
         raise UsageError(f"{folder}: expected the directory of a paused run; it has no {STATE}")
     scenario = load_scenario(folder / SCENARIO)
-    with np.load(folder / STATE, allow_pickle=False) as archive:
-        state: dict[str, Any] = json.loads(str(archive["json"]))
-        state |= {name: archive[name].tobytes() for name in _ARRAYS}
+    state = read_state(folder / STATE)
 
     def fly(recorder: Recorder) -> Result:
         with prepared(scenario, announce, recorder=recorder) as flight:
@@ -89,12 +87,36 @@ def resume(
     return result
 
 
+def read_state(path: Path) -> dict[str, Any]:
+    """The state in the file of a paused run; raises `UsageError` for any other than the one that was written."""
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+            text, parts = str(archive["json"]), {name: archive[name].tobytes() for name in _ARRAYS}
+            whole = str(archive["digest"]) == _digest(text, parts)
+    except Exception as error:  # what a damaged file raises is not documented
+        raise UsageError(f"{path}: expected the state of a paused run, as it was written: {error}") from error
+    if not whole:
+        raise UsageError(f"{path}: expected the state of a paused run, as it was written")
+    state: dict[str, Any] = json.loads(text)
+    return state | parts
+
+
 def _write(flight: Flight, folder: Path) -> None:
     state = flight.master.state()
-    arrays = {name: np.frombuffer(state.pop(name), dtype=np.uint8) for name in _ARRAYS}
-    state["of"] = _hashes(flight)
+    parts: dict[str, bytes] = {name: state.pop(name) for name in _ARRAYS}
+    text = json.dumps({**state, "of": _hashes(flight)})
+    arrays = {name: np.frombuffer(part, dtype=np.uint8) for name, part in parts.items()}
     (folder / SCENARIO).write_text(flight.scenario.to_toml(), encoding="utf-8")
-    np.savez(folder / STATE, allow_pickle=False, json=np.array(json.dumps(state)), **arrays)
+    strings = {"json": np.array(text), "digest": np.array(_digest(text, parts))}
+    np.savez(folder / STATE, allow_pickle=False, **strings, **arrays)
+
+
+def _digest(text: str, parts: dict[str, bytes]) -> str:
+    """Of all that a state is made of, so that only what was written is restored."""
+    content = hashlib.sha256(text.encode())
+    for name in _ARRAYS:
+        content.update(hashlib.sha256(parts[name]).digest())
+    return content.hexdigest()
 
 
 def _hashes(flight: Flight) -> dict[str, str]:

@@ -5,9 +5,11 @@ from collections.abc import Callable, Container
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from orchestration import plots, tables
-from orchestration.errors import UsageError
+from orchestration.documents import read_json
+from orchestration.errors import UsageError, shown
 from orchestration.flight import FlightInterrupted
 from orchestration.folder import NewFolder, new_folder
 from orchestration.result import Result
@@ -47,21 +49,40 @@ def _write(result: Result, folder: Path, *, figures: bool) -> None:
 
 
 def load_run(folder: str | Path) -> Result:
-    """Read the directory of a run; raises `UsageError` if it is none."""
+    """Read the directory of a run; raises `UsageError` if it is none, or damaged."""
     folder = Path(folder)
     missing = [name for name in (SIGNALS, EVENTS, METRICS, SCENARIO, PROVENANCE) if not (folder / name).is_file()]
     if missing:
         raise UsageError(f"{folder}: expected the directory of a run; it has no {', '.join(missing)}")
-    notes = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
+    notes = _object(folder / PROVENANCE, divergence=_TEXT, interrupted_at=_NUMBER, warnings=(list,))
+    recording = tables.InFolder(folder)
+    if not len(recording):
+        raise UsageError(f"{folder}: expected the directory of a run; it has no rows")
+    for _ in recording.chunks():  # what is damaged is to be known now
+        pass
     return Result(
         scenario=load_scenario(folder / SCENARIO),
-        recording=tables.InFolder(folder),
-        metrics=json.loads((folder / METRICS).read_text(encoding="utf-8")),
+        recording=recording,
+        metrics=_object(folder / METRICS, diverged=(bool,), divergence_time=_NUMBER),
         divergence=notes.pop("divergence"),
         interrupted_at=notes.pop("interrupted_at"),
         warnings=tuple(notes.pop("warnings")),
         provenance=notes,
     )
+
+
+_TEXT, _NUMBER = (str, type(None)), (int, float, type(None))
+
+
+def _object(path: Path, **types: tuple[type, ...]) -> dict[str, Any]:
+    """The object in a JSON file, whose values by these names have one of these types; raises `UsageError`."""
+    content = read_json(path, "JSON file")
+    if not isinstance(content, dict):
+        raise UsageError(f"{path}: expected an object")
+    for name, kinds in types.items():
+        if name not in content or not isinstance(content[name], kinds):
+            raise UsageError(f"{path}: {name}: expected what was written, got {shown(content.get(name))}")
+    return content
 
 
 def keep_flight(

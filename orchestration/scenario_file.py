@@ -124,5 +124,8 @@ def first_problem(error: pydantic.ValidationError, file: type) -> str:
         names = [f.name for f in dataclasses.fields(table)] + list(SHORTHANDS if table is Timing else ())
         keys = ", ".join(names)
         return f"{place}: no such key; expected one of {keys}"
-    message, value = problem["msg"], problem["input"]
+    if problem["type"] in ("missing", "missing_argument", "missing_keyword_only_argument"):
+        return f"{place}: expected a value"
+    value = problem["input"]
+    message = problem["msg"].replace("Input should be", "expected")
     return f"{place} = {shown(value if isinstance(value, float) else repr(value))}: {message[:1].lower()}{message[1:]}"

@@ -1,6 +1,6 @@
 """Signals and events as Parquet files, a row group for each chunk."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -8,12 +8,15 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from orchestration.errors import UsageError
 from orchestration.recording import Chunk, Event, Recording
 from orchestration.simulator import Floats
-from orchestration.wiring import POSITION_REFERENCE
+from orchestration.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE
 
 SIGNALS, EVENTS = "signals.parquet", "events.parquet"
 _EVENT = pa.schema([("time", pa.float64()), ("event", pa.string()), ("what", pa.string()), ("sample", pa.int64())])
+_DESIRED = frozenset(POSITION_REFERENCE)
+_NEEDED = ("time", *(f"plant.{name}" for name in (*COMMAND, *MEASUREMENT)), *POSITION_REFERENCE)
 
 
 class ToFolder:
@@ -26,8 +29,8 @@ class ToFolder:
     def begin(self, columns: tuple[str, ...]) -> None:
         """As `Recorder`."""
         self._writers = (
-            pq.ParquetWriter(self.folder / SIGNALS, _signals_schema(columns)),
-            pq.ParquetWriter(self.folder / EVENTS, _EVENT),
+            pq.ParquetWriter(self.folder / SIGNALS, _signals_schema(columns), write_page_checksum=True),
+            pq.ParquetWriter(self.folder / EVENTS, _EVENT, write_page_checksum=True),
         )
 
     def take(self, chunk: Chunk) -> None:
@@ -46,13 +49,24 @@ class ToFolder:
 
 
 class InFolder:
-    """A recording in the files of a folder, of which a chunk at a time is read."""
+    """A recording in the files of a folder, of which a chunk at a time is read.
+
+    Raises `UsageError` for files that are not as they were written: what is in a chunk is seen when that is read.
+    """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        with pq.ParquetFile(folder / SIGNALS) as signals:
+        with _opened(folder / SIGNALS) as signals, _opened(folder / EVENTS) as events:
+            names = signals.schema_arrow.names
+            missing = [name for name in _NEEDED if name not in names]
+            if missing:
+                raise UsageError(f"{folder / SIGNALS}: no column {', '.join(missing)}; expected those of a run")
+            _expect_schema(folder / SIGNALS, signals, _signals_schema(name for name in names if name not in _DESIRED))
+            _expect_schema(folder / EVENTS, events, _EVENT)
             self._count: int = signals.metadata.num_rows
-            self.columns = tuple(name for name in signals.schema_arrow.names if name not in POSITION_REFERENCE)
+            if signals.num_row_groups != events.num_row_groups:
+                raise UsageError(f"{folder}: expected as many groups of events as of rows")
+            self.columns = tuple(name for name in names if name not in _DESIRED)
 
     def __len__(self) -> int:
         return self._count
@@ -60,15 +74,43 @@ class InFolder:
     def chunks(self, columns: Collection[str] | None = None) -> Iterator[Chunk]:
         """As `Recording`."""
         names = tuple(name for name in self.columns if columns is None or name in columns)
-        with pq.ParquetFile(self._folder / SIGNALS) as signals, pq.ParquetFile(self._folder / EVENTS) as events:
+        with _opened(self._folder / SIGNALS) as signals, _opened(self._folder / EVENTS) as events:
             for group in range(signals.num_row_groups):
-                table = signals.read_row_group(group, [*names, *POSITION_REFERENCE])
+                table = _group(self._folder / SIGNALS, signals, group, [*names, *POSITION_REFERENCE])
                 yield Chunk(
                     columns=names,
                     rows=_matrix(table, names),
                     desired=_matrix(table, POSITION_REFERENCE),
-                    events=_events(events.read_row_group(group)),
+                    events=_events(_group(self._folder / EVENTS, events, group, _EVENT.names)),
                 )
+
+
+def _opened(path: Path) -> Any:
+    """A Parquet file whose pages are held to their checksums."""
+    try:
+        return pq.ParquetFile(path, page_checksum_verification=True)
+    except Exception as error:  # of many kinds, none of them documented
+        raise UsageError(f"{path}: expected a Parquet file, as it was written: {error}") from error
+
+
+def _group(path: Path, file: Any, group: int, names: Collection[str]) -> Any:
+    """The columns `names` of one row group, without gaps."""
+    try:
+        table = file.read_row_group(group, names)
+        table.validate(full=True)
+    except Exception as error:
+        raise UsageError(f"{path}: expected a Parquet file, as it was written: {error}") from error
+    if any(column.null_count for column in table.columns):
+        raise UsageError(f"{path}: expected columns without gaps")
+    if "time" in names and not np.isfinite(table["time"].to_numpy()).all():
+        raise UsageError(f"{path}: expected finite times")
+    return table
+
+
+def _expect_schema(path: Path, file: Any, schema: Any) -> None:
+    if not file.schema_arrow.equals(schema):
+        expected = ", ".join(f"{field.name} ({field.type})" for field in schema)
+        raise UsageError(f"{path}: expected the columns {expected}, in this order")
 
 
 def copy(recording: Recording, folder: Path) -> None:
@@ -82,12 +124,12 @@ def copy(recording: Recording, folder: Path) -> None:
 
 def write_signals(path: Path | BinaryIO, recording: Recording) -> None:
     """One column each for the recorded values and for P_d, all float64."""
-    with pq.ParquetWriter(path, _signals_schema(recording.columns)) as writer:
+    with pq.ParquetWriter(path, _signals_schema(recording.columns), write_page_checksum=True) as writer:
         for chunk in recording.chunks():
             writer.write_table(_signals_table(chunk))
 
 
-def _signals_schema(columns: tuple[str, ...]) -> Any:
+def _signals_schema(columns: Iterable[str]) -> Any:
     return pa.schema([(name, pa.float64()) for name in (*columns, *POSITION_REFERENCE)])
 
 

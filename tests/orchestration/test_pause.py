@@ -1,5 +1,6 @@
 """A run that is stopped and goes on later has the bits of one that never stopped."""
 
+import json
 import shutil
 import subprocess
 import sys
@@ -134,3 +135,21 @@ def test_a_pause_outside_the_run_is_refused(at: float, tmp_path: Path) -> None:
 def test_a_folder_without_a_pause_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="directory of a paused run"):
         resume(tmp_path)
+
+
+@pytest.mark.parametrize("part", ["now", "clock", "of", "row"])
+def test_a_state_that_has_been_edited_is_refused_in_one_line(part: str, tmp_path: Path) -> None:
+    fly_until(Scenario(stop_time=0.1), 0.05, tmp_path / "paused")
+    path = tmp_path / "paused" / "paused.npz"
+    with np.load(path) as archive:
+        arrays = dict(archive)
+    state = json.loads(str(arrays["json"]))
+    if part in state:
+        arrays["json"] = np.array(json.dumps({**state, part: [7]}))
+    else:
+        arrays[part][0] ^= 1
+    for edited in (arrays, {name: array for name, array in arrays.items() if name != part and name != "json"}):
+        np.savez(path, **edited)
+        with pytest.raises(UsageError, match="expected the state of a paused run, as it was written") as refused:
+            resume(tmp_path / "paused")
+        assert str(refused.value).isprintable()

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import matplotlib.image
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -381,3 +382,59 @@ def test_what_was_recorded_before_an_interruption_is_kept_but_replaces_nothing(
     assert kept.rows.tobytes() == whole.rows[: len(kept.rows)].tobytes()
     if there:
         assert load_run(folder).interrupted_at is None
+
+
+# -- what is damaged ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("columns", "expected"),
+    [
+        ({"time": None}, "no column time"),
+        ({"plant.position.x": None}, "no column plant.position.x"),
+        ({"reference.position.z": None}, "no column reference.position.z"),
+        ({"time": pa.array([float("nan")])}, "signals.parquet: expected finite times"),
+        ({"plant.tilt": pa.array(["a"])}, "plant.tilt (double)"),
+        ({"plant.tilt": pa.array([None], pa.float64())}, "signals.parquet: expected columns without gaps"),
+    ],
+)
+def test_signals_of_another_shape_are_refused(
+    result: Result, folder: Path, columns: dict[str, pa.Array | None], expected: str
+) -> None:
+    path = save_run(result, folder, figures=False) / "signals.parquet"
+    table = pq.read_table(path).slice(0, 1)
+    for name, values in columns.items():
+        at = table.column_names.index(name)
+        table = table.remove_column(at) if values is None else table.set_column(at, name, values)
+    pq.write_table(table, path)
+    with pytest.raises(UsageError) as refused:
+        load_run(folder)
+    assert expected in str(refused.value)
+
+
+@pytest.mark.parametrize("name", ["signals.parquet", "events.parquet"])
+def test_no_flipped_bit_of_a_page_is_read_as_a_value(result: Result, folder: Path, name: str) -> None:
+    path = save_run(result, folder, figures=False) / name
+    content = bytearray(path.read_bytes())
+    last = pq.ParquetFile(path).metadata.row_group(0).column(0)
+    content[last.data_page_offset + last.total_compressed_size // 2] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(UsageError, match="expected a Parquet file, as it was written"):
+        load_run(folder)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "expected"),
+    [
+        ("metrics.json", "[]", "expected an object"),
+        ("metrics.json", "{}", "diverged: expected what was written"),
+        ("provenance.json", '{"divergence": 3, "warnings": []}', "divergence: expected what was written, got 3"),
+        ("provenance.json", "{" * 5000, "expected JSON, as it was written"),
+        ("metrics.json", '{"diverged": NaN}', "NaN is no JSON"),
+    ],
+)
+def test_notes_of_another_shape_are_refused(result: Result, folder: Path, name: str, text: str, expected: str) -> None:
+    (save_run(result, folder, figures=False) / name).write_text(text)
+    with pytest.raises(UsageError) as refused:
+        load_run(folder)
+    assert expected in str(refused.value)

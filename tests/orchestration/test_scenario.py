@@ -258,7 +258,7 @@ def test_a_byte_order_mark_is_no_part_of_the_first_key(file: Path) -> None:
         ('[reference]\nfile = "a\\u0000"', "reference.file = 'a\\x00': expected text without NUL characters"),
         ('[plant]\n"a\\u0000" = 1', "plant: 'a\\x00': expected a name without NUL characters"),
         (f"# {'x' * 2**20}", "it has more than 1048576 characters"),
-        (f'stop_time = "{"x" * 2**19}"', "…: input should be a valid number"),
+        (f'stop_time = "{"x" * 2**19}"', "…: expected a valid number"),
     ],
     ids=range(11),
 )
