@@ -1,6 +1,7 @@
 """Which figures a study gets: decides by its axes, reads the store, writes PNG beside it."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,19 +18,23 @@ from orchestration.studies.study import Study
 from orchestration.studies.sweep import store_path
 from orchestration.studies.table import frame
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 
 def draw_study(study: Study, folder: Path | None, metric: str) -> list[Path]:
     """Draw what is in the store of `study`; the paths of the figures and tables.
 
     Raises `UsageError` for a metric that does not exist, or axes that no figure here is for.
     """
-    numbers = [name for name in METRICS if name not in TEXTS]
-    if metric not in numbers:
-        raise UsageError(f"--metric {metric}: expected one of {', '.join(numbers)}; every figure shows the outcome")
+    screened = study.method in sensitivity.METHODS and any(axis.values is None for axis in study.axes)
+    known = [name for name in METRICS if name not in TEXTS or screened]
+    if metric not in known:
+        raise UsageError(f"--metric {metric}: expected one of {', '.join(known)}; every figure shows the outcome")
     path = store_path(study.name, folder)
     table = frame(path)
-    if study.method in sensitivity.METHODS and any(axis.values is None for axis in study.axes):
-        indices = indices_of(study, table[metric].to_numpy(float), metric)
+    if screened:
+        indices = indices_of(study, numbers(table, metric), metric)
         listed = sensitivity.write(indices, path.parent / f"sensitivity_{metric}.csv")
         return [listed, figures.save(lambda: figures.sensitivity_bars(indices, metric), listed.with_suffix(".png"))]
     axes = tuple(axis for axis in study.axes if _is_numeric(axis))
@@ -78,6 +83,12 @@ def indices_of(study: Study, values: Floats, metric: str) -> list[sensitivity.In
     if len(values) != len(design):
         raise UsageError(f"{study.name}: {len(values)} of {len(design)} runs are there, expected all")
     return sensitivity.analyse(study.method, [axis.name for axis in sampled], design, values, metric)
+
+
+def numbers(table: "pd.DataFrame", metric: str) -> Floats:
+    """A metric run by run, shape (n,); of the outcome, 1 for a run that flies, 0 for one that does not."""
+    values = figures.flew(table).astype(float).where(table["outcome"].notna()) if metric == "outcome" else table[metric]
+    return np.asarray(values.to_numpy(float, na_value=np.nan))
 
 
 def _is_numeric(axis: Axis) -> bool:

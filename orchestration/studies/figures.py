@@ -14,6 +14,7 @@ from matplotlib.patches import Patch
 from orchestration.metrics import OUTCOMES, SETTLED
 from orchestration.plots import BLUE, GREY, ORANGE, RED, STYLE
 from orchestration.simulator import Floats
+from orchestration.statistics import wilson
 from orchestration.studies.axes import Axis
 
 if TYPE_CHECKING:
@@ -71,7 +72,12 @@ def scatter(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str) -> Figur
         panel.set_visible(False)
     figure.supylabel(metric)
     counts = [f"{int((table['outcome'] == kind).sum())} {kind} ({mark})" for kind, mark in _MARKS.items()]
-    figure.suptitle(f"{len(table)} runs: {', '.join(counts)}{_by_horizon(table)}", fontsize=10)
+    low, high = wilson(int((~fell).sum()), len(table))
+    figure.suptitle(
+        f"{len(table)} runs: {', '.join(counts)}{_by_horizon(table)}\n"
+        f"share that is settled {(~fell).mean():.0%}, 95 % interval {low:.0%} to {high:.0%}",
+        fontsize=10,
+    )
     return figure
 
 
@@ -136,7 +142,11 @@ def sensitivity_bars(indices: "list[Index]", metric: str) -> Figure:
             label=kind,
             capsize=2,
         )
-    panel.set(yticks=np.arange(len(axes)) + height * (len(kinds) - 1) / 2, yticklabels=axes, xlabel=f"of {metric}")
+    panel.set(
+        yticks=np.arange(len(axes)) + height * (len(kinds) - 1) / 2,
+        yticklabels=axes,
+        xlabel=f"of {_OF.get(metric, metric)}",
+    )
     panel.invert_yaxis()
     panel.legend()
     return figure
@@ -176,4 +186,5 @@ def _label(axis: Axis) -> str:
     return f"{axis.name} [s]" if seconds and not axis.multiplies else axis.name
 
 
+_OF = {"outcome": "whether a run flies"}
 _SECONDS = {f"timing.{key}" for key in ("period", "offset", "plant_interval", "delay", "delay_jitter", "jitter")}

@@ -54,7 +54,10 @@ def analyse(method: SensitivityMethod, axes: list[str], design: Floats, values: 
     """
     missing = int(np.count_nonzero(~np.isfinite(values)))
     if missing:
-        raise UsageError(f"{metric}: {missing} of {len(values)} runs have no value, expected one for each")
+        raise UsageError(
+            f"{metric}: {missing} of {len(values)} runs have no value, expected one for each; "
+            "a run that diverged has none but its outcome"
+        )
     problem = _problem(axes)
     if method == "morris":
         from SALib.analyze.morris import analyze as morris

@@ -231,6 +231,7 @@ def test_dots_of_many_axes_are_apart_by_what_flies() -> None:
         dots, crosses, _ = panel.get_lines()
         assert (len(dots.get_xdata()), len(crosses.get_xdata())) == (4, 1)
     assert not figure.axes[3].get_visible()
+    assert "share that is settled 80%, 95 % interval 38% to 96%" in figure.get_suptitle()
 
 
 def test_sensitivity_is_drawn_as_bars_with_their_confidence(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from orchestration import UsageError
 from orchestration.simulator import Floats
 from orchestration.studies import sensitivity
 from orchestration.studies.axes import Axis
-from orchestration.studies.drawing import draw_study, indices_of
+from orchestration.studies.drawing import draw_study, indices_of, numbers
 from orchestration.studies.sensitivity import Index, SensitivityMethod, analyse, shares
 from orchestration.studies.study import Study
 from tests.studies.common import axis, short, study, swept
@@ -139,3 +139,15 @@ def test_a_metric_that_some_runs_do_not_have_is_refused(flown: tuple[Study, Path
     chosen, folder = flown
     with pytest.raises(UsageError, match="divergence_time: 12 of 12 runs have no value"):
         draw_study(chosen, folder, "divergence_time")
+
+
+def test_the_outcome_has_indices_of_whether_a_run_flies(flown: tuple[Study, Path]) -> None:
+    chosen, folder = flown
+    table, figure = draw_study(chosen, folder, "outcome")
+    assert (table.name, figure.name) == ("sensitivity_outcome.csv", "sensitivity_outcome.png")
+    assert (pd.read_csv(table)["value"] == 0.0).all()  # in this short a flight none has settled
+
+
+def test_the_outcome_is_one_for_a_run_that_flies_and_missing_for_one_that_failed() -> None:
+    runs = pd.DataFrame({"outcome": ["settled", "bounded", "diverged", None]})
+    assert numbers(runs, "outcome").tolist() == pytest.approx([1.0, 0.0, 0.0, math.nan], nan_ok=True)
