@@ -13,16 +13,16 @@ ROWS = 2**15
 
 
 class Event(NamedTuple):
-    """Something that happened to one sample, its measurement or its command."""
+    """Something that happened to one message."""
 
     time: int
     """[ns]"""
     kind: str
     """sampled, sent, arrived or lost"""
     what: str
-    """measurement or command"""
+    """name of the connection"""
     sample: int
-    """index of the sample"""
+    """index of the message"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,8 +32,6 @@ class Chunk:
     columns: tuple[str, ...]
     rows: Floats
     """shape (n, number of columns), at most `ROWS` of them"""
-    desired: Floats
-    """P_d at the rows [m], inertial, shape (n, 3)"""
     events: tuple[Event, ...]
     """in order of time; the last chunk has those after its last row too"""
 
@@ -48,7 +46,7 @@ class Recording(Protocol):
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """`time`, then `plant.NAME` and `controller.NAME`."""
+        """`time`, then COMPONENT.NAME, then the signals of the sources."""
 
     def __len__(self) -> int:
         """Number of rows."""
@@ -113,7 +111,6 @@ def thinned(recording: Recording, columns: Collection[str], window: tuple[float,
             Chunk(
                 columns=chunk.columns,
                 rows=chunk.rows[keep],
-                desired=chunk.desired[keep],
                 events=tuple(event for event in chunk.events if stride == 1 or event.time in times),
             )
         )

@@ -7,17 +7,21 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from orchestration.metrics import Metrics
 from orchestration.recording import Event, Recording
+from orchestration.results.objectives import Metrics
 from orchestration.scenario import Scenario
 from orchestration.simulator import Floats
+from orchestration.system.model import System
 
 
 @dataclass(frozen=True, kw_only=True)
 class Result:
     """One run: what was asked, what was recorded, what it comes to."""
 
-    scenario: Scenario
+    asked: Scenario | System
+    """as the user wrote it"""
+    system: System
+    """what it means"""
     recording: Recording
     """rows and events in chunks; what follows has them whole"""
     metrics: Metrics
@@ -32,18 +36,13 @@ class Result:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """`time`, then `plant.NAME` and `controller.NAME`."""
+        """`time`, then COMPONENT.NAME, then the signals of the sources."""
         return self.recording.columns
 
     @cached_property
     def rows(self) -> Floats:
         """Shape (n, number of columns); a row is the value just after its instant."""
         return np.concatenate([chunk.rows for chunk in self.recording.chunks()])
-
-    @cached_property
-    def desired(self) -> Floats:
-        """P_d at the rows [m], inertial, shape (n, 3)."""
-        return np.concatenate([chunk.desired for chunk in self.recording.chunks(("time",))])
 
     @cached_property
     def events(self) -> tuple[Event, ...]:

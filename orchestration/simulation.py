@@ -19,12 +19,17 @@ from orchestration.errors import UsageError
 from orchestration.fleet import Loader
 from orchestration.fmi.model import NUMERIC, Model, read_model
 from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.interrupt import Interrupt, Interrupted, interrupts_held_back
+from orchestration.quadrotor.translation import in_its_own_words, system_of, warnings
+from orchestration.recording import InMemory, Recorder
+from orchestration.result import Result
 from orchestration.results import objectives
+from orchestration.scenario import Scenario
 from orchestration.simulator import Floats
 from orchestration.stepping import initial
 from orchestration.stepping.agenda import Agenda, FixedStep
 from orchestration.stepping.feeds import Feed
-from orchestration.stepping.master import Event, Master
+from orchestration.stepping.master import Master
 from orchestration.stepping.sources import BuiltIn, Constant, Table, Values, WhiteNoise
 from orchestration.stepping.streams import VALUE, Streams
 from orchestration.stepping.table_file import read_table
@@ -33,6 +38,8 @@ from orchestration.system.check import check, recorded
 from orchestration.system.model import Component, System, component_of, variable_of
 from orchestration.system.times import NANOSECONDS, Grid, exact_nanoseconds
 
+Progress = Callable[[float], None]
+"""Hears the share of the run that is done."""
 Announce = Callable[[str], None]
 """Hears what is done before the run begins."""
 
@@ -42,61 +49,137 @@ TRAJECTORY = ("amplitude_x", "amplitude_y", "frequency", "start_z", "rate_z")
 """Parameters trajectory.* of a component, and the fields of `Trajectory` that they are"""
 
 
+class RunInterrupted(Interrupted):
+    """A run has ended at the first instant after Ctrl-C, with this `result` so far."""
+
+    def __init__(self, text: str, result: Result) -> None:
+        super().__init__(text)
+        self.result = result
+
+
 @dataclass(frozen=True, kw_only=True)
 class Simulation:
     """A master over instances that have their parameters, ready to initialise or to restore."""
 
+    asked: Scenario | System
+    """as the user wrote it"""
     system: System
+    """what it means"""
     instances: Mapping[str, FmuSimulator]
-    sources: Mapping[str, Values]
     parameters: Mapping[str, float]
     """all numeric parameters of all components, as COMPONENT.NAME"""
     master: Master
+    recorder: Recorder
+    interrupt: Interrupt
     started: float
     """on the performance counter [s]"""
 
-    def source_signals(self, time: Floats) -> dict[str, Floats]:
-        """The signals of the sources at `time` [s], shape (n,)."""
-        found: dict[str, Floats] = {}
-        for name, values in self.sources.items():
-            over = values.over(time)
-            found |= {signal: over[:, i] for i, signal in enumerate(signals_of(name, self.system))}
-        return found
+    def result(self) -> Result:
+        """What was recorded so far, with its metrics; raises `RunInterrupted` with it if that is why it ended."""
+        master, recording = self.master, self.recorder.finish()
+        end = float(master.board.row[0])
+        result = Result(
+            asked=self.asked,
+            system=self.system,
+            recording=recording,
+            metrics=objectives.compute(
+                self.system,
+                lambda: objectives.spans(self.system, recording, self.parameters),
+                end=end,
+                divergence_time=_seconds(master.divergence_time),
+                steps=master.steps,
+            ),
+            divergence=master.divergence,
+            interrupted_at=_seconds(master.interrupted_at),
+            provenance={**provenance(self.instances), "wall_time": time.perf_counter() - self.started},
+            warnings=(
+                *(warnings(self.asked, self.parameters) if isinstance(self.asked, Scenario) else ()),
+                *(warning for instance in self.instances.values() for warning in instance.warnings),
+            ),
+        )
+        if self.interrupt.requested:
+            raise RunInterrupted(f"at t = {end:g} s of {self.system.stop_time:g} s", result)
+        return result
+
+
+def run(
+    asked: Scenario | System | None = None,
+    *,
+    recorder: Recorder | None = None,
+    progress: Progress | None = None,
+    announce: Announce | None = None,
+) -> Result:
+    """Run a system, or fly a scenario of the quadrotor, the paper's if none is given; divergence is a result.
+
+    Its rows are kept in memory unless a `recorder` takes them.
+
+    Raises `UsageError` for an FMU, variable or value that does not exist, `SimulatorError` if an FMU
+    refuses a call for another reason than divergence, `RunInterrupted` after Ctrl-C.
+    """
+    with prepared(asked or Scenario(), announce, recorder=recorder) as simulation:
+        simulation.master.initialise()
+        simulation.master.run(progress=progress)
+        return simulation.result()
 
 
 @contextmanager
-def prepared(system: System, announce: Announce | None = None, *, load: Loader = FmuSimulator) -> Iterator[Simulation]:
-    """The FMUs of `system`, built if need be, instantiated by `load` and with their parameters.
+def prepared(
+    asked: Scenario | System,
+    announce: Announce | None = None,
+    *,
+    load: Loader = FmuSimulator,
+    recorder: Recorder | None = None,
+) -> Iterator[Simulation]:
+    """The FMUs of a system, built if need be, instantiated by `load` and with their parameters.
 
-    Raises `UsageError` for what the FMUs do not have or cannot take, before any is loaded.
+    Ctrl-C ends the run at its next instant. Raises `UsageError` for what the FMUs do not have or cannot take,
+    before any is loaded.
     """
     started = time.perf_counter()
-    paths = {name: fmus.locate(component.fmu, announce) for name, component in system.components.items()}
-    models = {name: read_model(path) for name, path in paths.items()}
-    check(system, models)
-    streams = Streams(system.seed, system.streams)
-    with ExitStack() as stack:
-        instances = {name: stack.enter_context(load(path, name)) for name, path in paths.items()}
-        for name, component in system.components.items():
-            _set_parameters(instances[name], component)
-            _set_clock(instances[name], component, paths[name])
+    recorder = InMemory() if recorder is None else recorder
+    with in_its_own_words(asked):
+        system = system_of(asked) if isinstance(asked, Scenario) else asked
+        paths = {name: fmus.locate(component.fmu, announce) for name, component in system.components.items()}
+        models = {name: read_model(path) for name, path in paths.items()}
+        check(system, models)
         parameters = _parameters(system, models)
-        sources = {name: _source(system, name, parameters, streams) for name in system.sources}
         objectives.check(system, _signals(system, models), set(parameters))
-        signals = {name: signals_of(name, system) for name in sources}
-        master = Master(
-            system,
-            instances,
-            agenda=Agenda(system, streams, _fixed_steps(system, models)),
-            streams=streams,
-            recorded=recorded(system, models),
-            feeds=_feeds(system, sources, instances),
-            watch=lambda board: watch(system.criterion.diverged, board, sources, signals, parameters),
-            first_exchange=initial.groups(system.connections, lambda name, output: models[name].depends_on(output)),
-        )
+    streams = Streams(system.seed, system.streams)
+    with interrupts_held_back() as interrupt, ExitStack() as stack:
+        instances = {name: stack.enter_context(load(path, name)) for name, path in paths.items()}
+        with in_its_own_words(asked):
+            for name, component in system.components.items():
+                _set_parameters(instances[name], component)
+                _set_clock(instances[name], component, paths[name])
+            sources = {name: _source(system, name, parameters, streams) for name in system.sources}
+            signals = {name: signals_of(name, system) for name in sources}
+            master = Master(
+                system,
+                instances,
+                agenda=Agenda(system, streams, _fixed_steps(system, models)),
+                streams=streams,
+                recorded=recorded(system, models),
+                recorder=recorder,
+                sources=[(signals[name], values) for name, values in sources.items()],
+                feeds=_feeds(system, sources, instances),
+                interrupted=lambda: interrupt.requested,
+                watch=lambda board: watch(system.criterion.diverged, board, sources, signals, parameters),
+                first_exchange=initial.groups(system.connections, lambda name, output: models[name].depends_on(output)),
+            )
         yield Simulation(
-            system=system, instances=instances, sources=sources, parameters=parameters, master=master, started=started
+            asked=asked,
+            system=system,
+            instances=instances,
+            parameters=parameters,
+            master=master,
+            recorder=recorder,
+            interrupt=interrupt,
+            started=started,
         )
+
+
+def _seconds(time: int | None) -> float | None:
+    return None if time is None else time / NANOSECONDS
 
 
 def signals_of(source: str, system: System) -> tuple[str, ...]:
@@ -108,10 +191,17 @@ def signals_of(source: str, system: System) -> tuple[str, ...]:
     return tuple(name if name.startswith(f"{source}.") else f"{source}.{name}" for name in names)
 
 
-def versions() -> dict[str, str]:
-    """Of the software that a run's numbers come from."""
+def provenance(instances: Mapping[str, FmuSimulator]) -> dict[str, Any]:
+    """What the numbers of a run came from: versions of the software and GUIDs of the FMUs."""
     packages = ("quadcosim", "numpy", "fmpy", "pythonfmu")
-    return {"python": platform.python_version(), **{name: _version(name) for name in packages}}
+    return {
+        "versions": {"python": platform.python_version(), **{name: _version(name) for name in packages}},
+        "platform": platform.platform(),
+        "fmus": {
+            name: {"model": fmu.description.modelName, "guid": fmu.description.guid, "path": str(fmu.path)}
+            for name, fmu in instances.items()
+        },
+    }
 
 
 def _version(package: str) -> str:
@@ -214,21 +304,3 @@ def _fixed_steps(system: System, models: Mapping[str, Model]) -> dict[str, Fixed
             grid = Grid(Fraction(0), exact_nanoseconds(component.step))
             found[name] = FixedStep(name=name, grid=grid, moves=component.align == "next")
     return found
-
-
-def finished(simulation: Simulation, rows: Floats, columns: Sequence[str]) -> dict[str, Any]:
-    """Signals, events and metrics of a run that has ended."""
-    master, system = simulation.master, simulation.system
-    signals = {name: rows[:, i] for i, name in enumerate(columns)}
-    events = tuple(sorted(map(Event._make, master.events), key=lambda event: event.time))
-    at = master.divergence_time
-    seen = objectives.recorded_of(
-        system,
-        signals,
-        sources=simulation.source_signals(signals["time"]),
-        events=events,
-        parameters=simulation.parameters,
-    )
-    divergence_time = None if at is None else at / NANOSECONDS
-    metrics = objectives.compute(system, lambda: iter([seen]), divergence_time=divergence_time, steps=master.steps)
-    return {"signals": signals, "events": events, "metrics": metrics}

@@ -8,39 +8,30 @@ delivered; the row is recorded. So a row is the value just after its instant, an
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
 from orchestration.errors import SimulatorError
+from orchestration.recording import ROWS, Chunk, Event, Recorder
 from orchestration.simulator import Floats, Simulator, Transfer
 from orchestration.stepping.agenda import Agenda, Due, Message
 from orchestration.stepping.board import Board
 from orchestration.stepping.channel import Channel
 from orchestration.stepping.feeds import Feed
 from orchestration.stepping.plan import Plan
+from orchestration.stepping.sources import Values
 from orchestration.stepping.streams import NOISE, Streams
 from orchestration.system.model import System, variable_of
 from orchestration.system.times import NANOSECONDS
 
+ROWS_PENDING = "rows"
+"""Beside the names of the components in `Master.saved`"""
 SWEEPS, CONVERGED = 100, 1e-12
 """How often values go around a loop at initialisation, until they change by less, relative to what they are"""
 
 Watch = Callable[[float], str | None]
 """At t [s], says how the values of the row have diverged, or None"""
-
-
-class Event(NamedTuple):
-    """Something that happened to one message."""
-
-    time: int
-    """[ns]"""
-    kind: str
-    """sampled, sent, arrived or lost"""
-    what: str
-    """name of the connection"""
-    sample: int
-    """index of the message"""
 
 
 @dataclass(kw_only=True)
@@ -88,13 +79,17 @@ class Master:
         agenda: Agenda,
         streams: Streams,
         recorded: Mapping[str, Sequence[str]],
+        recorder: Recorder,
+        sources: Sequence[tuple[Sequence[str], Values]] = (),
         feeds: Sequence[Feed] = (),
+        interrupted: Callable[[], bool] = lambda: False,
         watch: Callable[[Board], Watch] | None = None,
         first_exchange: Sequence[Sequence[int]] | None = None,
     ) -> None:
         self.board = board = Board(system, recorded)
         self.events: list[tuple[int, str, str, int]] = []  # fields of `Event`, made cheaply
         self._arrived: list[tuple[int, str, str, int]] = []  # of this instant: noted after what was sent at it
+        self.interrupted_at: int | None = None
         self.divergence: str | None = None
         self.divergence_time: int | None = None
         self.steps = 0
@@ -102,7 +97,13 @@ class Master:
         self._system, self._simulators, self._agenda = system, simulators, agenda
         self._plan = plan = Plan(system)
         self._names = names = list(system.components)
-        self._rows = bytearray()
+        self._sources, self._interrupted, self._recorder = list(sources), interrupted, recorder
+        self.columns = (*board.columns, *(signal for signals, _ in self._sources for signal in signals))
+        """of every row: those of the board, then the signals of the sources"""
+        self._rows = bytearray()  # not handed over yet, and the times of `events` may lie before them
+        self._chunk = ROWS * board.row.nbytes
+        self._handed_over = False
+        recorder.begin(self.columns)
         self._watch = watch(board) if watch is not None else lambda t: None
         self._feeds = list(feeds)
         self._connections = [x.name for x in system.connections]
@@ -124,9 +125,16 @@ class Master:
             self._diverged(error)
 
     def run(self, *, pause_at: int | None = None, progress: Callable[[float], None] | None = None) -> bool:
-        """Fly to the end, to divergence or to the first instant from `pause_at` [ns]; whether it is over."""
-        if self.divergence is not None:
-            return True
+        """Run to the end, to divergence or to the first instant from `pause_at` [ns]; whether it is over.
+
+        So it is at the first instant after an interruption, but not at its end.
+        """
+        over = self.divergence is not None or self._run(pause_at, progress)
+        if over and (self._rows or self.events or not self._handed_over):
+            self._hand_over()
+        return over
+
+    def _run(self, pause_at: int | None, progress: Callable[[float], None] | None) -> bool:
         agenda, by_itself, count = self._agenda, self._by_itself, 0
         try:
             for instant in agenda:
@@ -149,6 +157,10 @@ class Master:
                     self.events += self._arrived
                     self._arrived.clear()
                 self._record(time)
+                if self._interrupted() and time < agenda.stop:
+                    self.interrupted_at = time
+                    self._drop_later_events()
+                    return True
                 if pause_at is not None and pause_at <= time < agenda.stop:
                     return False
                 count += 1
@@ -160,9 +172,50 @@ class Master:
             progress(1.0)
         return True
 
-    def rows(self) -> Floats:
-        """All recorded rows, shape (number of instants, number of `board.columns`)."""
-        return np.frombuffer(bytes(self._rows), dtype=np.float64).reshape(-1, len(self.board.columns))
+    def pending(self) -> Chunk:
+        """What was recorded since the last chunk was handed over; messages that go out later are left out."""
+        rows = np.frombuffer(bytes(self._rows), dtype=np.float64).reshape(-1, len(self.board.columns))
+        events = sorted((event for event in self.events if event[0] <= self.now), key=lambda event: event[0])
+        return Chunk(
+            columns=self.columns,
+            rows=np.column_stack([rows, *(values.over(rows[:, 0]) for _, values in self._sources)]),
+            events=tuple(map(Event._make, events)),
+        )
+
+    def state(self) -> dict[str, Any]:
+        """All that the rest of the run depends on, and what the recorder does not have yet, but for `saved`."""
+        return {
+            "instants": self._agenda.count,
+            "now": self.now,
+            "reached": {name: self._bodies[self._names.index(name)].now for name in self._plan.continuous},
+            "steps": self.steps,
+            "row": self.board.row.tolist(),
+            "handed_over": self._handed_over,
+            "channels": [channel.state() for channel in self._channels],
+            "events": list(self.events),
+        }
+
+    def saved(self) -> dict[str, bytes]:
+        """The states of the components, and the rows that the recorder does not have yet, as bytes."""
+        return {
+            **{name: simulator.save() for name, simulator in self._simulators.items()},
+            ROWS_PENDING: bytes(self._rows),
+        }
+
+    def restore(self, state: Mapping[str, Any], saved: Mapping[str, bytes]) -> None:
+        """Continue where `state` and `saved` were taken, instead of `initialise`."""
+        for name, simulator in self._simulators.items():
+            simulator.restore(saved[name])
+        for _ in range(state["instants"]):  # the agenda is the same again: it follows from the system and the seed
+            next(self._agenda)
+        self.now, self.steps = state["now"], state["steps"]
+        for name, time in state["reached"].items():
+            self._bodies[self._names.index(name)].now = time
+        self.board.row[:] = state["row"]
+        self._rows, self._handed_over = bytearray(saved[ROWS_PENDING]), state["handed_over"]
+        for channel, content in zip(self._channels, state["channels"], strict=True):
+            channel.restore(content)
+        self.events = [(time, kind, what, k) for time, kind, what, k in state["events"]]
 
     # -- what happens at an instant ------------------------------------------------------------------------------
 
@@ -293,15 +346,27 @@ class Master:
         row = self.board.row
         row[0] = time / NANOSECONDS
         self._rows += row.data
+        if len(self._rows) >= self._chunk:
+            self._hand_over()
+
+    def _hand_over(self) -> None:
+        self._recorder.take(self.pending())
+        self.events = [event for event in self.events if event[0] > self.now]
+        self._rows.clear()
+        self._handed_over = True
 
     def _diverged(self, error: Exception) -> None:
         """Take divergence as the end of the run; any other failure of an FMU is raised."""
         if isinstance(error, SimulatorError) and not error.divergence:
             raise error
         self.divergence, self.divergence_time = str(error), self.now
-        self.events = [event for event in self.events if event[0] <= self.now]
-        if not self._rows:
+        self._drop_later_events()
+        if not self._rows and not self._handed_over:
             self._record(self.now)
+
+    def _drop_later_events(self) -> None:
+        """In Jacobi order a message is written down before it goes out; after the end none does."""
+        self.events = [event for event in self.events if event[0] <= self.now]
 
     # -- initialisation ------------------------------------------------------------------------------------------
 

@@ -210,6 +210,8 @@ class System:
     def __post_init__(self) -> None:
         _positive(self, "stop_time")
         _require(0 <= self.seed < 2**63, "seed", self.seed, "a whole number from 0 to 2^63 - 1")
+        if "rows" in self.components:
+            raise UsageError("components.rows: expected another name; this one is taken")
         _require(len(self.components) > 0, "components", "none", "at least one")
         fed: dict[str, str] = {}
         for place, start, end in self._feeds():
