@@ -12,20 +12,20 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from orchestration.errors import QuadcosimError, SimulatorError, UsageError
-    from orchestration.flight import FlightInterrupted, run
     from orchestration.pause import fly_until, resume
     from orchestration.result import Result
     from orchestration.run_directory import load_run, save_run
     from orchestration.scenario import FmuChoice, Record, ReferenceChoice, Scenario
     from orchestration.scenario_file import load_scenario
+    from orchestration.simulation import RunInterrupted, run
     from orchestration.timing import Timing
 
 _HOMES = {
     "QuadcosimError": "errors",
     "SimulatorError": "errors",
     "UsageError": "errors",
-    "FlightInterrupted": "flight",
-    "run": "flight",
+    "RunInterrupted": "simulation",
+    "run": "simulation",
     "Result": "result",
     "load_run": "run_directory",
     "save_run": "run_directory",
@@ -40,12 +40,12 @@ _HOMES = {
 }
 
 __all__ = [
-    "FlightInterrupted",
     "FmuChoice",
     "QuadcosimError",
     "Record",
     "ReferenceChoice",
     "Result",
+    "RunInterrupted",
     "Scenario",
     "SimulatorError",
     "Timing",

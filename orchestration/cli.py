@@ -13,7 +13,7 @@ import typer.core
 
 from orchestration.child import misleading_variables
 from orchestration.errors import QuadcosimError, SimulatorError, UsageError, shown
-from orchestration.flags import FlightFlags, flies, scenario_from
+from orchestration.flags import FlightFlags, flies, request_from, scenario_from
 from orchestration.interop import cli as interop
 from orchestration.limit_flags import MemoryLimit, OutputLimit, SizeLimit, TimeLimit, limits_from
 from orchestration.studies import cli as studies
@@ -69,7 +69,8 @@ def build(
 @flies
 def run(
     scenario: Annotated[
-        Path | None, typer.Argument(help="Scenario file; without one, the paper's flight.", show_default=False)
+        Path | None,
+        typer.Argument(help="System or scenario file; without one, the paper's flight.", show_default=False),
     ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="Directory for signals, events, metrics and figures.", metavar="DIR")
@@ -87,8 +88,8 @@ def run(
 ) -> None:
     """Fly a scenario and print its metrics. FMUs that are missing or out of date are built first."""
     from orchestration import pause
-    from orchestration.flight import run as fly
     from orchestration.run_directory import keep_flight
+    from orchestration.simulation import run as fly
 
     if resume is not None and (scenario is not None or pause_at is not None or flags != FlightFlags()):
         raise UsageError("--resume: expected no scenario and no flags of the flight; the paused run has its own")
@@ -98,15 +99,15 @@ def run(
         if resume is not None:
             result: Result | None = pause.resume(resume, out, figures=figures, progress=progress, announce=say)
         elif pause_at is not None and out is not None:
-            chosen = scenario_from(scenario, flags)
+            chosen = request_from(scenario, flags)
             result = pause.fly_until(chosen, pause_at, out, figures=figures, progress=progress, announce=say)
         elif out is not None:
-            chosen = scenario_from(scenario, flags)
+            chosen = request_from(scenario, flags)
             result = keep_flight(
                 out, lambda to: fly(chosen, recorder=to, progress=progress, announce=say), figures=figures
             )
         else:
-            result = fly(scenario_from(scenario, flags), progress=progress, announce=say)
+            result = fly(request_from(scenario, flags), progress=progress, announce=say)
     if result is None:
         say(f"paused in {out}; go on with: quadcosim run --resume {out}")
         return

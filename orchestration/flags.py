@@ -13,7 +13,9 @@ from orchestration.errors import UsageError
 from orchestration.timing import TIMING_KEYS
 
 if TYPE_CHECKING:
+    from orchestration.request import Request
     from orchestration.scenario import Parameter, Scenario
+    from orchestration.system.model import System
 
 TIMING, EFFECTS, MODEL = "Timing", "What goes wrong", "What flies"
 
@@ -127,7 +129,7 @@ class FlightFlags:
             "--set",
             panel=MODEL,
             metavar="SIDE.NAME=V",
-            text="A parameter of an FMU, as controller.NAME=V or plant.NAME=V; may be repeated.",
+            text="A parameter, as controller.NAME=V, or of a system file any value by its path; may be repeated.",
         ),
     ] = None
 
@@ -153,6 +155,19 @@ class FlightFlags:
         parameters = {key: _value(key, text) for key, text in _pairs("set", self.set or [])}
         return scenario.with_changes(timing=timing, parameters=parameters, **top)
 
+    def applied_to_system(self, system: "System") -> "System":
+        """`system` with what was given; raises `UsageError` for flags that are for the quadrotor only."""
+        from orchestration.system.paths import changed
+
+        top = {name: value for name in ("seed", "stop_time") if (value := getattr(self, name)) is not None}
+        foreign = [f.name for f in fields(self) if f.name not in ("seed", "stop_time", "set") and getattr(self, f.name)]
+        if foreign:
+            flags = ", ".join(f"--{name.replace('_', '-')}" for name in foreign)
+            raise UsageError(
+                f"{flags}: for the quadrotor only; expected --set PATH=V for a system, as connections.NAME.delay"
+            )
+        return changed(system, {**top, **{key: _value(key, text) for key, text in _pairs("set", self.set or [])}})
+
 
 _BY_MEASUREMENT = ("noise", "quantisation")
 _TIMING_FLAGS = tuple(key for key in TIMING_KEYS if key not in _BY_MEASUREMENT)
@@ -177,11 +192,22 @@ def flies(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def scenario_from(path: Path | None, flags: FlightFlags) -> "Scenario":
-    """The scenario of a file, or the paper's, with the flags applied."""
+    """The scenario of a file, or the paper's, with the flags applied; raises `UsageError` for a system file."""
     from orchestration.scenario import Scenario
-    from orchestration.scenario_file import load_scenario
 
-    return flags.applied_to(Scenario() if path is None else load_scenario(path))
+    request = request_from(path, flags)
+    if not isinstance(request, Scenario):
+        raise UsageError(f"{path}: is a system file; this command is for scenarios of the quadrotor")
+    return request
+
+
+def request_from(path: Path | None, flags: FlightFlags) -> "Request":
+    """The system or the scenario of a file, or the paper's, with the flags applied."""
+    from orchestration.request import load_request
+    from orchestration.scenario import Scenario
+
+    request = Scenario() if path is None else load_request(path)
+    return flags.applied_to(request) if isinstance(request, Scenario) else flags.applied_to_system(request)
 
 
 def _pairs(flag: str, given: list[str]) -> list[tuple[str, str]]:

@@ -1,6 +1,6 @@
 """Figures of one run: the path, the errors, the commands with what happened when, the energy."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,11 +9,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration.metrics import COLUMNS, position_error
+from orchestration.quadrotor.measures import desired, position_error
 from orchestration.recording import thinned
 from orchestration.result import Result
+from orchestration.scenario import Scenario
 from orchestration.simulator import Floats
-from orchestration.wiring import COMMAND, ENERGY, POSITION, components
+from orchestration.wiring import ATTITUDE_ERROR_SCALAR, COMMAND, ENERGY, POSITION, POSITION_REFERENCE, components
 
 STYLE = {
     "axes.grid": True,
@@ -31,12 +32,21 @@ BLUE, ORANGE, GREEN, RED, GREY = "#1f6f9f", "#e0812b", "#2f8f5b", "#b5323e", "#8
 FIGURES = ("path", "errors", "commands", "energy")
 """The figures of a run, in the order in which they are drawn; the last where the controller has an energy."""
 
+SYSTEM_FIGURE = "signals"
+"""The figure of any other system"""
+
 _ERRORS = (
     (r"velocity  [m/s]", ORANGE, components("velocity_error")),
     (r"attitude  $\|\tilde q\|$  [1]", GREEN, components("attitude_error")),
     (r"angular velocity  [rad/s]", RED, components("angular_velocity_error")),
 )
-_DRAWN = {*COLUMNS, *(f"controller.{name}" for _, _, names in _ERRORS for name in names)}
+_DRAWN = {
+    "time",
+    *POSITION_REFERENCE,
+    *(f"plant.{name}" for name in (*POSITION, *COMMAND)),
+    *(f"controller.{name}" for name in (ATTITUDE_ERROR_SCALAR, ENERGY)),
+    *(f"controller.{name}" for _, _, names in _ERRORS for name in names),
+}
 
 Window = tuple[float, float]
 """A span of time [s]."""
@@ -52,16 +62,23 @@ def draw(result: Result, folder: Path, window: Window | None = None) -> list[Pat
     Of a run of more than `MOST` rows every n-th is drawn.
     """
     window = window or (0.0, min(1.0, result.end))
-    result = replace(result, recording=thinned(result.recording, _DRAWN, window, MOST))
+    drawn = _DRAWN if isinstance(result.asked, Scenario) else set(result.columns)
+    result = replace(result, recording=thinned(result.recording, drawn, window, MOST))
+    if not isinstance(result.asked, Scenario):
+        return _written({SYSTEM_FIGURE: lambda: signals(result)}, folder)
     makers: tuple[Callable[[], Figure | None], ...] = (
         lambda: path(result),
         lambda: errors(result),
         lambda: commands(result, window),
         lambda: energy(result),
     )
+    return _written(dict(zip(FIGURES, makers, strict=True)), folder)
+
+
+def _written(makers: Mapping[str, Callable[[], Figure | None]], folder: Path) -> list[Path]:
     written = []
     with matplotlib.rc_context(STYLE):
-        for name, make in zip(FIGURES, makers, strict=True):
+        for name, make in makers.items():
             figure = make()
             if figure is not None:
                 figure.savefig(folder / f"{name}.png")
@@ -69,12 +86,31 @@ def draw(result: Result, folder: Path, window: Window | None = None) -> list[Pat
     return written
 
 
+def signals(result: Result) -> Figure:
+    """What is exchanged in a system: a panel for each connection, its signals as the receiver has them."""
+    connections = result.system.connections
+    figure = Figure(figsize=(8.0, 1.0 + 1.8 * len(connections)))
+    t = result.signals["time"]
+    panels = figure.subplots(len(connections), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, x in zip(panels, connections, strict=True):
+        for start, end in zip(x.start, x.end):
+            held = end in result.signals or result.system.components[x.sender].sampling is not None
+            values = result.signals[end if end in result.signals else start]
+            axes.step(t, values, where="post", label=end) if held else axes.plot(t, values, label=start)
+        axes.margins(x=0)
+        axes.legend(loc="upper right", fontsize=8)
+        axes.set_ylabel(x.name)
+    panels[0].set_title(_title(result))
+    panels[-1].set_xlabel("time [s]")
+    return figure
+
+
 def path(result: Result) -> Figure:
     """The flight in space with its reference, up being up."""
     figure = Figure(figsize=(7.0, 6.0))
     axes = figure.add_subplot(projection="3d")
     x, y, z = (result.signals[f"plant.{name}"] for name in POSITION)
-    axes.plot(*result.desired.T, color=ORANGE, linestyle="--", label="reference $P_d$")
+    axes.plot(*desired(result.signals).T, color=ORANGE, linestyle="--", label="reference $P_d$")
     axes.plot(x, y, z, color=BLUE, label="flown $P$")
     axes.scatter(x[:1], y[:1], z[:1], color=BLUE, s=25)
     axes.text(x[0], y[0], z[0], "  start", color=BLUE)
@@ -91,7 +127,7 @@ def errors(result: Result) -> Figure:
     figure = Figure(figsize=(8.0, 4.5))
     axes = figure.add_subplot()
     t = result.signals["time"]
-    _log_line(axes, t, position_error(result.signals, result.desired), BLUE, "position  [m]")
+    _log_line(axes, t, position_error(result.signals), BLUE, "position  [m]")
     for label, color, names in _ERRORS:
         columns = [result.signals.get(f"controller.{name}") for name in names]
         if all(column is not None for column in columns):
@@ -165,12 +201,14 @@ def _mark_events(axes: Axes, result: Result, start: float, end: float) -> None:
 
 
 def _title(result: Result) -> str:
-    timing = result.scenario.timing
-    parts = [f"{result.scenario.controller.fmu}, period {timing.period * 1e3:g} ms"]
-    if timing.delay:
-        parts.append(f"delay {timing.delay * 1e3:g} ms")
-    if timing.order != "gauss-seidel":
-        parts.append("Jacobi")
+    parts = []
+    if isinstance(result.asked, Scenario):
+        timing = result.asked.timing
+        parts.append(f"{result.asked.controller.fmu}, period {timing.period * 1e3:g} ms")
+        if timing.delay:
+            parts.append(f"delay {timing.delay * 1e3:g} ms")
+        if timing.order != "gauss-seidel":
+            parts.append("Jacobi")
     if result.divergence is not None:
         parts.append(f"diverged at {result.metrics['divergence_time']:g} s")
     if result.interrupted_at is not None:

@@ -10,10 +10,10 @@ from typing import Any
 from orchestration import plots, tables
 from orchestration.documents import read_json
 from orchestration.errors import UsageError, shown
-from orchestration.flight import FlightInterrupted
 from orchestration.folder import NewFolder, new_folder
+from orchestration.request import load_request, system_meant, text_of
 from orchestration.result import Result
-from orchestration.scenario_file import load_scenario
+from orchestration.simulation import RunInterrupted, columns_of
 from orchestration.tables import ToFolder
 
 SIGNALS, EVENTS = tables.SIGNALS, tables.EVENTS
@@ -42,7 +42,7 @@ def _write(result: Result, folder: Path, *, figures: bool) -> None:
         "warnings": list(result.warnings),
     }
     (folder / METRICS).write_text(json.dumps(result.metrics, indent=2) + "\n", encoding="utf-8")
-    (folder / SCENARIO).write_text(result.scenario.to_toml(), encoding="utf-8")
+    (folder / SCENARIO).write_text(text_of(result.asked), encoding="utf-8")
     (folder / PROVENANCE).write_text(json.dumps(notes, indent=2) + "\n", encoding="utf-8")
     if figures:
         plots.draw(result, folder)
@@ -56,12 +56,18 @@ def load_run(folder: str | Path) -> Result:
         raise UsageError(f"{folder}: expected the directory of a run; it has no {', '.join(missing)}")
     notes = _object(folder / PROVENANCE, divergence=_TEXT, interrupted_at=_NUMBER, warnings=(list,))
     recording = tables.InFolder(folder)
+    asked = load_request(folder / SCENARIO)
+    system = system_meant(asked)
+    missing = [name for name in columns_of(system) if name not in recording.columns]
+    if missing:
+        raise UsageError(f"{folder / SIGNALS}: no column {', '.join(missing)}; expected those of a run")
     if not len(recording):
         raise UsageError(f"{folder}: expected the directory of a run; it has no rows")
     for _ in recording.chunks():  # what is damaged is to be known now
         pass
     return Result(
-        scenario=load_scenario(folder / SCENARIO),
+        asked=asked,
+        system=system,
         recording=recording,
         metrics=_object(folder / METRICS, diverged=(bool,), divergence_time=_NUMBER),
         divergence=notes.pop("divergence"),
@@ -97,14 +103,14 @@ def keep_flight(
     `fly` is given what records in the new directory as the flight goes on; if it comes to no result, it has
     written there what is to be kept. The directory takes the place of an earlier one that has a file of
     `replaces`. If that cannot be after all, it is kept beside `folder`, and `QuadcosimError` says where. After
-    Ctrl-C what was recorded is kept too, but not in place of anything: `FlightInterrupted` says where. Raises
+    Ctrl-C what was recorded is kept too, but not in place of anything: `RunInterrupted` says where. Raises
     `UsageError` if `folder` holds something else or cannot be written.
     """
-    interrupted: FlightInterrupted | None = None
+    interrupted: RunInterrupted | None = None
     with run_folder(Path(folder), replaces) as new:
         try:
             result = fly(ToFolder(new.path))
-        except FlightInterrupted as stop:
+        except RunInterrupted as stop:
             interrupted, result = stop, stop.result
             new.replaces = result.interrupted_at is None
         new.precious = True
@@ -112,7 +118,7 @@ def keep_flight(
             _write(result, new.path, figures=figures)
     if interrupted is not None:
         result = replace(interrupted.result, recording=tables.InFolder(new.place))
-        raise FlightInterrupted(f"{interrupted}; what was recorded is in {new.place}", result)
+        raise RunInterrupted(f"{interrupted}; what was recorded is in {new.place}", result)
     return result and replace(result, recording=tables.InFolder(new.place))
 
 
@@ -130,4 +136,12 @@ def run_folder(folder: Path, replaces: Container[str] = ()) -> AbstractContextMa
     return new_folder(folder, replaceable, expected)
 
 
-_KNOWN = {SIGNALS, EVENTS, METRICS, SCENARIO, PROVENANCE, STATE, *(f"{name}.png" for name in plots.FIGURES)}
+_KNOWN = {
+    SIGNALS,
+    EVENTS,
+    METRICS,
+    SCENARIO,
+    PROVENANCE,
+    STATE,
+    *(f"{name}.png" for name in (*plots.FIGURES, plots.SYSTEM_FIGURE)),
+}

@@ -191,6 +191,14 @@ def signals_of(source: str, system: System) -> tuple[str, ...]:
     return tuple(name if name.startswith(f"{source}.") else f"{source}.{name}" for name in names)
 
 
+def columns_of(system: System) -> tuple[str, ...]:
+    """The columns that a run of `system` has whatever is recorded beside them."""
+    exchanged = [start for x in system.connections for start in x.start]
+    applied = [end for x in system.connections for end in x.end if system.components[x.receiver].sampling is None]
+    sources = [signal for name in system.sources for signal in signals_of(name, system)]
+    return ("time", *dict.fromkeys((*applied, *exchanged, *sources)))
+
+
 def provenance(instances: Mapping[str, FmuSimulator]) -> dict[str, Any]:
     """What the numbers of a run came from: versions of the software and GUIDs of the FMUs."""
     packages = ("quadcosim", "numpy", "fmpy", "pythonfmu")
@@ -252,11 +260,7 @@ def _parameters(system: System, models: Mapping[str, Model]) -> dict[str, float]
 def _signals(system: System, models: Mapping[str, Model]) -> set[str]:
     """Everything that is recorded, or comes from a source."""
     found = {f"{name}.{variable}" for name, variables in recorded(system, models).items() for variable in variables}
-    for x in system.connections:
-        found.update(x.start)
-        if system.components[x.receiver].sampling is None:
-            found.update(x.end)
-    return found.union(*(signals_of(name, system) for name in system.sources))
+    return found.union(columns_of(system)) - {"time"}
 
 
 def _source(system: System, name: str, parameters: Mapping[str, float], streams: Streams) -> Values:

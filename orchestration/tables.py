@@ -11,12 +11,9 @@ import pyarrow.parquet as pq
 from orchestration.errors import UsageError
 from orchestration.recording import Chunk, Event, Recording
 from orchestration.simulator import Floats
-from orchestration.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE
 
 SIGNALS, EVENTS = "signals.parquet", "events.parquet"
 _EVENT = pa.schema([("time", pa.float64()), ("event", pa.string()), ("what", pa.string()), ("sample", pa.int64())])
-_DESIRED = frozenset(POSITION_REFERENCE)
-_NEEDED = ("time", *(f"plant.{name}" for name in (*COMMAND, *MEASUREMENT)), *POSITION_REFERENCE)
 
 
 class ToFolder:
@@ -58,15 +55,14 @@ class InFolder:
         self._folder = folder
         with _opened(folder / SIGNALS) as signals, _opened(folder / EVENTS) as events:
             names = signals.schema_arrow.names
-            missing = [name for name in _NEEDED if name not in names]
-            if missing:
-                raise UsageError(f"{folder / SIGNALS}: no column {', '.join(missing)}; expected those of a run")
-            _expect_schema(folder / SIGNALS, signals, _signals_schema(name for name in names if name not in _DESIRED))
+            if "time" not in names:
+                raise UsageError(f"{folder / SIGNALS}: no column time; expected those of a run")
+            _expect_schema(folder / SIGNALS, signals, _signals_schema(names))
             _expect_schema(folder / EVENTS, events, _EVENT)
             self._count: int = signals.metadata.num_rows
             if signals.num_row_groups != events.num_row_groups:
                 raise UsageError(f"{folder}: expected as many groups of events as of rows")
-            self.columns = tuple(name for name in names if name not in _DESIRED)
+            self.columns = tuple(names)
 
     def __len__(self) -> int:
         return self._count
@@ -76,11 +72,10 @@ class InFolder:
         names = tuple(name for name in self.columns if columns is None or name in columns)
         with _opened(self._folder / SIGNALS) as signals, _opened(self._folder / EVENTS) as events:
             for group in range(signals.num_row_groups):
-                table = _group(self._folder / SIGNALS, signals, group, [*names, *POSITION_REFERENCE])
+                table = _group(self._folder / SIGNALS, signals, group, [*names])
                 yield Chunk(
                     columns=names,
                     rows=_matrix(table, names),
-                    desired=_matrix(table, POSITION_REFERENCE),
                     events=_events(_group(self._folder / EVENTS, events, group, _EVENT.names)),
                 )
 
@@ -123,19 +118,18 @@ def copy(recording: Recording, folder: Path) -> None:
 
 
 def write_signals(path: Path | BinaryIO, recording: Recording) -> None:
-    """One column each for the recorded values and for P_d, all float64."""
+    """One column each for what is recorded, all float64."""
     with pq.ParquetWriter(path, _signals_schema(recording.columns), write_page_checksum=True) as writer:
         for chunk in recording.chunks():
             writer.write_table(_signals_table(chunk))
 
 
 def _signals_schema(columns: Iterable[str]) -> Any:
-    return pa.schema([(name, pa.float64()) for name in (*columns, *POSITION_REFERENCE)])
+    return pa.schema([(name, pa.float64()) for name in columns])
 
 
 def _signals_table(chunk: Chunk) -> Any:
-    desired = {name: chunk.desired[:, i] for i, name in enumerate(POSITION_REFERENCE)}
-    return pa.table({**chunk.signals, **desired})
+    return pa.table(chunk.signals)
 
 
 def _matrix(table: Any, names: tuple[str, ...]) -> Floats:

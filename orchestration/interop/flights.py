@@ -8,12 +8,12 @@ import numpy as np
 
 from orchestration import child, fmus, ssp
 from orchestration.errors import QuadcosimError, UsageError
-from orchestration.flight import prepared
 from orchestration.fmpy_adapter import FmuSimulator
 from orchestration.interop.catalogue import Tool
 from orchestration.interop.job import SIGNALS, Job
 from orchestration.interop.trace import PORTS, Trace, read_trace, traced_copy
 from orchestration.scenario import Scenario
+from orchestration.simulation import prepared
 from orchestration.simulator import Floats, Transfer
 from orchestration.timing import exact_nanoseconds
 

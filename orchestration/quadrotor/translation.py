@@ -8,7 +8,6 @@ from typing import Any
 
 from orchestration.errors import UsageError
 from orchestration.nominal_model import mismatch
-
 from orchestration.scenario import Scenario
 from orchestration.system.model import System
 from orchestration.system.paths import changed

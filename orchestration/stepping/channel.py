@@ -30,8 +30,8 @@ class Channel:
         self.received = received
         """what the receiver has been told, in place"""
         self._row, self._places, self._write = row, places, write
-        self._sigma = expand("noise", connection.noise, names)
-        self._quantum = expand("quantisation", connection.quantisation, names)
+        self._sigma = expand(f"connections.{connection.name}.noise", connection.noise, names)
+        self._quantum = expand(f"connections.{connection.name}.quantisation", connection.quantisation, names)
         self._noisy = bool(self._sigma.any())
         self._rounded = np.flatnonzero(self._quantum)
         self._quantum = self._quantum[self._rounded]
@@ -135,6 +135,6 @@ def expand(what: str, values: Mapping[str, float], names: Sequence[str]) -> Floa
         places = [i for i, name in enumerate(names) if given in (name, name.rpartition(".")[0])]
         if not places:
             vectors = dict.fromkeys(name.rpartition(".")[0] or name for name in names)
-            raise UsageError(f"{what}: {given} is not in the message; expected one of {', '.join(vectors)}")
+            raise UsageError(f"{what}: {given} is no signal of it; expected one of {', '.join(vectors)}")
         result[places] = value
     return result

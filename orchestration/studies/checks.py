@@ -7,9 +7,9 @@ from typing import Any
 
 from orchestration import wiring
 from orchestration.errors import UsageError
-from orchestration.reference import FromFile
 from orchestration.scenario import Scenario
-from orchestration.sensors import expand
+from orchestration.stepping.channel import expand
+from orchestration.stepping.table_file import read_table
 from orchestration.studies.study import Fmus, Study
 
 
@@ -27,7 +27,7 @@ def expect_flyable(study: Study, fmus: Fmus) -> None:
     if wrong:
         raise UsageError(first + (f" ({wrong - 1} more runs cannot be)" if wrong > 1 else ""))
     if study.base.reference.file is not None:
-        FromFile(study.base.reference.file, longest)
+        read_table(study.base.reference.file, wiring.REFERENCE, longest)
 
 
 def expect_possible(scenario: Scenario, fmus: Fmus) -> None:
@@ -40,7 +40,7 @@ def expect_possible(scenario: Scenario, fmus: Fmus) -> None:
         for name in getattr(scenario.record, side) or ():
             _variable(f"{side}.{name}", fmus)
     for kind in ("noise", "quantisation"):
-        expand(kind, getattr(scenario.timing, kind), wiring.MEASUREMENT)
+        expand(f"timing.{kind}", getattr(scenario.timing, kind), wiring.MEASUREMENT)
 
 
 def described(index: int, settings: Mapping[str, Any]) -> str:

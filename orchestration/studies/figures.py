@@ -11,8 +11,8 @@ from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from orchestration.metrics import OUTCOMES, SETTLED
 from orchestration.plots import BLUE, GREY, ORANGE, RED, STYLE
+from orchestration.quadrotor.measures import OUTCOMES, SETTLED
 from orchestration.simulator import Floats
 from orchestration.statistics import wilson
 from orchestration.studies.axes import Axis

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import get_args
 
 from orchestration.errors import UsageError
-from orchestration.metrics import Outcome
+from orchestration.quadrotor.measures import Outcome
 from orchestration.scenario import Record, Scenario
 from orchestration.studies.engine import Pool
 from orchestration.studies.local import local_limits

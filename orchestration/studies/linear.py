@@ -19,9 +19,9 @@ import numpy as np
 from orchestration import wiring
 from orchestration.errors import UsageError
 from orchestration.fleet import Fleet
-from orchestration.flight import prepared
 from orchestration.fmpy_adapter import FmuSimulator
 from orchestration.scenario import Scenario
+from orchestration.simulation import prepared
 from orchestration.simulator import Floats
 from orchestration.studies.study import locate_fmus
 
@@ -167,7 +167,7 @@ class PlantStep:
     def _plant(self, parameters: dict[str, float] | None = None) -> Iterator[FmuSimulator]:
         changed = {f"plant.{name}": value for name, value in (parameters or {}).items()}
         with prepared(self._hover.with_changes(parameters=changed), load=self._fleet.load) as flight:
-            yield flight.plant
+            yield flight.instances["plant"]
 
     def _saved(self, parameters: dict[str, float], command: Floats) -> bytes:
         """The plant's state after initialisation with these parameters and this first command."""
@@ -204,7 +204,7 @@ _BOTH_WAYS = (STEP, -STEP)
 def _controller_at_hover(hover: Scenario, fleet: Fleet) -> tuple[Floats, Floats]:
     """The command at hover and its derivative by the coordinates, shape (4, 12)."""
     with prepared(hover, load=fleet.load) as flight:
-        controller = flight.controller
+        controller = flight.instances["controller"]
         at_rest = _measurement({})
         _initialise(controller, wiring.MEASUREMENT, at_rest)
         step = min(STEP, 1e-3 * _value(controller, wiring.BOUNDARY_LAYER, absent=1.0))

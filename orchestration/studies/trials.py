@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from orchestration.metrics import Outcome
+from orchestration.quadrotor.measures import Outcome
 from orchestration.scenario import Scenario
 from orchestration.statistics import refutes, wilson
 from orchestration.studies.engine import Pool

@@ -10,10 +10,10 @@ from typing import Any
 
 from orchestration.errors import QuadcosimError, SimulatorError, UsageError
 from orchestration.fleet import Fleet
-from orchestration.flight import prepared
 from orchestration.fmpy_adapter import FmuSimulator
 from orchestration.result import Result
 from orchestration.scenario import Scenario
+from orchestration.simulation import prepared
 from orchestration.studies.store import Row
 
 

@@ -2,13 +2,13 @@
 
 import dataclasses
 import json
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import pydantic
 
+from orchestration.documents import read_toml
 from orchestration.errors import UsageError
 from orchestration.expressions.syntax import parse
 from orchestration.system.model import (
@@ -25,11 +25,6 @@ from orchestration.system.model import (
     System,
 )
 from orchestration.system.paths import for_each
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 
 class _Table(pydantic.BaseModel):
@@ -144,12 +139,7 @@ def load_system(path: str | Path) -> System:
     Raises `UsageError` in one line that names the place and what is valid there.
     """
     path = Path(path)
-    try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path}: expected a readable system file: {error}") from error
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise UsageError(f"{path}: expected TOML: {error}") from error
+    tables = read_toml(path, "system file")
     try:
         return system_from_tables(tables, path.parent)
     except UsageError as error:

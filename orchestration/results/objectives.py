@@ -1,0 +1,145 @@
+"""What a run comes to, as numbers: the objectives and the criterion of its system."""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from orchestration.expressions.over_run import Marks, Recorded, Spans, evaluate, expect_names, vectors
+from orchestration.expressions.syntax import names, parse
+from orchestration.recording import Event, Recording
+from orchestration.simulator import Floats
+from orchestration.system.model import System
+from orchestration.system.system_file import expressions
+from orchestration.system.times import NANOSECONDS
+
+Metrics = dict[str, float | int | bool | str | None]
+
+GOOD = "criterion.good"
+FIXED = ("outcome", "good", "horizon", "diverged", "divergence_time", "steps")
+"""Names that every run has beside its objectives."""
+
+
+def compute(system: System, spans: Spans, *, end: float, divergence_time: float | None, steps: int) -> Metrics:
+    """The objectives of a run by name, and what became of it by its `end` [s].
+
+    A run that diverged has no objective: an average over the time that it lasted would grow better the sooner it
+    ended. Raises `UsageError` for an objective that cannot be evaluated, naming it.
+    """
+    diverged = divergence_time is not None
+    found: dict[str, float | None] = dict.fromkeys(system.objectives)
+    good = None if system.criterion.good is None else False
+    if not diverged:
+        nodes = {name: parse(expression) for name, expression in system.objectives.items()}
+        if system.criterion.good is not None:
+            nodes[GOOD] = parse(system.criterion.good)
+        found = evaluate(nodes, spans)
+        if good is not None:
+            good = bool(found.pop(GOOD))
+    return {
+        "outcome": outcome(system, good=good, diverged=diverged),
+        "good": good,
+        "horizon": system.stop_time if diverged else end,
+        **found,
+        "diverged": diverged,
+        "divergence_time": divergence_time,
+        "steps": steps,
+    }
+
+
+def outcome(system: System, *, good: bool | None, diverged: bool) -> str | None:
+    """What a run is called; None if its system has no criterion."""
+    if diverged:
+        return "diverged"
+    return None if good is None else system.criterion.outcomes[0 if good else 1]
+
+
+def spans(system: System, recording: Recording, parameters: Mapping[str, float]) -> Iterator[Recorded]:
+    """What expressions see of a run, chunk by chunk, each with the last row of the one before."""
+    wanted = {name for _, expression in expressions(system) for name in names(parse(expression))}
+    columns = [c for c in recording.columns if c == "time" or c in wanted or c.rpartition(".")[0] in wanted]
+    lines = {x.name: _Line() for x in system.connections if x.hold == "first"}
+    before: Floats | None = None
+    lost: set[tuple[str, int]] = set()
+    for chunk in recording.chunks(columns):
+        rows = chunk.rows if before is None else np.vstack([before, chunk.rows])
+        signals = {name: rows[:, i] for i, name in enumerate(chunk.columns)}
+        lost |= {(event.what, event.sample) for event in chunk.events if event.kind == "lost"}
+        arrivals = _arrivals(system, signals["time"], chunk.events, lost)
+        yield Recorded(
+            time=signals["time"],
+            signals={name: values for name, values in signals.items() if name != "time"},
+            ends=_ends(system, signals, arrivals, lines),
+            numbers=parameters,
+            arrivals=arrivals,
+            stop_time=system.stop_time,
+            goes_on=before is not None,
+        )
+        before = rows[-1:]
+
+
+def _arrivals(
+    system: System, time: Floats, events: Sequence[Event], lost: Collection[tuple[str, int]]
+) -> dict[str, Marks]:
+    """By connection, the rows at which a message of it arrived, or was measured and not lost."""
+    instants = np.round(time * NANOSECONDS).astype(np.int64)
+    times: dict[str, list[int]] = {x.name: [] for x in system.connections}
+    for event in events:
+        if event.kind == "arrived" or (event.kind == "sampled" and (event.what, event.sample) not in lost):
+            times[event.what].append(event.time)
+    return {name: np.isin(instants, np.array(found, dtype=np.int64)) for name, found in times.items()}
+
+
+def check(system: System, signals: set[str], numbers: set[str]) -> None:
+    """Raise `UsageError` for an expression that names what is not there."""
+    valid = {"time", "stop_time", *signals, *vectors(dict.fromkeys(signals)), *numbers}
+    for name, text in system.objectives.items():
+        expect_names(parse(text), valid, f"objectives.{name}")
+        valid.add(name)
+    for place, expression in (("good", system.criterion.good), ("diverged", system.criterion.diverged)):
+        if expression is not None:
+            expect_names(parse(expression), valid, f"criterion.{place}")
+
+
+def _ends(
+    system: System, signals: Mapping[str, Floats], arrivals: Mapping[str, Marks], lines: Mapping[str, "_Line"]
+) -> dict[str, Floats]:
+    """Of every signal that is held between rows, what it has become just before the next."""
+    ends: dict[str, Floats] = {}
+    for name, component in system.components.items():
+        if component.sampling is not None:
+            ends |= {key: values[:-1] for key, values in signals.items() if key.startswith(f"{name}.")}
+    for x in system.connections:
+        held = [end for end in x.end if end in signals]
+        if x.hold == "zero":
+            ends |= {end: signals[end][:-1] for end in held}
+        else:
+            ends |= lines[x.name].ends(signals["time"], {end: signals[end] for end in held}, arrivals[x.name])
+    for name, source in system.sources.items():
+        if source.constant is not None or source.noise is not None:
+            ends |= {key: values[:-1] for key, values in signals.items() if key.startswith(f"{name}.")}
+    return ends
+
+
+class _Line:
+    """The line through the last two values that arrived, from span to span."""
+
+    def __init__(self) -> None:
+        self._last: dict[str, list[tuple[float, float]]] = {}
+
+    def ends(self, time: Floats, values: Mapping[str, Floats], arrived: Marks) -> dict[str, Floats]:
+        """What is on the line just before each next row."""
+        return {name: self._end(name, time, held, arrived) for name, held in values.items()}
+
+    def _end(self, name: str, time: Floats, held: Floats, arrived: Marks) -> Floats:
+        past = self._last.get(name)
+        rows = np.flatnonzero(arrived)
+        if past is None:  # that of initialisation is the first
+            past = [(float(time[0]), float(held[0]))]
+            rows = rows[rows > 0]
+        points = [*past, *((float(time[i]), float(held[i])) for i in rows)]
+        times, heights = np.array(points).T
+        slopes = np.concatenate([[0.0], np.diff(heights) / np.diff(times)])
+        latest = np.searchsorted(times, time[:-1], side="right") - 1
+        self._last[name] = points[-2:]
+        line: Floats = held[:-1] + slopes[latest] * np.diff(time)
+        return line
