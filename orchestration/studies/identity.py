@@ -11,11 +11,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from orchestration.quadrotor import translation
 from orchestration.scenario import Scenario
 from orchestration.studies.study import Fmus, Study
 
-ROOTS = ("orchestration.flight", "orchestration.studies.worker")
+ROOTS = ("orchestration.simulation", "orchestration.studies.worker")
 """Where the code that flies begins."""
+QUADROTOR = Path(translation.__file__).with_name("system.toml")
+"""What every scenario is a change of"""
 _ASIDE = ("orchestration.fmus", "orchestration.tables", "orchestration.studies.store")
 """What finds FMUs and keeps results; it is imported there and changes no bit of them."""
 _PACKAGES = ("orchestration", "fmu_kit")
@@ -44,6 +47,7 @@ def flight_sources() -> dict[str, Path]:
                 waiting += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
             elif isinstance(node, ast.Import):
                 waiting += [alias.name for alias in node.names]
+    found[QUADROTOR.name] = QUADROTOR
     return found
 
 
