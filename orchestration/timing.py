@@ -6,8 +6,7 @@ from fractions import Fraction
 from typing import ClassVar, Literal, get_args
 
 from orchestration.errors import UsageError, shown
-
-NANOSECONDS = 1_000_000_000
+from orchestration.system.times import exact_nanoseconds
 
 Order = Literal["gauss-seidel", "jacobi"]
 Hold = Literal["zero", "first"]
@@ -149,13 +148,3 @@ def _require(condition: bool, name: str, value: object, expected: str) -> None:
 
 
 TIMING_KEYS = tuple(f.name for f in fields(Timing))
-
-
-def exact_nanoseconds(seconds: float) -> Fraction:
-    """The rational number that the decimal form of `seconds` means, in nanoseconds."""
-    return Fraction(repr(float(seconds))) * NANOSECONDS
-
-
-def nanoseconds(seconds: float) -> int:
-    """`seconds` rounded to the nanosecond, half to even."""
-    return round(exact_nanoseconds(seconds))

@@ -15,7 +15,7 @@ from orchestration.interop.trace import PORTS, Trace, read_trace, traced_copy
 from orchestration.scenario import Scenario
 from orchestration.simulation import prepared
 from orchestration.simulator import Floats, Transfer
-from orchestration.timing import exact_nanoseconds
+from orchestration.system.times import exact_nanoseconds
 
 _TEMPORARY = ("TMPDIR", "TEMP", "TMP")
 """Where a tool unpacks, by the names that systems have for it: not all clean up after themselves."""

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from orchestration.flight import run
 
 from orchestration import Scenario
-from orchestration.flight import run
 from orchestration.fmpy_adapter import FmuSimulator
 from orchestration.interop.table import AIM
 from orchestration.simulator import Floats
-from orchestration.timing import NANOSECONDS
+from orchestration.system.times import NANOSECONDS
 from orchestration.wiring import COMMAND, MEASUREMENT
 
 H, STEPS = 0.01, 3000

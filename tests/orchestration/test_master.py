@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from orchestration.master import FARTHEST, FASTEST
 
 from orchestration.errors import SimulatorError
-from orchestration.master import FARTHEST, FASTEST
-from orchestration.timing import Timing, nanoseconds
+from orchestration.system.times import nanoseconds
+from orchestration.timing import Timing
 from orchestration.wiring import MEASUREMENT
 from tests.orchestration.strategies import timings
 from tests.orchestration.stubs import AtOrigin, Call, Counting, Feedback, Flown, Plant, Still, Straying

@@ -9,12 +9,12 @@ from types import FrameType
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
+from orchestration.reference import FromFile
 
 import orchestration
 from orchestration import Scenario, UsageError, fly_until, load_run, load_scenario, save_run
 from orchestration.pause import read_state
 from orchestration.presets import preset_timing
-from orchestration.reference import FromFile
 from orchestration.studies.study_file import load_study
 from orchestration.wiring import REFERENCE
 

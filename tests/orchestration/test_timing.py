@@ -12,12 +12,13 @@ import pytest
 import typer.main
 from hypothesis import given
 from hypothesis import strategies as st
+from orchestration.clock import Clock, Grid, Instant, Sample, random_streams
 
 from orchestration import Scenario, cli
-from orchestration.clock import Clock, Grid, Instant, Sample, random_streams
 from orchestration.errors import UsageError
 from orchestration.flags import FlightFlags
-from orchestration.timing import TIMING_KEYS, Timing, nanoseconds
+from orchestration.system.times import nanoseconds
+from orchestration.timing import TIMING_KEYS, Timing
 from tests.orchestration.strategies import Case, cases
 
 SECOND = 10**9

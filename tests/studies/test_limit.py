@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from orchestration.flight import prepared
 
 import orchestration
 from orchestration import Result, Scenario, Timing, UsageError
 from orchestration.fleet import Fleet
-from orchestration.flight import prepared
 from orchestration.scenario import FmuChoice
 from orchestration.simulator import Floats
 from orchestration.statistics import wilson
@@ -27,7 +27,7 @@ from orchestration.studies.linear import COORDINATES, HoverLoop, hover_of
 from orchestration.studies.local import local_limit, local_limits
 from orchestration.studies.search import first_failure
 from orchestration.studies.trials import flies
-from orchestration.timing import NANOSECONDS
+from orchestration.system.times import NANOSECONDS
 from orchestration.wiring import COMMAND
 from tests.fmus import source_tree
 from tests.studies.common import one_line, short

@@ -6,7 +6,7 @@ from libcosimpy.CosimObserver import CosimObserver
 from libcosimpy.CosimSlave import CosimLocalSlave
 
 from orchestration.interop.job import CONNECTIONS, SIGNALS, Job, Rows
-from orchestration.timing import NANOSECONDS
+from orchestration.system.times import NANOSECONDS
 
 SPARE = 2
 """Steps beyond the expected ones that the observer has room for."""
