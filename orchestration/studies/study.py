@@ -118,7 +118,8 @@ def changed(base: Scenario, changes: Mapping[str, Any]) -> Scenario:
         elif side in ("controller", "plant"):
             parameters[target] = value
         else:
-            top[target] = int(value) if target == "seed" else float(value)
+            whole = isinstance(value, float) and value.is_integer()  # as in a range: 1.0 for the seed 1
+            top[target] = int(value) if target == "seed" and whole else value
     return base.with_changes(timing=timing, parameters=parameters, **top)
 
 

@@ -79,6 +79,8 @@ def _study(tables: dict[str, Any], path: Path) -> Study:
         raise UsageError(first_problem(error, StudyFile)) from error
     if file.scenario is not None and file.base:
         raise UsageError("scenario and base: expected one of them")
+    if file.design.seed < 0:
+        raise UsageError(f"design.seed = {file.design.seed}: expected a whole number from 0")
     base = load_scenario(path.parent / file.scenario) if file.scenario else scenario_from_tables(file.base, path.parent)
     study = Study(
         name=file.name or path.stem,

@@ -4,7 +4,7 @@ import difflib
 import math
 from collections.abc import Iterable, Mapping
 
-from orchestration.errors import UsageError
+from orchestration.errors import UsageError, expected_name
 from orchestration.fmi.model import NUMERIC, Kind, Model, Variable
 from orchestration.system.model import Connection, Parameter, System, component_of, variable_of
 
@@ -17,7 +17,11 @@ def check(system: System, models: Mapping[str, Model]) -> None:
         for parameter, value in component.parameters.items():
             _check_parameter(f"{place}.parameters.{parameter}", models[name], parameter, value, parameter in fed)
         for recorded in component.record or ():
-            variable = models[name].variable(recorded, f"{place}.record")
+            variable = models[name].variables.get(recorded)
+            if variable is None:
+                names = [v.name for v in models[name].variables.values() if v.causality in ("output", "local")]
+                has_no = f"{place}.record: {models[name].name} has no variable {recorded}"
+                raise UsageError(f"{has_no}; {expected_name(recorded, names)}")
             if variable.kind not in NUMERIC or variable.causality not in ("output", "local"):
                 raise UsageError(f"{place}.record: {recorded} is {_article(variable)}; expected an output or a local")
     for x in system.connections:

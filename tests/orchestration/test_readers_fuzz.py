@@ -9,12 +9,12 @@ from types import FrameType
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from orchestration.reference import FromFile
 
 import orchestration
 from orchestration import Scenario, UsageError, fly_until, load_run, load_scenario, save_run
 from orchestration.pause import read_state
 from orchestration.presets import preset_timing
+from orchestration.stepping.table_file import read_table
 from orchestration.studies.study_file import load_study
 from orchestration.wiring import REFERENCE
 
@@ -156,10 +156,13 @@ def test_a_scenario(tmp_path: Path, content: bytes) -> None:
 
 @fuzz
 @given(CUTS.map(lambda cuts: damaged(STUDY.encode(), cuts)) | with_another_value(STUDY))
+@example(STUDY.replace("[1, 2]", '["text"]').encode())
+@example(STUDY.replace("[1, 2]", "[1.5]").encode())
+@example(STUDY.replace("seed = 1", "seed = -1").encode())
 def test_a_study(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "study.toml"
     path.write_bytes(content)
-    is_read_or_refused(lambda: load_study(path))
+    is_read_or_refused(lambda: load_study(path).scenario(0, {"plant.mass": 1.0, "controller.mass": 1.0}))
 
 
 @fuzz
@@ -168,7 +171,7 @@ def test_a_study(tmp_path: Path, content: bytes) -> None:
 def test_a_reference(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "reference.csv"
     path.write_bytes(content)
-    is_read_or_refused(lambda: FromFile(path, 1.0))
+    is_read_or_refused(lambda: read_table(path, REFERENCE, 1.0))
 
 
 @fuzz
