@@ -25,6 +25,11 @@ def check(system: System, models: Mapping[str, Model]) -> None:
             if variable.kind not in NUMERIC or variable.causality not in ("output", "local"):
                 raise UsageError(f"{place}.record: {recorded} is {_article(variable)}; expected an output or a local")
     for x in system.connections:
+        for what, ends, causality in (("from", x.start, "output"), ("to", x.end, "input")):
+            model = models[component_of(ends[0])]
+            missing = [variable_of(end) for end in ends if variable_of(end) not in model.variables]
+            if missing:
+                raise UsageError(f"connections.{x.name}.{what}: {_lacks(model, causality, missing)}")
         for start, end in zip(x.start, x.end):
             _check_pair(f"connections.{x.name}", x, _end(models, start), _end(models, end))
     for name, source in system.sources.items():
@@ -98,14 +103,19 @@ def _expect_input(place: str, end: str, found: End) -> Variable:
     return variable
 
 
+def _lacks(model: Model, causality: str, missing: list[str]) -> str:
+    """What a model does not have to be an end of a connection."""
+    names = model.names(causality)
+    near = difflib.get_close_matches(missing[0], names, n=1)
+    hint = f"; did you mean {near[0]}?" if near else ""
+    return f"{model.name} has no {causality} {', '.join(missing)}; its {causality}s are {_list(names)}{hint}"
+
+
 def _wrong(end: End, expected: str, valid: Iterable[str]) -> str:
     name, model, variable = end
-    owner, names = component_of(name), list(valid)
-    if variable is not None:
-        return f"{name} is {_article(variable)}; expected an {expected}: {_list(names)}"
-    near = difflib.get_close_matches(variable_of(name), names, n=1)
-    hint = f"; did you mean {owner}.{near[0]}?" if near else ""
-    return f"{model.name} has no {variable_of(name)}; its {expected}s are {_list(names)}{hint}"
+    if variable is None:
+        return _lacks(model, expected, [variable_of(name)])
+    return f"{name} is {_article(variable)}; expected an {expected}: {_list(valid)}"
 
 
 def _article(variable: Variable) -> str:
@@ -113,7 +123,7 @@ def _article(variable: Variable) -> str:
 
 
 def _check_parameter(place: str, model: Model, name: str, value: Parameter, is_fed: bool) -> None:
-    variable = model.variable(name, place.rpartition(f".{name}")[0])
+    variable = model.variable(name, place)
     if not variable.is_settable or is_fed:
         expected = "a parameter or an input that nothing is connected to"
         raise UsageError(f"{place}: is {'connected' if is_fed else _article(variable)}; expected {expected}")
