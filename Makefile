@@ -40,7 +40,7 @@ figures: .venv/.base
 	touch $@
 
 findings: .venv/.test
-	$(BIN)/python docs/make_findings.py
+	$(BIN)/python -m docs.make_findings
 
 interop: .venv/.test .venv-cofmupy/.made
 	QUADCOSIM_COFMUPY=$(abspath $(COFMUPY)) $(BIN)/python -m docs.make_interop
