@@ -301,6 +301,7 @@ def _geared(factor: float, kappa: float) -> Scenario:
 
 
 def as_scenario(flights: dict[str, Any], i: int) -> Scenario:
+    """One of some flights of a batch, for the FMUs."""
     chosen = {name: float(flights[name][i]) for name in ("period", "delay", "kappa", "gain_factor", "surface", "lag")}
     return PAPER.with_changes(
         timing={"period": chosen["period"], "delay": chosen["delay"]},
