@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from controller_fmu.law import Gains, Measurement, Model, evaluate
+from controller_fmu.sliding_mode.law import Gains, evaluate
+from controller_fmu.vehicle import Measurement, Model
 from fmu_kit import packaging
 from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.trajectory import Trajectory

@@ -1,6 +1,6 @@
 """Slaves with the variables of the real ones that compute nothing: the floor that pythonfmu and fmpy set."""
 
-from controller_fmu.slave import UnifiedController
+from controller_fmu.sliding_mode.slave import UnifiedController
 from fmu_kit.saved_state import State
 from plant_fmu.slave import QuadrotorPlant
 

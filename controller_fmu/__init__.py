@@ -1,1 +1,1 @@
-"""The unified (not time-scale-separated) finite-time sliding-mode controller, and its FMU."""
+"""Controllers as FMUs, one folder each; beside the folders is what every controller shares."""

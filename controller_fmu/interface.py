@@ -1,4 +1,4 @@
-"""The variables of a controller FMU: what any controller offers, and what this law adds."""
+"""The variables that every controller FMU has; each law adds its own."""
 
 from fmu_kit.trajectory import Trajectory
 from fmu_kit.variables import (
@@ -8,7 +8,6 @@ from fmu_kit.variables import (
     discrete_local,
     discrete_output,
     fixed_parameter,
-    tunable_parameter,
     vector,
 )
 
@@ -69,30 +68,6 @@ COMMON_PARAMETERS = (
     fixed_parameter("sample_offset", "time of the first sample of the FMU's own clock", "s", 0.0, minimum=0.0),
 )
 
-GAINS = (
-    *vector(
-        tunable_parameter("gain.translation", "k_t, of tanh(s) in the virtual control (22)", "m/s2", 2.0, minimum=0.0)
-    ),
-    tunable_parameter("gain.disturbance", "beta, of tanh(s) against the disturbance (32)", "m/s2", 0.99, minimum=0.0),
-    tunable_parameter(
-        "gain.surface", "k_s of the sliding surface (19)-(21); in 1/s for an exponent of 1", "1/s", 5.0, minimum=0.0
-    ),
-    tunable_parameter("gain.eta", "k_eta, of the attitude error in Psi (29)", "rad/s", 15.0, minimum=0.0),
-    tunable_parameter("gain.theta", "k_theta, of Theta in the torque (30)", "N.m.s", 15.0, minimum=0.0),
-    tunable_parameter("gain.attitude", "k_q, of the attitude error in the torque (30)", "N.m", 15.0, above=0.0),
-    tunable_parameter("surface_exponent", "beta_t of the sliding surface (19)-(21)", "1", 0.99, above=0.0, maximum=1.0),
-    tunable_parameter(
-        "boundary_layer", "epsilon: below this position error the surface is linear", "m", 0.001, above=0.0
-    ),
-    tunable_parameter(
-        "coupling",
-        "kappa >= 0, weight of s.s/2 in the energy (33) and so of its term in Psi (29): "
-        "0 none, 1 as the energy is printed, k_q as Psi is printed",
-        "kg",
-        1.0,
-    ),
-)
-
 COMMON_LOCALS = (
     *vector(
         discrete_local("desired_quaternion", "desired attitude Q_d as of the last sample (12)", "1"), QUATERNION_AXES
@@ -103,28 +78,7 @@ COMMON_LOCALS = (
     *vector(discrete_local("angular_velocity_error", "angular velocity minus the desired one, body frame", "rad/s")),
 )
 
-LAW_LOCALS = (
-    *vector(discrete_local("sliding", "sliding variable s as of the last sample (19)-(21)", "m/s")),
-    *vector(discrete_local("theta", "Theta as of the last sample (9), body frame", "rad/s")),
-    *vector(
-        discrete_local("desired_angular_velocity", "Omega_d as of the last sample (13), desired body frame", "rad/s")
-    ),
-    discrete_local("energy", "energy function L_kappa as of the last sample (33), with coupling/2 s.s", "J"),
-)
-
 COUNT_AND_SWITCH = (
     discrete_local("sample_count", "number of samples since the start, initialisation not counted", None, 0),
     fixed_parameter("use_reference_inputs", "true: follow reference.*; false: the built-in trajectory", None, False),
 )
-
-UNIFIED = (
-    *MEASUREMENT,
-    *REFERENCE,
-    *COMMAND,
-    *COMMON_PARAMETERS,
-    *GAINS,
-    *COMMON_LOCALS,
-    *LAW_LOCALS,
-    *COUNT_AND_SWITCH,
-)
-"""All variables of the unified controller; the place in this list is the value reference."""

@@ -19,7 +19,10 @@ PALE, DARK = "#f3f7fa", "#33414d"
 
 def main() -> None:
     """Draw both."""
-    for place, draw in (("controller_fmu/UnifiedController", controller), ("plant_fmu/QuadrotorPlant", plant)):
+    for place, draw in (
+        ("controller_fmu/sliding_mode/UnifiedController", controller),
+        ("plant_fmu/QuadrotorPlant", plant),
+    ):
         figure = Figure(figsize=(1.0, 1.0), dpi=PIXELS)
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         axes.set(xlim=(-1.0, 1.0), ylim=(-1.0, 1.0))

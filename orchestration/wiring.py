@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 MODELS = {
-    "UnifiedController": "controller_fmu.slave:UnifiedController",
+    "UnifiedController": "controller_fmu.sliding_mode.slave:UnifiedController",
     "QuadrotorPlant": "plant_fmu.slave:QuadrotorPlant",
 }
 """FMUs of this project by name, and the slave that each is built from."""

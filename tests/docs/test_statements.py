@@ -16,7 +16,7 @@ TEXTS = (
     *sorted((ROOT / "docs").glob("make_*.py")),
     ROOT / "fmus" / "README.md",
     *sorted((ROOT / "studies").glob("*.toml")),
-    *(path for package in ("controller_fmu", "fmu_kit") for path in sorted((ROOT / package).glob("*.[ph]*"))),
+    *(path for package in ("controller_fmu", "fmu_kit") for path in sorted((ROOT / package).rglob("*.[ph]*"))),
 )
 ONE_WEIGHT_OF_THE_PROOF = re.compile(
     r"proof\s+(needs|asks\s+for\s+κ|does\s+not\s+go)|\(the\s+lyapunov\s+proof\)|\(lyapunov\s+proof\)|weight\s+of\s+the\s+proof",

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controller_fmu.slave import UnifiedController
+from controller_fmu.sliding_mode.slave import UnifiedController
 from fmu_kit.failure import Failure
 from fmu_kit.saved_state import DEEPEST, parsed
 from fmu_kit.slave import Slave

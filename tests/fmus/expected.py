@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping
 
-from controller_fmu.law import Gains, Measurement, Model, evaluate
+from controller_fmu.sliding_mode.law import Gains, evaluate
+from controller_fmu.vehicle import Measurement, Model
 from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.trajectory import Trajectory
 

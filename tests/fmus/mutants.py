@@ -331,7 +331,7 @@ BEHAVIOUR = (
     ),
     Mutant(
         name="saved clock incomplete", rule="saved-state", words=("from the state",), model=CONTROLLER,
-        damage=source("controller_fmu/slave.py", 'state["next_index"]', "0"),
+        damage=source("controller_fmu/sampled.py", 'state["next_index"]', "0"),
     ),
     Mutant(
         name="serialised state rounded", rule="serialised-state", words=("from the bytes",),

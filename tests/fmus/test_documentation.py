@@ -24,7 +24,7 @@ from tests.fmus.instance import Instance
 from tests.fmus.process import ROOT, run
 from tests.fmus.source_tree import copy_sources, python
 
-SOURCES = {"UnifiedController": "controller_fmu/law.py", "QuadrotorPlant": "plant_fmu/dynamics.py"}
+SOURCES = {"UnifiedController": "controller_fmu/sliding_mode/law.py", "QuadrotorPlant": "plant_fmu/dynamics.py"}
 """Where the equations of each FMU are."""
 
 
@@ -362,7 +362,7 @@ def test_a_link_to_a_file_that_is_not_packed_is_refused(tree: Path, tmp_path: Pa
 
 
 SECOND = """
-from controller_fmu.slave import UnifiedController
+from controller_fmu.sliding_mode.slave import UnifiedController
 
 
 class Second(UnifiedController):

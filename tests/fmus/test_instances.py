@@ -42,7 +42,7 @@ THRUST = "thrust = model.mass * n  #"
 def changed_controller(folder: Path, factor: str) -> Path:
     """A controller whose law commands `factor` times the thrust."""
     sources = copy_sources(folder / "sources")
-    replace(sources / "controller_fmu" / "law.py", THRUST, f"thrust = {factor} * model.mass * n  #")
+    replace(sources / "controller_fmu" / "sliding_mode" / "law.py", THRUST, f"thrust = {factor} * model.mass * n  #")
     return build(sources, folder, "UnifiedController")
 
 
@@ -60,8 +60,11 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for package in ("fmu_kit", "controller_fmu", "plant_fmu", "pythonfmu"):
         (folder / package).mkdir()
         (folder / package / "__init__.py").touch()
-    (folder / "controller_fmu" / "law.py").write_text("def evaluate(*arguments):\n    raise SystemExit('wrong law')\n")
-    (folder / "controller_fmu" / "slave.py").write_text("class UnifiedController:\n    pass\n")
+    wrong = folder / "controller_fmu" / "sliding_mode"
+    wrong.mkdir()
+    (wrong / "__init__.py").touch()
+    (wrong / "law.py").write_text("def evaluate(*arguments):\n    raise SystemExit('wrong law')\n")
+    (wrong / "slave.py").write_text("class UnifiedController:\n    pass\n")
     return folder
 
 

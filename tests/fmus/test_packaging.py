@@ -69,7 +69,7 @@ def test_a_copied_source_tree_gives_the_same_bytes(
 
 
 def test_the_copied_tree_is_what_is_built(built: dict[str, Path], sources: Path, tmp_path: Path) -> None:
-    replace(sources / "controller_fmu" / "law.py", "model.mass * n  #", "2.0 * model.mass * n  #")
+    replace(sources / "controller_fmu" / "sliding_mode" / "law.py", "model.mass * n  #", "2.0 * model.mass * n  #")
     fmu = build(sources, tmp_path, "UnifiedController")
     assert fmu.read_bytes() != built["UnifiedController"].read_bytes()
     assert any(b"2.0 * model.mass * n" in content for content in files_of(fmu).values())
@@ -253,7 +253,7 @@ def test_a_slave_that_needs_more_than_the_standard_library_is_refused(
 
 
 def test_the_command_refuses_a_slave_that_imports_numpy_in_one_line(sources: Path, tmp_path: Path) -> None:
-    law = sources / "controller_fmu" / "law.py"
+    law = sources / "controller_fmu" / "sliding_mode" / "law.py"
     replace(law, "from typing import NamedTuple\n", "from typing import NamedTuple\n\nimport numpy as np\n")
     done = try_to_build(sources, tmp_path / "out", "UnifiedController")
     assert done.returncode == 1
@@ -278,7 +278,9 @@ def test_a_module_without_sources_is_refused_by_name() -> None:
         packaging.bundled_sources(packaging.Target("no_such_package.slave", "Slave"))
 
 
-@pytest.mark.parametrize("text", ["controller_fmu.slave", ":UnifiedController", "controller_fmu.slave:", ""])
+@pytest.mark.parametrize(
+    "text", ["controller_fmu.sliding_mode.slave", ":UnifiedController", "controller_fmu.sliding_mode.slave:", ""]
+)
 def test_a_target_must_name_module_and_class(text: str) -> None:
     with pytest.raises(packaging.PackagingError, match="expected module:Class"):
         packaging.Target.parse(text)
@@ -336,7 +338,7 @@ def test_fresh_fmus_are_up_to_date(built: dict[str, Path]) -> None:
 
 def test_an_fmu_of_other_sources_is_out_of_date(built: dict[str, Path], sources: Path, tmp_path: Path) -> None:
     shutil.copy(built["QuadrotorPlant"], tmp_path)
-    replace(sources / "controller_fmu" / "law.py", "model.mass * n  #", "2.0 * model.mass * n  #")
+    replace(sources / "controller_fmu" / "sliding_mode" / "law.py", "model.mass * n  #", "2.0 * model.mass * n  #")
     build(sources, tmp_path, "UnifiedController")
     assert fmus.out_of_date(MODELS, tmp_path) == ["UnifiedController"]
 

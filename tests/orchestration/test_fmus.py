@@ -108,7 +108,9 @@ def test_modification_times_do_not_matter(project: Path, built: dict[str, Path])
 
 
 def test_a_build_that_fails_says_why_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    done = subprocess.CompletedProcess([], 1, stdout="", stderr="Traceback …\ncontroller_fmu/law.py:3: imports numpy\n")
+    done = subprocess.CompletedProcess(
+        [], 1, stdout="", stderr="Traceback …\ncontroller_fmu/sliding_mode/law.py:3: imports numpy\n"
+    )
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: done)
-    with pytest.raises(QuadcosimError, match=r"failed: controller_fmu/law.py:3: imports numpy$"):
+    with pytest.raises(QuadcosimError, match=r"failed: controller_fmu/sliding_mode/law.py:3: imports numpy$"):
         fmus.build(["UnifiedController"], tmp_path)

@@ -14,7 +14,13 @@ from types import ModuleType
 from tests.fmus.expected import COMMAND, MEASUREMENT
 from tests.fmus.instance import Instance
 
-INSTALLED = ("fmu_kit", "controller_fmu", "controller_fmu.law", "controller_fmu.slave", "pythonfmu")
+INSTALLED = (
+    "fmu_kit",
+    "controller_fmu",
+    "controller_fmu.sliding_mode.law",
+    "controller_fmu.sliding_mode.slave",
+    "pythonfmu",
+)
 
 
 def import_installed() -> list[ModuleType]:

@@ -11,9 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pythonfmu.enums import Fmi2Status
 
-from controller_fmu.interface import UNIFIED
-from controller_fmu.law import Gains, Measurement, Model, evaluate
-from controller_fmu.slave import UnifiedController
+from controller_fmu.sliding_mode.interface import UNIFIED
+from controller_fmu.sliding_mode.law import Gains, evaluate
+from controller_fmu.sliding_mode.slave import UnifiedController
+from controller_fmu.vehicle import Measurement, Model
 from fmu_kit.algebra import ZERO, Inertia, Quaternion, Vec3
 from fmu_kit.failure import Failure
 from fmu_kit.trajectory import Reference, Trajectory
@@ -536,7 +537,7 @@ def test_an_error_of_python_is_reported_with_its_place_in_the_first_line(monkeyp
     with pytest.raises(Failure) as caught:
         slave.do_step(0.0, 0.01)
     first = str(caught.value).partition("\n")[0]
-    assert re.fullmatch(r"AttributeError\(.*\) in controller_fmu/slave.py, line \d+", first)
+    assert re.fullmatch(r"AttributeError\(.*\) in controller_fmu/sampled.py, line \d+", first)
 
 
 # -- state ----------------------------------------------------------------------------------------------------

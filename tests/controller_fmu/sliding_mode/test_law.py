@@ -14,21 +14,20 @@ import sympy
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from controller_fmu.law import (
+from controller_fmu.sliding_mode.law import (
     DesiredRate,
     Evaluation,
     Gains,
-    Measurement,
-    Model,
     desired_attitude,
     evaluate,
     surface,
 )
+from controller_fmu.vehicle import Measurement, Model
 from fmu_kit.algebra import ZERO, Inertia, Quaternion, Vec3
 from fmu_kit.errors import DivergenceError
 from fmu_kit.scalar import FLOAT, ScalarOps
 from fmu_kit.trajectory import Reference, Trajectory
-from orchestration.reference import NUMPY
+from orchestration.stepping.sources import NUMPY
 from plant_fmu.dynamics import Body, RigidState, Wrench, derivative
 from plant_fmu.integrator import rk4_step
 from tests.reference.tables import LAWS, law_at

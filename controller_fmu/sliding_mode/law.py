@@ -12,7 +12,8 @@ errors are actual minus desired.
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from fmu_kit.algebra import Inertia, Quaternion, Vec3
+from controller_fmu.vehicle import Measurement, Model
+from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.errors import DivergenceError
 from fmu_kit.scalar import FLOAT, Scalar, ScalarOps
 from fmu_kit.trajectory import Reference
@@ -46,31 +47,6 @@ class Gains:
 
     0: none; 1: as the energy is printed; k_q: as Ψ is printed.
     """
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Model:
-    """The rigid body the law believes in."""
-
-    mass: float = 1.0
-    """m [kg]"""
-    inertia: Inertia = Inertia(xx=1.0, yy=1.0, zz=1.0)
-    """J [kg·m²], body frame"""
-    gravity: float = 9.81
-    """g [m/s²]"""
-
-
-class Measurement(NamedTuple):
-    """What the controller is told of the vehicle."""
-
-    position: Vec3
-    """P [m], inertial"""
-    velocity: Vec3
-    """V [m/s], inertial"""
-    quaternion: Quaternion
-    """Q, unit, inertial to body"""
-    angular_velocity: Vec3
-    """Ω [rad/s], body"""
 
 
 class Evaluation(NamedTuple):

@@ -1,39 +1,38 @@
-"""The controller as an FMU: reads the inputs, evaluates the law, holds the command."""
+"""A controller behind its own sample clock: what the FMUs of all controllers do, whatever their law."""
 
-from controller_fmu.interface import UNIFIED
-from controller_fmu.law import Evaluation, Gains, Measurement, Model, evaluate
+from abc import abstractmethod
+
 from controller_fmu.sample_clock import SampleClock
-from fmu_kit.errors import require, require_finite_state
+from controller_fmu.vehicle import Measurement, Model
+from fmu_kit.errors import require
 from fmu_kit.saved_state import State
 from fmu_kit.slave import Slave
 from fmu_kit.trajectory import Reference, Trajectory
 
 SHORTEST_PERIOD = 1e-9
 """[s]; sample times further apart than a nanosecond stay distinct floats for days"""
-_RESULTS = ("thrust", "torque.x", "torque.y", "torque.z", "energy")
 
 
-class UnifiedController(Slave):
-    """The unified finite-time sliding-mode controller behind its own sample clock."""
+class SampledController(Slave):
+    """Evaluates a law when a sample is due, and holds its command: laws define `read_gains` and `control`.
 
-    variables = UNIFIED
-    description = "Unified finite-time sliding-mode quaternion tracking controller for a quadrotor, sampled"
+    Their variables are those of `controller_fmu.interface` and what they add.
+    """
+
     initial_outputs_depend_on_inputs = True
 
+    @abstractmethod
+    def read_gains(self) -> None:
+        """Take over the parameters of the law."""
+
+    @abstractmethod
+    def control(self, measurement: Measurement, reference: Reference) -> None:
+        """Evaluate the law and write its command and locals."""
+
     def read_parameters(self) -> None:
-        """Build the nominal model, the gains, the trajectory and the clock."""
+        """Build the nominal model, the trajectory and the law; check the clock."""
         self._model = Model(mass=self.real("mass"), inertia=self.inertia(), gravity=self.real("gravity"))
-        self._gains = Gains(
-            k_t=self.vec3("gain.translation"),
-            beta=self.real("gain.disturbance"),
-            k_s=self.real("gain.surface"),
-            beta_t=self.real("surface_exponent"),
-            epsilon=self.real("boundary_layer"),
-            k_eta=self.real("gain.eta"),
-            k_theta=self.real("gain.theta"),
-            k_q=self.real("gain.attitude"),
-            kappa=self.real("coupling"),
-        )
+        self.read_gains()
         self._trajectory = Trajectory(
             amplitude_x=self.real("trajectory.amplitude_x"),
             amplitude_y=self.real("trajectory.amplitude_y"),
@@ -83,9 +82,7 @@ class UnifiedController(Slave):
             quaternion.unit(),
             self.vec3("angular_velocity"),
         )
-        evaluation = evaluate(measurement, self._reference(t), self._gains, self._model)
-        require_finite_state(_RESULTS, (evaluation.thrust, *evaluation.torque, evaluation.energy))
-        self._write(evaluation)
+        self.control(measurement, self._reference(t))
 
     def _reference(self, t: float) -> Reference:
         if not self._use_reference_inputs:
@@ -106,16 +103,3 @@ class UnifiedController(Slave):
         self.put("thrust", self._model.mass * self._model.gravity)
         for axis in "xyz":
             self.put(f"torque.{axis}", 0.0)
-
-    def _write(self, evaluation: Evaluation) -> None:
-        self.put("thrust", evaluation.thrust)
-        self.put_vec3("torque", evaluation.torque)
-        self.put_quaternion("desired_quaternion", evaluation.desired_quaternion)
-        self.put_vec3("position_error", evaluation.position_error)
-        self.put_vec3("velocity_error", evaluation.velocity_error)
-        self.put_quaternion("attitude_error", evaluation.attitude_error)
-        self.put_vec3("angular_velocity_error", evaluation.angular_velocity_error)
-        self.put_vec3("sliding", evaluation.sliding)
-        self.put_vec3("theta", evaluation.theta)
-        self.put_vec3("desired_angular_velocity", evaluation.desired_angular_velocity)
-        self.put("energy", evaluation.energy)

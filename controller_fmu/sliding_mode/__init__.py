@@ -1,0 +1,1 @@
+"""The unified (not time-scale-separated) finite-time sliding-mode controller."""

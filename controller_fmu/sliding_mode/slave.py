@@ -1,0 +1,50 @@
+"""The controller as an FMU: evaluates the law at its samples, and writes what it computed."""
+
+from controller_fmu.sampled import SampledController
+from controller_fmu.sliding_mode.interface import UNIFIED
+from controller_fmu.sliding_mode.law import Evaluation, Gains, evaluate
+from controller_fmu.vehicle import Measurement
+from fmu_kit.errors import require_finite_state
+from fmu_kit.trajectory import Reference
+
+_RESULTS = ("thrust", "torque.x", "torque.y", "torque.z", "energy")
+
+
+class UnifiedController(SampledController):
+    """The unified finite-time sliding-mode controller behind its own sample clock."""
+
+    variables = UNIFIED
+    description = "Unified finite-time sliding-mode quaternion tracking controller for a quadrotor, sampled"
+
+    def read_gains(self) -> None:
+        """Take over the gains."""
+        self._gains = Gains(
+            k_t=self.vec3("gain.translation"),
+            beta=self.real("gain.disturbance"),
+            k_s=self.real("gain.surface"),
+            beta_t=self.real("surface_exponent"),
+            epsilon=self.real("boundary_layer"),
+            k_eta=self.real("gain.eta"),
+            k_theta=self.real("gain.theta"),
+            k_q=self.real("gain.attitude"),
+            kappa=self.real("coupling"),
+        )
+
+    def control(self, measurement: Measurement, reference: Reference) -> None:
+        """Evaluate the law; raises `DivergenceError` if it has no finite command."""
+        evaluation = evaluate(measurement, reference, self._gains, self._model)
+        require_finite_state(_RESULTS, (evaluation.thrust, *evaluation.torque, evaluation.energy))
+        self._write(evaluation)
+
+    def _write(self, evaluation: Evaluation) -> None:
+        self.put("thrust", evaluation.thrust)
+        self.put_vec3("torque", evaluation.torque)
+        self.put_quaternion("desired_quaternion", evaluation.desired_quaternion)
+        self.put_vec3("position_error", evaluation.position_error)
+        self.put_vec3("velocity_error", evaluation.velocity_error)
+        self.put_quaternion("attitude_error", evaluation.attitude_error)
+        self.put_vec3("angular_velocity_error", evaluation.angular_velocity_error)
+        self.put_vec3("sliding", evaluation.sliding)
+        self.put_vec3("theta", evaluation.theta)
+        self.put_vec3("desired_angular_velocity", evaluation.desired_angular_velocity)
+        self.put("energy", evaluation.energy)
