@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 import typer.core
 
+from orchestration import system_commands
 from orchestration.child import misleading_variables
 from orchestration.errors import QuadcosimError, SimulatorError, UsageError, shown
 from orchestration.flags import FlightFlags, flies, request_from, scenario_from
@@ -225,6 +226,7 @@ def ssp(
     print(system.write(scenario_from(scenario, flags), path, say))
 
 
+system_commands.register(app)
 studies.register(app)
 interop.register(app)
 

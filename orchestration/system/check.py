@@ -5,7 +5,8 @@ import math
 from collections.abc import Iterable, Mapping
 
 from orchestration.errors import UsageError, expected_name
-from orchestration.fmi.model import NUMERIC, Kind, Model, Variable
+from orchestration.fmi.model import NUMERIC, Model, Variable
+from orchestration.system.conversion import BECOMES, OtherQuantity, conversion
 from orchestration.system.model import Connection, Parameter, System, component_of, variable_of
 
 
@@ -73,24 +74,28 @@ def _check_pair(place: str, x: Connection, start: End, end: End) -> None:
         raise UsageError(f"{place}.from: {start[0]} is a {output.kind}; only {_list(NUMERIC)} can be connected")
     receiver = _expect_input(f"{place}.to", end[0], end)
     _check_kinds(place, start[0], output, end[0], receiver)
-    converted = x.scale != 1.0 or x.offset != 0.0
-    if output.unit and receiver.unit and output.unit != receiver.unit and not converted:
-        factor = _factor(model, output, end[1], receiver)
-        raise UsageError(
-            f"{place}: {start[0]} is in {output.unit}, {end[0]} in {receiver.unit}; expected the same unit{factor}"
-        )
+    if x.scale == 1.0 and x.offset == 0.0:
+        _check_units(place, start[0], model, output, end[0], end[1], receiver)
+
+
+def _check_units(
+    place: str, start: str, sender: Model, output: Variable, end: str, receiver: Model, into: Variable
+) -> None:
+    """Units that differ need a conversion, which is proposed; two spellings of one unit do not."""
+    try:
+        found = conversion(sender, output, receiver, into)
+    except OtherQuantity:
+        needed = "; they are of different quantities"
+    else:
+        if found is not None and found.is_none:
+            return
+        needed = ", or scale and offset in the connection" if found is None else f": {found} in the connection"
+    raise UsageError(f"{place}: {start} is in {output.unit}, {end} in {into.unit}; expected the same unit{needed}")
 
 
 def _check_kinds(place: str, start: str, output: Variable, end: str, receiver: Variable) -> None:
-    """Anything becomes a Real; a Boolean becomes a number; a Real becomes nothing else by itself."""
-    allowed: dict[Kind, tuple[Kind, ...]] = {
-        "Real": ("Real",),
-        "Integer": ("Real", "Integer", "Enumeration"),
-        "Enumeration": ("Real", "Integer", "Enumeration"),
-        "Boolean": ("Real", "Integer", "Boolean"),
-    }
-    if receiver.kind not in allowed[output.kind]:
-        expected = _list(kind for kind in NUMERIC if kind in allowed[output.kind])
+    if receiver.kind not in BECOMES[output.kind]:
+        expected = _list(kind for kind in NUMERIC if kind in BECOMES[output.kind])
         raise UsageError(f"{place}: {start} is a {output.kind}, {end} a {receiver.kind}; expected {expected}")
 
 
@@ -146,23 +151,6 @@ def _check_parameter(place: str, model: Model, name: str, value: Parameter, is_f
 
 def _is_number(value: object) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _factor(sender: Model, output: Variable, receiver: Model, into: Variable) -> str:
-    """The conversion to propose, where both units are defined by the same base units."""
-    ends = []
-    for model, variable in ((sender, output), (receiver, into)):
-        unit = next((u for u in model.description.unitDefinitions if u.name == variable.unit), None)
-        base = getattr(unit, "baseUnit", None)
-        if base is None:
-            return ", or scale and offset in the connection"
-        exponents = tuple(getattr(base, key) for key in ("kg", "m", "s", "A", "K", "mol", "cd", "rad"))
-        ends.append((exponents, float(base.factor), float(base.offset)))
-    (kinds, factor, offset), (others, by, plus) = ends
-    if kinds != others:
-        return "; they are of different quantities"
-    scale, added = factor / by, (offset - plus) / by
-    return f": scale = {scale:.12g}" + (f" and offset = {added:.12g}" if added else "") + " in the connection"
 
 
 def _list(names: Iterable[str], most: int = 12) -> str:

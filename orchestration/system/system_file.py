@@ -128,8 +128,8 @@ def schema() -> dict[str, Any]:
     """The JSON schema of a system file."""
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "quadcosim system",
         **SystemTable.model_json_schema(by_alias=True),
+        "title": "quadcosim system",
     }
 
 

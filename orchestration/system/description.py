@@ -1,0 +1,115 @@
+"""A system in words: its components with their rates, its connections with what happens to their messages."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from orchestration.system.model import Component, Connection, Sampling, Source, System, variable_of
+
+
+def as_text(system: System) -> str:
+    """Components, connections, sources, objectives and the criterion, a line each, columns aligned."""
+    components = [(name, _fmu(c), rate(c), _parameters(c)) for name, c in system.components.items()]
+    connections = [
+        (x.name, f"{x.sender} -> {x.receiver}", timing(x) or "at once", signals(x)) for x in system.connections
+    ]
+    sources = [(name, what(s), ", ".join(_shortened(s.to)) or "(objectives)") for name, s in system.sources.items()]
+    criterion = system.criterion
+    criteria = [("good", criterion.good), ("diverged", criterion.diverged)]
+    sections: list[tuple[str, Sequence[Sequence[str]]]] = [
+        ("components", components),
+        ("connections", connections),
+        ("sources", sources),
+        ("objectives", [(name, " ".join(text.split())) for name, text in system.objectives.items()]),
+        ("criterion", [(name, " ".join(text.split())) for name, text in criteria if text is not None]),
+    ]
+    head = f"{len(system.components)} components, {len(system.connections)} connections, {system.stop_time:g} s"
+    return "\n".join([head, *(line for title, rows in sections if rows for line in ("", title, *_table(rows)))])
+
+
+def rate(component: Component) -> str:
+    """How a component is stepped."""
+    if component.sampling is None:
+        return f"continuous, step {seconds(component.step or 0.0)}" + (
+            ", moved to its own grid" if component.align == "next" else ""
+        )
+    return sampled(component.sampling)
+
+
+def sampled(sampling: Sampling) -> str:
+    """When a digital task runs."""
+    parts = [f"every {seconds(sampling.period)}"]
+    parts += [f"from {seconds(sampling.offset)}"] if sampling.offset else []
+    parts += [f"jitter {seconds(sampling.jitter)} {sampling.jitter_distribution}"] if sampling.jitter else []
+    parts += [f"clock {sampling.clock_ratio:g} times true time"] if sampling.clock_ratio != 1.0 else []
+    parts += ["by its own clock"] if sampling.clock == "fmu" else []
+    return ", ".join(parts)
+
+
+def signals(x: Connection) -> str:
+    """What it carries, vectors as a whole; with the names at the receiver where they are others."""
+    names, others = (list(map(variable_of, ends)) for ends in (x.start, x.end))
+    carried = ", ".join(_shortened(names))
+    return carried if names == others else f"{carried} -> {', '.join(_shortened(others))}"
+
+
+def timing(x: Connection) -> str:
+    """What happens to the messages of a connection; empty if they arrive as they are, at once."""
+    parts = [f"delay {seconds(x.delay)}"] if x.delay else []
+    parts += [f"delay jitter {seconds(x.delay_jitter)} {x.jitter_distribution}"] if x.delay_jitter else []
+    if x.loss:
+        bursts = f" in bursts of {x.burst_length:g}" if x.burst_length is not None else ""
+        parts.append(f"loss {100.0 * x.loss:g} %{bursts}")
+    parts += ["hold first"] if x.hold == "first" else []
+    for kind in ("noise", "quantisation"):
+        given = {name: value for name, value in getattr(x, kind).items() if value}
+        same = len(set(given.values())) == 1 and len(given) == len(x.start)
+        named = [f"{next(iter(given.values())):g}"] if same else [f"{name} {value:g}" for name, value in given.items()]
+        parts += [f"{kind} {', '.join(named)}"] if given else []
+    parts += [f"times {x.scale:g}"] if x.scale != 1.0 else []
+    parts += [f"plus {x.offset:g}"] if x.offset else []
+    parts += ["jacobi"] if x.order == "jacobi" else []
+    return ", ".join(parts)
+
+
+def what(source: Source) -> str:
+    """What a source is."""
+    if source.constant is not None:
+        return f"constant {source.constant:g}"
+    if source.noise is not None:
+        return f"white noise of intensity {source.noise:g}, held {seconds(source.period or 0.0)}"
+    return f"file {source.file.name}" if source.file is not None else f"trajectory of {source.trajectory}"
+
+
+def seconds(value: float) -> str:
+    """A time with the unit that makes it readable."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if value >= size or value == 0.0:
+            return f"{value / size:.9g} {unit}"
+    return f"{value / 1e-9:.9g} ns"
+
+
+def _fmu(component: Component) -> str:
+    return Path(component.fmu).name
+
+
+def _parameters(component: Component) -> str:
+    return ", ".join(f"{name} = {value}" for name, value in component.parameters.items())
+
+
+def _shortened(names: Sequence[str], most: int = 6) -> list[str]:
+    """Scalars of one vector by the vector's name, as `position.{x,y,z}`; no more than `most`."""
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        stem, dot, last = name.rpartition(".")
+        groups.setdefault(stem if dot else name, []).append(f"{dot}{last}" if dot else "")
+    named = [
+        f"{stem}{parts[0]}" if len(parts) == 1 else f"{stem}.{{{','.join(part[1:] for part in parts)}}}"
+        for stem, parts in groups.items()
+    ]
+    return named if len(named) <= most else [*named[: most - 1], f"{len(named) - most + 1} more"]
+
+
+def _table(rows: Sequence[Sequence[str]]) -> list[str]:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows)
+    return [f"  {line}".rstrip() for line in lines]

@@ -1,0 +1,188 @@
+"""A system as a figure: components in a row, messages forward in lanes above them and back in lanes below."""
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyBboxPatch
+
+from orchestration.errors import UsageError
+from orchestration.system.description import rate, timing, what
+from orchestration.system.model import System, component_of, variable_of
+
+MOST = 40
+"""Boxes in a row that can still be read"""
+PITCH, WIDTH, HEIGHT, LANE = 4.2, 2.6, 1.5, 0.75
+"""Between boxes, of a box, between lanes [inch]"""
+CONTINUOUS, SAMPLED, SOURCE, LINE = "#dcebf5", "#fbe6d0", "#ececec", "#444444"
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Box:
+    title: str
+    lines: tuple[str, ...]
+    color: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Arrow:
+    start: int
+    end: int
+    name: str
+    text: str
+    """what travels, and what happens to it"""
+    is_late: bool
+
+    @property
+    def span(self) -> tuple[int, int]:
+        """Of the boxes that it passes."""
+        return min(self.start, self.end), max(self.start, self.end)
+
+
+def write(system: System, path: Path) -> Path:
+    """Draw a system into a file whose ending says the format; raises `UsageError` for one that cannot be."""
+    figure = draw(system)
+    formats = figure.canvas.get_supported_filetypes()
+    if path.suffix[1:].lower() not in formats:
+        raise UsageError(f"--out {path}: expected a figure ending in one of {', '.join(sorted(formats))}")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path)
+    return path
+
+
+def draw(system: System) -> Figure:
+    """Boxes with what steps them, arrows with what they carry; dashed where messages come late or not at all."""
+    boxes = _boxes(system)
+    if len(boxes) > MOST:
+        raise UsageError(f"--out: {len(boxes)} components and sources; expected at most {MOST} in a figure")
+    places = {name: i for i, name in enumerate(boxes)}
+    arrows = _arrows(system, places)
+    ahead = _lanes([a for a in arrows if a.start < a.end])
+    back = _lanes([a for a in arrows if a.start >= a.end])
+    above, below = (1 + max(lanes.values(), default=-1) for lanes in (ahead, back))
+    top, bottom = HEIGHT / 2 + LANE * (above + 0.6), -HEIGHT / 2 - LANE * (below + 0.6)
+    left, right = -0.7 * PITCH / 2 - 0.4, PITCH * (len(boxes) - 1) + 0.7 * PITCH / 2 + 0.4
+    figure = Figure(figsize=(right - left, top - bottom), dpi=110)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
+    axes.set_axis_off()
+    for lanes, side in ((ahead, 1.0), (back, -1.0)):
+        ports = _ports(lanes)
+        for arrow, lane in lanes.items():
+            _draw_arrow(axes, arrow, side, HEIGHT / 2 + LANE * (lane + 0.8), ports)
+    for place, box in enumerate(boxes.values()):
+        _draw_box(axes, PITCH * place, box)
+    return figure
+
+
+def _boxes(system: System) -> dict[str, _Box]:
+    """By name, in the order in which they stand: the sources that feed something, then the components."""
+    sources = {
+        f"sources.{name}": _Box(title=name, lines=(what(source),), color=SOURCE)
+        for name, source in system.sources.items()
+        if source.to
+    }
+    components = {
+        name: _Box(
+            title=name,
+            lines=(Path(component.fmu).name, rate(component)),
+            color=CONTINUOUS if component.sampling is None else SAMPLED,
+        )
+        for name, component in system.components.items()
+    }
+    return {**sources, **{name: components[name] for name in _in_a_row(system)}}
+
+
+def _in_a_row(system: System) -> list[str]:
+    """Components so that neighbours are those that feed each other, starting with the first of the file."""
+    left = list(system.components)
+    row: list[str] = []
+    while left:
+        nexts = [x.receiver for x in system.connections if row and x.sender == row[-1] and x.receiver in left]
+        row.append(nexts[0] if nexts else left[0])
+        left.remove(row[-1])
+    return row
+
+
+def _arrows(system: System, places: Mapping[str, int]) -> list[_Arrow]:
+    arrows = []
+    for name, source in system.sources.items():
+        for receiver in dict.fromkeys(map(component_of, source.to)):
+            fed = [variable_of(end) for end in source.to if component_of(end) == receiver]
+            start, end = places[f"sources.{name}"], places[receiver]
+            arrows.append(_Arrow(start=start, end=end, name="", text=_listed(fed), is_late=False))
+    for x in system.connections:
+        arrows.append(
+            _Arrow(
+                start=places[x.sender],
+                end=places[x.receiver],
+                name="" if x.name.isdecimal() else x.name,
+                text="\n".join(filter(None, (_listed([variable_of(end) for end in x.start]), timing(x)))),
+                is_late=bool(x.delay or x.delay_jitter or x.loss),
+            )
+        )
+    return arrows
+
+
+def _listed(names: Sequence[str], most: int = 4) -> str:
+    stems = list(dict.fromkeys(name.rpartition(".")[0] or name for name in names)) if len(names) > most else list(names)
+    return ", ".join(stems[:most]) + (f" and {len(stems) - most} more" if len(stems) > most else "")
+
+
+def _lanes(arrows: Sequence[_Arrow]) -> dict[_Arrow, int]:
+    """The lane of each arrow, short ones near the boxes, so that no two overlap."""
+    lanes: dict[_Arrow, int] = {}
+    for arrow in sorted(arrows, key=lambda a: (a.span[1] - a.span[0], a.span)):
+        low, high = arrow.span
+        taken = {
+            lane
+            for other, lane in lanes.items()
+            if other.span[0] < max(high, low + 1) and low < max(other.span[1], other.span[0] + 1)
+        }
+        lanes[arrow] = next(lane for lane in range(len(arrows)) if lane not in taken)
+    return lanes
+
+
+Port = tuple[_Arrow, str]
+
+
+def _ports(lanes: Mapping[_Arrow, int]) -> dict[Port, float]:
+    """Where arrows leave and enter, spread over the width of their boxes; far ends outside, so that few cross."""
+    ends: dict[int, list[tuple[float, Port]]] = {}
+    for arrow, lane in lanes.items():
+        low, high = arrow.span
+        for which, here, other in (("start", arrow.start, arrow.end), ("end", arrow.end, arrow.start)):
+            side = 0.0 if low == high else (1.0 if other > here else -1.0)
+            near = side * (100.0 - lane) + (0.1 if which == "start" else 0.0)
+            ends.setdefault(here, []).append((near, (arrow, which)))
+    found = {}
+    for place, members in ends.items():
+        for k, (_, port) in enumerate(sorted(members, key=lambda member: member[0])):
+            found[port] = PITCH * place + WIDTH * ((k + 1) / (len(members) + 1) - 0.5)
+    return found
+
+
+def _draw_box(axes: Axes, x: float, box: _Box) -> None:
+    style = "round,pad=0,rounding_size=0.12"
+    axes.add_patch(
+        FancyBboxPatch((x - WIDTH / 2, -HEIGHT / 2), WIDTH, HEIGHT, boxstyle=style, facecolor=box.color, edgecolor=LINE)
+    )
+    lines = [part for line in box.lines for part in textwrap.wrap(line, 28)]
+    axes.text(x, 0.42, "\n".join(textwrap.wrap(box.title, 22)[:1]), ha="center", va="center", weight="bold", size=11)
+    axes.text(x, -0.16, "\n".join(lines[:4]), ha="center", va="center", size=8.5)
+
+
+def _draw_arrow(axes: Axes, arrow: _Arrow, side: float, height: float, ports: Mapping[Port, float]) -> None:
+    start, end = ports[arrow, "start"], ports[arrow, "end"]
+    style = "--" if arrow.is_late else "-"
+    axes.plot([start, start, end, end], [side * y for y in (HEIGHT / 2, height, height, HEIGHT / 2 + 0.1)],
+              linestyle=style, color=LINE, linewidth=1.2)  # fmt: skip
+    axes.plot(end, side * (HEIGHT / 2 + 0.07), marker="v" if side > 0 else "^", color=LINE, markersize=7)
+    width = max(30, int(abs(end - start) * 13))
+    name = f"{arrow.name}: " if arrow.name else ""
+    text = "\n".join(part for line in f"{name}{arrow.text}".split("\n") for part in textwrap.wrap(line, width)[:2])
+    axes.text((start + end) / 2, side * height, text, ha="center", va="center", size=8.5,
+              bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5})  # fmt: skip

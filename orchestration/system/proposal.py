@@ -1,0 +1,137 @@
+"""A system file for some FMUs, proposed from what they say of themselves, with comments on what it leaves open."""
+
+import itertools
+import json
+import os
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from orchestration.errors import UsageError
+from orchestration.fmi.model import NUMERIC, Model
+from orchestration.system.matching import Match, match
+from orchestration.system.model import component_of
+
+STEP, PERIOD, STOP = 0.001, 0.01, 10.0
+"""[s], where no FMU says how it is meant to be run"""
+WIDTH = 110
+"""Characters of a line beyond which a list has a line for each of its members"""
+TAKEN = frozenset(("rows", "time", "stop_time", "sampled"))
+"""Names that no component can have"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Proposal:
+    """A system file as text, and what it does not decide."""
+
+    text: str
+    undecided: tuple[str, ...]
+
+
+def propose(fmus: Sequence[tuple[str, Model]], folder: Path) -> Proposal:
+    """Components named after their models, connected by name, type and unit; for a file that lies in `folder`.
+
+    Each FMU is given by the path or name that the user wrote, with what it says of itself.
+
+    One whose outputs are all discrete is proposed as sampled, any other in continuous time. Raises `UsageError`
+    without any FMU.
+    """
+    if not fmus:
+        raise UsageError("expected at least one FMU")
+    models = [model for _, model in fmus]
+    named = dict(zip(_names(models), models))
+    matches = match(named)
+    stop = max((_experiment(model, "stopTime") or 0.0 for model in models), default=0.0) or STOP
+    blocks = [
+        [
+            "# Proposed from what the FMUs say of themselves. Look at each line: names are no proof.",
+            f"stop_time = {stop!r}",
+        ],
+        *(_component(name, text, model, folder) for name, (text, model) in zip(named, fmus)),
+        *_connections(sorted(matches.found, key=lambda m: list(named).index(component_of(m.start)))),
+    ]
+    if matches.undecided:
+        blocks.append(["# Not decided:", *(f"# - {line}" for line in matches.undecided)])
+    first = next((f"{n}.{v}" for n, model in named.items() for v in model.names("output", kinds=("Real",))), None)
+    if first is not None:
+        blocks.append(["# What a run comes to, for instance:", "# [objectives]", f'# peak = "max(abs({first}))"'])
+    return Proposal(text="\n\n".join("\n".join(block) for block in blocks) + "\n", undecided=matches.undecided)
+
+
+def _names(models: Iterable[Model]) -> list[str]:
+    """The models' names as names of components, each once."""
+    names: list[str] = []
+    for model in models:
+        plain = re.sub(r"\W+", "_", model.name.rpartition(".")[2], flags=re.ASCII).strip("_") or "component"
+        plain = f"_{plain}" if plain[0].isdigit() else plain
+        numbered = (plain, *(f"{plain}_{k}" for k in range(2, 2 + len(names))), f"{plain}_{2 + len(names)}")
+        names.append(next(name for name in numbered if name not in names and name not in TAKEN))
+    return names
+
+
+def _component(name: str, fmu: str, model: Model, folder: Path) -> list[str]:
+    place = _relative(Path(fmu), folder) if fmu.endswith(".fmu") else fmu
+    lines = [f"[components.{name}]", f"fmu = {_text(place)}"]
+    step = _experiment(model, "stepSize")
+    outputs = [model.variables[v] for v in model.names("output", kinds=NUMERIC)]
+    if outputs and all(output.variability != "continuous" for output in outputs):
+        said = "" if step else "; its FMU does not say how often"
+        lines.append(
+            f"sampling = {{ period = {step or PERIOD!r} }}    # sampled, as all its outputs are discrete{said}"
+        )
+    else:
+        said = "" if step else "    # its FMU does not say how long"
+        lines.append(f"step = {step or STEP!r}{said}")
+    return lines
+
+
+def _relative(path: Path, folder: Path) -> str:
+    try:
+        return Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
+    except ValueError:  # another drive
+        return path.absolute().as_posix()
+
+
+def _experiment(model: Model, key: str) -> float | None:
+    """A number of the FMU's default experiment, if it is there and positive."""
+    try:
+        value = float(getattr(model.description.defaultExperiment, key, None) or 0.0)
+    except ValueError:
+        return None
+    return value if value > 0.0 else None
+
+
+def _connections(found: Sequence[Match]) -> list[list[str]]:
+    """A message for each pair of components, or more where signals are converted differently."""
+    groups: dict[tuple[str, str, str], list[Match]] = {}
+    for m in found:
+        pair = component_of(m.start), component_of(m.end)
+        groups.setdefault((*pair, "" if m.conversion.is_none else str(m.conversion)), []).append(m)
+    counts: dict[str, itertools.count[int]] = {}
+    blocks = []
+    for (sender, receiver, converted), members in groups.items():
+        base = f"{sender}_to_{receiver}"
+        count = next(counts.setdefault(base, itertools.count(1)))
+        blocks.append(_connection(base if count == 1 else f"{base}_{count}", members, converted))
+    return blocks
+
+
+def _connection(name: str, members: Sequence[Match], converted: str) -> list[str]:
+    lines = ["[[connections]]", f"name = {_text(name)}"]
+    lines += _list("from", [m.start for m in members])
+    lines += _list("to", [m.end for m in members])
+    if converted:
+        conversion = members[0].conversion
+        lines.append(f"scale = {conversion.scale!r}    # its units differ")
+        lines += [f"offset = {conversion.offset!r}"] if conversion.offset else []
+    return [*(f"# {m.end} has {m.start} because {m.why}" for m in members if m.why is not None), *lines]
+
+
+def _list(key: str, ends: Sequence[str]) -> list[str]:
+    line = f"{key} = [{', '.join(map(_text, ends))}]"
+    return [line] if len(line) <= WIDTH else [f"{key} = [", *(f"    {_text(end)}," for end in ends), "]"]
+
+
+def _text(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
