@@ -8,6 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from orchestration.clock import Clock, random_streams
+from orchestration.flight import prepared
+from orchestration.master import Board, Signals
 
 from controller_fmu.sliding_mode.law import Gains, evaluate
 from controller_fmu.vehicle import Measurement, Model
@@ -15,10 +18,7 @@ from fmu_kit import packaging
 from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.trajectory import Trajectory
 from orchestration import wiring
-from orchestration.clock import Clock, random_streams
-from orchestration.flight import prepared
 from orchestration.fmpy_adapter import FmuSimulator
-from orchestration.master import Board, Signals
 from orchestration.scenario import FmuChoice, Scenario
 from orchestration.timing import Timing
 from plant_fmu.dynamics import Body, RigidState, Wind, Wrench, derivative

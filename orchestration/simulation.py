@@ -1,5 +1,6 @@
 """From a system to a result: instantiates its FMUs, lets the master step them, computes the objectives."""
 
+import functools
 import importlib.metadata
 import platform
 import time
@@ -7,12 +8,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fmu_kit.packaging import read_source_hash
 from fmu_kit.trajectory import Trajectory
 from orchestration import fmus
 from orchestration.errors import UsageError
@@ -150,7 +149,7 @@ def prepared(
         with in_its_own_words(asked):
             for name, component in system.components.items():
                 _set_parameters(instances[name], component)
-                _set_clock(instances[name], component, paths[name])
+                _set_clock(instances[name], component, models[name])
             sources = {name: _source(system, name, parameters, streams) for name in system.sources}
             signals = {name: signals_of(name, system) for name in sources}
             master = Master(
@@ -212,6 +211,7 @@ def provenance(instances: Mapping[str, FmuSimulator]) -> dict[str, Any]:
     }
 
 
+@functools.cache
 def _version(package: str) -> str:
     try:
         return importlib.metadata.version(package)
@@ -224,7 +224,7 @@ def _set_parameters(instance: FmuSimulator, component: Component) -> None:
         instance.set(name, value)
 
 
-def _set_clock(instance: FmuSimulator, component: Component, path: Path) -> None:
+def _set_clock(instance: FmuSimulator, component: Component, model: Model) -> None:
     """A component built on `fmu_kit` samples at every step that it is given, unless it is to keep its own clock."""
     sampling = component.sampling
     if sampling is None or SAMPLE_PERIOD not in instance.variables:
@@ -240,7 +240,7 @@ def _set_clock(instance: FmuSimulator, component: Component, path: Path) -> None
     if sampling.clock == "fmu":
         instance.set(SAMPLE_PERIOD, sampling.period)
         instance.set(SAMPLE_OFFSET, sampling.offset)
-    elif read_source_hash(path) is not None:
+    elif model.is_of_this_kit:
         instance.set(SAMPLE_PERIOD, 0.0)
         instance.set(SAMPLE_OFFSET, 0.0)
 

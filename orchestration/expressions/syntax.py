@@ -2,6 +2,7 @@
 
 import ast
 import difflib
+import functools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -69,6 +70,7 @@ class Sampled:
 Node: TypeAlias = Number | Name | Operation | Call | Sampled
 
 
+@functools.lru_cache(maxsize=1024)
 def parse(text: str) -> Node:
     """The tree of an expression; raises `UsageError` naming what is not part of the language."""
     if not isinstance(text, str) or len(text) > LONGEST:

@@ -1,17 +1,20 @@
 """What an FMU says of itself, in one form for FMI 2.0 and FMI 3.0."""
 
 import difflib
+import functools
 import itertools
 import math
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
 import fmpy
 from fmpy.model_description import ModelDescription, ModelVariable
 
+from fmu_kit.packaging import read_source_hash
 from orchestration.errors import UsageError
 
 Kind = Literal["Real", "Integer", "Boolean", "Enumeration", "String", "Binary", "Clock"]
@@ -53,6 +56,11 @@ class Model:
     variables: Mapping[str, Variable]
     initial_dependencies: Mapping[str, frozenset[str] | None]
     """by output, the inputs that it depends on at initialisation; None: all"""
+
+    @cached_property
+    def is_of_this_kit(self) -> bool:
+        """Whether it is built on `fmu_kit`, and so has the conventions of its slaves."""
+        return read_source_hash(self.path) is not None
 
     @property
     def name(self) -> str:
@@ -113,7 +121,19 @@ def read_description(path: Path) -> ModelDescription:
 
 
 def read_model(path: Path) -> Model:
-    """Read what a co-simulation FMU says of itself; raises `UsageError` as `read_description` does."""
+    """Read what a co-simulation FMU says of itself; raises `UsageError` as `read_description` does.
+
+    It is read once in a process, as long as the file is the same.
+    """
+    try:
+        about = path.stat()
+    except OSError:
+        return _read_model(path, 0, 0)
+    return _read_model(path, about.st_mtime_ns, about.st_size)
+
+
+@functools.lru_cache(maxsize=64)
+def _read_model(path: Path, changed: int, size: int) -> Model:
     description = read_description(path)
     variables = {v.name: v for declared in description.modelVariables for v in _scalars(declared)}
     return Model(
