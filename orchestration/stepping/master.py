@@ -97,7 +97,7 @@ class Master:
         self._system, self._simulators, self._agenda = system, simulators, agenda
         self._plan = plan = Plan(system)
         self._names = names = list(system.components)
-        self._sources, self._interrupted, self._recorder = list(sources), interrupted, recorder
+        self._sources, self._interrupted, self.recorder = list(sources), interrupted, recorder
         self.columns = (*board.columns, *(signal for signals, _ in self._sources for signal in signals))
         """of every row: those of the board, then the signals of the sources"""
         self._rows = bytearray()  # not handed over yet, and the times of `events` may lie before them
@@ -350,7 +350,7 @@ class Master:
             self._hand_over()
 
     def _hand_over(self) -> None:
-        self._recorder.take(self.pending())
+        self.recorder.take(self.pending())
         self.events = [event for event in self.events if event[0] > self.now]
         self._rows.clear()
         self._handed_over = True

@@ -63,7 +63,14 @@ def system(components, connections=(), stop_time=1.0, **keys):
 
 
 def column(master, name):
-    return master.rows()[:, master.board.columns.index(name)]
+    """A column of what a master has recorded in memory."""
+    chunks = master.recorder.chunks()
+    return np.concatenate([chunk.rows[:, chunk.columns.index(name)] for chunk in chunks])
+
+
+def events(master):
+    """What happened, in order of time."""
+    return [event for chunk in master.recorder.chunks() for event in chunk.events]
 
 
 def near(values):

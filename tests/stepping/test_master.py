@@ -5,16 +5,19 @@ import math
 import pytest
 
 from orchestration.errors import SimulatorError
+from orchestration.recording import InMemory
 from orchestration.stepping.agenda import Agenda
 from orchestration.stepping.master import Master
 from orchestration.stepping.streams import Streams
-from tests.stepping.stubs import Stub, clock, column, continuous, near, sampled, system, wire
+from tests.stepping.stubs import Stub, clock, column, continuous, events, near, sampled, system, wire
 
 
 def run(what, stubs, **keys):
     streams = Streams(what.seed, what.streams)
     recorded = {name: ["y"] if "y" in stub.values else [] for name, stub in stubs.items()}
-    master = Master(what, stubs, agenda=Agenda(what, streams), streams=streams, recorded=recorded, **keys)
+    master = Master(
+        what, stubs, agenda=Agenda(what, streams), streams=streams, recorded=recorded, recorder=InMemory(), **keys
+    )  # fmt: skip
     master.initialise()
     master.run()
     return master
@@ -78,7 +81,7 @@ def test_events_name_the_connection():
         stop_time=0.3,
     )
     master = run(what, {"plant": Stub(clock, y=0.0, u=0.0), "controller": Stub(x=0.0, y=0.0)})
-    assert [(time // 1_000_000, kind, name, k) for time, kind, name, k in master.events] == [
+    assert [(time // 1_000_000, kind, name, k) for time, kind, name, k in events(master)] == [
         (0, "sampled", "level", 0), (0, "sent", "valve", 0), (50, "arrived", "valve", 0),
         (200, "sampled", "level", 1), (200, "sent", "valve", 1), (250, "arrived", "valve", 1),
     ]  # fmt: skip
