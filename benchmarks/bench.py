@@ -18,7 +18,7 @@ from fmu_kit import packaging
 from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.trajectory import Trajectory
 from orchestration import wiring
-from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.scenario import FmuChoice, Scenario
 from orchestration.timing import Timing
 from plant_fmu.dynamics import Body, RigidState, Wind, Wrench, derivative
@@ -86,8 +86,8 @@ def loop(scenario: Scenario) -> float:
 def bare(scenario: Scenario) -> float:
     """The same FMI calls as the master makes in a step, and nothing else."""
     with (
-        FmuSimulator(Path(scenario.plant.fmu), "plant") as plant_fmu,
-        FmuSimulator(Path(scenario.controller.fmu), "controller") as controller_fmu,
+        Fmi2Instance(Path(scenario.plant.fmu), "plant") as plant_fmu,
+        Fmi2Instance(Path(scenario.controller.fmu), "controller") as controller_fmu,
     ):
         board = Board(
             Signals(plant=plant_fmu.names("output", "local"), controller=controller_fmu.names("output", "local"))

@@ -2,6 +2,8 @@
 
 import os
 import sys
+import threading
+import time
 from pathlib import Path
 
 ROOT = str(Path(__file__).resolve().parent.parent)
@@ -30,3 +32,14 @@ def undisturbed_environment() -> dict[str, str]:
     """`environment` without them."""
     kept = {name: value for name, value in os.environ.items() if name not in _MISLEADING}
     return {**kept, "PYTHONPATH": ROOT}
+
+
+def end_with_parent() -> None:
+    """Called in a child: it ends when the process that started it does, whatever it is doing then."""
+    threading.Thread(target=_end_after, args=(os.getppid(),), daemon=True).start()
+
+
+def _end_after(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(0.5)
+    os._exit(1)

@@ -15,9 +15,10 @@ import numpy as np
 from fmu_kit.trajectory import Trajectory
 from orchestration import fmus
 from orchestration.errors import UsageError
-from orchestration.fleet import Loader
+from orchestration.fmi.instance import Instance, Loader
+from orchestration.fmi.instances import open_instance
 from orchestration.fmi.model import NUMERIC, Model, read_model
-from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.fmi.values import number_of
 from orchestration.interrupt import Interrupt, Interrupted, interrupts_held_back
 from orchestration.quadrotor.translation import in_its_own_words, system_of, warnings
 from orchestration.recording import InMemory, Recorder
@@ -64,7 +65,7 @@ class Simulation:
     """as the user wrote it"""
     system: System
     """what it means"""
-    instances: Mapping[str, FmuSimulator]
+    instances: Mapping[str, Instance]
     parameters: Mapping[str, float]
     """all numeric parameters of all components, as COMPONENT.NAME"""
     master: Master
@@ -126,7 +127,7 @@ def prepared(
     asked: Scenario | System,
     announce: Announce | None = None,
     *,
-    load: Loader = FmuSimulator,
+    load: Loader = open_instance,
     recorder: Recorder | None = None,
 ) -> Iterator[Simulation]:
     """The FMUs of a system, built if need be, instantiated by `load` and with their parameters.
@@ -198,7 +199,7 @@ def columns_of(system: System) -> tuple[str, ...]:
     return ("time", *dict.fromkeys((*applied, *exchanged, *sources)))
 
 
-def provenance(instances: Mapping[str, FmuSimulator]) -> dict[str, Any]:
+def provenance(instances: Mapping[str, Instance]) -> dict[str, Any]:
     """What the numbers of a run came from: versions of the software and GUIDs of the FMUs."""
     packages = ("quadcosim", "numpy", "fmpy", "pythonfmu")
     return {
@@ -219,12 +220,12 @@ def _version(package: str) -> str:
         return "not installed"
 
 
-def _set_parameters(instance: FmuSimulator, component: Component) -> None:
+def _set_parameters(instance: Instance, component: Component) -> None:
     for name, value in component.parameters.items():
         instance.set(name, value)
 
 
-def _set_clock(instance: FmuSimulator, component: Component, model: Model) -> None:
+def _set_clock(instance: Instance, component: Component, model: Model) -> None:
     """A component built on `fmu_kit` samples at every step that it is given, unless it is to keep its own clock."""
     sampling = component.sampling
     if sampling is None or SAMPLE_PERIOD not in instance.variables:
@@ -252,8 +253,7 @@ def _parameters(system: System, models: Mapping[str, Model]) -> dict[str, float]
         for variable in model.variables.values():
             value = given.get(variable.name, variable.start)
             if variable.causality == "parameter" and variable.kind in NUMERIC and value is not None:
-                number = {"true": 1.0, "false": 0.0}.get(str(value).lower(), value)
-                found[f"{name}.{variable.name}"] = float(number)
+                found[f"{name}.{variable.name}"] = number_of(variable, value)
     return found
 
 
@@ -277,7 +277,7 @@ def _source(system: System, name: str, parameters: Mapping[str, float], streams:
     return BuiltIn(Trajectory(**given))
 
 
-def _feeds(system: System, sources: Mapping[str, Values], instances: Mapping[str, FmuSimulator]) -> list[Feed]:
+def _feeds(system: System, sources: Mapping[str, Values], instances: Mapping[str, Instance]) -> list[Feed]:
     feeds = []
     for name, values in sources.items():
         ends = system.sources[name].to

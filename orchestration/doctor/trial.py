@@ -113,8 +113,8 @@ def _load(fmu: Fmu, folder: Path) -> None:
     import fmpy
     from fmpy import fmi2
 
-    from orchestration.fmpy_adapter import expect_readable_place, release_interpreter_state
-    from orchestration.messages import Message, collecting_callbacks, words
+    from orchestration.fmi.messages import Message, collecting_callbacks, words
+    from orchestration.fmi.pythonfmu import expect_readable_place, release_interpreter_state
 
     if fmpy.platform not in fmpy.supported_platforms(str(fmu.path)):
         raise QuadcosimError(f"has no binary for {fmpy.platform}")

@@ -9,7 +9,7 @@ from orchestration.doctor.binaries import LINUX, WINDOWS
 from orchestration.doctor.dependencies import PYTHON_DLL, lacking, part_for
 from orchestration.doctor.machine import Machine
 from orchestration.doctor.pythons import BY_LOADER, ON_PATH, PRELOADED, PythonLibrary
-from orchestration.fmpy_adapter import uri_is_read
+from orchestration.fmi.pythonfmu import uri_is_read
 
 TOLD = "QUADCOSIM_LIBPYTHON"
 """The variable by which the loader in an FMU is told of a libpython."""

@@ -38,8 +38,12 @@ class Variable:
     reference: int
     element: int
     """place within the array, 0 for a scalar"""
+    length: int
+    """of that array; 0 for a scalar"""
     minimum: float | None
     maximum: float | None
+    choices: Mapping[str, int]
+    """items of an Enumeration, by name"""
 
     @property
     def is_settable(self) -> bool:
@@ -89,13 +93,13 @@ class Model:
         return bool(self.description.coSimulation.canBeInstantiatedOnlyOncePerProcess)
 
     def variable(self, name: str, place: str) -> Variable:
-        """A variable by name; raises `UsageError` naming those that are near."""
+        """A variable by name; raises `UsageError` naming the place and the variables that are near."""
         if name in self.variables:
             return self.variables[name]
         near = difflib.get_close_matches(name, list(self.variables), n=3)
         hint = f"did you mean {' or '.join(near)}? " if near else ""
         settable = [v.name for v in self.variables.values() if v.causality == "parameter"]
-        raise UsageError(f"{place}: {self.name} has no variable {name}; {hint}its parameters are {_listed(settable)}")
+        raise UsageError(f"{place}: {self.name} has no such variable; {hint}its parameters are {_listed(settable)}")
 
     def names(self, *causalities: str, kinds: tuple[Kind, ...] = NUMERIC) -> tuple[str, ...]:
         """Variables of these causalities and types, in the order of the description."""
@@ -169,8 +173,10 @@ def _scalars(declared: ModelVariable) -> list[Variable]:
                 start=start,
                 reference=declared.valueReference,
                 element=element,
+                length=math.prod(shape) if shape else 0,
                 minimum=_number(declared.min),
                 maximum=_number(declared.max),
+                choices={i.name: int(i.value) for i in getattr(declared.declaredType, "items", ())},
             )
         )
     return found
@@ -186,17 +192,19 @@ def _number(text: str | None) -> float | None:
 
 def _dependencies(description: ModelDescription, variables: Mapping[str, Variable]) -> dict[str, frozenset[str] | None]:
     """Declared dependencies of outputs at initialisation, on inputs; what is not listed depends on nothing."""
-    names: dict[int, list[str]] = {}
+    names: dict[tuple[str, int], list[str]] = {}  # FMI 2.0 counts references by type
     for variable in variables.values():
-        names.setdefault(variable.reference, []).append(variable.name)
+        names.setdefault((variable.type, variable.reference), []).append(variable.name)
     inputs = {v.name for v in variables.values() if v.causality == "input"}
     listed = description.initialUnknowns
     nothing: frozenset[str] | None = frozenset() if listed else None
     found: dict[str, frozenset[str] | None] = {v.name: nothing for v in variables.values() if v.causality == "output"}
     for unknown in listed:
         needed = unknown.dependencies
-        which = None if needed is None else frozenset(n for v in needed for n in names[v.valueReference]) & inputs
-        for name in names.get(unknown.variable.valueReference, ()):
+        which = (
+            None if needed is None else frozenset(n for v in needed for n in names[v.type, v.valueReference]) & inputs
+        )
+        for name in names.get((unknown.variable.type, unknown.variable.valueReference), ()):
             found[name] = which
     return found
 

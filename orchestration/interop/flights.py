@@ -8,7 +8,7 @@ import numpy as np
 
 from orchestration import child, fmus, ssp
 from orchestration.errors import QuadcosimError, UsageError
-from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.interop.catalogue import Tool
 from orchestration.interop.job import SIGNALS, Job
 from orchestration.interop.trace import PORTS, Trace, read_trace, traced_copy
@@ -86,9 +86,9 @@ class Flights:
             late = 0.0 if order == "gauss-seidel" else self.step
             scenario = self._scenario.with_changes(timing={"clock": "fmu", "delay": late})
 
-            def load(path: Path, instance_name: str) -> FmuSimulator:
+            def load(path: Path, instance_name: str) -> Fmi2Instance:
                 if not start:
-                    return FmuSimulator(path, instance_name)
+                    return Fmi2Instance(path, instance_name)
                 return _GivenStart(path, instance_name, *start[instance_name])
 
             with prepared(scenario, load=load) as flight:
@@ -101,7 +101,7 @@ class Flights:
         return self._own[key]
 
 
-class _GivenStart(FmuSimulator):
+class _GivenStart(Fmi2Instance):
     """An FMU whose connected inputs are given ones until its first step is over, whatever the master sends."""
 
     def __init__(self, path: Path, name: str, initial: Sequence[float], first: Sequence[float]) -> None:

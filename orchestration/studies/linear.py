@@ -18,8 +18,8 @@ import numpy as np
 
 from orchestration import wiring
 from orchestration.errors import UsageError
-from orchestration.fleet import Fleet
-from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.fmi.instance import Instance
+from orchestration.fmi.reuse import Instances
 from orchestration.scenario import Scenario
 from orchestration.simulation import prepared
 from orchestration.simulator import Floats
@@ -81,13 +81,13 @@ class HoverLoop:
     @classmethod
     def of(cls, scenario: Scenario) -> "HoverLoop":
         """The loop of `scenario`; raises `UsageError` if hover is not an equilibrium of it."""
-        hover, fleet = _located(hover_of(scenario)), Fleet()
+        hover, fleet = _located(hover_of(scenario)), Instances()
         trim, feedback = _controller_at_hover(hover, fleet)
         return cls(feedback, PlantStep(hover, fleet, trim))
 
     def with_law(self, scenario: Scenario) -> "HoverLoop":
         """The loop of the same plant with the controller of `scenario`, whose command at hover must be the same."""
-        _, feedback = _controller_at_hover(_located(hover_of(scenario)), Fleet())
+        _, feedback = _controller_at_hover(_located(hover_of(scenario)), Instances())
         return HoverLoop(feedback, self._step)
 
     def spectral_radius(self, period: float, delay: float) -> float:
@@ -117,7 +117,7 @@ class PlantStep:
     are known by what they do to the vehicle in one more plant interval.
     """
 
-    def __init__(self, hover: Scenario, fleet: Fleet, trim: Floats) -> None:
+    def __init__(self, hover: Scenario, fleet: Instances, trim: Floats) -> None:
         self._hover, self._fleet, self._trim = hover, fleet, trim
         self._interval = hover.timing.plant_interval
         self._lags = True  # until the differences say otherwise
@@ -164,7 +164,7 @@ class PlantStep:
         return np.column_stack([(plus - minus) / (2.0 * STEP) for plus, minus in flown])
 
     @contextmanager
-    def _plant(self, parameters: dict[str, float] | None = None) -> Iterator[FmuSimulator]:
+    def _plant(self, parameters: dict[str, float] | None = None) -> Iterator[Instance]:
         changed = {f"plant.{name}": value for name, value in (parameters or {}).items()}
         with prepared(self._hover.with_changes(parameters=changed), load=self._fleet.load) as flight:
             yield flight.instances["plant"]
@@ -175,7 +175,7 @@ class PlantStep:
             _initialise(plant, wiring.COMMAND, command)
             return plant.save()
 
-    def _after(self, plant: FmuSimulator, state: bytes, command: Floats, h: float) -> Floats:
+    def _after(self, plant: Instance, state: bytes, command: Floats, h: float) -> Floats:
         """The vehicle after `h` [s] under `command`, and if the actuators lag a plant interval later under the trim."""
         plant.restore(state)
         found = []
@@ -201,7 +201,7 @@ _UNITS = np.eye(_COMMANDS)
 _BOTH_WAYS = (STEP, -STEP)
 
 
-def _controller_at_hover(hover: Scenario, fleet: Fleet) -> tuple[Floats, Floats]:
+def _controller_at_hover(hover: Scenario, fleet: Instances) -> tuple[Floats, Floats]:
     """The command at hover and its derivative by the coordinates, shape (4, 12)."""
     with prepared(hover, load=fleet.load) as flight:
         controller = flight.instances["controller"]
@@ -223,7 +223,7 @@ def _controller_at_hover(hover: Scenario, fleet: Fleet) -> tuple[Floats, Floats]
         return command(at_rest), np.column_stack(columns)
 
 
-def _value(fmu: FmuSimulator, name: str, *, absent: float) -> float:
+def _value(fmu: Instance, name: str, *, absent: float) -> float:
     """What a Real variable of an FMU is; `absent` if it has none of that name."""
     if name not in fmu.variables:
         return absent
@@ -245,7 +245,7 @@ def _measurement(initial: dict[str, float]) -> Floats:
     return np.array([at_rest.get(f"initial.{name}", 0.0) for name in wiring.MEASUREMENT])
 
 
-def _initialise(fmu: FmuSimulator, inputs: tuple[str, ...], values: Floats) -> None:
+def _initialise(fmu: Instance, inputs: tuple[str, ...], values: Floats) -> None:
     fmu.enter_initialization(0.0, 1.0)
     fmu.writer(inputs, values)()
     fmu.exit_initialization()

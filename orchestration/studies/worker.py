@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.errors import QuadcosimError, SimulatorError, UsageError
-from orchestration.fleet import Fleet
-from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.fmi.instance import Instance
+from orchestration.fmi.reuse import Instances
 from orchestration.result import Result
 from orchestration.scenario import Scenario
 from orchestration.simulation import prepared
@@ -59,7 +59,7 @@ class Hangar:
     """The FMUs of this process, instantiated once; one run at a time."""
 
     def __init__(self, machine: str | None = None) -> None:
-        self._fleet = Fleet()
+        self._fleet = Instances()
         self._machine = machine
 
     def fly(self, task: Task) -> Outcome:
@@ -88,7 +88,7 @@ class Hangar:
         )
 
     @contextmanager
-    def _load(self, path: Path, instance_name: str) -> Iterator[FmuSimulator]:
+    def _load(self, path: Path, instance_name: str) -> Iterator[Instance]:
         """An FMU that does not load has not been told yet what run it is for."""
         with ExitStack() as stack:
             try:

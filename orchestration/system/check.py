@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 
 from orchestration.errors import UsageError, expected_name
 from orchestration.fmi.model import NUMERIC, Model, Variable
+from orchestration.fmi.values import taken
 from orchestration.system.conversion import BECOMES, OtherQuantity, conversion
 from orchestration.system.model import Connection, Parameter, System, component_of, variable_of
 
@@ -132,14 +133,8 @@ def _check_parameter(place: str, model: Model, name: str, value: Parameter, is_f
     if not variable.is_settable or is_fed:
         expected = "a parameter or an input that nothing is connected to"
         raise UsageError(f"{place}: is {'connected' if is_fed else _article(variable)}; expected {expected}")
-    fits, expected = {
-        "Boolean": (isinstance(value, bool), "true or false"),
-        "String": (isinstance(value, str), "a text"),
-        "Integer": (isinstance(value, int) and not isinstance(value, bool), "a whole number"),
-        "Enumeration": (isinstance(value, (int, str)) and not isinstance(value, bool), "a name or whole number of it"),
-    }.get(variable.kind, (_is_number(value), "a finite number"))
-    if not fits:
-        raise UsageError(f"{place} = {value}: expected {expected}")
+    if isinstance(taken(variable, value, place), float) and not _is_number(value):
+        raise UsageError(f"{place} = {value}: expected a finite number")
     low, high = variable.minimum, variable.maximum
     outside = (low is not None and value < low) or (high is not None and value > high) if _is_number(value) else False  # type: ignore[operator]
     if outside:

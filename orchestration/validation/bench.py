@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from orchestration.messages import Message
+from orchestration.fmi.messages import Message
 from orchestration.validation.finding import Note
 from orchestration.validation.fmu import Fmu, Variable
 from orchestration.validation.instance import Instance, RefusedError, Row, Value, Values, same

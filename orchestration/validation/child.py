@@ -10,7 +10,7 @@ from pathlib import Path
 import fmpy
 
 from orchestration.confined import Limits, restrict
-from orchestration.fmpy_adapter import expect_readable_place
+from orchestration.fmi.pythonfmu import expect_readable_place
 from orchestration.validation import rules, runs
 from orchestration.validation.archive import UnreadableError, can_be_unpacked, read_archive
 from orchestration.validation.bench import Bench

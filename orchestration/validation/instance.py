@@ -9,8 +9,8 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
 from orchestration.errors import QuadcosimError
-from orchestration.fmpy_adapter import release_interpreter_state
-from orchestration.messages import Message, collecting_callbacks, words
+from orchestration.fmi.messages import Message, collecting_callbacks, words
+from orchestration.fmi.pythonfmu import release_interpreter_state
 from orchestration.validation.fmu import Fmu, Variable
 
 Value: TypeAlias = float | int | bool | str

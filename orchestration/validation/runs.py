@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
-from orchestration.messages import WARNING
+from orchestration.fmi.messages import WARNING
 from orchestration.validation.bench import PLAIN, Bench, Plan
 from orchestration.validation.finding import Note
 from orchestration.validation.fmu import Variable

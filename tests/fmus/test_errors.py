@@ -13,7 +13,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 
 from orchestration.errors import SimulatorError, UsageError
-from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.wiring import MODELS
 from tests.fmus.archive import without_loader
 from tests.fmus.instance import Instance
@@ -21,16 +21,16 @@ from tests.fmus.process import run, run_script
 
 PLANT, CONTROLLER = "QuadrotorPlant", "UnifiedController"
 Values = dict[str, float | bool]
-Make = Callable[[str], FmuSimulator]
+Make = Callable[[str], Fmi2Instance]
 
 
 @pytest.fixture
 def make(built: dict[str, Path]) -> Iterator[Make]:
     """Makes simulators that are closed when the test ends."""
-    made: list[FmuSimulator] = []
+    made: list[Fmi2Instance] = []
 
-    def make(model: str) -> FmuSimulator:
-        made.append(FmuSimulator(built[model], "it"))
+    def make(model: str) -> Fmi2Instance:
+        made.append(Fmi2Instance(built[model], "it"))
         return made[-1]
 
     yield make
@@ -38,7 +38,7 @@ def make(built: dict[str, Path]) -> Iterator[Make]:
         simulator.close()
 
 
-def initialise(simulator: FmuSimulator, values: Values) -> None:
+def initialise(simulator: Fmi2Instance, values: Values) -> None:
     for name, value in values.items():
         simulator.set(name, value)
     simulator.enter_initialization(0.0, 1.0)
@@ -333,9 +333,9 @@ LOAD = """
 import sys
 from pathlib import Path
 from orchestration.errors import QuadcosimError
-from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.fmi.fmi2 import Fmi2Instance
 try:
-    FmuSimulator(Path(sys.argv[1]), "it").close()
+    Fmi2Instance(Path(sys.argv[1]), "it").close()
 except QuadcosimError as error:
     sys.exit(str(error))
 """

@@ -8,7 +8,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 
 from orchestration.errors import SimulatorError
-from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.fmi.fmi2 import Fmi2Instance
 from tests.fmus.flights import FLIGHTS, Flight
 from tests.fmus.instance import Instance
 from tests.fmus.process import run_script
@@ -194,12 +194,12 @@ def test_the_state_of_the_other_model_is_refused_in_words(mine: str, other: str,
 
 
 def test_the_adapter_refuses_the_state_of_the_other_model_in_the_words_of_the_fmu(built: dict[str, Path]) -> None:
-    with FmuSimulator(built["UnifiedController"], "controller") as controller:
+    with Fmi2Instance(built["UnifiedController"], "controller") as controller:
         controller.enter_initialization(0.0, 1.0)
         controller.exit_initialization()
         content = controller.save()
     with (
-        FmuSimulator(built["QuadrotorPlant"], "plant") as plant,
+        Fmi2Instance(built["QuadrotorPlant"], "plant") as plant,
         pytest.raises(SimulatorError, match=r"FMU state \(model, number of Reals\) = \('UnifiedController', "),
     ):
         plant.restore(content)

@@ -8,7 +8,7 @@ import pytest
 from orchestration.flight import run
 
 from orchestration import Scenario
-from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.interop.table import AIM
 from orchestration.simulator import Floats
 from orchestration.system.times import NANOSECONDS
@@ -33,7 +33,7 @@ def replayed(fmu: Path, flight: tuple[Floats, Floats], point: Point) -> float:
     """How far the plant alone, given the flight's commands at the steps of `point`, is from the flight."""
     states, commands = flight
     given, found, farthest = np.zeros(len(COMMAND)), np.zeros(len(MEASUREMENT)), 0.0
-    with FmuSimulator(fmu, "plant") as plant:
+    with Fmi2Instance(fmu, "plant") as plant:
         write, read = plant.writer(COMMAND, given), plant.reader(MEASUREMENT, found)
         plant.enter_initialization(0.0, H * STEPS)
         given[:] = commands[0]

@@ -18,7 +18,7 @@ import pytest
 import orchestration
 from fmu_kit.trajectory import Trajectory
 from orchestration import FlightInterrupted, Result, Scenario, SimulatorError, Timing, UsageError
-from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.scenario import FmuChoice, Record, ReferenceChoice
 from orchestration.wiring import COMMAND, MEASUREMENT, REFERENCE
 
@@ -423,7 +423,7 @@ def test_ctrl_c_is_not_blamed_on_an_fmu_that_is_python() -> None:
 
 
 def test_ctrl_c_before_the_first_instant_ends_the_flight_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(FmuSimulator, "enter_initialization", lambda *_: signal.raise_signal(signal.SIGINT))
+    monkeypatch.setattr(Fmi2Instance, "enter_initialization", lambda *_: signal.raise_signal(signal.SIGINT))
     with pytest.raises(KeyboardInterrupt):
         orchestration.run(Scenario(stop_time=1.0))
 
@@ -433,7 +433,7 @@ def test_an_error_after_ctrl_c_is_ctrl_c(monkeypatch: pytest.MonkeyPatch) -> Non
         signal.raise_signal(signal.SIGINT)
         raise SimulatorError("plant: KeyboardInterrupt()")
 
-    monkeypatch.setattr(FmuSimulator, "step", fail)
+    monkeypatch.setattr(Fmi2Instance, "step", fail)
     with pytest.raises(KeyboardInterrupt):
         orchestration.run(Scenario(stop_time=1.0))
 
@@ -444,6 +444,6 @@ def test_the_second_ctrl_c_does_not_wait(monkeypatch: pytest.MonkeyPatch) -> Non
         signal.raise_signal(signal.SIGINT)
         raise AssertionError("went on")
 
-    monkeypatch.setattr(FmuSimulator, "step", hang)
+    monkeypatch.setattr(Fmi2Instance, "step", hang)
     with pytest.raises(KeyboardInterrupt):
         orchestration.run(Scenario(stop_time=1.0))

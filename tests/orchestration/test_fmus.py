@@ -8,7 +8,7 @@ import platformdirs
 import pytest
 
 from orchestration import QuadcosimError, UsageError, fmus
-from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.wiring import MODELS
 
 
@@ -53,7 +53,7 @@ def test_a_folder_that_cannot_be_written_is_not_used(
 def test_an_fmu_is_built_into_the_cache_and_loads_from_there(project: Path, tmp_path: Path) -> None:
     path = fmus.locate("QuadrotorPlant")
     assert path == tmp_path / "cache" / "quadcosim" / "fmus" / "QuadrotorPlant.fmu"
-    with FmuSimulator(path, "plant") as plant:
+    with Fmi2Instance(path, "plant") as plant:
         assert plant.description.modelName == "QuadrotorPlant"
 
 

@@ -5,14 +5,14 @@ from pathlib import Path
 import pytest
 
 from orchestration.errors import SimulatorError
-from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.fmi.fmi2 import Fmi2Instance
 from tests.fmus.foreign import lag, needs_compiler
 
 
 @needs_compiler
 def test_what_an_fmu_prints_like_c_is_formatted_and_told_apart_by_instance(tmp_path: Path) -> None:
     path = lag(tmp_path / "lag.fmu", "REFUSES")
-    with FmuSimulator(path, "first") as first, FmuSimulator(path, "second") as second:
+    with Fmi2Instance(path, "first") as first, Fmi2Instance(path, "second") as second:
         for one in (first, second):
             one.enter_initialization(0.0, 1.0)
             one.exit_initialization()

@@ -13,9 +13,9 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="folders have no
 
 WAITER = """
 import sys, time
-from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.fmi.fmi2 import Fmi2Instance
 from pathlib import Path
-fmu = FmuSimulator(Path(sys.argv[1]), "plant")
+fmu = Fmi2Instance(Path(sys.argv[1]), "plant")
 print("loaded", flush=True)
 time.sleep(60)
 """

@@ -17,7 +17,7 @@ from orchestration.flight import prepared
 
 import orchestration
 from orchestration import Result, Scenario, Timing, UsageError
-from orchestration.fleet import Fleet
+from orchestration.fmi.reuse import Instances
 from orchestration.scenario import FmuChoice
 from orchestration.simulator import Floats
 from orchestration.statistics import wilson
@@ -37,14 +37,14 @@ HELD = [f"plant.{name}" for name in COMMAND]
 
 
 @pytest.fixture(scope="module")
-def fleet() -> Iterator[Fleet]:
+def fleet() -> Iterator[Instances]:
     """FMUs for many short flights."""
-    made = Fleet()
+    made = Instances()
     yield made
     made.close()
 
 
-def fly(scenario: Scenario, fleet: Fleet) -> Result:
+def fly(scenario: Scenario, fleet: Instances) -> Result:
     with prepared(scenario, load=fleet.load) as flight:
         flight.master.initialise()
         flight.master.run()
@@ -150,7 +150,7 @@ def disturbed(scenario: Scenario, size: float, *coordinates: str) -> Scenario:
     return hover.with_changes(parameters={f"plant.initial.{name}": size for name in coordinates})
 
 
-def growth(scenario: Scenario, periods: int, fleet: Fleet) -> float:
+def growth(scenario: Scenario, periods: int, fleet: Instances) -> float:
     """How the error about hover grows from the second quarter of a flight to the last, from 1e-8 at first."""
     stop_time = periods * scenario.timing.period
     tilted = disturbed(scenario, 1e-8, "position.x", "position.y", "position.z", "quaternion.x", "quaternion.z")
@@ -168,7 +168,7 @@ CASES = [(0.0, 0.0, 60), (1.0, 0.0, 60), (5.0, 0.0, 60), (0.0, 0.01, 30), (1.0, 
 
 @pytest.mark.parametrize(("coupling", "delay", "periods"), CASES)
 def test_tiny_errors_shrink_one_per_cent_below_the_local_limit_and_grow_one_per_cent_above(
-    coupling: float, delay: float, periods: int, fleet: Fleet
+    coupling: float, delay: float, periods: int, fleet: Instances
 ) -> None:
     limit = theory(coupling, delay=delay)
     below, above = (
@@ -203,7 +203,7 @@ def test_a_clock_that_runs_fast_moves_the_local_limit_by_its_ratio() -> None:
 # -- the matrix against flights ---------------------------------------------------------------------------
 
 
-def flown_derivatives(scenario: Scenario, instants: Sequence[float], fleet: Fleet) -> Floats:
+def flown_derivatives(scenario: Scenario, instants: Sequence[float], fleet: Instances) -> Floats:
     """d(vehicle, command)/d(vehicle at 0) through the master at each instant, shape (n, 16, 12)."""
     size = 1e-6
     moved = []
@@ -213,7 +213,7 @@ def flown_derivatives(scenario: Scenario, instants: Sequence[float], fleet: Flee
     return np.stack(moved, axis=-1)
 
 
-def values_at(scenario: Scenario, instants: Sequence[float], fleet: Fleet) -> Floats:
+def values_at(scenario: Scenario, instants: Sequence[float], fleet: Instances) -> Floats:
     """The twelve coordinates and the command that the plant has at each instant, shape (n, 16)."""
     result = fly(dataclasses.replace(scenario, stop_time=max(instants)), fleet)
     time = np.round(result.signals["time"] * NANOSECONDS).astype(int)
@@ -222,7 +222,7 @@ def values_at(scenario: Scenario, instants: Sequence[float], fleet: Fleet) -> Fl
     return values
 
 
-def expect_powers(matrix: Floats, scenario: Scenario, fleet: Fleet) -> None:
+def expect_powers(matrix: Floats, scenario: Scenario, fleet: Instances) -> None:
     """Expect d(vehicle after k periods)/d(vehicle) to be that of the k-th power of `matrix`, flown."""
     period = scenario.timing.period
     first, *flown = flown_derivatives(scenario, [k * period for k in range(6)], fleet)
@@ -246,7 +246,7 @@ LOOPS: list[tuple[dict[str, Any], float, int]] = [
 
 @pytest.mark.parametrize(("timing", "lag", "size"), LOOPS)
 def test_powers_of_the_matrix_are_derivatives_of_whole_periods_of_flight(
-    timing: dict[str, Any], lag: float, size: int, fleet: Fleet
+    timing: dict[str, Any], lag: float, size: int, fleet: Instances
 ) -> None:
     base = scenario_of(plant_interval=0.005, **timing)
     base = base.with_changes(parameters={"plant.actuator_time_constant": lag})
@@ -285,7 +285,7 @@ def test_differences_stay_inside_a_boundary_layer_that_is_small() -> None:
     )
 
 
-def test_with_jacobi_order_the_loop_is_that_of_a_delay_of_one_period(fleet: Fleet) -> None:
+def test_with_jacobi_order_the_loop_is_that_of_a_delay_of_one_period(fleet: Instances) -> None:
     jacobi = scenario_of(plant_interval=0.005, period=0.03, order="jacobi")
     expect_powers(HoverLoop.of(jacobi).matrix(0.03, 0.03), jacobi, fleet)
 
@@ -313,7 +313,7 @@ def test_the_wind_and_the_reference_of_a_scenario_do_not_change_its_local_limit(
     assert local_limit(HoverLoop.of(scenario), scenario, "period") == theory()
 
 
-def test_hover_stays_at_hover(fleet: Fleet) -> None:
+def test_hover_stays_at_hover(fleet: Instances) -> None:
     result = fly(dataclasses.replace(hover_of(scenario_of()), stop_time=1.0), fleet)
     assert max(float(np.abs(result.signals[name]).max()) for name in SAMPLED) < 1e-12
 

@@ -16,7 +16,7 @@ import pytest
 
 import orchestration
 from orchestration import QuadcosimError, UsageError
-from orchestration.fmpy_adapter import FmuSimulator
+from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.scenario import FmuChoice, Record, Scenario
 from orchestration.studies import engine
 from orchestration.studies import sweep as sweeps
@@ -595,12 +595,12 @@ def instantiated(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Names of the instances that are made, in order."""
     names: list[str] = []
 
-    class Counted(FmuSimulator):
+    class Counted(Fmi2Instance):
         def __init__(self, path: Path, instance_name: str) -> None:
             names.append(instance_name)
             super().__init__(path, instance_name)
 
-    monkeypatch.setattr("orchestration.fleet.FmuSimulator", Counted)
+    monkeypatch.setattr("orchestration.fmi.reuse.open_instance", Counted)
     return names
 
 

@@ -16,11 +16,10 @@ import fmpy
 from fmpy import fmi2
 from fmpy.fmi1 import printLogMessage
 
+from orchestration.fmi import pythonfmu
+
 Message: TypeAlias = tuple[int, bytes | None, bytes]
 """Status, category and text of what an FMU logged"""
-
-PYTHONFMU_ENTRY = Path("resources", "slavemodule.txt")
-"""The file by which an unpacked FMU is known to be one of pythonfmu"""
 
 WARNING: int = fmi2.fmi2Warning
 
@@ -32,14 +31,13 @@ _by_name: dict[bytes, list[Message]] = {}
 def collecting_callbacks(messages: list[Message], name: str, folder: Path) -> fmi2.fmi2CallbackFunctions:
     """Callbacks that collect in `messages` what the instance `name` of the FMU unpacked in `folder` logs.
 
-    pythonfmu passes no arguments, only doubled percent signs; what it logs is taken as it comes, since the compiled
-    logger would cut it off after 2047 bytes.
+    What pythonfmu logs is taken as it comes, since the compiled logger would cut it off after 2047 bytes.
     """
     callbacks = fmi2.fmi2CallbackFunctions()
     callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
     callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
     add_formatting = getattr(fmi2, "addLoggerProxy", None)  # fmpy has none for some platforms
-    if add_formatting is None or (folder / PYTHONFMU_ENTRY).is_file():
+    if add_formatting is None or pythonfmu.is_made_by_it(folder):
         callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(_logger_of(messages))
         return callbacks
     environment = next(_environments)
@@ -55,15 +53,13 @@ def words(messages: Sequence[Message], otherwise: str) -> tuple[str, str]:
     """The first line of the first message of a failure, and what follows it; `otherwise` if there is none."""
     bad = [message for message in messages if message[0] > WARNING]
     text = bad[0][2].decode("utf-8", "replace") if bad else otherwise
-    if text.startswith("Fatal py exception"):  # pythonfmu's own line comes before the slave's text
-        text = text.partition("\n")[2]
-    summary, _, details = text.partition("\n")
+    summary, _, details = pythonfmu.without_banner(text).partition("\n")
     return summary, details
 
 
 def _logger_of(messages: list[Message]) -> Any:
     def log(environment: Any, instance: bytes, status: int, category: bytes | None, message: bytes | None) -> None:
-        messages.append((status, category, (message or b"").replace(b"%%", b"%")))
+        messages.append((status, category, pythonfmu.logged(message or b"")))
 
     return log
 

@@ -1,0 +1,63 @@
+"""An instance of an FMI 2.0 FMU for co-simulation."""
+
+import ctypes
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from fmpy import fmi2
+
+from orchestration.errors import UsageError
+from orchestration.fmi.messages import WARNING, collecting_callbacks
+from orchestration.fmi.native import NativeInstance, Numbers
+from orchestration.simulator import Transfer
+
+
+class Fmi2Instance(NativeInstance):
+    """See `NativeInstance`."""
+
+    stored: ClassVar = {"Real": np.float64, "Integer": np.int32, "Boolean": np.int32, "Enumeration": np.int32}
+    state_calls = ("getFMUstate", "serializeFMUstate", "freeFMUstate", "deSerializeFMUstate", "setFMUstate")
+
+    def _expect_supported(self) -> None:
+        if self.model.version != 2:
+            raise UsageError(f"{self.path}: FMI {self.description.fmiVersion}; expected FMI 2.0 for co-simulation")
+
+    def _instantiated(self, folder: Path) -> Any:
+        fmu = fmi2.FMU2Slave(
+            guid=self.description.guid,
+            unzipDirectory=str(folder),
+            modelIdentifier=self.description.coSimulation.modelIdentifier,
+            instanceName=self.name,
+        )
+        fmu.instantiate(callbacks=collecting_callbacks(self._messages, self.name, folder), loggingOn=True)
+        self._do_step = fmu.dll.fmi2DoStep
+        return fmu
+
+    def _enter(self, start: float, stop: float) -> None:
+        self._call("setupExperiment", startTime=start, stopTime=stop)
+        self._call("enterInitializationMode")
+
+    def step(self, t: float, h: float) -> None:
+        """Advance from `t` to `t + h` seconds."""
+        if self._do_step(self._component, t, h, True) > WARNING:
+            raise self._failure("fmi2DoStep")
+        if self._messages:
+            self._collect_warnings()
+
+    def _access(self, action: str, type: str) -> str:
+        return f"fmi2{action}{'Integer' if type == 'Enumeration' else type}"
+
+    def _transfer(self, function: str, references: Sequence[int], values: Numbers) -> Transfer:
+        count = len(references)
+        of = (ctypes.c_uint32 * count)(*references)
+        kind = ctypes.c_double if values.dtype == np.float64 else ctypes.c_int32
+        at = (kind * count).from_buffer(values)  # type: ignore[arg-type]
+        call, component, failure = getattr(self._fmu.dll, function), self._component, self._failure
+
+        def transfer() -> None:
+            if call(component, of, count, at) > WARNING:
+                raise failure(function)
+
+        return transfer

@@ -1,0 +1,84 @@
+"""An instance of an FMI 3.0 FMU for co-simulation: scalars and arrays of numbers; no clocks, no event mode."""
+
+import ctypes
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from fmpy import fmi3
+
+from orchestration.errors import UsageError
+from orchestration.fmi.messages import WARNING
+from orchestration.fmi.native import NativeInstance, Numbers
+from orchestration.fmi.values import INTEGERS
+from orchestration.simulator import Transfer
+
+
+class Fmi3Instance(NativeInstance):
+    """See `NativeInstance`."""
+
+    stored: ClassVar = {
+        **INTEGERS,
+        "Float64": np.float64,
+        "Float32": np.float32,
+        "Boolean": np.bool_,
+        "Enumeration": np.int64,
+    }
+    state_calls = ("getFMUState", "serializeFMUState", "freeFMUState", "deserializeFMUState", "setFMUState")
+
+    def _expect_supported(self) -> None:
+        if self.model.version != 3:
+            raise UsageError(f"{self.path}: FMI {self.description.fmiVersion}; expected FMI 3.0 for co-simulation")
+        clocks = [v.name for v in self.variables.values() if v.kind == "Clock"]
+        if clocks:
+            raise UsageError(f"{self.path}: has clocks, which are not supported: {', '.join(clocks)}; expected none")
+
+    def _instantiated(self, folder: Path) -> Any:
+        fmu = fmi3.FMU3Slave(
+            guid=self.description.instantiationToken,
+            unzipDirectory=str(folder),
+            modelIdentifier=self.description.coSimulation.modelIdentifier,
+            instanceName=self.name,
+        )
+        fmu.instantiate(loggingOn=True, logMessage=self._log)
+        self._do_step = fmu.dll.fmi3DoStep
+        self._event, self._ends, self._early = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
+        self._reached = ctypes.c_double()
+        self._said = [ctypes.byref(x) for x in (self._event, self._ends, self._early, self._reached)]
+        return fmu
+
+    def _log(self, environment: Any, status: int, category: bytes | None, message: bytes | None) -> None:
+        self._messages.append((status, category, message or b""))
+
+    def _enter(self, start: float, stop: float) -> None:
+        self._call("enterInitializationMode", startTime=start, stopTime=stop)
+
+    def step(self, t: float, h: float) -> None:
+        """Advance from `t` to `t + h` seconds."""
+        if self._do_step(self._component, t, h, True, *self._said) > WARNING:
+            raise self._failure("fmi3DoStep")
+        if self._event or self._ends or self._early:
+            self._expect_whole_step(t + h)
+        if self._messages:
+            self._collect_warnings()
+
+    def _expect_whole_step(self, end: float) -> None:
+        what = "ends the run" if self._ends else "asks for event mode" if self._event else "returns early"
+        if self._ends.value or self._event.value or self._early.value:
+            raise self._failure("fmi3DoStep", f"the FMU {what} at {self._reached.value:g} s, before {end:g} s")
+
+    def _access(self, action: str, type: str) -> str:
+        return f"fmi3{action}{'Int64' if type == 'Enumeration' else type}"
+
+    def _transfer(self, function: str, references: Sequence[int], values: Numbers) -> Transfer:
+        count, length = len(references), len(values)
+        of = (ctypes.c_uint32 * count)(*references)
+        at = (np.ctypeslib.as_ctypes_type(values.dtype) * length).from_buffer(values)  # type: ignore[arg-type]
+        call, component, failure = getattr(self._fmu.dll, function), self._component, self._failure
+
+        def transfer() -> None:
+            if call(component, of, count, at, length) > WARNING:
+                raise failure(function)
+
+        return transfer

@@ -1,0 +1,98 @@
+"""The process of an isolated instance.
+
+`python -m orchestration.fmi.isolated_process FMU NAME` answers commands on its standard input until that ends; what
+the FMU itself prints goes to standard error.
+"""
+
+import os
+import signal
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from orchestration import child
+from orchestration.fmi.instances import open_here
+from orchestration.fmi.isolated import Command, receive, send
+from orchestration.fmi.native import NativeInstance
+from orchestration.simulator import Floats, Transfer
+
+
+class _Served:
+    """An instance and the arrays that its transfers use."""
+
+    def __init__(self, path: Path, name: str) -> None:
+        self.instance: NativeInstance | None = None
+        self._path, self._name = path, name
+        self._readers: list[tuple[Transfer, Floats]] = []
+        self._writers: list[tuple[Transfer, Floats]] = []
+
+    def answer(self, commands: list[Command]) -> Any:
+        """What the last of the commands gives."""
+        if self.instance is None:
+            self.instance = open_here(self._path, self._name)
+        result = None
+        for name, *arguments in commands:
+            local: Callable[..., Any] | None = getattr(self, f"_{name}", None)
+            result = (local or getattr(self.instance, name))(*arguments)
+        return result
+
+    def _reader(self, names: tuple[str, ...]) -> None:
+        assert self.instance is not None
+        values: Floats = np.zeros(len(names))
+        self._readers.append((self.instance.reader(names, values), values))
+
+    def _writer(self, names: tuple[str, ...]) -> None:
+        assert self.instance is not None
+        values: Floats = np.zeros(len(names))
+        self._writers.append((self.instance.writer(names, values), values))
+
+    def _write(self, index: int, content: bytes) -> None:
+        write, values = self._writers[index]
+        values[:] = np.frombuffer(content)
+        write()
+
+    def _read(self) -> bytes:
+        for read, _ in self._readers:
+            read()
+        return b"".join(values.tobytes() for _, values in self._readers)
+
+
+def main(path: Path, name: str) -> None:
+    """Serve one instance."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the master, which ends this process when it is done
+    child.end_with_parent()
+    requests, answers = _streams()
+    served = _Served(path, name)
+    while True:
+        try:
+            commands = receive(requests)
+        except EOFError:
+            break
+        result = error = None
+        try:
+            result = served.answer(commands)
+        except Exception as raised:
+            error = raised
+        instance = served.instance
+        send(
+            answers, (result, error, instance is None or instance.failed, [] if instance is None else instance.warnings)
+        )
+    if served.instance is not None:
+        served.instance.close()
+
+
+def _streams() -> tuple[IO[bytes], IO[bytes]]:
+    """Standard input and output, kept from whatever reads and prints here."""
+    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
+    os.dup2(2, 1)
+    return requests, answers
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), sys.argv[2])

@@ -1,0 +1,326 @@
+"""An FMU loaded into this process, through fmpy: what instances of FMI 2.0 and FMI 3.0 have in common.
+
+Every array of a step is allocated once.
+"""
+
+from abc import abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import fmpy
+import numpy as np
+import numpy.typing as npt
+from fmpy.fmi1 import FMICallException
+
+from orchestration import scratch
+from orchestration.errors import QuadcosimError, RefusedValueError, SimulatorError, UsageError
+from orchestration.fmi import pythonfmu
+from orchestration.fmi.instance import Instance
+from orchestration.fmi.messages import WARNING, Message, words
+from orchestration.fmi.model import Variable, read_model
+from orchestration.fmi.values import Value, number_of, same, taken
+from orchestration.scratch import Scratch
+from orchestration.simulator import Floats, Transfer
+
+DIVERGENCE_CATEGORY = b"divergence"
+
+Numbers = npt.NDArray[Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Part:
+    """Variables that one call transfers: all scalars of a type, or one array."""
+
+    type: str
+    references: tuple[int, ...]
+    buffer: Numbers
+    """what is transferred, in the order of the references"""
+    asked: npt.NDArray[np.int64]
+    """places in the names that were asked for"""
+    places: npt.NDArray[np.int64]
+    """of the same in the buffer"""
+
+
+class NativeInstance(Instance):
+    """One instance of a co-simulation FMU in this process.
+
+    The FMU's log is on and collected, so that a failed call raises `SimulatorError` with the FMU's own
+    words. After a failed call the instance is never called again, not even to free it: FMI leaves what
+    would happen undefined.
+    """
+
+    def __init__(self, path: Path, instance_name: str) -> None:
+        self.path = path
+        self.name = instance_name
+        self.warnings: list[str] = []
+        self.failed = False
+        self._messages: list[Message] = []
+        self._given: dict[str, Value] = {}  # until initialisation ends, as then the FMU has taken all of it
+        self._arrays: dict[int, Numbers] = {}  # what was last set of arrays, by reference: a call sets a whole one
+        self._folder: Scratch | None = None
+        self.model = read_model(path)
+        self._expect_supported()
+        if fmpy.platform not in fmpy.supported_platforms(str(path)):
+            raise QuadcosimError(
+                f"{path}: has no binary for {fmpy.platform}; pythonfmu ships them for 64-bit Linux and Windows only"
+            )
+        try:
+            self._folder = scratch.temporary()
+            fmpy.extract(str(path), str(self._folder.path))
+            pythonfmu.expect_readable_place(self._folder.path)
+            self._fmu = self._instantiated(self._folder.path)
+            pythonfmu.release_interpreter_state(self._fmu.dll)
+        except Exception as error:
+            self.failed = True
+            self.close()
+            said, _ = words(self._messages, str(error))
+            raise QuadcosimError(f"{path}: expected a co-simulation FMU that loads here: {said}") from error
+        self._component = self._fmu.component
+
+    # -- what differs between versions ---------------------------------------------------------------------------
+
+    stored: ClassVar[Mapping[str, type[np.generic]]]
+    """by type, what holds its values"""
+    state_calls: tuple[str, str, str, str, str]
+    """fmpy's names of the calls that get, serialise, free, deserialise and set a state"""
+
+    @abstractmethod
+    def _expect_supported(self) -> None:
+        """Raise `UsageError` for an FMU that needs what is not done here."""
+
+    @abstractmethod
+    def _instantiated(self, folder: Path) -> Any:
+        """fmpy's instance of the FMU unpacked in `folder`, its messages collected."""
+
+    @abstractmethod
+    def _enter(self, start: float, stop: float) -> None:
+        """Into initialisation mode."""
+
+    @abstractmethod
+    def _access(self, action: str, type: str) -> str:
+        """The function that does an action, Get or Set, to variables of a type."""
+
+    @abstractmethod
+    def _transfer(self, function: str, references: Sequence[int], values: Numbers) -> Transfer:
+        """A call of a function of `_access` that transfers `values`."""
+
+    # -- a run ---------------------------------------------------------------------------------------------------
+
+    def enter_initialization(self, start: float, stop: float) -> None:
+        """Begin initialisation of a run over [start, stop] seconds; what the FMU has lost is set once more."""
+        self._expect_alive()
+        self._enter(start, stop)
+        for name, value in self._given.items():
+            variable = self.variable(name)
+            if same(variable, value, self.get(name)):
+                continue
+            self._put(variable, value)
+            if not same(variable, value, kept := self.get(name)):
+                self.warnings.append(f"{self.name}.{name}: was set to {value}, the FMU has {kept}")
+
+    def exit_initialization(self) -> None:
+        """End initialisation."""
+        self._call("exitInitializationMode")
+        self._given.clear()
+        self._collect_warnings()
+
+    def reset(self) -> None:
+        """Back to the state after instantiation, all parameters at their defaults."""
+        self._call("reset")
+        self._given.clear()
+        self._arrays.clear()
+        self.warnings.clear()
+
+    def save(self) -> bytes:
+        """The whole state, serialised; raises `UsageError` for an FMU that cannot."""
+        self._expect_state()
+        get, serialise, free, _, _ = self.state_calls
+        state = self._call(get)
+        content = bytes(self._call(serialise, state))
+        self._call(free, state)
+        return content
+
+    def restore(self, state: bytes) -> None:
+        """Put back what `save` gave."""
+        self._expect_state()
+        _, _, free, deserialise, put = self.state_calls
+        handle = self._call(deserialise, state)
+        self._call(put, handle)
+        self._call(free, handle)
+
+    def close(self) -> None:
+        """Free the instance and what was unpacked for it."""
+        if not self.failed:
+            self.failed = True
+            self._fmu.freeInstance()
+        if self._folder is not None:
+            self._folder.remove()
+            self._folder = None
+
+    # -- values --------------------------------------------------------------------------------------------------
+
+    def reader(self, names: Sequence[str], into: Floats) -> Transfer:
+        """A call that puts the values of the variables `names` into `into`; a Boolean is 0 or 1."""
+        parts = self._parts(names, into)
+        calls = [(self._transfer(self._access("Get", x.type), x.references, x.buffer), x) for x in parts]
+        if len(parts) == 1 and parts[0].buffer is into:
+            return calls[0][0]
+
+        def read() -> None:
+            for call, part in calls:
+                call()
+                into[part.asked] = part.buffer[part.places]
+
+        return read
+
+    def writer(self, names: Sequence[str], source: Floats) -> Transfer:
+        """A call that sets the variables `names` from `source`.
+
+        A Boolean is true for what is not 0; an Integer or Enumeration takes the nearest whole number. Raises
+        `SimulatorError` for one that it does not hold.
+        """
+        parts = self._parts(names, source, shared=self._arrays)
+        calls = [(self._transfer(self._access("Set", x.type), x.references, x.buffer), x) for x in parts]
+        if len(parts) == 1 and parts[0].buffer is source:
+            return calls[0][0]
+        converters = [self._converter([names[i] for i in part.asked], part.buffer.dtype) for part in parts]
+
+        def write() -> None:
+            for (call, part), converted in zip(calls, converters):
+                part.buffer[part.places] = converted(source[part.asked])
+                call()
+
+        return write
+
+    def set(self, name: str, value: Value) -> None:
+        """Set one variable, converted to its type; raises `UsageError` for a value it cannot take."""
+        self._expect_alive()
+        variable = self.variable(name)
+        if variable.causality == "structuralParameter":
+            raise UsageError(f"{self.name}.{name}: is a structural parameter, which is not supported")
+        given = taken(variable, value, f"{self.name}.{name}")
+        self._given[name] = given
+        self._put(variable, given)
+
+    def get(self, name: str) -> Value:
+        """The value of one variable."""
+        self._expect_alive()
+        variable = self.variable(name)
+        if variable.kind == "String":
+            text = self._call("getString", [variable.reference])[0]
+            return text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text)
+        value = np.zeros(1)
+        self.reader((name,), value)()
+        return bool(value[0]) if variable.kind == "Boolean" else float(value[0])
+
+    def _put(self, variable: Variable, value: Value) -> None:
+        if isinstance(value, str):
+            self._call("setString", [variable.reference], [value])
+        else:
+            self.writer((variable.name,), np.array([float(value)]))()
+
+    def _parts(self, names: Sequence[str], array: Floats, shared: dict[int, Numbers] | None = None) -> list[_Part]:
+        """What is called to transfer `names`; the array itself is transferred where it is as it is to be.
+
+        Arrays lie in `shared`, from their start values on, since whoever sets an element sets them all.
+        """
+        if array.shape != (len(names),):
+            raise ValueError(f"expected an array of {len(names)} values, got shape {array.shape}")
+        groups: dict[tuple[str, int | None], list[tuple[int, Variable]]] = {}
+        for i, name in enumerate(names):
+            variable = self.model.variable(name, f"{self.name}.{name}")
+            group = variable.reference if variable.length else None
+            groups.setdefault((variable.type, group), []).append((i, variable))
+        return [self._part(array, group, reference, shared) for (_, reference), group in groups.items()]
+
+    def _part(
+        self, array: Floats, group: list[tuple[int, Variable]], reference: int | None, shared: dict[int, Numbers] | None
+    ) -> _Part:
+        first = group[0][1]
+        asked = np.array([i for i, _ in group])
+        if reference is None:
+            references, places = tuple(v.reference for _, v in group), np.arange(len(group))
+        else:
+            references, places = (reference,), np.array([v.element for _, v in group])
+        length = first.length or len(group)
+        if (
+            self.stored[first.type] is np.float64
+            and np.array_equal(places, np.arange(len(array)))
+            and length == len(array)
+        ):
+            buffer: Numbers = array
+        elif reference is None or shared is None:
+            buffer = np.zeros(length, dtype=self.stored[first.type])
+        else:
+            buffer = shared.setdefault(reference, self._start_of(first))
+        return _Part(type=first.type, references=references, buffer=buffer, asked=asked, places=places)
+
+    def _start_of(self, element: Variable) -> Numbers:
+        found = np.zeros(element.length, dtype=self.stored[element.type])
+        for variable in self.variables.values():
+            if variable.reference == element.reference and variable.start is not None:
+                found[variable.element] = number_of(variable, variable.start)
+        return found
+
+    def _converter(self, names: Sequence[str], dtype: np.dtype[Any]) -> Callable[[Floats], Numbers]:
+        """From what is written to what lies in memory."""
+        if dtype.kind == "f":
+            return lambda values: values
+        if dtype.kind == "b" or self.variable(names[0]).kind == "Boolean":
+            return lambda values: values != 0.0
+        low, high = float(np.iinfo(dtype).min), float(np.iinfo(dtype).max)
+
+        def whole(values: Floats) -> Numbers:
+            rounded = np.rint(values)
+            outside = ~((rounded >= low) & (rounded <= high))
+            if outside.any():
+                at = int(np.argmax(outside))
+                raise SimulatorError(f"{self.name}.{names[at]} = {values[at]:g}: expected a number that {dtype} holds")
+            return rounded
+
+        return whole
+
+    # -- inside --------------------------------------------------------------------------------------------------
+
+    def _call(self, method: str, *args: Any, **kwargs: Any) -> Any:
+        self._expect_alive()
+        try:
+            return getattr(self._fmu, method)(*args, **kwargs)
+        except FMICallException as error:
+            raise self._failure(error.function) from None
+
+    def _expect_alive(self) -> None:
+        if self.failed:
+            raise SimulatorError(f"{self.name}: the FMU has failed and is not called again")
+
+    def _expect_state(self) -> None:
+        if not self.model.saves_state:
+            raise UsageError(
+                f"{self.name}: {self.model.name} cannot save its state: its description does not declare that it can "
+                "get, set and serialise it"
+            )
+
+    def _collect_warnings(self) -> None:
+        for status, _, message in self._messages:
+            if status == WARNING:
+                self.warnings.append(f"{self.name}: {message.decode('utf-8', 'replace')}")
+        self._messages.clear()
+
+    def _failure(self, function: str, otherwise: str = "no message") -> SimulatorError:
+        """The error for a call that failed, in the words that the FMU logged."""
+        self.failed = True
+        diverged = [m for m in self._messages if m[0] > WARNING and m[1] == DIVERGENCE_CATEGORY]
+        summary, details = words(diverged or self._messages, otherwise)
+        if not diverged and self._names_what_was_given(summary):
+            return RefusedValueError(f"{self.name}.{summary}", details=details)
+        return SimulatorError(
+            f"{self.name} ({self.model.name}): {function}: {summary}", divergence=bool(diverged), details=details
+        )
+
+    def _names_what_was_given(self, text: str) -> bool:
+        """Whether the message `NAME = VALUE: expected …` is about a variable, or a vector of one, that was set."""
+        name, equals, _ = text.partition(" = ")
+        vector = name.partition(".{")[0]
+        return bool(equals) and any(given == name or given.startswith(f"{vector}.") for given in self._given)

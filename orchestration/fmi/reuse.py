@@ -1,0 +1,45 @@
+"""FMUs loaded once in a process and reset between runs, where that has been shown to change nothing."""
+
+import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from orchestration.fmi import repeatability
+from orchestration.fmi.instance import Instance
+from orchestration.fmi.instances import open_instance
+
+
+class Instances:
+    """Gives an instance for each run: one that was there before, reset, or else a fresh one.
+
+    It keeps one instance of each FMU and name if a run after a reset is the run of a fresh instance, to the bit;
+    one that has failed is left and made anew.
+    """
+
+    def __init__(self) -> None:
+        self._kept: dict[tuple[Path, str], Instance] = {}
+        self.close = weakref.finalize(self, _free, self._kept)
+        """Free all instances; done in any case when they are no longer used or the process ends."""
+
+    @contextmanager
+    def load(self, path: Path, instance_name: str) -> Iterator[Instance]:
+        """An instance of the FMU at `path` for one run."""
+        key = (path, instance_name)
+        instance = self._kept.pop(key, None)
+        if instance is None:
+            instance = open_instance(path, instance_name)
+        else:
+            instance.reset()
+        try:
+            yield instance
+        finally:
+            if instance.failed or not repeatability.of(path).reset:
+                instance.close()
+            else:
+                self._kept[key] = instance
+
+
+def _free(instances: dict[tuple[Path, str], Instance]) -> None:
+    while instances:
+        instances.popitem()[1].close()

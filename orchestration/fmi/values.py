@@ -1,0 +1,78 @@
+"""Values of variables: what each type takes, and what of it can be compared."""
+
+import math
+from collections.abc import Mapping
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from orchestration.errors import UsageError, expected_name, shown
+from orchestration.fmi.model import Variable
+
+Value: TypeAlias = float | bool | str
+
+_ROUNDING = {"Float32": 1e-6}
+"""Relative differences that are none, by type; 1e-12 for others: an FMU may keep a value in other units"""
+
+INTEGERS: Mapping[str, type[np.signedinteger[Any] | np.unsignedinteger[Any]]] = {
+    "Integer": np.int32, "Enumeration": np.int32, "Int8": np.int8, "UInt8": np.uint8, "Int16": np.int16,
+    "UInt16": np.uint16, "Int32": np.int32, "UInt32": np.uint32, "Int64": np.int64, "UInt64": np.uint64,
+}  # fmt: skip
+"""What holds the whole numbers of a type"""
+
+
+def taken(variable: Variable, value: object, place: str) -> Value:
+    """`value` as the variable takes it, an item of an enumeration as its number.
+
+    Raises `UsageError` that names the place for a value that it cannot take.
+    """
+    if variable.kind == "Boolean":
+        return _of_kind(value, bool, place, "true or false")
+    if variable.kind == "String":
+        return _of_kind(value, str, place, "a text")
+    if variable.choices:
+        return _chosen(variable.choices, value, place)
+    if variable.kind in ("Integer", "Enumeration"):
+        bounds = np.iinfo(INTEGERS[variable.type])
+        fits = isinstance(value, int) and not isinstance(value, bool) and bounds.min <= value <= bounds.max
+        return _if(fits, value, place, f"a whole number of {bounds.bits} bits")
+    if variable.kind != "Real":
+        raise UsageError(f"{place}: is a {variable.kind}, which cannot be set")
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool) and _is_float(value)
+    return float(_if(is_number, value, place, "a number"))
+
+
+def number_of(variable: Variable, value: object) -> float:
+    """A value that the variable takes, or its start as the description writes it, as it is recorded."""
+    if isinstance(value, str):
+        value = {"true": 1, "false": 0, **variable.choices}.get(value, value)
+    return float(value)  # type: ignore[arg-type]
+
+
+def same(variable: Variable, given: Value, read: Value) -> bool:
+    """Whether what is read is what was given, as far as the type can hold it."""
+    if isinstance(given, str) or isinstance(read, str):
+        return given == read
+    return math.isclose(given, read, rel_tol=_ROUNDING.get(variable.type, 1e-12))
+
+
+def _chosen(choices: Mapping[str, int], value: object, place: str) -> int:
+    if isinstance(value, int) and not isinstance(value, bool) and value in choices.values():
+        return value
+    if not isinstance(value, str) or value not in choices:
+        raise UsageError(f"{place} = {shown(value)}: {expected_name(str(value), list(choices))}")
+    return choices[value]
+
+
+def _is_float(value: float) -> bool:
+    return isinstance(value, float) or abs(value) < 2**63
+
+
+def _of_kind(value: object, kind: type, place: str, expected: str) -> Value:
+    return _if(isinstance(value, kind), value, place, expected)
+
+
+def _if(condition: bool, value: object, place: str, expected: str) -> Value:
+    if not condition:
+        raise UsageError(f"{place} = {shown(value)}: expected {expected}")
+    return value  # type: ignore[return-value]

@@ -1,0 +1,97 @@
+"""FMUs of one C source with one habit each, compiled where the tests run, their descriptions written to fit."""
+
+import shutil
+import subprocess
+import uuid
+import zipfile
+from pathlib import Path
+
+import fmpy
+import pytest
+
+COMPILER = shutil.which("gcc") or shutil.which("cc")
+needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+
+_SOURCE = Path(__file__).with_name("small.c")
+
+_FMI2 = """<fmiModelDescription fmiVersion="2.0" modelName="Small" guid="small">
+  <CoSimulation modelIdentifier="Small" {attributes}/>
+  <TypeDefinitions><SimpleType name="Mode"><Enumeration>{items}</Enumeration></SimpleType></TypeDefinitions>
+  <ModelVariables>
+    <ScalarVariable name="u" valueReference="0" causality="input"><Real start="0"/></ScalarVariable>
+    <ScalarVariable name="y" valueReference="1" causality="output"><Real/></ScalarVariable>
+    <ScalarVariable name="gain" valueReference="2" causality="parameter" variability="tunable"><Real start="1"/>
+    </ScalarVariable>
+    <ScalarVariable name="on" valueReference="3" causality="input" variability="discrete"><Boolean start="true"/>
+    </ScalarVariable>
+    <ScalarVariable name="high" valueReference="4" causality="output" variability="discrete"><Boolean/></ScalarVariable>
+    <ScalarVariable name="count" valueReference="5" causality="output" variability="discrete"><Integer/>
+    </ScalarVariable>
+    <ScalarVariable name="mode" valueReference="6" causality="parameter" variability="fixed">
+      <Enumeration declaredType="Mode" start="1"/></ScalarVariable>
+  </ModelVariables>
+  <ModelStructure>
+    <Outputs><Unknown index="2"/><Unknown index="5"/><Unknown index="6"/></Outputs>
+    <InitialUnknowns><Unknown index="2" dependencies=""/></InitialUnknowns>
+  </ModelStructure>
+</fmiModelDescription>"""
+
+_FMI3 = """<fmiModelDescription fmiVersion="3.0" modelName="Small" instantiationToken="small">
+  <CoSimulation modelIdentifier="Small" {attributes}/>
+  <TypeDefinitions><EnumerationType name="Mode">{items}</EnumerationType></TypeDefinitions>
+  <ModelVariables>
+    <Float64 name="u" valueReference="0" causality="input" start="0 0"><Dimension start="2"/></Float64>
+    <Float64 name="y" valueReference="1" causality="output"><Dimension start="2"/></Float64>
+    <Float32 name="gain" valueReference="2" causality="parameter" variability="tunable" start="1"/>
+    <Boolean name="on" valueReference="3" causality="input" start="true"/>
+    <Boolean name="high" valueReference="4" causality="output"/>
+    <UInt8 name="count" valueReference="5" causality="output"/>
+    <Enumeration name="mode" valueReference="6" causality="parameter" variability="fixed" declaredType="Mode"
+      start="1"/>
+    {more}
+  </ModelVariables>
+  <ModelStructure>
+    <Output valueReference="1"/><Output valueReference="4"/><Output valueReference="5"/>
+    <InitialUnknown valueReference="1" dependencies=""/>
+  </ModelStructure>
+</fmiModelDescription>"""
+
+_ITEMS = '<Item name="forward" value="1"/><Item name="backward" value="2"/>'
+_CLOCK = '<Clock name="tick" valueReference="7" causality="input" intervalVariability="constant" intervalDecimal="1"/>'
+
+
+def small(
+    folder: Path,
+    *habits: str,
+    fmi: int = 2,
+    fixed_step: bool = False,
+    once: bool = False,
+    saves: bool = True,
+    clock: bool = False,
+) -> Path:
+    """The FMU with these habits (macros of `small.c`) in `folder`; what it says of itself is as told."""
+    folder.mkdir(parents=True, exist_ok=True)
+    library = folder / f"Small{fmpy.sharedLibraryExtension}"
+    macros = [f"-D{macro}" for macro in (*habits, *(["FMI3"] if fmi == 3 else []), f'KEPT="{uuid.uuid4().hex}"')]
+    subprocess.run(
+        [str(COMPILER), "-shared", "-fPIC", "-O1", "-w", *macros, str(_SOURCE), "-o", str(library), "-lm"], check=True
+    )
+    state = (
+        ("canGetAndSetFMUState", "canSerializeFMUState")
+        if fmi == 3
+        else ("canGetAndSetFMUstate", "canSerializeFMUstate")
+    )
+    said = {
+        "canHandleVariableCommunicationStepSize": not fixed_step,
+        "canBeInstantiatedOnlyOncePerProcess": once,
+        **dict.fromkeys(state, saves),
+    }
+    attributes = " ".join(f'{name}="{str(value).lower()}"' for name, value in said.items())
+    text = _FMI3 if fmi == 3 else _FMI2
+    place = fmpy.platform_tuple if fmi == 3 else fmpy.platform
+    path = folder / "small.fmu"
+    with zipfile.ZipFile(path, "w") as archive:
+        described = text.format(attributes=attributes, items=_ITEMS, more=_CLOCK if clock else "")
+        archive.writestr("modelDescription.xml", described)
+        archive.write(library, f"binaries/{place}/{library.name}")
+    return path
