@@ -70,11 +70,13 @@ def draw(
     metric: Annotated[str, typer.Option("--metric", help="What to draw.")] = "ultimate_bound",
 ) -> None:
     """Draw a study: a metric over one or two axes with what flies, or sensitivity bars."""
-    from orchestration.studies.drawing import draw_study
+    from orchestration.studies.drawing import draw_study, expect_metric
     from orchestration.studies.study_file import load_study
 
+    chosen = load_study(study)
+    expect_metric(chosen, metric)
     _current_store(study, out)
-    for written in draw_study(load_study(study), out, metric):
+    for written in draw_study(chosen, out, metric):
         print(written)
 
 

@@ -22,18 +22,22 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+def expect_metric(study: Study, metric: str) -> None:
+    """Raise `UsageError` for a metric of which `study` has no figure."""
+    known = [name for name in METRICS if name not in TEXTS or _is_screened(study)]
+    if metric not in known:
+        raise UsageError(f"--metric {metric}: expected one of {', '.join(known)}; every figure shows the outcome")
+
+
 def draw_study(study: Study, folder: Path | None, metric: str) -> list[Path]:
     """Draw what is in the store of `study`; the paths of the figures and tables.
 
     Raises `UsageError` for a metric that does not exist, or axes that no figure here is for.
     """
-    screened = study.method in sensitivity.METHODS and any(axis.values is None for axis in study.axes)
-    known = [name for name in METRICS if name not in TEXTS or screened]
-    if metric not in known:
-        raise UsageError(f"--metric {metric}: expected one of {', '.join(known)}; every figure shows the outcome")
+    expect_metric(study, metric)
     path = store_path(study.name, folder)
     table = frame(path)
-    if screened:
+    if _is_screened(study):
         indices = indices_of(study, numbers(table, metric), metric)
         listed = sensitivity.write(indices, path.parent / f"sensitivity_{metric}.csv")
         return [listed, figures.save(lambda: figures.sensitivity_bars(indices, metric), listed.with_suffix(".png"))]
@@ -89,6 +93,10 @@ def numbers(table: "pd.DataFrame", metric: str) -> Floats:
     """A metric run by run, shape (n,); of the outcome, 1 for a run that flies, 0 for one that does not."""
     values = figures.flew(table).astype(float).where(table["outcome"].notna()) if metric == "outcome" else table[metric]
     return np.asarray(values.to_numpy(float, na_value=np.nan))
+
+
+def _is_screened(study: Study) -> bool:
+    return study.method in sensitivity.METHODS and any(axis.values is None for axis in study.axes)
 
 
 def _is_numeric(axis: Axis) -> bool:

@@ -127,7 +127,7 @@ def test_a_study_that_was_never_flown_is_wrong_usage(folder: Path, command: str)
     ("arguments", "said"),
     [
         (("sweep", "study.toml", "--workers", "0"), "--workers 0: expected at least 1"),
-        (("draw", "study.toml", "--metric", "beauty"), "--metric beauty: expected one of outcome"),
+        (("draw", "study.toml", "--metric", "beauty"), "--metric beauty: expected one of horizon"),
     ],
 )
 def test_options_that_cannot_be_are_wrong_usage(folder: Path, arguments: tuple[str, ...], said: str) -> None:
