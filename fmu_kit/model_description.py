@@ -9,7 +9,7 @@ import os
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
-from fmu_kit.units import BASE_UNIT_EXPONENTS
+from fmu_kit.units import base_unit_exponents
 from fmu_kit.variables import Variable
 
 PYTHON_REQUIRED = ">=3.10"
@@ -78,7 +78,7 @@ def _add_units(root: Element, variables: tuple[Variable, ...]) -> None:
     definitions = SubElement(root, "UnitDefinitions")
     for name in sorted({v.unit for v in variables if v.unit is not None}):
         unit = SubElement(definitions, "Unit", name=name)
-        exponents = {base: str(exponent) for base, exponent in BASE_UNIT_EXPONENTS[name].items()}
+        exponents = {base: str(exponent) for base, exponent in base_unit_exponents(name).items()}
         SubElement(unit, "BaseUnit", attrib=exponents)
 
 

@@ -9,32 +9,23 @@ and refuses a slave whose base class has been renamed. Its slave base and its bi
 Packing imports the slave, so it runs in a process of its own: `python -m fmu_kit.packaging`.
 """
 
-import ast
-import functools
 import hashlib
 import importlib
 import importlib.metadata
-import importlib.util
 import os
 import posixpath
 import re
 import sys
 import uuid
 import zipfile
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from xml.dom.minidom import parseString
 from xml.etree.ElementTree import ParseError, fromstring, tostring
 
-from fmu_kit import documentation, loader
+from fmu_kit import bundle, documentation, loader
+from fmu_kit.bundle import PackagingError, Target, bundled_sources, module_path, place, renamed
 from fmu_kit.model_description import GUID_PLACEHOLDER, PYTHON_REQUIRED
-
-SHARED_PACKAGES = ("fmu_kit", "controller_fmu", "plant_fmu", "pythonfmu")
-"""Top-level packages that may be bundled beside the slave's own; all else must be the standard library."""
-
-EMPTY_INIT = {"pythonfmu/__init__.py"}
-"""Package files replaced by empty ones: pythonfmu's imports its builder."""
 
 PAGE, ICON = "documentation/index.html", "model.png"
 """The documentation of an FMU and its icon, by their place in the archive."""
@@ -71,67 +62,18 @@ class {model}(Model):
 '''
 
 
-class PackagingError(Exception):
-    """The slave cannot be packed; the text says why."""
-
-
-@dataclass(frozen=True, slots=True)
-class Target:
-    """A slave class, by the module that defines it."""
-
-    module: str
-    model: str
-
-    @classmethod
-    def parse(cls, text: str) -> "Target":
-        """From `module:Class`; raises `PackagingError` for another form."""
-        module, colon, model = text.partition(":")
-        if not (module and colon and model):
-            raise PackagingError(f"{text}: expected module:Class")
-        return cls(module, model)
-
-    @property
-    def packages(self) -> frozenset[str]:
-        """Top-level packages that may be bundled."""
-        return frozenset((*SHARED_PACKAGES, self.module.partition(".")[0]))
-
-    @property
-    def fragment(self) -> Path:
-        """Where the part of its documentation written by hand is, if it has one: beside it, under its name."""
-        return _module_path(self.module).with_name(f"{self.model}.html")
-
-    @property
-    def icon(self) -> Path:
-        """Where its icon is, if it has one."""
-        return _module_path(self.module).with_name(f"{self.model}.png")
-
-
-def bundled_sources(target: Target) -> dict[str, str]:
-    """The text of every module that the slave needs, by its path in the bundle; none is imported.
-
-    Raises `PackagingError` if one of them imports what is neither bundled nor the standard library.
-    """
-    sources: dict[str, str] = {}
-    waiting = [target.module, "fmu_kit.failure"]
-    while waiting:
-        module = waiting.pop()
-        path = _module_path(module)
-        key = _place(module)
-        if key in sources:
-            continue
-        sources[key] = "" if key in EMPTY_INIT else path.read_text(encoding="utf-8")
-        package = module if path.name == "__init__.py" else module.rpartition(".")[0]
-        waiting += _imported_modules(sources[key], package, path, target.packages)
-        if "." in module:
-            waiting.append(module.rpartition(".")[0])
-    return dict(sorted(sources.items()))
-
-
 def source_hash(target: Target) -> str:
     """The hash of all that decides the content of the FMU: its modules and other files, and the packaging itself."""
     digest = hashlib.sha256()
     sources = bundled_sources(target)
-    own = (Path(__file__), Path(documentation.__file__), documentation.TEMPLATE, Path(loader.__file__), loader.SOURCE)
+    own = (
+        Path(__file__),
+        Path(bundle.__file__),
+        Path(documentation.__file__),
+        documentation.TEMPLATE,
+        Path(loader.__file__),
+        loader.SOURCE,
+    )
     packaging = {path.name: _text(path) for path in own} | {"compiler": str(loader.compiler() is not None)}
     for name, text in {**sources, **packaging, "fragment": _fragment(target)}.items():
         digest.update(f"{name}\0{text}\0".encode())
@@ -153,18 +95,16 @@ def build(target: Target, folder: Path) -> Path:
     """Write `folder`/Model.fmu, replacing it in one go, and return its path."""
     sources = bundled_sources(target)
     digest = source_hash(target)
-    bundle = f"quadcosim_{digest[:16]}"
-    entry = f"{bundle}_entry"
-    files = {
-        f"resources/{bundle}/{name}": _renamed(text, bundle, target.packages).encode() for name, text in sources.items()
-    }
-    files[f"resources/{bundle}/__init__.py"] = b""
-    files[f"resources/{entry}.py"] = _entry(bundle, target).encode()
+    name = f"quadcosim_{digest[:16]}"
+    entry = f"{name}_entry"
+    files = {f"resources/{name}/{path}": renamed(text, name, target).encode() for path, text in sources.items()}
+    files[f"resources/{name}/__init__.py"] = b""
+    files[f"resources/{entry}.py"] = _entry(name, target).encode()
     files["resources/slavemodule.txt"] = entry.encode()
     files[SOURCE_HASH_FILE] = digest.encode()
     files |= _with_loader(_unchanged_files(target), target.model)
     slave = _slave(target)
-    source = f"../resources/{bundle}/{_place(target.module)}"
+    source = f"../resources/{name}/{place(target.module, target.root)}"
     files[PAGE] = documentation.to_html(slave, source, _well_formed_fragment(target)).encode()
     for link in documentation.files_linked(files[PAGE].decode()):
         if posixpath.normpath(posixpath.join(posixpath.dirname(PAGE), link)) not in files:
@@ -218,76 +158,17 @@ def write_archive(path: Path, files: dict[str, bytes], *, first: str) -> None:
 
 def _slave(target: Target) -> Any:
     """The class; raises `PackagingError` if it says nothing of itself, only what its base class says."""
-    slave = getattr(importlib.import_module(target.module), target.model)
+    slave = getattr(importlib.import_module(target.module), target.model, None)
+    if slave is None:
+        raise PackagingError(f"{target.module}: expected a class {target.model}")
     if "description" not in vars(slave):
         raise PackagingError(f"{target.module}:{target.model}: expected a description of its own")
     return slave
 
 
-def _module_path(module: str) -> Path:
-    """Where a module's source is, without importing it or its package."""
-    top, *rest = module.split(".")
-    spec = importlib.util.find_spec(top)
-    if spec is None or spec.origin is None:
-        raise PackagingError(f"{module}: expected an importable package with sources")
-    base = Path(spec.origin).parent.joinpath(*rest)
-    path = base / "__init__.py" if base.is_dir() else base.with_suffix(".py")
-    if not path.is_file():
-        raise PackagingError(f"{module}: no source at {path}")
-    return path
-
-
-def _place(module: str) -> str:
-    """Where a module is in the bundle."""
-    return "/".join(module.split(".")) + ("/__init__.py" if _module_path(module).name == "__init__.py" else ".py")
-
-
-@functools.cache
-def _imported_modules(text: str, package: str, path: Path, own: frozenset[str]) -> tuple[str, ...]:
-    """The bundled modules that a source imports; only the forms that renaming understands are allowed."""
-    found = []
-    for node in ast.walk(ast.parse(text, str(path))):
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-            if any(name.partition(".")[0] in own for name in names):
-                raise PackagingError(f"{path}:{node.lineno}: expected `from package.module import name` in an FMU")
-        elif isinstance(node, ast.ImportFrom):
-            base = importlib.util.resolve_name("." * node.level + (node.module or ""), package)
-            names = [base]
-            if base.partition(".")[0] in own:
-                found += [base, *(f"{base}.{alias.name}" for alias in node.names if _is_module(base, alias.name))]
-                continue
-        else:
-            continue
-        for name in names:
-            if name.partition(".")[0] not in sys.stdlib_module_names:
-                raise PackagingError(f"{path}:{node.lineno}: imports {name}, but an FMU has the standard library only")
-    return tuple(found)
-
-
-def _is_module(package: str, name: str) -> bool:
-    base = _module_path(package)
-    return base.name == "__init__.py" and ((base.parent / f"{name}.py").is_file() or (base.parent / name).is_dir())
-
-
-def _renamed(text: str, bundle: str, own: frozenset[str]) -> str:
-    """The source with its imports of bundled packages going to the bundle."""
-    lines = text.encode().splitlines(keepends=True)
-    imports = [
-        node
-        for node in ast.walk(ast.parse(text))
-        if isinstance(node, ast.ImportFrom) and node.level == 0 and (node.module or "").partition(".")[0] in own
-    ]
-    for node in sorted(imports, key=lambda node: -node.col_offset):  # from the right, so that columns stay true
-        line, column = lines[node.lineno - 1], node.col_offset
-        renamed = re.sub(rb"from\s+", f"from {bundle}.".encode(), line[column:], count=1)
-        lines[node.lineno - 1] = line[:column] + renamed
-    return b"".join(lines).decode()
-
-
 def _binaries(model: str) -> dict[str, bytes]:
     """pythonfmu's binaries, by their place in the FMU of `model`."""
-    folder = _module_path("pythonfmu").parent / "resources" / "binaries"
+    folder = module_path("pythonfmu").parent / "resources" / "binaries"
     return {
         f"binaries/{path.parent.name}/{model}{path.suffix}": path.read_bytes()
         for path in sorted(folder.glob("*/*"))
@@ -355,11 +236,18 @@ def _license_of_pythonfmu() -> str:
 
 
 def main(arguments: list[str]) -> int:
-    """`python -m fmu_kit.packaging FOLDER MODULE:CLASS …`: build each, print its path."""
+    """`python -m fmu_kit.packaging FOLDER [--root ROOT] MODULE:CLASS …`: build each, print its path.
+
+    ROOT is the folder in which modules are found before all others.
+    """
     folder, *targets = arguments
+    root = None
+    if targets[:1] == ["--root"]:
+        root, targets = Path(targets[1]), targets[2:]
+        sys.path.insert(0, str(root))
     try:
         for text in targets:
-            print(build(Target.parse(text), Path(folder)))
+            print(build(Target.parse(text, root), Path(folder)))
     except PackagingError as error:
         print(error, file=sys.stderr)
         return 1

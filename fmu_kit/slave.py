@@ -1,8 +1,8 @@
 """The base of every slave: what FMI asks of an FMU and pythonfmu 0.7.0 leaves to its user.
 
-A model lists its variables and defines `read_parameters`, `initialise`, `step`, `internal_state` and
-`restore`; this class keeps the values in a list, checks every call and turns any failure into one
-readable message.
+A model lists its variables and defines `step`; if need be also `read_parameters`, `initialise`, and, for what it
+keeps beside the variables, `internal_state` and `restore`. This class keeps the values in a list, checks every call
+and turns any failure into one readable message.
 """
 
 import contextlib
@@ -64,7 +64,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     variables: ClassVar[tuple[Variable, ...]]
     description: ClassVar[str]
-    initial_outputs_depend_on_inputs: ClassVar[bool]
+    initial_outputs_depend_on_inputs: ClassVar[bool] = True
     """Whether outputs depend on the inputs when initialisation ends; at no other time they do."""
 
     author = "The quadcosim authors"
@@ -81,6 +81,9 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
         if "variables" in cls.__dict__:
+            reals = [v.type == "Real" for v in cls.variables]
+            if reals != sorted(reals, reverse=True):
+                raise TypeError(f"{cls.__name__}.variables: expected all Reals before the others")
             cls._index = {v.name: i for i, v in enumerate(cls.variables)}
             cls._real_count = sum(v.type == "Real" for v in cls.variables)
             cls._readable = frozenset(range(cls._real_count))
@@ -117,23 +120,23 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     # -- what a model defines ---------------------------------------------------------------------------
 
-    @abstractmethod
     def read_parameters(self) -> None:
         """Take over the parameters, each within its own bounds; raise `FmuError` for what they are together."""
 
-    @abstractmethod
     def initialise(self, t: float) -> None:
-        """Compute the outputs at the start time `t` [s]; may be called again before initialisation ends."""
+        """Compute the outputs at the start time `t` [s]; may be called again before initialisation ends.
+
+        Unless a model says more, all variables have their start values.
+        """
 
     @abstractmethod
     def step(self, t: float, h: float) -> None:
         """Advance from `t` to `t + h` [s] with the inputs held."""
 
-    @abstractmethod
     def internal_state(self) -> State:
-        """What a step depends on beyond the variables, in JSON types."""
+        """What a step depends on beyond the variables, in JSON types: nothing, unless a model says so."""
+        return {}
 
-    @abstractmethod
     def restore(self, state: State) -> None:
         """Put back what `internal_state` gave, after the variables have been put back."""
 
@@ -174,6 +177,10 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     def put_count(self, name: str, value: int) -> None:
         """Set an Integer variable."""
+        self._others[self._index[name]] = value
+
+    def put_boolean(self, name: str, value: bool) -> None:
+        """Set a Boolean variable."""
         self._others[self._index[name]] = value
 
     def put_vec3(self, name: str, v: Vec3) -> None:

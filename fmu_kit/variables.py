@@ -88,6 +88,7 @@ def _kind(causality: Causality, variability: Variability) -> _Kind:
 
 
 continuous_input = _kind("input", "continuous")
+discrete_input = _kind("input", "discrete")
 continuous_output = _kind("output", "continuous")
 discrete_output = _kind("output", "discrete")
 continuous_local = _kind("local", "continuous")

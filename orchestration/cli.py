@@ -56,13 +56,26 @@ app = typer.Typer(
 
 @app.command()
 def build(
-    out: Annotated[Path | None, typer.Option("--out", help="Folder for the FMUs; fmus/ unless told.")] = None,
+    folder: Annotated[
+        Path | None,
+        typer.Argument(
+            help="Folder of modules that define slaves; without one, this project's FMUs.", show_default=False
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="Folder for the FMUs; FOLDER, or fmus/ for this project's, unless told."),
+    ] = None,
 ) -> None:
-    """Build QuadrotorPlant.fmu and UnifiedController.fmu. Same sources give the same bytes."""
+    """Build every slave that the modules of FOLDER define, each as an .fmu. Same sources give the same bytes."""
     from orchestration import fmus
     from orchestration.wiring import MODELS
 
-    for path in fmus.build(MODELS, out or fmus.default_folder(), say):
+    if folder is None:
+        built = fmus.build(MODELS, out or fmus.default_folder(), say)
+    else:
+        built = fmus.build_slaves(fmus.slaves_of(folder), out or folder, say)
+    for path in built:
         print(path)
 
 

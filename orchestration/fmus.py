@@ -2,10 +2,13 @@
 
 import os
 import subprocess
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import TypeVar
 
-from fmu_kit import packaging
+from fmu_kit.bundle import PackagingError, Target
+from fmu_kit.discovery import slave_beside, slaves_in
+from fmu_kit.packaging import read_source_hash, source_hash
 from orchestration import child
 from orchestration.errors import QuadcosimError, UsageError
 from orchestration.wiring import MODELS
@@ -23,51 +26,93 @@ def default_folder() -> Path:
 
 
 def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
-    """The .fmu for the name of one of this project's FMUs, built first if need be, or for a path.
+    """The .fmu for the name of one of this project's FMUs, or for a path; built first if need be.
 
-    Raises `UsageError` naming the valid names if there is none; `announce` hears of a build.
+    A path's FMU is built where a module beside it defines a slave of that name, unless it carries the hash of these
+    sources or is none of ours. Raises `UsageError` naming the valid names if there is none; `announce` hears of
+    a build.
     """
     if fmu in MODELS:
         folder = default_folder()
         if out_of_date([fmu], folder):
-            if announce is not None:
-                announce(f"building {folder / fmu}.fmu")
+            _announce_build(folder / f"{fmu}.fmu", announce)
             build([fmu], folder, announce)
         return folder / f"{fmu}.fmu"
     path = Path(fmu)
-    if path.suffix == ".fmu" and path.is_file():
-        return path
-    raise UsageError(f"fmu = {fmu}: expected {' or '.join(MODELS)}, or the path of an .fmu file")
+    if path.suffix == ".fmu":
+        target = _told(slave_beside, path)
+        if target is not None and _is_old(path, target):
+            _announce_build(path, announce)
+            build_slaves([target], path.parent, announce)
+        if path.is_file():
+            return path
+    raise UsageError(
+        f"fmu = {fmu}: expected {' or '.join(MODELS)}, or the path of an .fmu file, which may be missing if a module "
+        "beside it defines the slave"
+    )
 
 
 def out_of_date(names: Iterable[str], folder: Path) -> list[str]:
     """Those of this project's FMUs that are missing in `folder` or carry another hash than the sources."""
     return [
-        name
-        for name in names
-        if packaging.read_source_hash(folder / f"{name}.fmu") != packaging.source_hash(_target(name))
+        name for name in names if read_source_hash(folder / f"{name}.fmu") != source_hash(Target.parse(MODELS[name]))
     ]
 
 
 def build(names: Iterable[str], folder: Path, announce: Callable[[str], None] | None = None) -> list[Path]:
-    """Build FMUs of this project into `folder`, in a process of its own; their paths.
+    """Build FMUs of this project into `folder`; their paths. Else as `build_slaves`."""
+    return build_slaves([Target.parse(MODELS[name]) for name in names], folder, announce)
+
+
+def slaves_of(folder: Path) -> list[Target]:
+    """The slaves that the modules of a folder define; raises `UsageError` if there are none."""
+    if not folder.is_dir():
+        raise UsageError(f"{folder}: expected a folder with modules that define slaves")
+    found = _told(slaves_in, folder)
+    if not found:
+        raise UsageError(f"{folder}: expected a module with a subclass of fmu_kit.slave.Slave that has a description")
+    return found
+
+
+def build_slaves(targets: Sequence[Target], folder: Path, announce: Callable[[str], None] | None = None) -> list[Path]:
+    """Build slaves whose modules are found in one place into `folder`, in a process of its own; the FMUs' paths.
 
     `announce` hears, a line each, of what could not be packed. Raises `QuadcosimError` with what the build said if
     it fails.
     """
-    targets = [MODELS[name] for name in names]
+    named = [f"{target.module}:{target.model}" for target in targets]
+    root = targets[0].root if targets else None
     done = subprocess.run(
-        child.command("fmu_kit.packaging", folder.resolve(), *targets),
+        child.command("fmu_kit.packaging", folder.resolve(), *(() if root is None else ("--root", root)), *named),
         capture_output=True, text=True, env=child.environment(), check=False,
     )  # fmt: skip
     if done.returncode != 0:
         lines = done.stderr.strip().splitlines() or ["no output"]
-        raise QuadcosimError(f"building {', '.join(targets)} in {folder} failed: {lines[-1]}")
+        raise QuadcosimError(f"building {', '.join(named)} in {folder} failed: {lines[-1]}")
     if announce is not None:
         for line in done.stderr.splitlines():
             announce(line)
     return [Path(line) for line in done.stdout.splitlines()]
 
 
-def _target(name: str) -> packaging.Target:
-    return packaging.Target.parse(MODELS[name])
+def _is_old(path: Path, target: Target) -> bool:
+    """Whether an FMU is missing, or made by packaging from other sources than those of its slave."""
+    carried = read_source_hash(path)
+    return not path.exists() if carried is None else carried != _told(source_hash, target)
+
+
+def _announce_build(path: Path, announce: Callable[[str], None] | None) -> None:
+    if announce is not None:
+        announce(f"building {path}")
+
+
+Given = TypeVar("Given")
+Told = TypeVar("Told")
+
+
+def _told(function: Callable[[Given], Told], of: Given) -> Told:
+    """What a function of packaging says; its refusals are this package's."""
+    try:
+        return function(of)
+    except PackagingError as error:
+        raise QuadcosimError(str(error)) from error

@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 import fmpy
 import pytest
 
-from fmu_kit import packaging
+from fmu_kit import bundle, packaging
 from fmu_kit.loader import BESIDE, GUID_FILE
 from orchestration import fmus
 from orchestration.doctor import binaries
@@ -21,7 +21,7 @@ from orchestration.wiring import MODELS
 from tests.fmus.archive import files_of
 from tests.fmus.instance import Instance
 from tests.fmus.process import ROOT, run
-from tests.fmus.source_tree import PACKAGES, build, copy_sources, python, replace, try_to_build
+from tests.fmus.source_tree import build, copy_sources, python, replace, try_to_build
 
 EPOCH = 1_000_000_000  # 2001-09-09T01:46:40Z
 
@@ -160,7 +160,7 @@ def test_every_import_from_the_bundle_finds_a_bundled_file(model: str, built: di
 def test_what_only_building_needs_is_not_bundled(model: str, built: dict[str, Path]) -> None:
     bundled = {PurePosixPath(name).name for name in files_of(built[model]) if "/fmu_kit/" in name}
     assert "slave.py" in bundled
-    assert not bundled & {"packaging.py", "documentation.py", "page.html"}
+    assert not bundled & {"packaging.py", "bundle.py", "discovery.py", "documentation.py", "page.html"}
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -245,8 +245,8 @@ def test_a_slave_that_needs_more_than_the_standard_library_is_refused(
     (package / "slave.py").write_text("from thirsty_fmu.helper import late\n")
     (package / "helper.py").write_text(f"{statement}\n")  # found though the slave imports it only indirectly
     monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(packaging.PackagingError) as refusal:
-        packaging.bundled_sources(packaging.Target("thirsty_fmu.slave", "Thirsty"))
+    with pytest.raises(bundle.PackagingError) as refusal:
+        bundle.bundled_sources(bundle.Target("thirsty_fmu.slave", "Thirsty"))
     assert str(package / "helper.py") in str(refusal.value)
     assert f"imports {module}," in str(refusal.value)
     assert "\n" not in str(refusal.value)
@@ -269,21 +269,21 @@ def test_an_import_that_renaming_would_miss_is_refused(tmp_path: Path, monkeypat
     (package / "__init__.py").touch()
     (package / "slave.py").write_text("import fmu_kit.algebra\n")
     monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(packaging.PackagingError, match=r"slave\.py:1: expected `from package\.module import name`"):
-        packaging.bundled_sources(packaging.Target("plain_fmu.slave", "Plain"))
+    with pytest.raises(bundle.PackagingError, match=r"slave\.py:1: expected `from package\.module import name`"):
+        bundle.bundled_sources(bundle.Target("plain_fmu.slave", "Plain"))
 
 
 def test_a_module_without_sources_is_refused_by_name() -> None:
-    with pytest.raises(packaging.PackagingError, match="no_such_package"):
-        packaging.bundled_sources(packaging.Target("no_such_package.slave", "Slave"))
+    with pytest.raises(bundle.PackagingError, match="no_such_package"):
+        bundle.bundled_sources(bundle.Target("no_such_package.slave", "Slave"))
 
 
 @pytest.mark.parametrize(
     "text", ["controller_fmu.sliding_mode.slave", ":UnifiedController", "controller_fmu.sliding_mode.slave:", ""]
 )
 def test_a_target_must_name_module_and_class(text: str) -> None:
-    with pytest.raises(packaging.PackagingError, match="expected module:Class"):
-        packaging.Target.parse(text)
+    with pytest.raises(bundle.PackagingError, match="expected module:Class"):
+        bundle.Target.parse(text)
 
 
 def test_a_failed_build_says_why(sources: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -303,7 +303,8 @@ def test_the_source_hash_changes_with_a_source(sources: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "file", ["packaging.py", "documentation.py", "page.html", "loader.py", "loader.c", "LICENSE", "slave.py"]
+    "file",
+    ["packaging.py", "bundle.py", "documentation.py", "page.html", "loader.py", "loader.c", "LICENSE", "slave.py"],
 )
 def test_the_source_hash_changes_with_what_both_fmus_stand_on(file: str, sources: Path) -> None:
     before = {model: hash_of(sources, model) for model in MODELS}
@@ -324,11 +325,12 @@ def test_the_source_hash_changes_with_the_files_beside_the_slave(file: str, sour
     assert hash_of(sources, "QuadrotorPlant") not in (changed, before["QuadrotorPlant"])
 
 
-@pytest.mark.parametrize("package", PACKAGES)
+@pytest.mark.parametrize("package", ["fmu_kit", *(target.rpartition(".")[0] for target in MODELS.values())])
 def test_an_installed_package_has_every_file_that_packaging_reads(package: str) -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     declared = settings["tool"]["setuptools"]["package-data"][package]
-    files = {path.name for path in (ROOT / package).iterdir() if path.is_file() and path.suffix != ".py"}
+    folder = ROOT.joinpath(*package.split("."))
+    files = {path.name for path in folder.iterdir() if path.is_file() and path.suffix != ".py"}
     assert sorted(declared) == sorted(files)
 
 

@@ -114,3 +114,75 @@ def test_a_build_that_fails_says_why_in_one_line(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: done)
     with pytest.raises(QuadcosimError, match=r"failed: controller_fmu/sliding_mode/law.py:3: imports numpy$"):
         fmus.build(["UnifiedController"], tmp_path)
+
+
+# -- slaves of anybody ------------------------------------------------------------------------------------
+
+LAMP = """
+from fmu_kit.slave import Slave
+from fmu_kit.variables import continuous_output, discrete_input
+from voltage import VOLTS
+
+
+class Lamp(Slave):
+    variables = (
+        continuous_output("voltage", "at the lamp", "{unit}"),
+        discrete_input("switch", "whether it is on", None, False),
+    )
+    description = "A lamp"
+
+    def step(self, t: float, h: float) -> None:
+        self.put("voltage", VOLTS * self.boolean("switch"))
+"""
+
+
+@pytest.fixture
+def lamp(tmp_path: Path) -> Path:
+    """A folder with a slave of a few lines, which uses a module beside it."""
+    folder = tmp_path / "lamp"
+    folder.mkdir()
+    (folder / "lamp.py").write_text(LAMP.format(unit="V"), encoding="utf-8")
+    (folder / "voltage.py").write_text("VOLTS = 12.0\n", encoding="utf-8")
+    return folder
+
+
+def test_a_missing_fmu_is_built_from_the_slave_beside_it_and_again_when_that_changes(lamp: Path) -> None:
+    path, heard = lamp / "Lamp.fmu", []
+    for _ in range(2):
+        assert fmus.locate(str(path), heard.append) == path
+    assert heard == [f"building {path}"]
+    (lamp / "voltage.py").write_text("VOLTS = 24.0\n", encoding="utf-8")
+    fmus.locate(str(path), heard.append)
+    assert heard == [f"building {path}"] * 2
+    with FmuSimulator(path, "lamp") as instance:
+        instance.enter_initialization(0.0, 1.0)
+        instance.exit_initialization()
+        instance.set("switch", True)
+        instance.step(0.0, 0.1)
+        assert instance.get("voltage") == 24.0
+
+
+def test_somebody_elses_fmu_is_left_as_it_is_beside_a_slave_of_its_name(lamp: Path) -> None:
+    (lamp / "Lamp.fmu").write_bytes(b"of another tool")
+    assert fmus.locate(str(lamp / "Lamp.fmu")).read_bytes() == b"of another tool"
+
+
+def test_a_slave_that_cannot_be_built_is_an_error_of_one_line(lamp: Path) -> None:
+    (lamp / "lamp.py").write_text(LAMP.format(unit="furlong"), encoding="utf-8")
+    with pytest.raises(QuadcosimError, match=r"failed: ValueError: unit furlong: expected powers of .*$"):
+        fmus.locate(str(lamp / "Lamp.fmu"))
+    (lamp / "voltage.py").write_text("import numpy\n", encoding="utf-8")
+    with pytest.raises(QuadcosimError, match=r"voltage.py:1: imports numpy, but an FMU has the standard library only$"):
+        fmus.locate(str(lamp / "Lamp.fmu"))
+
+
+def test_every_slave_of_a_folder_is_built_into_it_unless_told(lamp: Path, tmp_path: Path) -> None:
+    assert fmus.build_slaves(fmus.slaves_of(lamp), lamp) == [lamp / "Lamp.fmu"]
+    assert fmus.build_slaves(fmus.slaves_of(lamp), tmp_path / "out") == [tmp_path / "out" / "Lamp.fmu"]
+    assert (tmp_path / "out" / "Lamp.fmu").read_bytes() == (lamp / "Lamp.fmu").read_bytes()
+
+
+@pytest.mark.parametrize("folder", ["nowhere", "."])
+def test_a_folder_without_slaves_is_wrong_usage(folder: str, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r": expected a "):
+        fmus.slaves_of(tmp_path / folder)

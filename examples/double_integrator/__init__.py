@@ -1,1 +1,0 @@
-"""A double integrator under state feedback: the smallest loop with a known largest sampling period."""

@@ -1,0 +1,167 @@
+"""What an FMU brings along: the sources that a slave needs, found without importing any, under names of its own."""
+
+import ast
+import functools
+import importlib.util
+import re
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+SHARED_PACKAGES = ("fmu_kit", "pythonfmu")
+"""What every FMU bundles; else only what lies beside its slave, and the standard library, may be imported."""
+
+EMPTY_INIT = {"pythonfmu/__init__.py"}
+"""Package files replaced by empty ones: pythonfmu's imports its builder."""
+
+
+class PackagingError(Exception):
+    """The slave cannot be packed; the text says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A slave class, by the module that defines it."""
+
+    module: str
+    model: str
+    root: Path | None = None
+    """the folder in which modules are looked for first; None: only as Python finds them"""
+
+    @classmethod
+    def parse(cls, text: str, root: Path | None = None) -> "Target":
+        """From `module:Class`; raises `PackagingError` for another form."""
+        module, colon, model = text.partition(":")
+        if not (module and colon and model):
+            raise PackagingError(f"{text}: expected module:Class")
+        return cls(module, model, root)
+
+    def bundles(self, module: str) -> bool:
+        """Whether a module goes into the FMU: of the kit, of pythonfmu, the slave's own, or lying beside that.
+
+        Where packages are installed everything lies beside everything, and counts for nothing.
+        """
+        top, own = module.partition(".")[0], self.module.partition(".")[0]
+        if top in (*SHARED_PACKAGES, own):
+            return True
+        path = module_path(own, self.root)
+        folder = path.parent.parent if path.name == "__init__.py" else path.parent
+        beside = (folder / top / "__init__.py").is_file() or (folder / f"{top}.py").is_file()
+        return beside and folder.name not in ("site-packages", "dist-packages")
+
+    @property
+    def fragment(self) -> Path:
+        """Where the part of its documentation written by hand is, if it has one: beside it, under its name."""
+        return module_path(self.module, self.root).with_name(f"{self.model}.html")
+
+    @property
+    def icon(self) -> Path:
+        """Where its icon is, if it has one."""
+        return module_path(self.module, self.root).with_name(f"{self.model}.png")
+
+
+def bundled_sources(target: Target) -> dict[str, str]:
+    """The text of every module that the slave needs, by its path in the bundle; none is imported.
+
+    Raises `PackagingError` if one of them imports what is neither bundled nor the standard library.
+    """
+    sources: dict[str, str] = {}
+    waiting = [target.module, "fmu_kit.failure"]
+    while waiting:
+        module = waiting.pop()
+        path = module_path(module, target.root)
+        key = place(module, target.root)
+        if key in sources:
+            continue
+        sources[key] = "" if key in EMPTY_INIT else path.read_text(encoding="utf-8")
+        package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+        waiting += _imported_modules(sources[key], package, path, target)
+        if "." in module:
+            waiting.append(module.rpartition(".")[0])
+    return dict(sorted(sources.items()))
+
+
+def module_path(module: str, root: Path | None = None) -> Path:
+    """Where a module's source is, without importing it or its package; raises `PackagingError` if it has none."""
+    top, *rest = module.split(".")
+    base = _top_level(top, root)
+    if base is None:
+        raise PackagingError(f"{module}: expected an importable package with sources")
+    if rest or base.is_dir():
+        base = base.joinpath(*rest)
+        base = base / "__init__.py" if base.is_dir() else base.with_suffix(".py")
+    if not base.is_file():
+        raise PackagingError(f"{module}: no source at {base}")
+    return base
+
+
+def _top_level(name: str, root: Path | None) -> Path | None:
+    """The folder of a package or the file of a module."""
+    if root is not None:
+        if (root / name / "__init__.py").is_file():
+            return root / name
+        if (root / f"{name}.py").is_file():
+            return root / f"{name}.py"
+    spec = importlib.util.find_spec(name) if name else None
+    if spec is None or spec.origin is None or not spec.has_location:
+        return None
+    origin = Path(spec.origin)
+    return origin.parent if origin.name == "__init__.py" else origin
+
+
+def place(module: str, root: Path | None = None) -> str:
+    """Where a module is in the bundle."""
+    return "/".join(module.split(".")) + ("/__init__.py" if module_path(module, root).name == "__init__.py" else ".py")
+
+
+def tree_of(text: str, path: Path) -> ast.Module:
+    """The syntax tree of a source; raises `PackagingError` if it is no Python."""
+    try:
+        return ast.parse(text, str(path))
+    except (SyntaxError, ValueError) as error:
+        line = getattr(error, "lineno", None) or 1
+        raise PackagingError(f"{path}:{line}: {getattr(error, 'msg', error)}; expected Python") from error
+
+
+@functools.cache
+def _imported_modules(text: str, package: str, path: Path, target: Target) -> tuple[str, ...]:
+    """The bundled modules that a source imports; only the forms that renaming understands are allowed."""
+    found = []
+    for node in ast.walk(tree_of(text, path)):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+            if any(target.bundles(name) for name in names):
+                raise PackagingError(f"{path}:{node.lineno}: expected `from package.module import name` in an FMU")
+        elif isinstance(node, ast.ImportFrom):
+            base = importlib.util.resolve_name("." * node.level + (node.module or ""), package)
+            names = [base]
+            if target.bundles(base):
+                root = target.root
+                found += [base, *(f"{base}.{alias.name}" for alias in node.names if _is_module(base, alias.name, root))]
+                continue
+        else:
+            continue
+        for name in names:
+            if name.partition(".")[0] not in sys.stdlib_module_names:
+                raise PackagingError(f"{path}:{node.lineno}: imports {name}, but an FMU has the standard library only")
+    return tuple(found)
+
+
+def _is_module(package: str, name: str, root: Path | None) -> bool:
+    base = module_path(package, root)
+    return base.name == "__init__.py" and ((base.parent / f"{name}.py").is_file() or (base.parent / name).is_dir())
+
+
+def renamed(text: str, bundle: str, target: Target) -> str:
+    """The source with its imports of bundled packages going to the bundle."""
+    lines = text.encode().splitlines(keepends=True)
+    imports = [
+        node
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.ImportFrom) and node.level == 0 and target.bundles(node.module or "")
+    ]
+    for node in sorted(imports, key=lambda node: -node.col_offset):  # from the right, so that columns stay true
+        line, column = lines[node.lineno - 1], node.col_offset
+        moved = re.sub(rb"from\s+", f"from {bundle}.".encode(), line[column:], count=1)
+        lines[node.lineno - 1] = line[:column] + moved
+    return b"".join(lines).decode()

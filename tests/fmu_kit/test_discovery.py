@@ -1,0 +1,87 @@
+"""Slaves are found in the sources of a folder, without running any of them."""
+
+from pathlib import Path
+
+import pytest
+
+from fmu_kit.bundle import PackagingError, Target
+from fmu_kit.discovery import slave_beside, slaves_in
+
+ROOT = Path(__file__).parents[2]
+
+TANK = """
+from fmu_kit.slave import Slave
+
+
+class Tank(Slave):
+    description = "a tank"
+"""
+OTHERS = """
+from base import Base as Ancestor
+from fmu_kit import slave
+
+raise SystemExit("imported")
+
+
+class Pump(Ancestor):
+    description: str = "a pump, by a base class of another module"
+
+
+class Unspoken(Ancestor):
+    pass
+
+
+class Law:
+    description = "no slave"
+
+
+class Law2(Law):
+    description = "no slave either"
+"""
+BASE = """
+from fmu_kit.slave import Slave
+
+class Base(Slave):
+    pass
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    folder = tmp_path / "plants"
+    folder.mkdir()
+    for name, text in (("tank", TANK), ("others", OTHERS), ("base", BASE)):
+        (folder / f"{name}.py").write_text(text, encoding="utf-8")
+    return folder
+
+
+def test_classes_made_from_slave_that_say_what_they_are_are_found(folder: Path) -> None:
+    assert slaves_in(folder) == [Target("others", "Pump", folder), Target("tank", "Tank", folder)]
+
+
+def test_modules_of_a_package_are_named_from_where_its_outermost_package_lies(folder: Path) -> None:
+    inner = folder / "inner"
+    inner.mkdir()
+    for package in (folder, inner):
+        (package / "__init__.py").touch()
+    (inner / "tank.py").write_text("from ..base import Base\nclass Tank(Base):\n    description = ''\n")
+    assert slaves_in(inner) == [Target("plants.inner.tank", "Tank", folder.parent)]
+
+
+def test_the_projects_own_slaves_are_found() -> None:
+    assert slaves_in(ROOT / "controller_fmu" / "sliding_mode") == [
+        Target("controller_fmu.sliding_mode.slave", "UnifiedController", ROOT)
+    ]
+
+
+def test_an_fmu_goes_with_the_class_of_its_name_in_its_folder(folder: Path) -> None:
+    assert slave_beside(folder / "Tank.fmu") == Target("tank", "Tank", folder)
+    for name in ("Unspoken", "Law", "Tan", "Missing"):
+        assert slave_beside(folder / f"{name}.fmu") is None
+    assert slave_beside(folder / "nowhere" / "Tank.fmu") is None
+
+
+def test_a_source_that_is_no_python_is_named_with_its_line(folder: Path) -> None:
+    (folder / "bad.py").write_text("x = 1\ndef f(:\n", encoding="utf-8")
+    with pytest.raises(PackagingError, match=r"bad\.py:2: invalid syntax; expected Python$"):
+        slaves_in(folder)
