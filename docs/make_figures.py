@@ -6,10 +6,11 @@ import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration import plots
-from orchestration.clock import Clock, random_streams
-from orchestration.flight import run
+from orchestration import plots, run
+from orchestration.quadrotor.translation import system_of
 from orchestration.scenario import Scenario
+from orchestration.stepping.agenda import Agenda
+from orchestration.stepping.streams import Streams
 from orchestration.timing import Timing
 
 FIGURES = Path(__file__).parent / "figures"
@@ -30,7 +31,7 @@ def main() -> None:
 
 
 def timing_diagram() -> Figure:
-    """When each sample is taken and its command applied, as the clock of a run says."""
+    """When each sample is taken and its command applied, as the agenda of a run says."""
     cases = (
         ("Gauss-Seidel", Timing(period=0.01)),
         ("Jacobi", Timing(period=0.01, order="jacobi")),
@@ -49,19 +50,19 @@ def timing_diagram() -> Figure:
 
 
 def _draw_case(axes: Axes, timing: Timing) -> None:
-    sampled: dict[int, float] = {}
-    for instant in Clock(timing, 0.065, random_streams(3)):
-        now = instant.time * MILLISECONDS
+    system, sampled = system_of(Scenario(timing=timing, stop_time=0.065, seed=3)), {}
+    for instant in Agenda(system, Streams(system.seed, system.streams)):
+        now, arrivals = instant.time * MILLISECONDS, list(instant.arrivals)
         axes.plot(now, 0.0, "|", color=plots.GREY, markersize=4, label="plant point")
-        if instant.sample is not None:
-            sampled[instant.sample.k] = now
-            lost = instant.sample.arrival is None
+        for due in instant.due:
+            sampled[due.k] = now
             axes.plot(now, 1.0, "o", color=plots.BLUE, markersize=5, label="sample")
-            if lost:
+            if any(message.arrival is None for message in due.sent):
                 axes.plot(now, 0.72, "x", color=plots.RED, markersize=6, label="command lost")
-        for k in instant.arrivals:
+            arrivals += [message for message in due.sent if message.arrival == instant.time]
+        for message in arrivals:
             arrow = {"arrowstyle": "-|>", "color": plots.GREEN, "shrinkA": 3, "shrinkB": 0}
-            axes.annotate("", xy=(now, 0.0), xytext=(sampled[k], 1.0), arrowprops=arrow)
+            axes.annotate("", xy=(now, 0.0), xytext=(sampled[message.k], 1.0), arrowprops=arrow)
     axes.set(yticks=(0.0, 1.0), yticklabels=("plant", "controller"), ylim=(-0.3, 1.35), xlim=(-1.0, 66.0))
     axes.grid(False)
     axes.spines["left"].set_visible(False)

@@ -18,10 +18,9 @@ import fmpy
 import numpy as np
 import pytest
 
-from orchestration import ssp
+from orchestration import run, ssp
 from orchestration.doctor.machine import this_machine
 from orchestration.doctor.verdict import INSTALL_LIBPYTHON, satisfies
-from orchestration.flight import run
 from orchestration.scenario import Scenario
 from orchestration.timing import Timing
 from orchestration.wiring import COMMAND, MEASUREMENT

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from orchestration import Scenario
-from orchestration.flight import run
+from orchestration import Scenario, run
 from orchestration.interop.catalogue import TOOLS
 from orchestration.interop.compare import Agreement
 from orchestration.interop.job import SIGNALS

@@ -5,9 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from orchestration.flight import run
 
-from orchestration import Scenario
+from orchestration import Scenario, run
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.interop.table import AIM
 from orchestration.simulator import Floats

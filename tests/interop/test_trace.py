@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestration import QuadcosimError, Result, Scenario, UsageError, load_run
-from orchestration.flight import run
+from orchestration import QuadcosimError, Result, Scenario, UsageError, load_run, run
 from orchestration.interop.trace import PORTS, Trace, log_of, read_trace, traced_copy
 from orchestration.wiring import COMMAND, MEASUREMENT
 from tests.studies.common import quadcosim

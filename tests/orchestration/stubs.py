@@ -1,22 +1,25 @@
-"""Simulators in a few lines of Python that write down every call, and a master over two of them."""
+"""Simulators in a few lines of Python that write down every call, a master over two of them, and its agenda."""
 
 import json
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from orchestration.clock import Clock, random_streams
 from orchestration.errors import SimulatorError
-from orchestration.master import Master, Signals
+from orchestration.quadrotor.translation import system_of
 from orchestration.recording import Chunk, Event, InMemory
-from orchestration.reference import ReferencePath
-from orchestration.sensors import Sensors
+from orchestration.scenario import Scenario
 from orchestration.simulator import Floats, Simulator, Transfer
+from orchestration.stepping.agenda import Agenda
+from orchestration.stepping.master import Master
+from orchestration.stepping.sources import Constant, Values
+from orchestration.stepping.streams import Streams
+from orchestration.stepping.watch import watch
 from orchestration.timing import Timing
-from orchestration.wiring import COMMAND, MEASUREMENT
+from orchestration.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE
 
 Call = tuple[Any, ...]
 
@@ -115,10 +118,29 @@ class Counting(Stub):
     def __init__(self, log: list[Call] | None = None) -> None:
         super().__init__(dict.fromkeys((*MEASUREMENT, *COMMAND), math.nan), log)
         self.told: list[dict[str, float]] = []
+        self.initialising = False
+
+    def reader(self, names: Sequence[str], into: Floats) -> Transfer:
+        read = super().reader(names, into)
+
+        def read_what_follows() -> None:
+            if self.initialising:
+                self.begin()
+            read()
+
+        return read_what_follows
+
+    def enter_initialization(self, start: float, stop: float) -> None:
+        super().enter_initialization(start, stop)
+        self.initialising = True
 
     def exit_initialization(self) -> None:
         super().exit_initialization()
+        self.initialising = False
         self.told.append({name: self.values[name] for name in MEASUREMENT})
+
+    def begin(self) -> None:
+        """What follows from its inputs while it is initialised, however often it is asked for."""
         self.values.update(dict.fromkeys(COMMAND, 0.0))
 
     def advance(self, t: float, h: float) -> None:
@@ -129,8 +151,8 @@ class Counting(Stub):
 class Feedback(Counting):
     """A controller that pulls the mass to the origin, with memory, so that every difference shows."""
 
-    def exit_initialization(self) -> None:
-        super().exit_initialization()
+    def begin(self) -> None:
+        super().begin()
         self.command()
 
     def advance(self, t: float, h: float) -> None:
@@ -143,14 +165,46 @@ class Feedback(Counting):
         v["thrust"] = -4.0 * v["position.x"] - 3.0 * v["velocity.x"] - v["torque.x"]
 
 
-class AtOrigin:
-    """The reference that stays at the origin."""
+AT_ORIGIN = Constant([0.0, 0.0, 0.0])
+"""The reference that stays at the origin."""
 
-    def position(self, t: float) -> tuple[float, float, float]:
-        return 0.0, 0.0, 0.0
 
-    def positions(self, t: Floats) -> Floats:
-        return np.zeros((len(t), 3))
+class Sample(NamedTuple):
+    """One sampling instant of the controller."""
+
+    k: int
+    time: int
+    next_time: int
+    measurement_lost: bool
+    sent: int
+    arrival: int | None
+
+
+class Instant(NamedTuple):
+    """A point at which the plant halts, and what happens there."""
+
+    time: int
+    sample: Sample | None
+    arrivals: tuple[int, ...]
+
+
+def agenda_of(timing: Timing, stop_time: float, seed: int = 0) -> Agenda:
+    """What happens when in a flight with this timing."""
+    system = system_of(Scenario(timing=timing, stop_time=stop_time))
+    return Agenda(system, Streams(seed, system.streams))
+
+
+def instants_of(agenda: Agenda) -> Iterator[Instant]:
+    """The instants of a flight in words of the loop of two: at each the plant halts."""
+    for instant in agenda:
+        sample, at_once = None, ()
+        for due in instant.due:
+            (measurement,), (command,) = due.received, due.sent
+            lost = measurement.arrival is None
+            sample = Sample(due.k, due.time, due.next_time, lost, command.sent, command.arrival)
+            at_once = (command,) if command.arrival == instant.time else ()
+        assert instant.halts == (0,)
+        yield Instant(instant.time, sample, tuple(message.k for message in (*instant.arrivals, *at_once)))
 
 
 class Flown:
@@ -164,23 +218,24 @@ class Flown:
         controller: Simulator | None = None,
         *,
         seed: int = 0,
-        reference: ReferencePath | None = None,
+        reference: Values = AT_ORIGIN,
         start: bool = True,
     ) -> None:
         self.timing = timing
         self.plant = plant or Plant(**{"position.x": 1.0})
         self.controller: Any = controller or Counting()
-        streams = random_streams(seed)
         self.recorder = InMemory()
+        system = system_of(Scenario(timing=timing, stop_time=stop_time))
+        streams = Streams(seed, system.streams)
+        named, signals = {"reference": reference}, {"reference": POSITION_REFERENCE}
         self.master = Master(
-            self.plant,
-            self.controller,
-            clock=Clock(timing, stop_time, streams),
-            timing=timing,
-            sensors=Sensors(MEASUREMENT, timing, streams["noise"]),
-            reference=reference or AtOrigin(),
-            signals=Signals(plant=(), controller=()),
+            system,
+            {"plant": self.plant, "controller": self.controller},
+            agenda=Agenda(system, streams),
+            streams=streams,
+            recorded={"plant": (), "controller": ()},
             recorder=self.recorder,
+            watch=lambda board: watch(system.criterion.diverged, board, named, signals, {}),
         )
         self.over: bool | None = None
         if start:
@@ -206,6 +261,10 @@ class Flown:
     def events(self, kind: str, what: str | None = None) -> list[Event]:
         """In order of time."""
         return [event for event in self.all_events() if event.kind == kind and what in (None, event.what)]
+
+    def state(self) -> tuple[dict[str, Any], dict[str, bytes]]:
+        """What another goes on from."""
+        return self.master.state(), self.master.saved()
 
     def bits(self) -> tuple[bytes, list[tuple[Any, ...]]]:
         """All that was recorded."""

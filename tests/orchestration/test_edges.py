@@ -6,14 +6,13 @@ from typing import Any
 
 import pytest
 
-from orchestration.clock import Clock, random_streams
 from orchestration.errors import UsageError
 from orchestration.run_directory import run_folder
 from orchestration.scenario import Scenario
 from orchestration.scenario_file import load_scenario
 from orchestration.timing import Timing
 
-from .stubs import Counting, Flown, Plant, Straying
+from .stubs import Counting, Flown, Plant, Straying, agenda_of
 
 
 @pytest.mark.parametrize("name", ["velocity__x", "quaternion__w"])
@@ -56,7 +55,7 @@ def test_instants_less_than_a_nanosecond_apart_are_refused(timing: dict[str, flo
 
 
 def test_a_period_of_a_nanosecond_has_instants_that_increase() -> None:
-    times = [instant.time for instant in Clock(Timing(period=1e-9, plant_interval=1e-9), 1e-8, random_streams(0))]
+    times = [instant.time for instant in agenda_of(Timing(period=1e-9, plant_interval=1e-9), 1e-8)]
     assert times == list(range(11))
 
 
@@ -89,10 +88,10 @@ def test_a_state_that_was_taken_does_not_change_while_the_run_goes_on() -> None:
     first = Flown(Timing(), 0.05, start=False)
     first.master.initialise()
     first.master.run(pause_at=20_000_000)
-    state = first.master.state()
+    state, saved = first.state()
     first.master.run()
     second = Flown(Timing(), 0.05, start=False)
-    second.master.restore(state)
+    second.master.restore(state, saved)
     second.master.run()
     assert second.bits() == first.bits()
 

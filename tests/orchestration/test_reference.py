@@ -7,7 +7,8 @@ import pytest
 
 from fmu_kit.trajectory import Trajectory
 from orchestration import UsageError
-from orchestration.reference import BuiltIn, FromFile
+from orchestration.stepping.sources import BuiltIn, Table
+from orchestration.stepping.table_file import read_table
 from orchestration.wiring import REFERENCE
 
 HEADER = ",".join(("time", *REFERENCE))
@@ -18,10 +19,10 @@ def row(t: float | str, value: float | str = 0.0) -> str:
     return ",".join(map(str, (t, *[value] * len(REFERENCE))))
 
 
-def table(tmp_path: Path, *rows: str, header: str = HEADER) -> FromFile:
+def table(tmp_path: Path, *rows: str, header: str = HEADER) -> Table:
     file = tmp_path / "reference.csv"
     file.write_text("\n".join((header, *rows)) + "\n", encoding="utf-8")
-    return FromFile(file, STOP)
+    return Table(*read_table(file, REFERENCE, STOP))
 
 
 def refused(tmp_path: Path, *rows: str, header: str = HEADER) -> str:
@@ -36,27 +37,26 @@ def refused(tmp_path: Path, *rows: str, header: str = HEADER) -> str:
 def test_between_its_rows_a_table_is_linear(tmp_path: Path) -> None:
     reference = table(tmp_path, row(0.0, 1.0), row(0.5, 2.0), row(2.0, -1.0))
     for t, value in ((0.0, 1.0), (0.25, 1.5), (0.5, 2.0), (1.0, 1.0), (2.0, -1.0)):
-        assert reference.values(t) == pytest.approx([value] * len(REFERENCE))
-        assert reference.position(t) == pytest.approx((value,) * 3)
-    assert reference.positions(np.array([0.25, 1.0]))[:, 1] == pytest.approx([1.5, 1.0])
+        assert reference.at(t) == pytest.approx([value] * len(REFERENCE))
+    assert reference.over(np.array([0.25, 1.0]))[:, 1] == pytest.approx([1.5, 1.0])
 
 
 def test_at_its_rows_a_table_is_exact(tmp_path: Path) -> None:
     times, values = [0.0, 0.1, 0.3, 2.0], [0.1, 0.7, -1.3, 1e-17]
     reference = table(tmp_path, *(row(t, value) for t, value in zip(times, values, strict=True)))
-    assert [reference.values(t)[0] for t in times[:-1]] == values[:-1]
+    assert [reference.at(t)[0] for t in times[:-1]] == values[:-1]
 
 
 def test_columns_are_found_by_name_in_any_order_among_others(tmp_path: Path) -> None:
     names = ["note", *reversed(REFERENCE), "time"]
     rows = [",".join(map(str, (7.0, *range(len(REFERENCE)), t))) for t in (0.0, STOP)]
     reference = table(tmp_path, *rows, header=" , ".join(names))
-    assert reference.values(1.0).tolist() == list(reversed(range(len(REFERENCE))))
+    assert reference.at(1.0) == list(reversed(range(len(REFERENCE))))
 
 
 def test_a_table_may_reach_beyond_the_run_and_have_empty_lines(tmp_path: Path) -> None:
     reference = table(tmp_path, row(-1.0, 0.0), "", row(3.0, 4.0), "")
-    assert reference.position(0.0) == pytest.approx((1.0,) * 3)
+    assert reference.at(0.0)[:3] == pytest.approx([1.0] * 3)
 
 
 @pytest.mark.parametrize("column", ["time", "reference.position.x", "reference.snap.z"])
@@ -117,19 +117,19 @@ def test_a_field_or_a_line_without_end_is_refused(tmp_path: Path, cell: str) -> 
 
 def test_a_byte_order_mark_is_no_part_of_the_first_name(tmp_path: Path) -> None:
     reference = table(tmp_path, row(0.0, 1.0), row(2.0, 1.0), header=f"\ufeff{HEADER}")
-    assert reference.position(1.0) == (1.0, 1.0, 1.0)
+    assert reference.at(1.0)[:3] == [1.0, 1.0, 1.0]
 
 
 def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="expected a readable CSV file"):
-        FromFile(tmp_path / "none.csv", STOP)
+        read_table(tmp_path / "none.csv", REFERENCE, STOP)
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(UsageError, match="expected a readable CSV file"):
-        FromFile(tmp_path / "binary.csv", STOP)
+        read_table(tmp_path / "binary.csv", REFERENCE, STOP)
 
 
 def test_the_built_in_reference_is_the_same_point_by_point_and_at_once() -> None:
     reference, times = BuiltIn(Trajectory(amplitude_y=1.5)), np.linspace(0.0, 30.0, 301)
-    one_by_one = np.array([reference.position(t) for t in times.tolist()])
-    assert reference.positions(times) == pytest.approx(one_by_one, abs=1e-14)
+    one_by_one = np.array([reference.at(t) for t in times.tolist()])
+    assert reference.over(times) == pytest.approx(one_by_one, abs=1e-14)
     assert one_by_one[0].tolist() == [0.0, 0.0, 2.0]

@@ -17,10 +17,10 @@ import pytest
 
 import orchestration
 from orchestration import (
-    FlightInterrupted,
     QuadcosimError,
     Record,
     Result,
+    RunInterrupted,
     Scenario,
     Timing,
     UsageError,
@@ -75,10 +75,9 @@ def test_a_run_read_back_is_the_run_written(result: Result, folder: Path) -> Non
     again = load_run(save_run(result, folder, figures=False))
     assert again.columns == result.columns
     assert again.rows.tobytes() == result.rows.tobytes()
-    assert again.desired.tobytes() == result.desired.tobytes()
     assert again.events == result.events
     assert again.metrics == result.metrics
-    assert again.scenario == result.scenario
+    assert again.asked == result.asked
     assert again.provenance == result.provenance
     assert (again.divergence, again.warnings) == (result.divergence, result.warnings)
 
@@ -338,7 +337,7 @@ def test_a_flight_whose_place_is_taken_meanwhile_is_kept_beside(result: Result, 
         folder.mkdir()
         (folder / "thesis.tex").write_text("years of work")
         folder.with_name("run.1").mkdir()
-        return orchestration.run(result.scenario, recorder=recorder)
+        return orchestration.run(result.asked, recorder=recorder)
 
     with pytest.raises(QuadcosimError, match=r"expected a new .*; what was written is in .*run\.2$"):
         keep_flight(folder, fly, figures=False)
@@ -355,7 +354,7 @@ def test_a_flight_that_cannot_be_written_whole_is_kept_beside(
 
     monkeypatch.setattr(plots, "draw", fail)
     with pytest.raises(QuadcosimError, match=r"no space left on device; what was written is in .*run\.1$"):
-        keep_flight(folder, lambda to: orchestration.run(result.scenario, recorder=to))
+        keep_flight(folder, lambda to: orchestration.run(result.asked, recorder=to))
     assert load_run(folder.with_name("run.1")).rows.tobytes() == result.rows.tobytes()
 
 
@@ -370,7 +369,7 @@ def test_what_was_recorded_before_an_interruption_is_kept_but_replaces_nothing(
     def progress(share: float) -> None:
         os.kill(os.getpid(), signal.SIGINT)
 
-    with pytest.raises(FlightInterrupted, match=r"^at t = 0\.5\d+ s of 3 s; what was recorded is in ") as stop:
+    with pytest.raises(RunInterrupted, match=r"^at t = 0\.5\d+ s of 3 s; what was recorded is in ") as stop:
         keep_flight(
             folder, lambda to: orchestration.run(Scenario(stop_time=3.0), recorder=to, progress=progress), figures=False
         )

@@ -12,7 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orchestration.clock import random_streams
+from orchestration.quadrotor.translation import quadrotor
+from orchestration.stepping.streams import Streams
 from orchestration.timing import Timing
 from orchestration.wiring import COMMAND, MEASUREMENT
 from tests.orchestration import second_clock
@@ -44,7 +45,7 @@ class Moved(Plant):
 class Answered(Counting):
     """`answered` as a simulator."""
 
-    def exit_initialization(self) -> None:
+    def begin(self) -> None:
         self.advance(0.0, 0.0)
 
     def advance(self, t: float, h: float) -> None:
@@ -125,9 +126,16 @@ def test_the_second_clock_imports_nothing_of_the_project() -> None:
 def test_the_numbers_of_seed_1_are_those_of_the_page() -> None:
     rows = re.findall(r"^\| ([a-z ]+) \| (-?[\d.]+), (-?[\d.]+) \|$", PAGE.read_text(encoding="utf-8"), re.M)
     page = {name.replace(" ", "_"): [float(a), float(b)] for name, a, b in rows}
-    streams = random_streams(1)
-    drawn = {name: [stream.random(), stream.random()] for name, stream in streams.items() if name != "noise"}
-    assert page == {**drawn, "noise": streams["noise"].standard_normal(2).tolist()}
+    numbered = quadrotor().streams
+    owners = {"jitter": "components.controller", "delay_jitter": "connections.command"}
+    drawn = {}
+    for place in sorted(numbered, key=numbered.__getitem__):
+        owner, _, cause = place.rpartition(".")
+        name = f"{owner.rpartition('.')[2]}_loss" if cause == "loss" else cause
+        stream = Streams(1, numbered).of(owner, cause)
+        assert owners.get(cause, owner) == owner
+        drawn[name] = stream.standard_normal(2).tolist() if cause == "noise" else [stream.random(), stream.random()]
+    assert page == drawn
 
 
 @pytest.mark.parametrize("constant", [second_clock.C0, second_clock.C1])

@@ -1,9 +1,8 @@
-"""The clock: theorems about which instants there are, in integers and exact rationals."""
+"""The agenda of a flight: theorems about which instants there are, in integers and exact rationals."""
 
 import itertools
-import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
@@ -12,29 +11,33 @@ import pytest
 import typer.main
 from hypothesis import given
 from hypothesis import strategies as st
-from orchestration.clock import Clock, Grid, Instant, Sample, random_streams
 
 from orchestration import Scenario, cli
 from orchestration.errors import UsageError
 from orchestration.flags import FlightFlags
-from orchestration.system.times import nanoseconds
+from orchestration.quadrotor.translation import quadrotor
+from orchestration.stepping.agenda import Agenda
+from orchestration.stepping.streams import Streams
+from orchestration.system.times import Grid, nanoseconds
 from orchestration.timing import TIMING_KEYS, Timing
+from tests.orchestration import stubs
 from tests.orchestration.strategies import Case, cases
+from tests.orchestration.stubs import Instant, Sample
 
 SECOND = 10**9
 COMMANDS = typer.main.get_command(cli.app).commands  # type: ignore[attr-defined]
 
 
-def clock_of(case: Case) -> Clock:
-    return Clock(case.timing, case.stop_time, random_streams(case.seed))
+def agenda_of(case: Case) -> Agenda:
+    return stubs.agenda_of(case.timing, case.stop_time, case.seed)
 
 
 def instants_of(case: Case) -> list[Instant]:
-    return list(clock_of(case))
+    return list(stubs.instants_of(agenda_of(case)))
 
 
 def samples_of(case: Case) -> list[Sample]:
-    return [instant.sample for instant in clock_of(case) if instant.sample is not None]
+    return [instant.sample for instant in instants_of(case) if instant.sample is not None]
 
 
 def exact(seconds: float) -> Fraction:
@@ -135,12 +138,12 @@ def test_the_next_time_is_right_also_beyond_the_end(case: Case) -> None:
 
 
 @given(cases())
-def test_the_time_that_the_clock_announces_comes_next(case: Case) -> None:
-    clock = clock_of(case)
-    announced = clock.next_time()
-    for instant in clock:
+def test_the_time_that_the_agenda_announces_comes_next(case: Case) -> None:
+    agenda = agenda_of(case)
+    announced = agenda.next_time()
+    for instant in agenda:
         assert instant.time == announced
-        announced = clock.next_time()
+        announced = agenda.next_time()
 
 
 def test_an_offset_beyond_the_end_leaves_no_samples() -> None:
@@ -314,53 +317,23 @@ def test_switching_one_cause_off_leaves_the_numbers_of_the_others(switched: str,
         assert all(one == other for one, other in both)
 
 
-@pytest.mark.parametrize("switched", CAUSES)
-def test_no_cause_of_the_clock_draws_from_the_noise(switched: str) -> None:
-    plain, disturbed = random_streams(7), random_streams(7)
-    list(Clock(Timing(), 0.5, plain))
-    list(Clock(Timing(**{switched: CAUSES[switched]}), 0.5, disturbed))
-    assert plain["noise"].standard_normal(10).tolist() == disturbed["noise"].standard_normal(10).tolist()
-
-
 def test_streams_of_one_seed_differ_from_each_other() -> None:
-    first = [stream.random() for stream in random_streams(0).values()]
+    numbered = quadrotor().streams
+    first = [Streams(0, numbered).of(*place.rsplit(".", 1)).random() for place in numbered]
+    assert len(first) == 5
     assert len(set(first)) == len(first)
 
 
-# -- saved state ------------------------------------------------------------------------------------------
-
-
 @given(cases(), st.data())
-def test_a_clock_restored_at_any_instant_through_json_continues_identically(case: Case, data: st.DataObject) -> None:
+def test_an_agenda_made_again_and_counted_on_continues_identically(case: Case, data: st.DataObject) -> None:
     whole = instants_of(case)
     at = data.draw(st.integers(0, len(whole)))
-    clock = clock_of(case)
-    before = list(itertools.islice(clock, at))
-    text = json.dumps(clock.state())
-    other = Clock(case.timing, case.stop_time, random_streams(case.seed + 1))  # the seed must not matter any more
-    other.restore(json.loads(text))
-    assert before + list(other) == whole
-
-
-@given(cases())
-def test_taking_the_state_changes_nothing(case: Case) -> None:
-    def watched() -> Iterator[Instant]:
-        clock = clock_of(case)
-        for instant in clock:
-            clock.state()
-            yield instant
-
-    assert list(watched()) == instants_of(case)
-
-
-def test_a_restored_clock_does_not_share_its_queue_with_the_state() -> None:
-    clock = clock_of(Case(Timing(delay=0.05), 1.0, 0))
-    for _ in itertools.islice(clock, 30):
-        pass
-    state = clock.state()
-    text = json.dumps(state)
-    list(clock)
-    assert json.dumps(state) == text
+    first, again = agenda_of(case), agenda_of(case)
+    before = list(itertools.islice(stubs.instants_of(first), at))
+    assert first.count == at
+    for _ in range(first.count):
+        next(again)
+    assert before + list(stubs.instants_of(again)) == whole
 
 
 # -- what is refused --------------------------------------------------------------------------------------

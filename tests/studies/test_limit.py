@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from orchestration.flight import prepared
 
 import orchestration
 from orchestration import Result, Scenario, Timing, UsageError
 from orchestration.fmi.reuse import Instances
 from orchestration.scenario import FmuChoice
+from orchestration.simulation import prepared
 from orchestration.simulator import Floats
 from orchestration.statistics import wilson
 from orchestration.studies import limit as limits
