@@ -84,7 +84,7 @@ class Simulation:
             recording=recording,
             metrics=objectives.compute(
                 self.system,
-                lambda: objectives.spans(self.system, recording, self.parameters),
+                lambda: objectives.spans(self.system, recording, self.parameters, end),
                 end=end,
                 divergence_time=_seconds(master.divergence_time),
                 steps=master.steps,

@@ -49,7 +49,7 @@ class Recorded:
     arrivals: Mapping[str, Marks] = field(default_factory=dict)
     """by connection, the rows at which a message arrived, shape (n,)"""
     stop_time: float
-    """[s], of a run that ends as planned"""
+    """[s], at which the run ended"""
     goes_on: bool = False
     """whether the first row is the last one of the span before"""
 

@@ -53,8 +53,11 @@ def outcome(system: System, *, good: bool | None, diverged: bool) -> str | None:
     return None if good is None else system.criterion.outcomes[0 if good else 1]
 
 
-def spans(system: System, recording: Recording, parameters: Mapping[str, float]) -> Iterator[Recorded]:
-    """What expressions see of a run, chunk by chunk, each with the last row of the one before."""
+def spans(system: System, recording: Recording, parameters: Mapping[str, float], end: float) -> Iterator[Recorded]:
+    """What expressions see of a run that ended at `end` [s], chunk by chunk, each with the last row of the one before.
+
+    Their `stop_time` is the end, so that the last third of an interrupted run is of what there is.
+    """
     wanted = {name for _, expression in expressions(system) for name in names(parse(expression))}
     columns = [c for c in recording.columns if c == "time" or c in wanted or c.rpartition(".")[0] in wanted]
     lines = {x.name: _Line() for x in system.connections if x.hold == "first"}
@@ -71,7 +74,7 @@ def spans(system: System, recording: Recording, parameters: Mapping[str, float])
             ends=_ends(system, signals, arrivals, lines),
             numbers=parameters,
             arrivals=arrivals,
-            stop_time=system.stop_time,
+            stop_time=end,
             goes_on=before is not None,
         )
         before = rows[-1:]

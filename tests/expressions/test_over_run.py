@@ -52,6 +52,7 @@ def value(expression: str, recorded: Recorded | None = None):
         ("peak_time(valve.u)", 1.0),
         ("settling_time(valve.u - 3, 0.1)", 1.0),
         ("settling_time(tank.level, 10)", 0.0),
+        ("settling_time(tank.level, 6)", 0.0),
         ("max(tank.level) / tank.area", 3.0),
         ("max(norm(p))", 6.0 * math.sqrt(2.0)),
         ("max(norm(p - p))", 0.0),
