@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from controller_fmu.law import Gains, Measurement, Model, evaluate
 
+from controller_fmu.sliding_mode.law import Gains, Measurement, Model, evaluate
 from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.trajectory import Trajectory
 from orchestration.quadrotor.measures import SETTLED
