@@ -154,7 +154,7 @@ def test_a_missing_fmu_is_built_from_the_slave_beside_it_and_again_when_that_cha
     (lamp / "voltage.py").write_text("VOLTS = 24.0\n", encoding="utf-8")
     fmus.locate(str(path), heard.append)
     assert heard == [f"building {path}"] * 2
-    with FmuSimulator(path, "lamp") as instance:
+    with Fmi2Instance(path, "lamp") as instance:
         instance.enter_initialization(0.0, 1.0)
         instance.exit_initialization()
         instance.set("switch", True)
