@@ -10,6 +10,7 @@ from typing import Any
 
 from orchestration.errors import QuadcosimError, SimulatorError, UsageError
 from orchestration.fmi.instance import Instance
+from orchestration.fmi.model import read_model
 from orchestration.fmi.reuse import Instances
 from orchestration.result import Result
 from orchestration.scenario import Scenario
@@ -103,10 +104,15 @@ class Hangar:
 
 
 def _expect_files(scenario: Scenario) -> None:
-    """Raise `BrokenPlaceError` if a file of a run is no longer there."""
+    """Raise `BrokenPlaceError` if a file of a run is not there, or is not the FMU that the coordinator has read."""
     for file in (scenario.plant.fmu, scenario.controller.fmu, scenario.reference.file):
         if file is not None and not Path(file).is_file():
             raise BrokenPlaceError(f"{file}: is no longer there")
+    try:
+        for fmu in (scenario.plant.fmu, scenario.controller.fmu):
+            read_model(Path(fmu))
+    except QuadcosimError as error:
+        raise BrokenPlaceError(str(error)) from error
 
 
 def row_of(

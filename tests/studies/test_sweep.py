@@ -476,7 +476,7 @@ def test_runs_that_fail_and_diverge_among_others_are_the_same_with_any_number_of
         (study(axis("plant.tilt", 1.0)), "plant.tilt: expected a parameter or an input, it is local"),
         (study(axis("timing.period", 0.01, -0.01)), "timing.period = -0.01: expected a positive number"),
         (study(axis("timing.jitter", 0.001, 0.02), base=short(period=0.01)), "run 1 (timing.jitter = 0.02): timing."),
-        (study(axis("timing.noise.posit", 0.1)), "timing.noise: posit is no measurement"),
+        (study(axis("timing.noise.posit", 0.1)), "timing.noise: posit is no signal"),
         (study(axis("stop_time", 1.0, -1.0)), "stop_time = -1.0: expected a positive number"),
         (study(PERIODS, base=dataclasses.replace(short(), record=Record(plant=("speed",)))), "plant.speed: Quadrotor"),
     ],
