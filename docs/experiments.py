@@ -28,8 +28,8 @@ PERIODS = np.round(np.arange(2, 49) * 0.0025, 4)
 """[s], at which every start is flown"""
 
 CONTINUOUS_KAPPAS = (0.0, 0.5, 1.0, 2.0, *(round(2.9 + 0.01 * i, 2) for i in range(11)), 5.0, 15.0)
-CONTINUOUS_HORIZONS = (30.0, 120.0)
-"""[s]"""
+CONTINUOUS_STEP = 0.001
+"""[s], of the integration; 5 ms is too long for kappa = 15"""
 
 SAMPLES, DESIGNS = 1024, 4
 """base samples of a design of Sobol indices, and how many such designs"""
@@ -70,17 +70,18 @@ def median_interval(values: Array) -> tuple[float, float, float, float]:
     return float(np.median(ordered)), float(ordered[below]), float(ordered[n - 1 - below]), float(confidence)
 
 
-def continuous() -> dict[str, Outcomes]:
-    """The paper's start in continuous time, for each of `CONTINUOUS_KAPPAS`, by each horizon."""
-    flights = Flights(kappa=np.array(CONTINUOUS_KAPPAS))
-    return {f"{horizon:g}": fly_continuously(flights, horizon) for horizon in CONTINUOUS_HORIZONS}
+def continuous(stop_time: float = 30.0) -> Outcomes:
+    """The paper's start in continuous time, for each of `CONTINUOUS_KAPPAS`."""
+    return fly_continuously(Flights(kappa=np.array(CONTINUOUS_KAPPAS)), stop_time, CONTINUOUS_STEP)
 
 
 def continuous_gains(factors: list[float]) -> dict[str, Outcomes]:
     """The paper's start in continuous time for each gain factor, with kappa = 1, scaled with the gains, and 0."""
     factor = np.array(factors)
     held = {"1": 0.0 * factor + 1.0, "scaled": factor, "0": 0.0 * factor}
-    found = fly_continuously(Flights(gain_factor=np.tile(factor, 3), kappa=np.concatenate(list(held.values()))))
+    found = fly_continuously(
+        Flights(gain_factor=np.tile(factor, 3), kappa=np.concatenate(list(held.values()))), step=0.0025
+    )
     split = {name: np.split(values, 3) for name, values in vars(found).items()}
     return {name: Outcomes(**{key: parts[i] for key, parts in split.items()}) for i, name in enumerate(held)}
 
