@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from orchestration.errors import SimulatorError
 from orchestration.fmi import repeatability
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_instance
@@ -27,10 +28,8 @@ class Instances:
         """An instance of the FMU at `path` for one run."""
         key = (path, instance_name)
         instance = self._kept.pop(key, None)
-        if instance is None:
+        if instance is None or not _is_reset(instance):
             instance = open_instance(path, instance_name)
-        else:
-            instance.reset()
         try:
             yield instance
         finally:
@@ -38,6 +37,16 @@ class Instances:
                 instance.close()
             else:
                 self._kept[key] = instance
+
+
+def _is_reset(instance: Instance) -> bool:
+    """Whether the instance could be reset; one that could not is given up, which is not the next run's failure."""
+    try:
+        instance.reset()
+    except SimulatorError:
+        instance.close()
+        return False
+    return True
 
 
 def _free(instances: dict[tuple[Path, str], Instance]) -> None:

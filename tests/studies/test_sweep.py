@@ -294,7 +294,7 @@ def test_what_is_not_the_runs_own_failure_is_no_row(monkeypatch: pytest.MonkeyPa
 def test_an_fmu_that_cannot_be_reset_is_made_anew_for_the_next_run(instantiated: list[str]) -> None:
     hangar = Hangar()
     before = rmse(hangar.fly(task(short())))
-    next(iter(hangar._fleet._instances.values())).failed = True  # it refuses the reset
+    next(iter(hangar._fleet._kept.values())).failed = True  # it refuses the reset
     assert rmse(hangar.fly(task(short()))) == before
     assert len(instantiated) == 3
 
@@ -619,7 +619,7 @@ def test_each_fmu_is_instantiated_once_in_a_process(instantiated: list[str]) -> 
 def test_an_fmu_that_failed_is_made_anew_and_the_next_run_is_as_if_nothing_had_been(instantiated: list[str]) -> None:
     hangar = Hangar()
     before = rmse(hangar.fly(task(short())))
-    assert hangar.fly(task(short().with_changes(parameters={"plant.mass": -1.0}))).row.metrics is None
+    assert hangar.fly(task(short().with_changes(parameters={"plant.mass": FAILS}))).row.metrics is None
     assert rmse(hangar.fly(task(short()))) == before
     assert instantiated.count("plant") == 2
 
