@@ -143,7 +143,7 @@ def prepared(
         models = {name: read_model(path) for name, path in paths.items()}
         check(system, models)
         parameters = _parameters(system, models)
-        objectives.check(system, _signals(system, models), set(parameters))
+        system = objectives.known(system, _signals(system, models), set(parameters))
     streams = Streams(system.seed, system.streams)
     with interrupts_held_back() as interrupt, ExitStack() as stack:
         instances = {name: stack.enter_context(load(path, name)) for name, path in paths.items()}

@@ -1,6 +1,7 @@
 """What a run comes to, as numbers: the objectives and the criterion of its system."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,13 +27,13 @@ def compute(system: System, spans: Spans, *, end: float, divergence_time: float 
     ended. Raises `UsageError` for an objective that cannot be evaluated, naming it.
     """
     diverged = divergence_time is not None
-    found: dict[str, float | None] = dict.fromkeys(system.objectives)
+    found: dict[str, float | None] = dict.fromkeys((*system.objectives, *system.optional))
     good = None if system.criterion.good is None else False
     if not diverged:
-        nodes = {name: parse(expression) for name, expression in system.objectives.items()}
+        nodes = {name: parse(text) for name, text in system.objectives.items()}
         if system.criterion.good is not None:
             nodes[GOOD] = parse(system.criterion.good)
-        found = evaluate(nodes, spans)
+        found |= evaluate(nodes, spans)
         if good is not None:
             good = bool(found.pop(GOOD))
     return {
@@ -92,15 +93,23 @@ def _arrivals(
     return {name: np.isin(instants, np.array(found, dtype=np.int64)) for name, found in times.items()}
 
 
-def check(system: System, signals: set[str], numbers: set[str]) -> None:
-    """Raise `UsageError` for an expression that names what is not there."""
+def known(system: System, signals: set[str], numbers: set[str]) -> System:
+    """`system` with the objectives that its FMUs have the variables for, where the others may be without a value.
+
+    Raises `UsageError` for an expression that names what is not there.
+    """
     valid = {"time", "stop_time", *signals, *vectors(dict.fromkeys(signals)), *numbers}
+    found = {}
     for name, text in system.objectives.items():
+        if name in system.optional and not valid.issuperset(names(parse(text))):
+            continue
         expect_names(parse(text), valid, f"objectives.{name}")
+        found[name] = text
         valid.add(name)
     for place, expression in (("good", system.criterion.good), ("diverged", system.criterion.diverged)):
         if expression is not None:
             expect_names(parse(expression), valid, f"criterion.{place}")
+    return replace(system, objectives=found)
 
 
 def _ends(

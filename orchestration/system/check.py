@@ -5,10 +5,12 @@ import math
 from collections.abc import Iterable, Mapping
 
 from orchestration.errors import UsageError, expected_name
+from orchestration.expressions.syntax import names, parse
 from orchestration.fmi.model import NUMERIC, Model, Variable
 from orchestration.fmi.values import taken
 from orchestration.system.conversion import BECOMES, OtherQuantity, conversion
 from orchestration.system.model import Connection, Parameter, System, component_of, variable_of
+from orchestration.system.system_file import expressions
 
 
 def check(system: System, models: Mapping[str, Model]) -> None:
@@ -43,12 +45,17 @@ def check(system: System, models: Mapping[str, Model]) -> None:
 
 
 def recorded(system: System, models: Mapping[str, Model]) -> dict[str, tuple[str, ...]]:
-    """What is recorded of each component beside what is exchanged: as the file says, or all outputs and local Reals."""
+    """What is recorded of each component beside what is exchanged: as the file says, or all outputs and local Reals.
+
+    What an expression names is recorded in any case.
+    """
+    named = {name for _, expression in expressions(system) for name in names(parse(expression))}
     found = {}
     for name, component in system.components.items():
         model = models[name]
         if component.record is not None:
-            found[name] = component.record
+            needed = [v.name for v in model.variables.values() if f"{name}.{v.name}" in named and _is_recordable(v)]
+            found[name] = (*component.record, *(v for v in needed if v not in component.record))
             continue
         chosen = [
             v.name
@@ -57,6 +64,10 @@ def recorded(system: System, models: Mapping[str, Model]) -> dict[str, tuple[str
         ]
         found[name] = tuple(chosen)
     return found
+
+
+def _is_recordable(variable: Variable) -> bool:
+    return variable.kind in NUMERIC and variable.causality in ("output", "local")
 
 
 def _end(models: Mapping[str, Model], end: str) -> tuple[str, Model, Variable | None]:

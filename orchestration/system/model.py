@@ -201,6 +201,8 @@ class System:
     sources: Mapping[str, Source] = field(default_factory=dict)
     objectives: Mapping[str, str] = field(default_factory=dict)
     """expressions by name"""
+    optional: tuple[str, ...] = ()
+    """objectives that are without a value where an FMU has no variable of a name in them"""
     criterion: Criterion = field(default_factory=Criterion)
     streams: Mapping[str, int] = field(default_factory=dict)
     """random streams that have a number instead of a name, as `connections.NAME.CAUSE` and `components.NAME.jitter`"""

@@ -117,6 +117,9 @@ class SystemTable(_Table):
     connections: Annotated[tuple[ConnectionTable, ...], _says("What is connected to what.")] = ()
     sources: Annotated[dict[str, SourceTable], _says("What drives inputs from outside, by name.")] = {}
     objectives: Annotated[dict[str, str], _says("What a run comes to: expressions by name.")] = {}
+    optional: Annotated[
+        tuple[str, ...], _says("Objectives without a value where an FMU lacks a variable that they name.")
+    ] = ()
     criterion: Annotated[CriterionTable, _says("When a run is good, and when it has diverged.")] = CriterionTable()
     streams: Annotated[dict[str, int], _says("Random streams that have a number for a name.")] = {}
     operating_point: Annotated[
@@ -164,6 +167,7 @@ def system_from_tables(tables: Mapping[str, Any], folder: Path) -> System:
         connections=tuple(_connection(i, value, table.order) for i, value in enumerate(table.connections)),
         sources={name: _source(name, value, folder) for name, value in table.sources.items()},
         objectives=table.objectives,
+        optional=table.optional,
         criterion=_made("criterion", Criterion, table.criterion.model_dump()),
         streams=table.streams,
         operating_point=dict(_flattened(table.operating_point)),
@@ -265,7 +269,7 @@ def to_toml(system: System) -> str:
     """The system file that loads as this system, wherever it lies."""
     import tomli_w
 
-    tables: dict[str, Any] = {"stop_time": system.stop_time, "seed": system.seed}
+    tables: dict[str, Any] = {"stop_time": system.stop_time, "seed": system.seed, "optional": list(system.optional)}
     tables["components"] = {
         name: _without_defaults(component, keep=("fmu",)) for name, component in system.components.items()
     }
