@@ -75,6 +75,8 @@ def system_of(scenario: Scenario) -> System:
             "sources.reference.to": tuple(f"controller.{name}" for name in REFERENCE),
             f"components.controller.parameters.{USE_REFERENCE_INPUTS}": True,
         }
+    elif scenario.controller.parameters.get(USE_REFERENCE_INPUTS) is True:
+        raise UsageError(f"controller.{USE_REFERENCE_INPUTS}: expected [reference] file = … to feed them")
     return changed(quadrotor(), changes)
 
 

@@ -21,7 +21,7 @@ from orchestration import Result, RunInterrupted, Scenario, SimulatorError, Timi
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.quadrotor.measures import desired
 from orchestration.scenario import FmuChoice, Record, ReferenceChoice
-from orchestration.wiring import COMMAND, MEASUREMENT, REFERENCE
+from orchestration.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE, REFERENCE
 
 EVERYTHING: dict[str, Any] = {
     "delay": 0.003,
@@ -253,7 +253,7 @@ def test_a_period_that_is_too_long_diverges_as_a_result() -> None:
 def test_a_flight_that_diverged_has_no_metrics_but_what_became_of_it() -> None:
     found = fly(5.0, period=0.3).metrics
     assert {name for name, value in found.items() if value is not None} == {
-        "outcome", "horizon", "diverged", "divergence_time", "steps",
+        "outcome", "good", "horizon", "diverged", "divergence_time", "steps",
     }  # fmt: skip
     assert (found["outcome"], found["horizon"]) == ("diverged", 5.0)
     assert set(found) == set(plain().metrics)
@@ -298,9 +298,11 @@ def test_what_is_recorded_can_be_chosen() -> None:
     flight = orchestration.run(Scenario(stop_time=0.05, record=record))
     exchanged = [f"plant.{name}" for name in (*COMMAND, *MEASUREMENT)]
     commands = [f"controller.{name}" for name in COMMAND]
-    assert flight.columns == ("time", *exchanged, "plant.tilt", *commands, "controller.energy")
+    judged = ["controller.energy", "controller.attitude_error.w"]  # the latter only because objectives name it
+    assert flight.columns == ("time", *exchanged, "plant.tilt", *commands, *judged, *POSITION_REFERENCE)
     chosen = [plain().columns.index(name) for name in flight.columns]
     assert flight.rows[:50].tolist() == plain().rows[:50, chosen].tolist()  # at its end it does not sample
+    assert None not in (flight.metrics["attitude_error_rmse"], flight.metrics["energy_growth_share"])
 
 
 def test_every_output_and_local_is_recorded_unless_told() -> None:
@@ -312,7 +314,7 @@ def test_every_output_and_local_is_recorded_unless_told() -> None:
     ("parameters", "text"),
     [
         ({"plant.mas": 1.0}, "did you mean mass?"),
-        ({"controller.gain.etta": 1.0}, "did you mean gain.eta?"),
+        ({"controller.gain.etta": 1.0}, "did you mean gain.eta "),
         ({"plant.qqqq": 1.0}, "its parameters are mass, gravity"),
         ({"plant.position.x": 1.0}, "expected a parameter"),
         ({"controller.position.x": 1.0}, "expected a parameter"),
@@ -332,21 +334,27 @@ def test_a_parameter_that_cannot_be_set_is_refused_in_one_line(parameters: dict[
 
 @pytest.mark.parametrize("side", ["plant", "controller"])
 def test_a_value_that_the_fmu_refuses_is_an_error_in_the_fmus_own_words(side: str) -> None:
-    with pytest.raises(SimulatorError, match=r"mass = -1.0: expected a finite value > 0") as refused:
-        fly(0.05, {f"{side}.mass": -1.0})
+    with pytest.raises(SimulatorError, match=r"mass = 0.0: expected a finite value > 0") as refused:
+        fly(0.05, {f"{side}.mass": 0.0})
     assert str(refused.value).startswith(side)
     assert "Traceback" in refused.value.details
+
+
+@pytest.mark.parametrize("side", ["plant", "controller"])
+def test_a_value_below_what_the_fmu_declares_is_refused_before_it_is_loaded(side: str) -> None:
+    with pytest.raises(UsageError, match=rf"^{side}.mass = -1.0: expected at least 0$"):
+        fly(0.05, {f"{side}.mass": -1.0})
 
 
 def test_a_record_of_what_is_no_variable_is_refused() -> None:
     with pytest.raises(UsageError, match="did you mean tilt"):
         orchestration.run(Scenario(stop_time=0.05, record=Record(plant=("tild",))))
-    with pytest.raises(UsageError, match=r"mass cannot be recorded; expected one of position.x, "):
+    with pytest.raises(UsageError, match=r"^record.plant: mass is a parameter; expected an output or a local$"):
         orchestration.run(Scenario(stop_time=0.05, record=Record(plant=("mass",))))
 
 
 def test_an_unknown_measurement_is_refused() -> None:
-    with pytest.raises(UsageError, match=r"timing.noise: positio is no measurement; expected one of position"):
+    with pytest.raises(UsageError, match=r"^timing.noise: positio is no signal of it; expected one of position"):
         fly(0.05, noise={"positio": 1.0})
 
 
