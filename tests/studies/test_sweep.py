@@ -28,7 +28,6 @@ from orchestration.studies.study import Fmus, Study, locate_fmus
 from orchestration.studies.study_file import load_study
 from orchestration.studies.sweep import store_path, sweep
 from orchestration.studies.worker import BrokenPlaceError, Hangar, Outcome, Task
-from orchestration.wiring import POSITION_REFERENCE
 from tests.studies.common import (
     GRID,
     NOISY,
@@ -512,9 +511,9 @@ def test_signals_of_the_chosen_runs_are_kept_and_are_those_of_a_direct_run(tmp_p
     for index, path in zip((1, 2), kept, strict=True):
         table = pq.read_table(path)
         direct = orchestration.run(chosen.scenario(index, starts()))
-        assert tuple(table.column_names) == (*direct.columns, *POSITION_REFERENCE)
+        assert tuple(table.column_names) == direct.columns
         kept_rows = np.column_stack([table[name].to_numpy() for name in table.column_names])
-        assert np.array_equal(kept_rows, np.hstack([direct.rows, direct.desired]))
+        assert np.array_equal(kept_rows, direct.rows)
 
 
 def test_no_signals_are_kept_unless_told(tmp_path: Path) -> None:
