@@ -14,7 +14,7 @@ import typer.core
 from orchestration import system_commands
 from orchestration.child import misleading_variables
 from orchestration.errors import QuadcosimError, SimulatorError, UsageError, shown
-from orchestration.flags import FlightFlags, flies, request_from, scenario_from
+from orchestration.flags import FlightFlags, Timing, flies, request_from
 from orchestration.interop import cli as interop
 from orchestration.limit_flags import MemoryLimit, OutputLimit, SizeLimit, TimeLimit, limits_from
 from orchestration.studies import cli as studies
@@ -84,8 +84,9 @@ def build(
 def run(
     scenario: Annotated[
         Path | None,
-        typer.Argument(help="System or scenario file; without one, the paper's flight.", show_default=False),
+        typer.Argument(help="System or scenario file, or SSP; without one, the paper's flight.", show_default=False),
     ] = None,
+    timing: Timing = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="Directory for signals, events, metrics and figures.", metavar="DIR")
     ] = None,
@@ -113,15 +114,15 @@ def run(
         if resume is not None:
             result: Result | None = pause.resume(resume, out, figures=figures, progress=progress, announce=say)
         elif pause_at is not None and out is not None:
-            chosen = request_from(scenario, flags)
+            chosen = request_from(scenario, flags, timing)
             result = pause.fly_until(chosen, pause_at, out, figures=figures, progress=progress, announce=say)
         elif out is not None:
-            chosen = request_from(scenario, flags)
+            chosen = request_from(scenario, flags, timing)
             result = keep_flight(
                 out, lambda to: fly(chosen, recorder=to, progress=progress, announce=say), figures=figures
             )
         else:
-            result = fly(request_from(scenario, flags), progress=progress, announce=say)
+            result = fly(request_from(scenario, flags, timing), progress=progress, announce=say)
     if result is None:
         say(f"paused in {out}; go on with: quadcosim run --resume {out}")
         return
@@ -223,20 +224,29 @@ def doctor(
 @flies
 def ssp(
     scenario: Annotated[
-        Path | None, typer.Argument(help="Scenario file; without one, the paper's flight.", show_default=False)
+        Path | None,
+        typer.Argument(help="System or scenario file; without one, the paper's flight.", show_default=False),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="The file; fmus/QuadrotorLoop.ssp unless told.", metavar="FILE")
+        Path | None,
+        typer.Option(
+            "--out", help="The file; QuadrotorLoop.ssp in fmus/, or NAME.ssp here, unless told.", metavar="FILE"
+        ),
     ] = None,
     *,
     flags: FlightFlags,
 ) -> None:
-    """Write both FMUs, their connections and a scenario's parameters as one SSP 1.0 file for other tools."""
+    """Write FMUs, their connections and their parameters as one SSP 1.0 file for other tools."""
     from orchestration import fmus
-    from orchestration import ssp as system
+    from orchestration.scenario import Scenario
+    from orchestration.ssp import writing
 
-    path = out or fmus.default_folder() / f"{system.NAME}.ssp"
-    print(system.write(scenario_from(scenario, flags), path, say))
+    asked = request_from(scenario, flags)
+    if isinstance(asked, Scenario) or scenario is None:
+        usual = fmus.default_folder() / f"{writing.NAME}.ssp"
+    else:
+        usual = Path(f"{scenario.stem}.ssp")
+    print(writing.write(asked, out or usual, say))
 
 
 system_commands.register(app)

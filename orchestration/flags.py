@@ -169,6 +169,11 @@ class FlightFlags:
         return changed(system, {**top, **{key: _value(key, text) for key, text in _pairs("set", self.set or [])}})
 
 
+Timing = Annotated[
+    Path | None,
+    typer.Argument(help="Of an SSP: the file with the timing that SSP has no words for.", show_default=False),
+]
+
 _BY_MEASUREMENT = ("noise", "quantisation")
 _TIMING_FLAGS = tuple(key for key in TIMING_KEYS if key not in _BY_MEASUREMENT)
 
@@ -201,12 +206,12 @@ def scenario_from(path: Path | None, flags: FlightFlags) -> "Scenario":
     return request
 
 
-def request_from(path: Path | None, flags: FlightFlags) -> "Request":
-    """The system or the scenario of a file, or the paper's, with the flags applied."""
+def request_from(path: Path | None, flags: FlightFlags, timing: Path | None = None) -> "Request":
+    """The system or the scenario of a file, an SSP's with its timing, or the paper's, with the flags applied."""
     from orchestration.request import load_request
     from orchestration.scenario import Scenario
 
-    request = Scenario() if path is None else load_request(path)
+    request = Scenario() if path is None else load_request(path, timing)
     return flags.applied_to(request) if isinstance(request, Scenario) else flags.applied_to_system(request)
 
 

@@ -1,30 +1,59 @@
-"""What can be asked to run: a system file, or a scenario of the quadrotor; both are TOML."""
+"""What can be asked to run: a system file or a scenario of the quadrotor, both TOML; an SSP and its timing."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from orchestration.documents import read_toml
 from orchestration.errors import UsageError
 from orchestration.quadrotor.translation import system_of
 from orchestration.scenario import Scenario
 from orchestration.scenario_file import scenario_from_tables
+from orchestration.ssp.reading import ENDINGS, tables_of
 from orchestration.system.model import System
 from orchestration.system.system_file import is_system, system_from_tables, to_toml
 
 Request: TypeAlias = Scenario | System
 
 
-def load_request(path: str | Path) -> Request:
-    """Read a system file or a scenario file; paths in it are relative to its folder.
+SSP = "ssp"
+"""Key of a file with timing: the SSP that it is for"""
 
-    Raises `UsageError` for a file that cannot be read, a key that does not exist (naming those that do) or a
-    value of the wrong kind.
+
+def load_request(path: str | Path, timing: str | Path | None = None) -> Request:
+    """Read a system file, a scenario file, or an SSP with a file of its `timing`; paths are relative to their file.
+
+    A file with timing that names its SSP is as good as both. Raises `UsageError` for a file that cannot be read, a
+    key that does not exist (naming those that do) or a value of the wrong kind.
     """
     path = Path(path)
+    if path.suffix.lower() in ENDINGS:
+        on_top = {} if timing is None else read_toml(Path(timing), "file with timing")
+        if SSP in on_top and (Path(timing or "").parent / str(on_top.pop(SSP))).resolve() != path.resolve():
+            raise UsageError(f"{timing}: ssp: names another file than {path}")
+        with _said_of(path if timing is None else Path(timing)):
+            return _from_ssp(path, on_top, path.parent if timing is None else Path(timing).parent)
+    if timing is not None:
+        raise UsageError(f"{timing}: expected no second file; only an SSP leaves its timing to one")
     tables = read_toml(path, "system or scenario file")
-    try:
+    with _said_of(path):
+        if isinstance(tables.get(SSP), str):
+            return _from_ssp(path.parent / tables.pop(SSP), tables, path.parent)
         return (system_from_tables if is_system(tables) else scenario_from_tables)(tables, path.parent)
+
+
+def _from_ssp(path: Path, timing: dict[str, Any], folder: Path) -> System:
+    return system_from_tables(tables_of(path, timing), folder)
+
+
+@contextmanager
+def _said_of(path: Path) -> Iterator[None]:
+    try:
+        yield
     except UsageError as error:
+        if str(error).startswith(f"{path}: "):
+            raise
         raise UsageError(f"{path}: {error}") from error
 
 

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from orchestration.flags import FlightFlags, flies, request_from
+from orchestration.flags import FlightFlags, Timing, flies, request_from
 from orchestration.terminal import say
 
 
@@ -48,8 +48,9 @@ def connect(
 def show(
     system: Annotated[
         Path | None,
-        typer.Argument(help="System or scenario file; without one, the paper's flight.", show_default=False),
+        typer.Argument(help="System or scenario file, or SSP; without one, the paper's flight.", show_default=False),
     ] = None,
+    timing: Timing = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="Draw it, in the format of the ending.", metavar="FIGURE.png")
     ] = None,
@@ -60,7 +61,7 @@ def show(
     from orchestration.request import system_meant
     from orchestration.system.description import as_text
 
-    meant = system_meant(request_from(system, flags))
+    meant = system_meant(request_from(system, flags, timing))
     print(as_text(meant))
     if out is not None:
         from orchestration.system import diagram

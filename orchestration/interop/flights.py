@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestration import child, fmus, ssp
+from orchestration import child, fmus
 from orchestration.errors import QuadcosimError, UsageError
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.interop.catalogue import Tool
@@ -15,6 +15,8 @@ from orchestration.interop.trace import PORTS, Trace, read_trace, traced_copy
 from orchestration.scenario import Scenario
 from orchestration.simulation import prepared
 from orchestration.simulator import Floats, Transfer
+from orchestration.ssp import writing
+from orchestration.ssp.carried import carried
 from orchestration.system.times import exact_nanoseconds
 
 _TEMPORARY = ("TMPDIR", "TEMP", "TMP")
@@ -60,10 +62,10 @@ class Flights:
         scenario = self._scenario.with_fmus(**paths)
         job = Job(
             **paths,
-            ssp=ssp.write(scenario, folder / "loop.ssp"),
+            ssp=writing.write(scenario, folder / "loop.ssp"),
             step=self.step,
             stop=self._scenario.stop_time,
-            parameters={component.name: component.parameters for component in ssp.components(scenario)},
+            parameters={component.name: component.parameters for component in carried(scenario).parts},
             recorded=self._folder / "recorded.npy",
             folder=folder,
         )
@@ -135,7 +137,7 @@ class _GivenStart(Fmi2Instance):
 
 def _expect_common_grid(scenario: Scenario) -> None:
     """Other masters step both FMUs together; between two of their points nothing can be due."""
-    ssp.components(scenario)
+    carried(scenario)
     timing = scenario.timing
     step = exact_nanoseconds(timing.plant_interval)
     if step.denominator != 1:

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TypeAlias
 
-from orchestration.scenario import Parameter
+from orchestration.system.model import Parameter
 from orchestration.wiring import COMMAND, MEASUREMENT
 
 SIGNALS = (*(f"plant.{name}" for name in MEASUREMENT), *(f"controller.{name}" for name in COMMAND))

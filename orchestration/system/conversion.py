@@ -25,12 +25,50 @@ class Conversion:
         """Whether values stay as they are."""
         return self == Conversion()
 
+    def then(self, other: "Conversion") -> "Conversion":
+        """This one, and the other on what comes of it."""
+        return Conversion(scale=other.scale * self.scale, offset=other.scale * self.offset + other.offset)
+
+    def __call__(self, value: float) -> float:
+        """A value, converted."""
+        return self.scale * value + self.offset
+
     def __str__(self) -> str:
         return f"scale = {self.scale:.12g}" + (f" and offset = {self.offset:.12g}" if self.offset else "")
 
 
+@dataclass(frozen=True, kw_only=True)
+class BaseUnits:
+    """What a unit is: value · factor + offset in the base units with these exponents."""
+
+    exponents: tuple[int, ...]
+    """of `BASE`"""
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+
+
 class OtherQuantity(Exception):
     """Two units that no factor turns into each other."""
+
+
+def between(one: BaseUnits, other: BaseUnits) -> Conversion:
+    """From one unit to another; raises `OtherQuantity`."""
+    if one.exponents != other.exponents:
+        raise OtherQuantity
+    return Conversion(scale=one.factor / other.factor, offset=(one.offset - other.offset) / other.factor)
+
+
+def unit_of(model: Model, name: str | None) -> BaseUnits | None:
+    """What a unit is by an FMU's definitions; None if they do not say."""
+    unit = next((u for u in model.description.unitDefinitions if u.name == name), None)
+    base = getattr(unit, "baseUnit", None)
+    if base is None:
+        return None
+    exponents = tuple(int(getattr(base, key)) for key in BASE)
+    return BaseUnits(exponents=exponents, factor=float(base.factor), offset=float(base.offset))
 
 
 def conversion(sender: Model, output: Variable, receiver: Model, into: Variable) -> Conversion | None:
@@ -40,15 +78,5 @@ def conversion(sender: Model, output: Variable, receiver: Model, into: Variable)
     """
     if not (output.unit and into.unit) or output.unit == into.unit:
         return Conversion()
-    ends = []
-    for model, variable in ((sender, output), (receiver, into)):
-        unit = next((u for u in model.description.unitDefinitions if u.name == variable.unit), None)
-        base = getattr(unit, "baseUnit", None)
-        if base is None:
-            return None
-        exponents = tuple(getattr(base, key) for key in ("kg", "m", "s", "A", "K", "mol", "cd", "rad"))
-        ends.append((exponents, float(base.factor), float(base.offset)))
-    (kinds, factor, offset), (others, by, plus) = ends
-    if kinds != others:
-        raise OtherQuantity
-    return Conversion(scale=factor / by, offset=(offset - plus) / by)
+    one, other = unit_of(sender, output.unit), unit_of(receiver, into.unit)
+    return None if one is None or other is None else between(one, other)

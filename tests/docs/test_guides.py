@@ -18,10 +18,11 @@ import fmpy
 import numpy as np
 import pytest
 
-from orchestration import run, ssp
+from orchestration import run
 from orchestration.doctor.machine import this_machine
 from orchestration.doctor.verdict import INSTALL_LIBPYTHON, satisfies
 from orchestration.scenario import Scenario
+from orchestration.ssp import writing
 from orchestration.timing import Timing
 from orchestration.wiring import COMMAND, MEASUREMENT
 from tests.fmus.expected import law_command
@@ -65,7 +66,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, built: dict[str, Path]) -> 
     folder = tmp_path_factory.mktemp("guide")
     for path in built.values():
         shutil.copy(path, folder)
-    ssp.write(
+    writing.write(
         Scenario().with_fmus(plant=built["QuadrotorPlant"], controller=built["UnifiedController"]),
         folder / "QuadrotorLoop.ssp",
     )

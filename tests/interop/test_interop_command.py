@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from orchestration import Scenario, fmus, ssp
+from orchestration import Scenario, fmus
 from orchestration.interop.catalogue import COFMUPY, TOOLS, chosen
+from orchestration.ssp import writing
 from orchestration.wiring import MODELS
 from tests.commands import Main
 from tests.studies.common import error_line, quadcosim
@@ -79,12 +80,12 @@ def test_json_has_each_tool_once_and_the_chart_goes_to_out(tmp_path: Path, tempo
 
 
 def test_a_tool_that_flies_with_another_gain_is_noticed(main: Main, monkeypatch: pytest.MonkeyPatch) -> None:
-    write = ssp.write
+    write = writing.write
 
     def with_another_gain(scenario: Scenario, path: Path) -> Path:
         return write(scenario.with_changes(parameters={"controller.gain.eta": 14.9999}), path)
 
-    monkeypatch.setattr(ssp, "write", with_another_gain)
+    monkeypatch.setattr(writing, "write", with_another_gain)
     chosen = ("--tool", "libcosim", "--tool", "libcosim, SSP", "--tool", "fmpy, SSP")
     done = main(*INTEROP, *chosen, "--json", code=1)
     assert [row["agrees"] for row in json.loads(done.stdout)] == [True, False, False]

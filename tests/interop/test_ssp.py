@@ -13,7 +13,8 @@ import pytest
 from fmpy.ssp.ssd import read_ssd, read_ssv
 
 from fmu_kit.packaging import write_archive
-from orchestration import FmuChoice, Scenario, Timing, UsageError, ssp
+from orchestration import FmuChoice, Scenario, Timing, UsageError
+from orchestration.ssp import writing
 from tests.fmus.interface_table import TABLES
 from tests.interop.common import with_other_parameters
 
@@ -34,7 +35,7 @@ def scenario(request: pytest.FixtureRequest, short: Scenario) -> Scenario:
 
 @pytest.fixture
 def written(scenario: Scenario, tmp_path: Path) -> Path:
-    return ssp.write(scenario, tmp_path / "loop.ssp")
+    return writing.write(scenario, tmp_path / "loop.ssp")
 
 
 def document(path: Path, name: str = "SystemStructure.ssd") -> Element:
@@ -73,9 +74,9 @@ def test_the_structure_and_each_parameter_set_are_valid_ssp_1_0(written: Path) -
 
 
 def test_the_same_scenario_gives_the_same_bytes(scenario: Scenario, written: Path, tmp_path: Path) -> None:
-    again = ssp.write(dataclasses.replace(scenario), tmp_path / "new" / "folder" / "again.ssp")
+    again = writing.write(dataclasses.replace(scenario), tmp_path / "new" / "folder" / "again.ssp")
     assert again.read_bytes() == written.read_bytes()
-    other = ssp.write(scenario.with_changes(parameters={"plant.mass": 1.3}), tmp_path / "other.ssp")
+    other = writing.write(scenario.with_changes(parameters={"plant.mass": 1.3}), tmp_path / "other.ssp")
     assert other.read_bytes() != written.read_bytes()
 
 
@@ -107,13 +108,13 @@ def test_every_set_is_bound_where_it_belongs(written: Path) -> None:
         "plant": [{"source": "resources/plant.ssv"}],
     }
     names = {document(written, name).attrib["name"] for name in SETS}
-    assert names == {ssp.PARAMETER_SET}, "ecos takes its sets by this name"
+    assert names == {writing.PARAMETER_SET}, "ecos takes its sets by this name"
 
 
 def test_a_boolean_is_written_if_it_is_not_what_it_is_anyway(short: Scenario, tmp_path: Path) -> None:
     for given, expected in ((True, ("Boolean", "true", None)), (False, None)):
         chosen = short.with_changes(parameters={"controller.use_reference_inputs": given})
-        path = ssp.write(chosen, tmp_path / "loop.ssp")
+        path = writing.write(chosen, tmp_path / "loop.ssp")
         assert values_in(path, "resources/controller.ssv").get("use_reference_inputs") == expected
         assert read_ssv(str(path), "resources/controller.ssv", validate=True)
 
@@ -188,10 +189,10 @@ def test_the_fmus_inside_are_byte_for_byte_those_of_the_scenario(written: Path, 
 
 def test_the_date_is_that_of_the_sources(short: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
-    path = ssp.write(short, tmp_path / "loop.ssp")
+    path = writing.write(short, tmp_path / "loop.ssp")
     assert document(path).attrib["generationDateAndTime"] == "1980-01-01T00:00:00Z"
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1000000000")
-    path = ssp.write(short, tmp_path / "loop.ssp")
+    path = writing.write(short, tmp_path / "loop.ssp")
     assert document(path).attrib["generationDateAndTime"] == "2001-09-09T01:46:40Z"
 
 
@@ -205,24 +206,26 @@ def test_numbers_of_numpy_and_whole_numbers_are_written_as_any_other(short: Scen
         stop_time=np.float64(2.0),
         timing=Timing(period=np.float64(0.02), plant_interval=np.float64(0.01)),
     )
-    expected = ssp.write(plain, tmp_path / "plain.ssp")
-    assert ssp.write(same, tmp_path / "same.ssp").read_bytes() == expected.read_bytes()
+    expected = writing.write(plain, tmp_path / "plain.ssp")
+    assert writing.write(same, tmp_path / "same.ssp").read_bytes() == expected.read_bytes()
 
 
 def test_the_clock_of_the_scenario_makes_no_difference(short: Scenario, tmp_path: Path) -> None:
-    paths = [ssp.write(short.with_changes(timing={"clock": clock}), tmp_path / clock) for clock in ("master", "fmu")]
+    paths = [
+        writing.write(short.with_changes(timing={"clock": clock}), tmp_path / clock) for clock in ("master", "fmu")
+    ]
     assert paths[0].read_bytes() == paths[1].read_bytes()
 
 
 def test_whole_numbers_stay_whole_and_only_they_are_taken(odd_plant: Path, short: Scenario, tmp_path: Path) -> None:
     chosen = dataclasses.replace(short, plant=FmuChoice(fmu=str(odd_plant), parameters={"cargo": 3}))
-    path = ssp.write(chosen, tmp_path / "loop.ssp")
+    path = writing.write(chosen, tmp_path / "loop.ssp")
     assert values_in(path, "resources/plant.ssv")["cargo"] == ("Integer", "3", None)
     assert read_ssv(str(path), "resources/plant.ssv", validate=True)
-    without = ssp.write(dataclasses.replace(short, plant=FmuChoice(fmu=str(odd_plant))), path)
+    without = writing.write(dataclasses.replace(short, plant=FmuChoice(fmu=str(odd_plant))), path)
     assert values_in(without, "resources/plant.ssv")["cargo"] == ("Integer", "0", None)
-    with pytest.raises(UsageError, match=r"^plant.cargo = 3.0: expected a whole number$"):
-        ssp.write(chosen.with_changes(parameters={"plant.cargo": 3.0}), path)
+    with pytest.raises(UsageError, match=r"^plant.cargo = 3.0: expected a whole number of 32 bits$"):
+        writing.write(chosen.with_changes(parameters={"plant.cargo": 3.0}), path)
 
 
 DEGREES = '<Unit name="deg"><BaseUnit rad="1" factor="0.017453292519943295"/></Unit><Unit name="box"/>'
@@ -232,7 +235,7 @@ def test_fmus_of_others_may_have_units_of_any_kind(short: Scenario, built: dict[
     def changed(description: str) -> str:
         return description.replace("<UnitDefinitions>", f"<UnitDefinitions>{DEGREES}", 1)
 
-    path = ssp.write(with_descriptions(short, built, tmp_path, changed), tmp_path / "loop.ssp")
+    path = writing.write(with_descriptions(short, built, tmp_path, changed), tmp_path / "loop.ssp")
     assert read_ssd(str(path), validate=True)
     units = document(path).iterfind("ssd:Units/ssc:Unit", NAMES)
     defined = {unit.attrib["name"]: unit[0].attrib for unit in units}
@@ -246,7 +249,7 @@ def test_fmus_of_others_need_no_units(short: Scenario, built: dict[str, Path], t
         description = re.sub("<UnitDefinitions>.*</UnitDefinitions>", "", description, flags=re.DOTALL)
         return re.sub(r' unit="[^"]*"', "", description)
 
-    path = ssp.write(with_descriptions(short, built, tmp_path, changed), tmp_path / "loop.ssp")
+    path = writing.write(with_descriptions(short, built, tmp_path, changed), tmp_path / "loop.ssp")
     assert read_ssd(str(path), validate=True)
     for name in ("SystemStructure.ssd", *SETS):
         assert not any(

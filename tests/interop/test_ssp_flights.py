@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestration import Scenario, load_scenario, ssp
+from orchestration import Scenario, load_scenario
 from orchestration.interop.catalogue import TOOLS, chosen
 from orchestration.interop.compare import Agreement, agreements
 from orchestration.interop.table import AIM, agrees
+from orchestration.ssp import writing
 from tests.interop.common import farthest, states_of_master, with_other_parameters
 
 FROM_SSP = ("libcosim, SSP", "ecos, SSP", "fmpy, SSP")
@@ -44,14 +45,14 @@ def test_each_tool_takes_the_parameters_from_the_ssp(
     other: Scenario, paper: Scenario, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Given an SSP with the default parameters, they all fly those."""
-    write = ssp.write
+    write = writing.write
 
     def without_parameters(scenario: Scenario, path: Path) -> Path:
         defaults = paper.with_changes(timing={"plant_interval": 0.01}, stop_time=2.0)
         fmus = {side: Path(getattr(scenario, side).fmu) for side in ("plant", "controller")}
         return write(defaults.with_fmus(**fmus), path)
 
-    monkeypatch.setattr(ssp, "write", without_parameters)
+    monkeypatch.setattr(writing, "write", without_parameters)
     for agreement in agreements(other, chosen(FROM_SSP)):
         assert farthest(agreement, agreement.same_start) > 1e-2, agreement.tool.name
         assert not agrees(agreement)

@@ -6,7 +6,7 @@ from importlib.metadata import files
 from typing import Any
 
 from orchestration.interop.job import CONNECTIONS, SIGNALS, Job, Rows
-from orchestration.ssp import PARAMETER_SET
+from orchestration.ssp.writing import PARAMETER_SET
 
 
 def _load_tbb() -> None:

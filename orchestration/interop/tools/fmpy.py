@@ -8,7 +8,7 @@ from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssv
 
 from orchestration.interop.job import SIGNALS, Job, Rows
-from orchestration.ssp import SYSTEM_PARAMETERS
+from orchestration.ssp.writing import SYSTEM_PARAMETERS
 
 
 def fly_ssp(job: Job) -> Rows:
