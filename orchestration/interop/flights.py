@@ -115,8 +115,10 @@ class _GivenStart(Fmi2Instance):
         self.stepped = False
 
     def writer(self, names: Sequence[str], source: Floats) -> Transfer:
-        """As of the base, once the first step is over."""
+        """As of the base; of connected inputs only once the first step is over."""
         usual = super().writer(names, source)
+        if not set(names) <= set(PORTS[self.name][0]):
+            return usual
         self._held.append(usual)
         return lambda: usual() if self.stepped else None
 
