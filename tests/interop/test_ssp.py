@@ -14,7 +14,9 @@ from fmpy.ssp.ssd import read_ssd, read_ssv
 
 from fmu_kit.packaging import write_archive
 from orchestration import FmuChoice, Scenario, Timing, UsageError
+from orchestration.quadrotor.translation import system_of
 from orchestration.ssp import writing
+from orchestration.system.paths import changed
 from tests.fmus.interface_table import TABLES
 from tests.interop.common import with_other_parameters
 
@@ -113,7 +115,7 @@ def test_every_set_is_bound_where_it_belongs(written: Path) -> None:
 
 def test_a_boolean_is_written_if_it_is_not_what_it_is_anyway(short: Scenario, tmp_path: Path) -> None:
     for given, expected in ((True, ("Boolean", "true", None)), (False, None)):
-        chosen = short.with_changes(parameters={"controller.use_reference_inputs": given})
+        chosen = changed(system_of(short), {"components.controller.parameters.use_reference_inputs": given})
         path = writing.write(chosen, tmp_path / "loop.ssp")
         assert values_in(path, "resources/controller.ssv").get("use_reference_inputs") == expected
         assert read_ssv(str(path), "resources/controller.ssv", validate=True)
