@@ -1,12 +1,11 @@
 """A double integrator, solved exactly over each step."""
 
-from fmu_kit.saved_state import State
 from fmu_kit.slave import Slave
 from fmu_kit.variables import continuous_input, continuous_output, fixed_parameter
 
 
 class DoubleIntegrator(Slave):
-    """x'' = u."""
+    """x'' = u, with u held over a step."""
 
     variables = (
         continuous_input("u", "acceleration", "m/s2"),
@@ -18,23 +17,13 @@ class DoubleIntegrator(Slave):
     description = "Double integrator: acceleration in, position and velocity out"
     initial_outputs_depend_on_inputs = False
 
-    def read_parameters(self) -> None:
-        """There is nothing to prepare."""
-
     def initialise(self, t: float) -> None:
         """Start at the initial state."""
         self.put("x", self.real("initial.x"))
         self.put("v", self.real("initial.v"))
 
     def step(self, t: float, h: float) -> None:
-        """Advance exactly, the input held."""
+        """Advance exactly."""
         x, v, u = self.real("x"), self.real("v"), self.real("u")
         self.put("x", x + h * v + 0.5 * h * h * u)
         self.put("v", v + h * u)
-
-    def internal_state(self) -> State:
-        """The state is among the variables."""
-        return {}
-
-    def restore(self, state: State) -> None:
-        """Nothing beyond the variables."""
