@@ -15,8 +15,15 @@ class CruiseController(Slave):
         tunable_parameter("k_p", "gain of the error", "N.s/m", 1200.0),
         tunable_parameter("k_i", "gain of its integral", "N/m", 300.0),
         fixed_parameter("force_max", "that the engine has", "N", 4000.0, above=0.0),
+        fixed_parameter("initial.force", "force before the first sample, and integral(0)", "N", 800.0),
     )
     description = "Cruise controller: speed in, force out"
+    initial_outputs_depend_on_inputs = False
+
+    def initialise(self, t: float) -> None:
+        """Ask for the initial force."""
+        self.put("force", self.real("initial.force"))
+        self.put("integral", self.real("initial.force"))
 
     def step(self, t: float, h: float) -> None:
         """Sample; `h` is the time until the next one."""

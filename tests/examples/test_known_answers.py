@@ -1,0 +1,93 @@
+"""The examples give the numbers that are known of their problems, each to the accuracy that is said."""
+
+import math
+
+import numpy as np
+import pytest
+
+from orchestration.simulation import run
+from tests.examples.common import example, largest_good
+
+PERIOD = "components.controller.sampling.period"
+COMMAND_DELAY = "connections.command.delay"
+
+
+@pytest.mark.parametrize("k_d", [1.0, 1.4])
+def test_double_integrator_has_the_largest_period_of_theory(k_d: float) -> None:
+    """min(2/k_d, 2 k_d/k_p), within 0.5 %: the run of 240 s must show that the motion still dies out."""
+    system = example("double_integrator", {"components.controller.parameters.k_d": k_d})
+    expected = min(2.0 / k_d, 2.0 * k_d)
+    assert largest_good(system, PERIOD, 0.7 * expected, 1.2 * expected, 0.002) == pytest.approx(expected, rel=0.005)
+
+
+@pytest.mark.parametrize("connection", ["command", "measurement"])
+def test_double_integrator_has_the_largest_delay_of_theory_wherever_it_lies(connection: str) -> None:
+    """0.68614 s at a period of 0.05 s, within 0.1 %; plant and samples are exact, so only the horizon is left."""
+    limit = largest_good(example("double_integrator"), f"connections.{connection}.delay", 0.5, 0.9, 2e-4)
+    assert limit == pytest.approx(0.68614, rel=1e-3)
+
+
+WIRE = {f"connections.command.{key}": 0.0 for key in ("delay_jitter", "loss")}
+
+
+def test_servo_has_the_largest_delay_of_theory() -> None:
+    """13.497 ms, within 0.1 %, as above."""
+    limit = largest_good(example("dc_servo", WIRE), COMMAND_DELAY, 0.010, 0.018, 1e-5)
+    assert limit == pytest.approx(0.013497, rel=1e-3)
+
+
+def test_servo_decays_with_the_spectral_radius_of_theory() -> None:
+    """0.9324 at a delay of 2 ms, to its four digits: after 40 samples two pairs of modes are left."""
+    signals = run(example("dc_servo", {**WIRE, COMMAND_DELAY: 0.002, "stop_time": 0.9})).signals
+    time, angle = np.asarray(signals["time"]), np.asarray(signals["servo.angle"])
+    sampled = angle[np.isclose(time / 0.006, np.round(time / 0.006), atol=1e-6)][40:140]
+    past = np.stack([sampled[i : len(sampled) - 4 + i] for i in range(4)], axis=1)
+    size = np.abs(sampled[4:])
+    coefficients = np.linalg.lstsq(past / size[:, None], sampled[4:] / size, rcond=None)[0]
+    radius = np.abs(np.roots([1.0, *-coefficients[::-1]])).max()
+    assert radius == pytest.approx(0.9324, abs=5e-5)
+
+
+@pytest.mark.parametrize(
+    ("gain", "weight", "expected"),
+    [
+        (3.0 - math.sqrt(3.0), 0.0, (3.0 + math.sqrt(3.0)) / 6.0),
+        (0.6 * (math.sqrt(13.0 / 3.0) - 1.0), 1.0, 1.540833),
+    ],
+    ids=["state", "state and command"],
+)
+def test_minimum_variance_control_has_the_cost_of_theory(gain: float, weight: float, expected: float) -> None:
+    """Mean of x^2 (and u^2), in an interval of 99.9 % over eight seeds, which is narrower than 10 % of it.
+
+    The noise is held for q = 0.1 s, at whose points x is as under white noise; the trapezoid over them adds
+    q^2/6 P L^2 (P the variance at samples), 0.4 %.
+    """
+    found = []
+    for seed in range(8):
+        metrics = run(
+            example("minimum_variance", {"seed": seed, "components.controller.parameters.gain": gain})
+        ).metrics
+        found.append(metrics["variance"] + weight * metrics["effort"])
+    excess = 0.1**2 / 6.0 * gain**2 / (2.0 * gain - gain**2)
+    half_width = 5.41 * np.std(found, ddof=1) / math.sqrt(len(found))
+    assert half_width < 0.1 * expected
+    assert abs(np.mean(found) - excess - expected) < half_width
+
+
+@pytest.mark.parametrize(("period", "delay"), [(0.1, 0.25), (0.5, 0.0), (0.07, 1.0), (0.25, 0.1)])
+def test_tank_rises_by_a_period_and_a_delay_above_the_switch_and_no_more(period: float, delay: float) -> None:
+    """The bound 2 + (T + d) · 1 m/s is reached, but for the micrometre that the level lacks at a sample."""
+    last = math.floor(2.0 / period) * period  # a sample at which the level is a micrometre below the switch
+    changes = {
+        PERIOD: period,
+        "connections.valve.delay": delay,
+        "components.tank.parameters.initial.level": 2 - 1e-6 - last,
+    }
+    peak = run(example("water_tank", changes)).metrics["peak"]
+    assert peak == pytest.approx(2.0 + period + delay - 1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("level", [0.0, 0.013, 0.5, 0.77])
+def test_tank_never_rises_above_the_bound(level: float) -> None:
+    peak = run(example("water_tank", {"components.tank.parameters.initial.level": level})).metrics["peak"]
+    assert 2.25 - 1e-9 <= peak <= 2.35 + 1e-9
