@@ -62,10 +62,9 @@ class NativeInstance(Instance):
         self._folder: Scratch | None = None
         self.model = read_model(path)
         self._expect_supported()
-        if fmpy.platform not in fmpy.supported_platforms(str(path)):
-            raise QuadcosimError(
-                f"{path}: has no binary for {fmpy.platform}; pythonfmu ships them for 64-bit Linux and Windows only"
-            )
+        found = fmpy.supported_platforms(str(path))
+        if fmpy.platform not in found:
+            raise QuadcosimError(f"{path}: has no binary for {fmpy.platform}, only for {', '.join(found) or 'none'}")
         try:
             self._folder = scratch.temporary()
             fmpy.extract(str(path), str(self._folder.path))
@@ -112,13 +111,22 @@ class NativeInstance(Instance):
         """Begin initialisation of a run over [start, stop] seconds; what the FMU has lost is set once more."""
         self._expect_alive()
         self._enter(start, stop)
-        for name, value in self._given.items():
-            variable = self.variable(name)
-            if same(variable, value, self.get(name)):
-                continue
-            self._put(variable, value)
-            if not same(variable, value, kept := self.get(name)):
-                self.warnings.append(f"{self.name}.{name}: was set to {value}, the FMU has {kept}")
+        for name, value in self._lost():
+            self._put(self.variable(name), value)
+        for name, value in self._lost():
+            self.warnings.append(f"{self.name}.{name}: was set to {value}, the FMU has {self.get(name)}")
+
+    def _lost(self) -> list[tuple[str, Value]]:
+        """What was set and is not there any more."""
+        numbers = [name for name, value in self._given.items() if not isinstance(value, str)]
+        values = np.zeros(len(numbers))
+        self.reader(numbers, values)()
+        kept: dict[str, Value] = dict(zip(numbers, values.tolist()))
+        return [
+            (name, value)
+            for name, value in self._given.items()
+            if not same(self.variable(name), value, kept[name] if name in kept else self.get(name))
+        ]
 
     def exit_initialization(self) -> None:
         """End initialisation."""

@@ -9,14 +9,14 @@
 #include <unistd.h>
 
 #define API __attribute__((visibility("default")))
-enum { U, Y, GAIN, ON, HIGH, COUNT, MODE };
+enum { U, Y, GAIN, ON, HIGH, COUNT, MODE, LABEL };
 enum { OK, WARNING, DISCARD, ERROR };
 
 typedef void (*Log2)(void *, const char *, int, const char *, const char *, ...);
 typedef void (*Log3)(void *, int, const char *, const char *);
 typedef struct { Log2 log; void *allocate, *release, *finished, *environment; } Callbacks;
 
-typedef struct { double u[2], x[2], gain; int on, mode, count; } State;
+typedef struct { double u[2], x[2], gain; int on, mode, count; char label[32]; } State;
 typedef struct { State s; char name[64]; Log2 log2; Log3 log3; void *environment; } Model;
 
 /* What libraries of its own would keep for the whole process, copies of this one included. */
@@ -73,6 +73,7 @@ static int reset(Model *m) {
 static void forget(Model *m) {
 #ifdef LOSES
     m->s.gain = 1.0;
+    m->s.label[0] = 0;
 #endif
 }
 
@@ -157,8 +158,14 @@ API int fmi2SetBoolean(void *c, const unsigned vr[], size_t n, const int v[]) {
     for (size_t i = 0; i < n; i++) ((Model *)c)->s.on = v[i];
     return OK;
 }
-API int fmi2GetString(void *c, const unsigned vr[], size_t n, const char *v[]) { return ERROR; }
-API int fmi2SetString(void *c, const unsigned vr[], size_t n, const char *const v[]) { return ERROR; }
+API int fmi2GetString(void *c, const unsigned vr[], size_t n, const char *v[]) {
+    for (size_t i = 0; i < n; i++) v[i] = ((Model *)c)->s.label;
+    return OK;
+}
+API int fmi2SetString(void *c, const unsigned vr[], size_t n, const char *const v[]) {
+    for (size_t i = 0; i < n; i++) snprintf(((Model *)c)->s.label, sizeof ((Model *)c)->s.label, "%s", v[i]);
+    return OK;
+}
 
 API int fmi2GetFMUstate(void *c, void **state) {
     *state = realloc(*state, sizeof(State));

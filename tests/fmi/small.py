@@ -29,6 +29,8 @@ _FMI2 = """<fmiModelDescription fmiVersion="2.0" modelName="Small" guid="small">
     </ScalarVariable>
     <ScalarVariable name="mode" valueReference="6" causality="parameter" variability="fixed">
       <Enumeration declaredType="Mode" start="1"/></ScalarVariable>
+    <ScalarVariable name="label" valueReference="7" causality="parameter" variability="fixed"><String start=""/>
+    </ScalarVariable>
   </ModelVariables>
   <ModelStructure>
     <Outputs><Unknown index="2"/><Unknown index="5"/><Unknown index="6"/></Outputs>

@@ -75,6 +75,14 @@ def test_types_and_enumerations_by_name(tmp_path: Path) -> None:
         ran(alone(small(tmp_path), parameters={"mode": 3}))
 
 
+def test_a_number_that_a_type_does_not_hold_is_refused(tmp_path: Path) -> None:
+    with instances.open_here(small(tmp_path), "it") as it:
+        it.writer(("mode",), np.array([1.6]))()
+        assert it.get("mode") == 2.0
+        with pytest.raises(SimulatorError, match=r"^it.mode = 3e\+09: expected a number that int32 holds$"):
+            it.writer(("mode",), np.array([3e9]))()
+
+
 def test_a_boolean_is_wired_to_a_boolean_and_to_a_real(tmp_path: Path) -> None:
     path = small(tmp_path)
     system = System(
@@ -116,7 +124,11 @@ def test_a_fixed_step_is_kept_whatever_happens_between_its_points(tmp_path: Path
 
 
 def test_parameters_that_initialisation_loses_are_set_again(tmp_path: Path) -> None:
-    result = ran(alone(small(tmp_path, "LOSES"), parameters={"gain": 3.0}))
+    with prepared(alone(small(tmp_path, "LOSES"), parameters={"gain": 3.0, "label": "x"})) as simulation:
+        simulation.master.initialise()
+        simulation.master.run()
+        assert simulation.instances["it"].get("label") == "x"
+        result = simulation.result()
     assert last(result, "it.y") == pytest.approx(0.3)
     assert not result.warnings
 
