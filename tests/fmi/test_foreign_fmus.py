@@ -307,8 +307,9 @@ def test_what_an_fmu_prints_is_not_among_what_the_command_prints(load: str, tmp_
         print("after")
     """)
     done = subprocess.run(
-        [sys.executable, "-c", script, str(path)], capture_output=True, text=True, env=child.environment(), check=True
-    )
+        [sys.executable, "-c", script, str(path)],
+        capture_output=True, text=True, env=child.environment(PYTHONUNBUFFERED=""), check=True,
+    )  # fmt: skip
     assert done.stdout.split() == ["before", "inside", "after"]
     assert done.stderr.count("SMALL FMU, version 1") == 1
     assert done.stderr.count("stepping") == 10
