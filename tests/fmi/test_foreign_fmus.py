@@ -1,5 +1,6 @@
 """What third-party FMUs force: each habit of theirs does in a run of a system what the documents say."""
 
+import json
 import os
 import signal
 import subprocess
@@ -313,3 +314,16 @@ def test_what_an_fmu_prints_is_not_among_what_the_command_prints(load: str, tmp_
     assert done.stdout.split() == ["before", "inside", "after"]
     assert done.stderr.count("SMALL FMU, version 1") == 1
     assert done.stderr.count("stepping") == 10
+
+
+def test_a_banner_does_not_spoil_the_json_of_a_command(tmp_path: Path) -> None:
+    path = small(tmp_path, "PRINTS")
+    (tmp_path / "system.toml").write_text(
+        f'stop_time = 0.1\n[components.it]\nfmu = "{path.name}"\nstep = 0.01\n[objectives]\npeak = "max(it.y)"\n'
+    )
+    done = subprocess.run(
+        child.command("orchestration.cli", "run", "system.toml", "--json"),
+        cwd=tmp_path, capture_output=True, text=True, env=child.environment(), check=True,
+    )  # fmt: skip
+    assert json.loads(done.stdout)["peak"] == 0.0
+    assert "SMALL FMU, version 1" in done.stderr

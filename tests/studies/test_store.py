@@ -440,8 +440,9 @@ def test_a_parameter_given_as_its_fmu_has_it_is_the_same_run() -> None:
 
 
 @pytest.mark.parametrize(
-    "module", ["orchestration.stepping.master", "orchestration.stepping.streams", "orchestration.results.objectives",
-               "fmu_kit.trajectory", "orchestration.fmi.native", "orchestration.studies.worker", "orchestration.wiring"],
+    "module",
+    ["orchestration.stepping.master", "orchestration.stepping.streams", "orchestration.results.objectives",
+     "fmu_kit.trajectory", "orchestration.fmi.native", "orchestration.studies.worker", "orchestration.wiring"],
 )  # fmt: skip
 def test_an_edited_source_on_the_path_of_the_flight_is_other_software(module: str, tmp_path: Path) -> None:
     sources = flight_sources()
