@@ -15,6 +15,7 @@ from orchestration import system_commands
 from orchestration.child import misleading_variables
 from orchestration.errors import QuadcosimError, SimulatorError, UsageError, shown
 from orchestration.flags import FlightFlags, Timing, flies, request_from
+from orchestration.fmi.banners import banners_to_stderr
 from orchestration.interop import cli as interop
 from orchestration.limit_flags import MemoryLimit, OutputLimit, SizeLimit, TimeLimit, limits_from
 from orchestration.studies import cli as studies
@@ -275,7 +276,8 @@ def main(arguments: list[str] | None = None) -> None:
     debug = "--debug" in given
     try:
         arguments = [argument for argument in given if argument != "--debug"]
-        code = app(arguments or ["--help"], standalone_mode=False)
+        with banners_to_stderr():
+            code = app(arguments or ["--help"], standalone_mode=False)
         sys.exit(code if arguments else 2)
     except (KeyboardInterrupt, _Stopped) as stop:
         say(f"quadcosim: interrupted {stop}".rstrip())

@@ -149,6 +149,9 @@ class IsolatedInstance(Instance):
         except (EOFError, OSError):
             self.failed = True
             raise SimulatorError(f"{self.name} ({self.model.name}): its process {self._ending()}") from None
+        except BaseException:  # whose answer this would be is no longer known
+            self.failed = True
+            raise
         if error is not None:
             raise error
         return result
