@@ -157,6 +157,9 @@ class NativeInstance(Instance):
         handle = self._call(deserialise, state)
         self._call(put, handle)
         self._call(free, handle)
+        for reference, values in self._arrays.items():
+            kind = next(v.type for v in self.variables.values() if v.length and v.reference == reference)
+            self._transfer(self._access("Get", kind), (reference,), values)()
 
     def close(self) -> None:
         """Free the instance and what was unpacked for it."""

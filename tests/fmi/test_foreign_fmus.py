@@ -195,6 +195,22 @@ def test_fmi_3_with_arrays_and_small_types(tmp_path: Path) -> None:
     assert last(result, "b.y[1]") == pytest.approx(0.02 * -5.0 * gain * t.sum())
 
 
+def test_an_element_that_is_set_leaves_the_others_as_they_were_saved(tmp_path: Path) -> None:
+    with instances.open_here(small(tmp_path, fmi=3), "it") as it:
+        one, two = np.array([1.0]), np.array([2.0])
+        write_one, write_two = it.writer(("u[1]",), one), it.writer(("u[2]",), two)
+        it.enter_initialization(0.0, 1.0)
+        it.exit_initialization()
+        write_one()
+        write_two()
+        state = it.save()
+        two[0] = 7.0
+        write_two()
+        it.restore(state)
+        write_one()
+        assert (it.get("u[1]"), it.get("u[2]")) == (1.0, 2.0)
+
+
 def test_fmi_3_with_clocks_or_event_mode_is_refused_by_name(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"has clocks, which are not supported: tick"):
         ran(alone(small(tmp_path / "a", fmi=3, clock=True), array=True))
