@@ -1,0 +1,141 @@
+"""Draws figure.png of every example: `python examples/make_figures.py [NAME …]`, run from anywhere."""
+
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from orchestration.plots import BLUE, GREEN, GREY, ORANGE, RED, STYLE
+from orchestration.result import Result
+from orchestration.simulation import run
+from orchestration.system.paths import changed
+from orchestration.system.system_file import load_system
+
+HERE = Path(__file__).resolve().parent
+SMALL = (7.0, 3.2)
+"""[inch]"""
+
+
+def flown(name: str, **changes: Any) -> Result:
+    """A run of an example; changes go by path, with `__` for the dots of it."""
+    system = load_system(HERE / name / "system.toml")
+    return run(changed(system, {path.replace("__", "."): value for path, value in changes.items()}))
+
+
+def line(axes: Axes, result: Result, signal: str, color: str, label: str, **style: Any) -> None:
+    """A signal over time."""
+    axes.plot(result.signals["time"], result.signals[signal], color=color, label=label, **style)
+
+
+def held(axes: Axes, result: Result, signal: str, color: str, label: str) -> None:
+    """A signal that is held between its changes."""
+    line(axes, result, signal, color, label, drawstyle="steps-post")
+
+
+def water_tank() -> Figure:
+    """The level with a prompt valve and a late one, and what the bound says."""
+    figure = Figure(figsize=SMALL)
+    axes = figure.subplots()
+    for delay, color in ((0.0, GREEN), (0.25, BLUE), (0.6, ORANGE)):
+        result = flown("water_tank", stop_time=10.0, connections__valve__delay=delay)
+        line(axes, result, "tank.level", color, f"valve {delay:g} s late: peak {result.metrics['peak']:.2f} m")
+        axes.axhline(2.0 + 0.1 + delay, color=color, linestyle=":", linewidth=1.0)
+    axes.axhspan(1.0, 2.0, color=GREY, alpha=0.12, label="where the valve is left as it is")
+    axes.set(xlabel="time [s]", ylabel="level [m]", title="dotted: 2 m + (0.1 s + delay) · 1 m/s", ylim=(0.0, 3.9))
+    axes.legend(loc="upper left", ncols=2, fontsize=8)
+    return figure
+
+
+def double_integrator() -> Figure:
+    """The position at periods on both sides of the limit."""
+    figure = Figure(figsize=SMALL)
+    axes = figure.subplots()
+    for period, color in ((0.5, GREEN), (1.8, BLUE), (2.1, RED)):
+        result = flown("double_integrator", stop_time=25.0, components__controller__sampling__period=period)
+        line(axes, result, "plant.x", color, f"period {period:g} s")
+    axes.set(xlabel="time [s]", ylabel="x [m]", ylim=(-8.0, 8.0), title="by theory it dies out below a period of 2 s")
+    axes.legend(loc="lower left", ncols=3, frameon=True, framealpha=0.9)
+    return figure
+
+
+def dc_servo() -> Figure:
+    """The angle over wires of different quality."""
+    figure = Figure(figsize=SMALL)
+    axes = figure.subplots()
+    wires = (
+        ("2 ms late", 0.002, 0.0, 0.0, GREEN),
+        ("and up to 4 ms more, a tenth lost", 0.002, 0.004, 0.1, BLUE),
+        ("12 ms late", 0.012, 0.0, 0.0, ORANGE),
+        ("and up to 4 ms more, a tenth lost", 0.012, 0.004, 0.1, RED),
+    )
+    for label, delay, jitter, loss, color in wires:
+        result = flown(
+            "dc_servo", stop_time=0.6, connections__command__delay=delay,
+            connections__command__delay_jitter=jitter, connections__command__loss=loss,
+        )  # fmt: skip
+        line(axes, result, "servo.angle", color, label)
+    axes.set(xlabel="time [s]", ylabel="angle [rad]", ylim=(-2.5, 2.5), title="seed 0; sampled every 6 ms")
+    axes.legend(loc="upper right", ncols=2, fontsize=8)
+    return figure
+
+
+def minimum_variance() -> Figure:
+    """Cost over gain: theory, and eight runs at each of some gains."""
+    figure = Figure(figsize=SMALL)
+    axes = figure.subplots()
+    gains = np.linspace(0.3, 1.8, 200)
+    variance = 1.0 / (2.0 * gains - gains**2)
+    axes.plot(gains, variance * (1.0 - gains + gains**2 / 3.0) + 0.5, color=BLUE, label="x², theory")
+    axes.plot(gains, variance * (1.0 - gains + 4.0 * gains**2 / 3.0) + 0.5, color=ORANGE, label="x² + u², theory")
+    for gain in (0.4, 0.65, 3.0 - math.sqrt(3.0), 1.6):
+        runs = [flown("minimum_variance", seed=s, components__controller__parameters__gain=gain) for s in range(8)]
+        for costs, color in (
+            ([r.metrics["variance"] for r in runs], BLUE),
+            ([r.metrics["variance"] + r.metrics["effort"] for r in runs], ORANGE),
+        ):
+            axes.plot([gain] * len(costs), costs, ".", color=color, markersize=4)
+    axes.plot([], [], ".", color=GREY, label="runs of 2000 s")
+    axes.set(xlabel="gain [1/s]", ylabel="per unit time", ylim=(0.5, 4.0), title="least of x²: (3 + √3)/6 at 3 - √3")
+    axes.legend(loc="upper left")
+    return figure
+
+
+def four_components() -> Figure:
+    """Speed and forces on the way."""
+    figure = Figure(figsize=(7.0, 5.0))
+    speeds, forces = figure.subplots(2, 1, sharex=True)
+    result = flown("four_components")
+    speeds.axhline(25.0, color=GREY, linestyle=":", label="set speed")
+    held(speeds, result, "sensor.filtered", ORANGE, "sensor, every 10 ms")
+    line(speeds, result, "car.speed", BLUE, "car")
+    held(forces, result, "controller.force", GREEN, "asked by the controller, every 100 ms")
+    held(forces, result, "engine.force", RED, "engine, every 20 ms")
+    speeds.set(ylabel="speed [m/s]", title="uphill from 20 s on; demands up to 80 ms late, a tenth of them lost")
+    forces.set(xlabel="time [s]", ylabel="force [N]")
+    speeds.legend(loc="lower right")
+    forces.legend(loc="upper center")
+    return figure
+
+
+FIGURES: dict[str, Callable[[], Figure]] = {
+    draw.__name__: draw for draw in (water_tank, double_integrator, dc_servo, minimum_variance, four_components)
+}
+
+
+def main(names: list[str]) -> None:
+    """Draw the figures of these examples; of all if none is named."""
+    with matplotlib.rc_context({**STYLE, "figure.dpi": 80}):
+        for name in names or FIGURES:
+            path = HERE / name / "figure.png"
+            FIGURES[name]().savefig(path)
+            print(path)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,54 @@
+"""What the pages of the examples tell their readers to type works as it stands there."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from orchestration.system.paths import value_at
+from tests.commands import Main
+from tests.examples.common import EXAMPLES, NAMES, example
+
+PAGES = [*(EXAMPLES / name / "README.md" for name in NAMES), EXAMPLES.parent / "README.md"]
+COMMANDS = [
+    shlex.split(line, comments=True)
+    for page in PAGES
+    for line in page.read_text(encoding="utf-8").splitlines()
+    if re.match(r"    quadcosim .*examples/", line)
+]
+
+
+def commands(name: str) -> list[list[str]]:
+    """Each once, without `quadcosim`."""
+    return [list(found) for found in dict.fromkeys(tuple(given[1:]) for given in COMMANDS if given[1] == name)]
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with nothing but the examples, as far as a reader's commands go."""
+    (tmp_path / "examples").symlink_to(EXAMPLES)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("command", [*commands("run"), *commands("show"), *commands("build")], ids=" ".join)
+def test_a_command_that_is_shown_works(command: list[str], here: Path, main: Main) -> None:
+    done = main(*command)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("command", commands("limit"), ids=" ".join)
+def test_a_limit_that_is_asked_for_is_of_what_there_is(command: list[str]) -> None:
+    file, options = command[1], dict(zip(command[2::2], command[3::2]))
+    system = example(Path(file).parent.name)
+    assert value_at(system, options["--of"]) is not None
+    given = [setting.partition("=")[0] for option, setting in zip(command[2::2], command[3::2]) if option == "--set"]
+    assert all(value_at(system, path) is not None for path in given)
+
+
+def test_every_example_is_on_the_list_and_has_a_figure() -> None:
+    text = (EXAMPLES / "README.md").read_text(encoding="utf-8")
+    for name in NAMES:
+        assert f"[{name}]({name}/README.md)" in text
+        assert (EXAMPLES / name / "figure.png").is_file()
