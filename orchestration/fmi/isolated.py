@@ -48,6 +48,7 @@ class IsolatedInstance(Instance):
         self._process = subprocess.Popen(
             child.command("orchestration.fmi.isolated_process", path.absolute(), instance_name),
             env=child.environment(), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            start_new_session=True,  # Ctrl-C is for the master, which ends the process when it is done
         )  # fmt: skip
         self._end = weakref.finalize(self, _ended, self._process)
         try:

@@ -62,7 +62,7 @@ class _Served:
 
 def main(path: Path, name: str) -> None:
     """Serve one instance."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the master, which ends this process when it is done
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it comes here nevertheless
     child.end_with_parent()
     requests, answers = _streams()
     served = _Served(path, name)

@@ -59,7 +59,9 @@ _FMI3 = """<fmiModelDescription fmiVersion="3.0" modelName="Small" instantiation
 </fmiModelDescription>"""
 
 _ITEMS = '<Item name="forward" value="1"/><Item name="backward" value="2"/>'
-_CLOCK = '<Clock name="tick" valueReference="7" causality="input" intervalVariability="constant" intervalDecimal="1"/>'
+BINARY = '<Binary name="blob" valueReference="8" causality="input"/>'
+SIZE = '<UInt64 name="size" valueReference="9" causality="structuralParameter" start="2"/>'
+CLOCK = '<Clock name="tick" valueReference="7" causality="input" intervalVariability="constant" intervalDecimal="1"/>'
 
 
 def small(
@@ -69,9 +71,9 @@ def small(
     fixed_step: bool = False,
     once: bool = False,
     saves: bool = True,
-    clock: bool = False,
+    more: str = "",
 ) -> Path:
-    """The FMU with these habits (macros of `small.c`) in `folder`; what it says of itself is as told."""
+    """The FMU with these habits (macros of `small.c`) in `folder`; it says of itself what it is told to, with `more` variables."""
     folder.mkdir(parents=True, exist_ok=True)
     library = folder / f"Small{fmpy.sharedLibraryExtension}"
     macros = [f"-D{macro}" for macro in (*habits, *(["FMI3"] if fmi == 3 else []), f'KEPT="{uuid.uuid4().hex}"')]
@@ -93,7 +95,7 @@ def small(
     place = fmpy.platform_tuple if fmi == 3 else fmpy.platform
     path = folder / "small.fmu"
     with zipfile.ZipFile(path, "w") as archive:
-        described = text.format(attributes=attributes, items=_ITEMS, more=_CLOCK if clock else "")
+        described = text.format(attributes=attributes, items=_ITEMS, more=more)
         archive.writestr("modelDescription.xml", described)
         archive.write(library, f"binaries/{place}/{library.name}")
     return path

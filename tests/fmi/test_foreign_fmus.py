@@ -20,7 +20,7 @@ from orchestration.fmi.native import NativeInstance
 from orchestration.result import Result
 from orchestration.simulation import prepared
 from orchestration.system.model import Component, Connection, Sampling, Source, System
-from tests.fmi.small import needs_compiler, small
+from tests.fmi.small import BINARY, CLOCK, SIZE, needs_compiler, small
 
 pytestmark = needs_compiler
 
@@ -213,9 +213,22 @@ def test_an_element_that_is_set_leaves_the_others_as_they_were_saved(tmp_path: P
 
 def test_fmi_3_with_clocks_or_event_mode_is_refused_by_name(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"has clocks, which are not supported: tick"):
-        ran(alone(small(tmp_path / "a", fmi=3, clock=True), array=True))
+        ran(alone(small(tmp_path / "a", fmi=3, more=CLOCK), array=True))
     with pytest.raises(SimulatorError, match=r"it \(Small\): fmi3DoStep: the FMU asks for event mode"):
         ran(alone(small(tmp_path / "b", "NEEDS_EVENTS", fmi=3), array=True))
+
+
+def test_fmi_3_what_cannot_be_connected_or_set_is_refused_by_name(tmp_path: Path) -> None:
+    path = small(tmp_path, fmi=3, more=BINARY + SIZE)
+    wired = System(
+        stop_time=0.1,
+        components={name: Component(fmu=str(path), step=0.01) for name in ("a", "b")},
+        connections=(Connection(name="wire", start=("a.y[1]",), end=("b.blob",)),),
+    )
+    with pytest.raises(UsageError, match=r"^connections.wire.to: b.blob is a Binary; only .* can be connected$"):
+        ran(wired)
+    with pytest.raises(UsageError, match=r"size: is a structural parameter, which is not supported$"):
+        ran(alone(path, array=True, parameters={"size": 2}))
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
