@@ -73,7 +73,7 @@ def small(
     saves: bool = True,
     more: str = "",
 ) -> Path:
-    """The FMU with these habits (macros of `small.c`) in `folder`; it says of itself what it is told to, with `more` variables."""
+    """The FMU with these habits (macros of `small.c`) in `folder`, which says of itself what it is told to."""
     folder.mkdir(parents=True, exist_ok=True)
     library = folder / f"Small{fmpy.sharedLibraryExtension}"
     macros = [f"-D{macro}" for macro in (*habits, *(["FMI3"] if fmi == 3 else []), f'KEPT="{uuid.uuid4().hex}"')]
