@@ -32,7 +32,9 @@ def check(system: System, models: Mapping[str, Model]) -> None:
         for what, ends, causality in (("from", x.start, "output"), ("to", x.end, "input")):
             model = models[component_of(ends[0])]
             missing = [variable_of(end) for end in ends if variable_of(end) not in model.variables]
-            if missing:
+            unfit = [variable_of(end) for end in ends if not _is(model, variable_of(end), causality)]
+            if missing or len(unfit) == len(ends) > 1:
+                missing = missing or unfit
                 raise UsageError(f"connections.{x.name}.{what}: {_lacks(model, causality, missing)}")
         for start, end in zip(x.start, x.end):
             _check_pair(f"connections.{x.name}", x, _end(models, start), _end(models, end))
@@ -68,6 +70,11 @@ def recorded(system: System, models: Mapping[str, Model]) -> dict[str, tuple[str
 
 def _is_recordable(variable: Variable) -> bool:
     return variable.kind in NUMERIC and variable.causality in ("output", "local")
+
+
+def _is(model: Model, name: str, causality: str) -> bool:
+    found = model.variables[name].causality if name in model.variables else None
+    return found == causality or (found, causality) == ("local", "output")
 
 
 def _end(models: Mapping[str, Model], end: str) -> tuple[str, Model, Variable | None]:

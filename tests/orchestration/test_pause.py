@@ -78,7 +78,7 @@ def test_other_fmus_than_those_of_the_pause_are_refused(built: dict[str, Path], 
     fly_until(Scenario(stop_time=0.1).with_fmus(**own(built, tmp_path)), 0.05, tmp_path / "paused")
     with zipfile.ZipFile(tmp_path / "UnifiedController.fmu", "a") as fmu:
         fmu.writestr("resources/more.txt", "more")  # its GUID stays
-    with pytest.raises(UsageError, match=r"the controller's FMU is not as when the run was paused"):
+    with pytest.raises(UsageError, match=r"the FMU of controller is not as when the run was paused"):
         resume(tmp_path / "paused")
 
 
@@ -99,7 +99,7 @@ def test_another_reference_than_that_of_the_pause_is_refused(tmp_path: Path) -> 
     scenario = Scenario(stop_time=0.1, reference=ReferenceChoice(file=table))
     fly_until(scenario, 0.05, tmp_path / "paused")
     table.write_text(table.read_text() + "\n2" + ",0" * 15)
-    with pytest.raises(UsageError, match="the reference is not as when the run was paused"):
+    with pytest.raises(UsageError, match="the file of reference is not as when the run was paused"):
         resume(tmp_path / "paused")
 
 
@@ -137,7 +137,7 @@ def test_a_folder_without_a_pause_is_refused(tmp_path: Path) -> None:
         resume(tmp_path)
 
 
-@pytest.mark.parametrize("part", ["now", "clock", "of", "row"])
+@pytest.mark.parametrize("part", ["now", "instants", "of", "row", "plant"])
 def test_a_state_that_has_been_edited_is_refused_in_one_line(part: str, tmp_path: Path) -> None:
     fly_until(Scenario(stop_time=0.1), 0.05, tmp_path / "paused")
     path = tmp_path / "paused" / "paused.npz"

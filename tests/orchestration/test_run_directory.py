@@ -1,5 +1,6 @@
 """A run's directory: complete or not there, whatever happens while it is written."""
 
+import dataclasses
 import json
 import os
 import signal
@@ -18,7 +19,6 @@ import pytest
 import orchestration
 from orchestration import (
     QuadcosimError,
-    Record,
     Result,
     RunInterrupted,
     Scenario,
@@ -28,7 +28,7 @@ from orchestration import (
     plots,
     save_run,
 )  # fmt: skip
-from orchestration.recording import Recorder
+from orchestration.recording import Chunk, InMemory, Recorder
 from orchestration.run_directory import keep_flight
 
 FILES = {"signals.parquet", "events.parquet", "metrics.json", "scenario.toml"}
@@ -141,8 +141,12 @@ def test_a_run_without_samples_can_be_drawn(tmp_path: Path) -> None:
 
 
 def test_no_energy_is_drawn_of_a_controller_that_has_none(tmp_path: Path) -> None:
-    recorded = Record(controller=("attitude_error.w",))
-    written = plots.draw(orchestration.run(Scenario(stop_time=0.1, record=recorded)), tmp_path)
+    flown = orchestration.run(Scenario(stop_time=0.1))
+    place = flown.columns.index("controller.energy")
+    columns, without = (*flown.columns[:place], *flown.columns[place + 1 :]), InMemory()
+    without.begin(columns)
+    without.take(Chunk(columns=columns, rows=np.delete(flown.rows, place, axis=1), events=flown.events))
+    written = plots.draw(dataclasses.replace(flown, recording=without), tmp_path)
     assert {path.name for path in written} == {path.name for path in tmp_path.iterdir()} == FIGURES - {"energy.png"}
 
 

@@ -291,7 +291,7 @@ def test_a_wrong_fmu_name_is_refused_with_those_there_are(file: Path) -> None:
 
 def test_a_wrong_parameter_name_is_refused_with_the_closest(file: Path) -> None:
     scenario = loaded(file, "[controller.gain]\ntheeta = 3.0")
-    with pytest.raises(UsageError, match=r"controller.gain.theeta: .* did you mean gain.theta\?"):
+    with pytest.raises(UsageError, match=r"controller.gain.theeta: .* did you mean gain.theta or "):
         orchestration.run(scenario)
 
 
