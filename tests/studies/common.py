@@ -1,5 +1,6 @@
 """What the tests of studies share: short studies, the command as a process, and what goes on in processes."""
 
+import contextlib
 import json
 import os
 import shutil
@@ -195,7 +196,8 @@ def is_running(process: int) -> bool:
 
 
 def kill(process: int) -> None:
-    os.kill(process, signal.SIGKILL)
+    with contextlib.suppress(ProcessLookupError):  # has ended meanwhile
+        os.kill(process, signal.SIGKILL)
 
 
 class Cluster:
