@@ -14,6 +14,7 @@ from orchestration.recording import thinned
 from orchestration.result import Result
 from orchestration.scenario import Scenario
 from orchestration.simulator import Floats
+from orchestration.system.model import component_of
 from orchestration.wiring import ATTITUDE_ERROR_SCALAR, COMMAND, ENERGY, POSITION, POSITION_REFERENCE, components
 
 STYLE = {
@@ -32,6 +33,8 @@ BLUE, ORANGE, GREEN, RED, GREY = "#1f6f9f", "#e0812b", "#2f8f5b", "#b5323e", "#8
 FIGURES = ("path", "errors", "commands", "energy")
 """The figures of a run, in the order in which they are drawn; the last where the controller has an energy."""
 
+MOST_LINES = 8
+"""In one panel"""
 SYSTEM_FIGURE = "signals"
 """The figure of any other system"""
 
@@ -87,19 +90,27 @@ def _written(makers: Mapping[str, Callable[[], Figure | None]], folder: Path) ->
 
 
 def signals(result: Result) -> Figure:
-    """What is exchanged in a system: a panel for each connection, its signals as the receiver has them."""
-    connections = result.system.connections
-    figure = Figure(figsize=(8.0, 1.0 + 1.8 * len(connections)))
+    """What is exchanged in a system: a panel for each connection, its signals as the receiver has them.
+
+    Of a system without connections, the recorded outputs of each component.
+    """
+    groups = {x.name: [end if end in result.signals else start for start, end in zip(x.start, x.end)]
+              for x in result.system.connections} or {
+        name: [column for column in result.columns if column.startswith(f"{name}.")][:MOST_LINES]
+        for name in result.system.components
+    }  # fmt: skip
+    figure = Figure(figsize=(8.0, 1.0 + 1.8 * len(groups)))
     t = result.signals["time"]
-    panels = figure.subplots(len(connections), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, x in zip(panels, connections, strict=True):
-        for start, end in zip(x.start, x.end):
-            held = end in result.signals or result.system.components[x.sender].sampling is not None
-            values = result.signals[end if end in result.signals else start]
-            axes.step(t, values, where="post", label=end) if held else axes.plot(t, values, label=start)
+    panels = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
+    applied = {end for x in result.system.connections for end in x.end}
+    for axes, (name, columns) in zip(panels, groups.items(), strict=True):
+        for column in columns:
+            held = column in applied or result.system.components[component_of(column)].sampling is not None
+            axes.plot(t, result.signals[column], drawstyle="steps-post" if held else "default", label=column)
         axes.margins(x=0)
-        axes.legend(loc="upper right", fontsize=8)
-        axes.set_ylabel(x.name)
+        if columns:
+            axes.legend(loc="upper right", fontsize=8)
+        axes.set_ylabel(name)
     panels[0].set_title(_title(result))
     panels[-1].set_xlabel("time [s]")
     return figure
