@@ -248,8 +248,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     @guarded
     def get_real(self, vrs: list[int]) -> list[float]:
         """fmi2GetReal; in initialisation mode, what was set can be read back before the rest is set too."""
-        if self._stale and self._phase is Phase.INITIALIZATION and not self._given.issuperset(vrs):
-            self._initialise()
+        self._bring_up_to_date(vrs)
         if not self._readable.issuperset(vrs):
             raise self._wrong_type(vrs, "Real")
         reals = self._reals
@@ -271,6 +270,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     @guarded
     def get_integer(self, vrs: list[int]) -> list[int]:
         """fmi2GetInteger."""
+        self._bring_up_to_date(vrs)
         return [int(self._others[vr]) for vr in self._of_type(vrs, "Integer")]
 
     @guarded
@@ -281,6 +281,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     @guarded
     def get_boolean(self, vrs: list[int]) -> list[bool]:
         """fmi2GetBoolean."""
+        self._bring_up_to_date(vrs)
         return [bool(self._others[vr]) for vr in self._of_type(vrs, "Boolean")]
 
     @guarded
@@ -349,6 +350,11 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             self.initialise(self._start_time)
         except (ArithmeticError, ValueError) as error:
             raise DivergenceError(f"at initialisation: {error}, expected finite values") from error
+
+    def _bring_up_to_date(self, vrs: list[int]) -> None:
+        """In initialisation mode, compute what is asked for anew if values were set that it has not seen."""
+        if self._stale and self._phase is Phase.INITIALIZATION and not self._given.issuperset(vrs):
+            self._initialise()
 
     def _take_parameters(self) -> None:
         self._check_parameters()

@@ -21,6 +21,7 @@ class PidController(Slave):
         fixed_parameter("period", "h for which the controller is programmed", "s", 0.006, above=0.0),
     )
     description = "PID controller: angle in, command out"
+    initial_outputs_depend_on_inputs = False
 
     def initialise(self, t: float) -> None:
         """At rest until the first sample."""

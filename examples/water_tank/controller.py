@@ -16,7 +16,8 @@ class TankController(Slave):
     description = "Water tank controller: level in, valve out"
 
     def initialise(self, t: float) -> None:
-        """The command for the initial level."""
+        """The command for the initial level; between the two the valve is closed."""
+        self.put_boolean("valve", False)
         self.step(t, 0.0)
 
     def step(self, t: float, h: float) -> None:

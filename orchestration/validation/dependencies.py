@@ -14,6 +14,9 @@ MOST_SWITCHES = 16
 _POINTS = (0, 3)
 """Communication points, in steps, at which the inputs are moved"""
 
+_FAR = tuple(sign * 10.0**k for k in range(5) for sign in (1.0, -1.0))
+"""By how much an input is moved that moves nothing when it is moved a little"""
+
 Moved = dict[str, set[str]]
 """Outputs that move, by the input that they move with"""
 
@@ -45,7 +48,7 @@ def idle_dependency(bench: Bench) -> Iterator[str]:
     for mode in _modes(bench):
         for v in bench.inputs:
             declaring = {output for output, inputs in mode.declared.items() if inputs is not None and v.name in inputs}
-            if declaring and not declaring & mode.moved[v.name]:
+            if declaring and not declaring & (mode.moved[v.name] or _moving_far(bench, v)):
                 names = ", ".join(sorted(declaring))
                 yield f"{v.name} moves none of {names} {mode.where}: expected it not to be among their dependencies"
 
@@ -102,6 +105,20 @@ def _moving(bench: Bench, instance: Instance, v: Variable, before: Row) -> set[s
         after = instance.get(bench.outputs)
         outputs |= {output for output, old in before.items() if not same(old, after[output])}
     instance.set({v.name: value})
+    return outputs
+
+
+def _moving_far(bench: Bench, v: Variable) -> set[str]:
+    """The outputs that move in initialisation mode with a Real input that is moved far: a switch has a threshold."""
+    outputs: set[str] = set()
+    for move in _FAR if v.type == "Real" else ():
+        with bench.instance() as instance, contextlib.suppress(RefusedError):
+            values = bench.inputs_at(0)
+            instance.begin(values, bench.start)
+            before = instance.get(bench.outputs)
+            instance.set({v.name: float(values[v.name]) + move})
+            after = instance.get(bench.outputs)
+            outputs |= {output for output, old in before.items() if not same(old, after[output])}
     return outputs
 
 

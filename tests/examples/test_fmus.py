@@ -1,0 +1,13 @@
+"""The slaves of the examples, short as they are, make FMUs with which nothing is wrong."""
+
+import pytest
+
+from orchestration import fmus
+from orchestration.validation import validate
+from tests.examples.common import EXAMPLES
+
+
+@pytest.mark.parametrize("name", ["water_tank/TankController", "dc_servo/PidController", "four_components/Car"])
+def test_validation_finds_nothing_of_an_example(name: str) -> None:
+    """One with a threshold and a Boolean, one with a state of its own, one with several inputs."""
+    assert [finding for finding in validate(fmus.locate(str(EXAMPLES / f"{name}.fmu"))) if not finding.note] == []
