@@ -24,6 +24,7 @@ test: .venv/.test
 
 bench: .venv/.test
 	$(BIN)/python -m benchmarks.bench
+	$(BIN)/python -m benchmarks.scaling
 	$(BIN)/python -m benchmarks.bench_studies
 
 figures: .venv/.base

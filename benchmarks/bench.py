@@ -1,4 +1,4 @@
-"""What a step costs, and where: run as `make bench`. One process, one run, medians of several repetitions."""
+"""What a step costs, and where: run as `make bench`. One process, one run, medians of several CPU times."""
 
 import statistics
 import sys
@@ -8,9 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from orchestration.clock import Clock, random_streams
-from orchestration.flight import prepared
-from orchestration.master import Board, Signals
 
 from controller_fmu.sliding_mode.law import Gains, evaluate
 from controller_fmu.vehicle import Measurement, Model
@@ -19,7 +16,15 @@ from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.trajectory import Trajectory
 from orchestration import wiring
 from orchestration.fmi.fmi2 import Fmi2Instance
+from orchestration.fmi.model import read_model
+from orchestration.quadrotor.translation import system_of
 from orchestration.scenario import FmuChoice, Scenario
+from orchestration.simulation import prepared
+from orchestration.simulator import Floats
+from orchestration.stepping.agenda import Agenda
+from orchestration.stepping.board import Board
+from orchestration.stepping.streams import Streams
+from orchestration.system.check import recorded
 from orchestration.timing import Timing
 from plant_fmu.dynamics import Body, RigidState, Wind, Wrench, derivative
 from plant_fmu.integrator import rk4_step
@@ -35,9 +40,9 @@ def microseconds(work: Callable[[], object], count: int) -> float:
     """Median time of one of `count` units of `work` [µs]; the first repetition is a warm-up."""
     times = []
     for _ in range(REPETITIONS + 1):
-        start = time.perf_counter()
+        start = time.process_time()
         work()
-        times.append(time.perf_counter() - start)
+        times.append(time.process_time() - start)
     return statistics.median(times[1:]) / count * 1e6
 
 
@@ -74,10 +79,10 @@ def loop(scenario: Scenario) -> float:
     def work() -> float:
         with prepared(scenario) as flight:
             flight.master.initialise()
-            start = time.perf_counter()
+            start = time.process_time()
             flight.master.run()
             assert flight.master.steps == STEPS
-            return time.perf_counter() - start
+            return time.process_time() - start
 
     work()
     return statistics.median(work() for _ in range(REPETITIONS)) / STEPS * 1e6
@@ -85,17 +90,17 @@ def loop(scenario: Scenario) -> float:
 
 def bare(scenario: Scenario) -> float:
     """The same FMI calls as the master makes in a step, and nothing else."""
+    system = system_of(scenario)
+    paths = {name: Path(component.fmu) for name, component in system.components.items()}
+    board = Board(system, recorded(system, {name: read_model(path) for name, path in paths.items()}))
     with (
-        Fmi2Instance(Path(scenario.plant.fmu), "plant") as plant_fmu,
-        Fmi2Instance(Path(scenario.controller.fmu), "controller") as controller_fmu,
+        Fmi2Instance(paths["plant"], "plant") as plant_fmu,
+        Fmi2Instance(paths["controller"], "ctrl") as controller_fmu,
     ):
-        board = Board(
-            Signals(plant=plant_fmu.names("output", "local"), controller=controller_fmu.names("output", "local"))
-        )
         received = np.zeros(len(wiring.MEASUREMENT))
-        read_plant = plant_fmu.reader(board.plant_names, board.plant)
-        write_command = plant_fmu.writer(wiring.COMMAND, board.applied)
-        read_controller = controller_fmu.reader(board.controller_names, board.controller)
+        read_plant = plant_fmu.reader(board.outputs["plant"], outputs(board, "plant"))
+        write_command = plant_fmu.writer(wiring.COMMAND, board.of([f"plant.{name}" for name in wiring.COMMAND]))
+        read_controller = controller_fmu.reader(board.outputs["controller"], outputs(board, "controller"))
         write_measurement = controller_fmu.writer(wiring.MEASUREMENT, received)
         for fmu in (plant_fmu, controller_fmu):
             fmu.enter_initialization(0.0, 1.0)
@@ -114,11 +119,18 @@ def bare(scenario: Scenario) -> float:
         return microseconds(work, STEPS)
 
 
+def outputs(board: Board, component: str) -> Floats:
+    """The part of the row that holds what is read of a component."""
+    return board.of([f"{component}.{name}" for name in board.outputs[component]])
+
+
 def clock(timing: Timing) -> float:
     """One instant of the timing alone, no FMU."""
 
+    system = system_of(Scenario(timing=timing, stop_time=STEPS * MILLISECOND))
+
     def work() -> int:
-        return sum(1 for _ in Clock(timing, STEPS * MILLISECOND, random_streams(0)))
+        return sum(1 for _ in Agenda(system, Streams(0, system.streams)))
 
     return microseconds(work, work())
 

@@ -1,0 +1,125 @@
+"""What an instant costs the master over how much there is: `python -m benchmarks.scaling [--figure FILE]`.
+
+Simulators that do nothing, so that the time is the master's alone; in one run, the smallest CPU time of several
+repetitions.
+"""
+
+import argparse
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from orchestration import plots
+from orchestration.recording import InMemory
+from orchestration.simulator import Floats, Transfer
+from orchestration.stepping.agenda import Agenda
+from orchestration.stepping.master import Master
+from orchestration.stepping.streams import Streams
+from orchestration.system.model import Component, Connection, Sampling, System
+
+SIZES = (2, 4, 10, 20, 50, 100, 200)
+INSTANTS = 200
+REPETITIONS = 3
+MILLISECOND = 1e-3
+PLANT = Component(fmu="none", step=MILLISECOND, record=())
+CONTROLLER = Component(fmu="none", sampling=Sampling(period=MILLISECOND), record=())
+
+
+class Nothing:
+    """A simulator that does nothing."""
+
+    def reader(self, names: Sequence[str], into: Floats) -> Transfer:
+        return lambda: None
+
+    def writer(self, names: Sequence[str], source: Floats) -> Transfer:
+        return lambda: None
+
+    def enter_initialization(self, start: float, stop: float) -> None:
+        pass
+
+    def exit_initialization(self) -> None:
+        pass
+
+    def step(self, t: float, h: float) -> None:
+        pass
+
+    def save(self) -> bytes:
+        return b""
+
+    def restore(self, state: bytes) -> None:
+        pass
+
+
+def loops(components: int) -> System:
+    """Half of the components plants, half controllers, in loops of two: as many connections as components."""
+    members, connections = {}, []
+    for i in range(components // 2):
+        members |= {f"plant{i}": PLANT, f"controller{i}": CONTROLLER}
+        connections += [
+            Connection(name=f"y{i}", start=(f"plant{i}.y",), end=(f"controller{i}.y",)),
+            Connection(name=f"u{i}", start=(f"controller{i}.u",), end=(f"plant{i}.u",)),
+        ]
+    return System(stop_time=INSTANTS * MILLISECOND, components=members, connections=tuple(connections))
+
+
+def messages(connections: int) -> System:
+    """One plant and one controller, with as many messages of one signal each way."""
+    there = [
+        Connection(name=f"y{i}", start=(f"plant.y{i}",), end=(f"controller.y{i}",)) for i in range(connections // 2)
+    ]
+    back = [
+        Connection(name=f"u{i}", start=(f"controller.u{i}",), end=(f"plant.u{i}",)) for i in range(connections // 2)
+    ]
+    members = {"plant": PLANT, "controller": CONTROLLER}
+    return System(stop_time=INSTANTS * MILLISECOND, components=members, connections=(*there, *back))
+
+
+def cost(system: System) -> float:
+    """Of one instant at which every component steps and every connection carries a message [µs]."""
+    times = []
+    for _ in range(REPETITIONS):
+        streams = Streams(system.seed)
+        master = Master(
+            system,
+            {name: Nothing() for name in system.components},
+            agenda=Agenda(system, streams),
+            streams=streams,
+            recorded=dict.fromkeys(system.components, ()),
+            recorder=InMemory(),
+        )
+        master.initialise()
+        start = time.process_time()
+        master.run()
+        times.append(time.process_time() - start)
+    return min(times) / INSTANTS * 1e6
+
+
+def main() -> None:
+    """Print the costs; draw them if a file is given."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.scaling", description=__doc__)
+    parser.add_argument("--figure", type=Path, help="where to draw it")
+    file = parser.parse_args().figure
+    made = {"components, in loops of two": loops, "connections between two components": messages}
+    figure = Figure(figsize=(6.0, 4.0), layout="constrained", dpi=100)
+    axes = figure.subplots()
+    for what, make in made.items():
+        costs = [cost(make(size)) for size in SIZES]
+        slope, constant = np.polyfit(SIZES, costs, 1, w=1.0 / np.array(costs))
+        exponent = np.polyfit(np.log(SIZES[2:]), np.log(costs[2:]), 1)[0]
+        print(f"{what}: {slope:.2f} µs each and {constant:.1f} µs; from 10 to 200 as the power {exponent:.2f}")
+        for size, value in zip(SIZES, costs, strict=True):
+            print(f"{size:>6} {value:10.1f} µs an instant {value / size:8.2f} µs each")
+        axes.loglog(SIZES, costs, "o", label=f"{what}: {slope:.2f} µs each")
+        axes.loglog(SIZES, slope * np.array(SIZES) + constant, color=plots.GREY, linewidth=1.0)
+    axes.set(xlabel="how many", ylabel="the master's cost of an instant [µs]")
+    axes.grid(True, alpha=0.3)
+    axes.legend()
+    if file is not None:
+        figure.savefig(file)
+
+
+if __name__ == "__main__":
+    main()
