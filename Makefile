@@ -1,5 +1,5 @@
 # make demo: build the FMUs, fly the paper's scenario, draw it. make test: lint and run all tests.
-# make bench: time the loop. make figures, make findings, make interop: what docs/ shows, and the icons of the FMUs.
+# make bench: time the loop. make figures, make findings, make interop: what docs/ and examples/ show, and the icons of the FMUs.
 # Each makes its own environment first.
 PYTHON ?= python3
 BIN := .venv/bin
@@ -30,6 +30,7 @@ bench: .venv/.test
 figures: .venv/.base
 	$(BIN)/python docs/make_figures.py
 	$(BIN)/python docs/make_icons.py
+	$(BIN)/python examples/make_figures.py
 
 .venv/.base: pyproject.toml
 	$(PYTHON) -m venv .venv
@@ -52,4 +53,4 @@ interop: .venv/.test .venv-cofmupy/.made
 	touch $@
 
 clean:
-	rm -rf .venv .venv-cofmupy results fmus/*.fmu fmus/*.ssp
+	rm -rf .venv .venv-cofmupy results fmus/*.fmu fmus/*.ssp examples/*/*.fmu
