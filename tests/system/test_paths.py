@@ -1,0 +1,71 @@
+"""Values of a system by path, as axes, flags and operating points name them."""
+
+import pytest
+
+from orchestration.errors import UsageError
+from orchestration.quadrotor.translation import quadrotor
+from orchestration.system.paths import changed, value_at
+
+CHANGES = {
+    "stop_time": 5.0,
+    "seed": 7,
+    "components.plant.step": 0.002,
+    "components.controller.sampling.period": 0.02,
+    "components.controller.parameters.gain.eta": 12.0,
+    "connections.command.delay": 0.003,
+    "connections.command.hold": "first",
+    "connections.measurement.noise.position.x": 0.01,
+}
+
+
+@pytest.mark.parametrize(("path", "value"), CHANGES.items())
+def test_what_is_changed_at_a_path_is_there_and_nothing_else_has_changed(path: str, value: object) -> None:
+    system = changed(quadrotor(), {path: value})
+    assert value_at(system, path) == value != value_at(quadrotor(), path)
+    others = [other for other in CHANGES if other != path]
+    assert [value_at(system, other) for other in others] == [value_at(quadrotor(), other) for other in others]
+
+
+def test_several_changes_are_all_made_at_once() -> None:
+    system = changed(quadrotor(), CHANGES)
+    assert {path: value_at(system, path) for path in CHANGES} == CHANGES
+    once = {"components.controller.sampling.period": 0.5, "components.controller.sampling.jitter": 0.4}
+    assert changed(quadrotor(), once).components["controller"].sampling.jitter == 0.4  # more than the period there was
+
+
+@pytest.mark.parametrize(
+    ("path", "line"),
+    [
+        ("stop", "stop: "),
+        ("component.plant.step", "component.plant.step: "),
+        ("components.plan.step", "components.plan"),
+        ("components.plant.stepp", "components.plant.stepp: "),
+        ("components.plant.sampling.period", "components.plant.sampling"),
+        ("components.controller.sampling.perod", "components.controller.sampling.perod: "),
+        ("connections.commnd.delay", "connections.commnd"),
+        ("connections.command.dela", "connections.command.dela: "),
+        ("sources.wind.noise", "sources.wind"),
+    ],
+)
+def test_a_path_that_does_not_exist_is_refused_in_one_line(path: str, line: str) -> None:
+    with pytest.raises(UsageError) as refused:
+        changed(quadrotor(), {path: 1.0})
+    assert str(refused.value).startswith(line)
+    assert "expected" in str(refused.value)
+    assert str(refused.value).isprintable()
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("components.plant.step", -1.0),
+        ("components.plant.step", "fast"),
+        ("components.controller.sampling.period", 0.0),
+        ("connections.command.loss", 2.0),
+        ("connections.command.hold", "last"),
+        ("stop_time", 0.0),
+    ],
+)
+def test_a_value_that_cannot_be_is_refused_with_its_path(path: str, value: object) -> None:
+    with pytest.raises(UsageError, match=rf"^{path} = .*: expected"):
+        changed(quadrotor(), {path: value})

@@ -1,0 +1,170 @@
+"""A system file: what is wrong is one line that names the place and what is valid, and it comes back as it was."""
+
+from pathlib import Path
+
+import pytest
+
+from orchestration.errors import UsageError
+from orchestration.quadrotor import translation
+from orchestration.quadrotor.translation import quadrotor
+from orchestration.request import load_request
+from orchestration.stepping.agenda import Agenda
+from orchestration.stepping.streams import Streams
+from orchestration.system.system_file import load_system, schema, to_toml
+
+SHIPPED = Path(translation.__file__).with_name("system.toml")
+
+TANK = """\
+stop_time = 60.0
+seed = 3
+order = "jacobi"
+
+[components.tank]
+fmu = "Tank.fmu"
+step = 0.01
+parameters = { area = 2.0, "pipe.length" = 3.0 }
+align = "next"
+
+[components.controller]
+fmu = "Controller.fmu"
+sampling = { period = 0.1, jitter = 0.02, jitter_distribution = "normal" }
+record = ["mode"]
+
+[[connections]]
+from = ["tank.level"]
+to = ["controller.level"]
+noise = 0.001
+
+[[connections]]
+name = "valve"
+from = ["controller.valve"]
+to = ["tank.valve"]
+order = "gauss-seidel"
+delay = 0.25
+loss = 0.1
+burst_length = 2.0
+hold = "first"
+scale = 2.0
+
+[sources.rain]
+to = ["tank.inflow"]
+noise = 0.1
+period = 0.5
+
+[objectives]
+peak = "max(tank.level)"
+late = "settling_time(tank.level - 1, 0.1)"
+
+[criterion]
+good = "peak < 2.5"
+diverged = "abs(tank.level) > 100"
+"""
+
+
+def loaded(folder: Path, text: str):
+    file = folder / "system.toml"
+    file.write_text(text, encoding="utf-8")
+    return load_system(file)
+
+
+def refusal(folder: Path, text: str) -> str:
+    with pytest.raises(UsageError) as refused:
+        loaded(folder, text)
+    line = str(refused.value)
+    assert line.startswith(f"{folder / 'system.toml'}: ")
+    assert line.isprintable()
+    return line.partition(": ")[2]
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "line"),
+    [
+        ("align =", "aling =", "components.tank.aling: no such key; expected one of fmu, parameters, step, sampling, "),
+        ("jitter =", "jiter =", "components.controller.sampling.jiter: no such key; expected one of period, offset, "),
+        ("delay =", "delai =", "connections.1.delai: no such key; expected one of from, to, name, order, delay, "),
+        ("noise = 0.1", "nois = 0.1", "sources.rain.nois: no such key; expected one of to, constant, file, noise, "),
+        ("good =", "god =", "criterion.god: no such key; expected one of good, diverged, outcomes"),
+        ("seed = 3", "sead = 3", "sead: no such key; expected one of stop_time, seed, order, components, "),
+        ("step = 0.01", 'step = "fast"', "components.tank.step = fast: input should be a valid number"),
+        ("step = 0.01", "step = -1.0", "components.tank.step = -1.0: expected a positive number"),
+        (
+            "step = 0.01",
+            "",
+            "components.tank.step = none: expected step (continuous time) or sampling (a digital task)",
+        ),
+        ("period = 0.1,", "period = 0.01,", "components.controller.sampling.jitter = 0.02: expected less than the "),
+        (
+            '"normal"',
+            '"gauss"',
+            "components.controller.sampling.jitter_distribution = gauss: input should be 'uniform'",
+        ),
+        ("area = 2.0", "area = [1]", "components.tank.parameters.area = [1]: expected a number, true, false or a text"),
+        ('"tank.level"]', '"tnk.level"]', "connections.0.from: tnk.level: no such component; expected one of tank, "),
+        ('["tank.valve"]', '["tank.valve", "tank.x"]', "connections.valve.to = 2: expected 1 inputs, one for each"),
+        ('["tank.inflow"]', '["tank.valve"]', "sources.rain.to: tank.valve is fed by connections.valve already; "),
+        ('["tank.inflow"]', '["pond.inflow"]', "sources.rain.to: pond.inflow: no such component; expected one of tank"),
+        ("loss = 0.1", "loss = 1.1", "connections.valve.loss = 1.1: expected a probability in [0, 1]"),
+        ("loss = 0.1", "loss = 0.9", "connections.valve.loss = 0.9: expected at most 0.666667 in bursts of 2"),
+        ("noise = 0.001", "noise = -1.0", "connections.0.noise of level = -1.0: expected zero or positive"),
+        ('hold = "first"', 'hold = "last"', "connections.1.hold = last: input should be 'zero' or 'first'"),
+        ("period = 0.5", "", "sources.rain.period = none: expected how long each value is held, in seconds"),
+        ("noise = 0.1\n", "", "sources.rain.source = nothing: expected one of constant, file, noise, trajectory"),
+        ('"max(tank.level)"', '"max(tank.level"', "objectives.peak: "),
+        ('"peak < 2.5"', '"open(1)"', "criterion.good: "),
+        ('"abs(tank.level) > 100"', '"__import__(1)"', "criterion.diverged: "),
+        ("stop_time = 60.0", "stop_time = 0.0", "stop_time = 0.0: expected a positive number"),
+        ("stop_time = 60.0", "", "stop_time: expected to be given"),
+        ("seed = 3", "seed = 0.5", "seed = 0.5: "),
+        ('name = "valve"', 'name = "0"', "connections = 0: expected a name of its own for each"),
+    ],
+)
+def test_one_error_is_one_line_that_names_its_place(right: str, wrong: str, line: str, tmp_path: Path) -> None:
+    assert right in TANK
+    assert refusal(tmp_path, TANK.replace(right, wrong, 1)).startswith(line)
+
+
+def test_a_system_comes_back_from_the_file_that_it_writes(tmp_path: Path) -> None:
+    first = loaded(tmp_path, TANK)
+    (tmp_path / "elsewhere").mkdir()
+    assert loaded(tmp_path / "elsewhere", to_toml(first)) == first
+    assert loaded(tmp_path, to_toml(quadrotor())) == quadrotor()
+
+
+def test_the_order_at_the_top_is_that_of_connections_that_say_none(tmp_path: Path) -> None:
+    assert [x.order for x in loaded(tmp_path, TANK).connections] == ["jacobi", "gauss-seidel"]
+
+
+def test_one_number_for_noise_is_for_all_signals(tmp_path: Path) -> None:
+    assert loaded(tmp_path, TANK).connections[0].noise == {"level": 0.001}
+
+
+def test_a_file_without_components_is_a_scenario_of_the_quadrotor(tmp_path: Path) -> None:
+    (tmp_path / "scenario.toml").write_text("stop_time = 2.0\n")
+    (tmp_path / "system.toml").write_text(TANK)
+    kinds = [type(load_request(tmp_path / f"{name}.toml")).__name__ for name in ("scenario", "system")]
+    assert kinds == ["Scenario", "System"]
+
+
+def test_what_happens_when_needs_no_fmu(tmp_path: Path) -> None:
+    system = loaded(tmp_path, TANK.replace("60.0", "1.0"))
+    assert sum(len(instant.due) for instant in Agenda(system, Streams(system.seed))) == 10
+
+
+def test_the_schema_holds_for_the_files_that_are_read_and_for_no_unknown_key(tmp_path: Path) -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    from orchestration.documents import read_toml
+
+    check = jsonschema.Draft202012Validator(schema())
+    check.check_schema(schema())
+    (tmp_path / "tank.toml").write_text(TANK)
+    (tmp_path / "wrong.toml").write_text(TANK.replace("align =", "aling ="))
+    assert [error.message for file in (SHIPPED, tmp_path / "tank.toml") for error in check.iter_errors(
+        read_toml(file, "system file"))] == []  # fmt: skip
+    (error,) = check.iter_errors(read_toml(tmp_path / "wrong.toml", "system file"))
+    assert "aling" in error.message
+
+
+def test_every_key_of_the_schema_is_explained() -> None:
+    tables = [schema(), *schema()["$defs"].values()]
+    assert len(tables) == 6
+    assert all("description" in key for table in tables for key in table["properties"].values())
