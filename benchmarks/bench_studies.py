@@ -6,9 +6,11 @@ import tempfile
 import time
 from pathlib import Path
 
+from orchestration.quadrotor.translation import system_of
 from orchestration.scenario import Scenario
 from orchestration.studies.axes import Axis
-from orchestration.studies.study import Study, locate_fmus
+from orchestration.studies.files import files_of, with_files
+from orchestration.studies.study import Study
 from orchestration.studies.sweep import sweep
 from orchestration.studies.worker import Hangar, Task
 
@@ -30,10 +32,9 @@ def runs_per_second(workers: int) -> float:
 
 def many_short_runs() -> tuple[float, float]:
     """Median time of a run of one plant step [ms], FMUs loaded, and growth of memory over the last half [KiB]."""
-    scenario = Scenario(stop_time=0.001)
-    fmus = locate_fmus(scenario)
-    scenario = scenario.with_fmus(plant=fmus.plant, controller=fmus.controller)
-    task = Task(index=0, key="", settings={}, scenario=scenario, keep_signals=False)
+    system = system_of(Scenario(stop_time=0.001))
+    system = with_files(system, files_of(system).fmus)
+    task = Task(index=0, key="", settings={}, system=system, keep_signals=False)
     durations, memory, hangar = [], [], Hangar()
     for i in range(MANY):
         durations.append(hangar.fly(dataclasses.replace(task, index=i)).row.duration)

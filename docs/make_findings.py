@@ -20,12 +20,13 @@ import numpy as np
 import pandas as pd
 
 from docs import batch, charts, experiments
+from orchestration.quadrotor.translation import system_of
 from orchestration.scenario import Scenario
 from orchestration.statistics import wilson
 from orchestration.studies import drawing, figures, limit
 from orchestration.studies.engine import Pool
-from orchestration.studies.local import local_limits
-from orchestration.studies.study import locate_fmus
+from orchestration.studies.files import files_of
+from orchestration.studies.local import about_hover
 from orchestration.studies.study_file import load_study
 from orchestration.studies.sweep import store_path, sweep
 from orchestration.studies.table import frame
@@ -272,8 +273,8 @@ def _in_processes(function: Callable[[Any], Any], arguments: Any) -> list[Any]:
 
 
 def _flown(scenarios: list[Scenario]) -> list[Any]:
-    with Pool(locate_fmus(PAPER), WORKERS) as pool:
-        return pool.fly(scenarios, stop=lambda metrics: False)
+    with Pool(files_of(system_of(PAPER)), WORKERS) as pool:
+        return pool.fly(list(map(system_of, scenarios)), stop=lambda metrics: False)
 
 
 def _limit(scenario: Scenario) -> dict[str, Any]:
@@ -288,7 +289,7 @@ def _sampled(kappa: float, period: float, stop_time: float) -> Scenario:
 
 def _local(factor: float) -> float | None:
     """The local limit without coupling, the attitude gains times a factor."""
-    return local_limits(_geared(factor, 0.0), "period")[0]
+    return about_hover(_geared(factor, 0.0), "period").limit
 
 
 def _geared(factor: float, kappa: float) -> Scenario:

@@ -40,7 +40,12 @@ def load_request(path: str | Path, timing: str | Path | None = None) -> Request:
     with _said_of(path):
         if isinstance(tables.get(SSP), str):
             return _from_ssp(path.parent / tables.pop(SSP), tables, path.parent)
-        return (system_from_tables if is_system(tables) else scenario_from_tables)(tables, path.parent)
+        return request_from_tables(tables, path.parent)
+
+
+def request_from_tables(tables: dict[str, Any], folder: Path) -> Request:
+    """The system or the scenario of a TOML document whose relative paths start at `folder`; raises `UsageError`."""
+    return (system_from_tables if is_system(tables) else scenario_from_tables)(tables, folder)
 
 
 def _from_ssp(path: Path, timing: dict[str, Any], folder: Path) -> System:

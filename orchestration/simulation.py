@@ -28,6 +28,7 @@ from orchestration.scenario import Scenario
 from orchestration.simulator import Floats
 from orchestration.stepping import initial
 from orchestration.stepping.agenda import Agenda, FixedStep
+from orchestration.stepping.channel import expand
 from orchestration.stepping.feeds import Feed
 from orchestration.stepping.master import Master
 from orchestration.stepping.sources import BuiltIn, Constant, Table, Values, WhiteNoise
@@ -141,9 +142,7 @@ def prepared(
         system = system_of(asked) if isinstance(asked, Scenario) else asked
         paths = {name: fmus.locate(component.fmu, announce) for name, component in system.components.items()}
         models = {name: read_model(path) for name, path in paths.items()}
-        check(system, models)
-        parameters = _parameters(system, models)
-        system = objectives.known(system, _signals(system, models), set(parameters))
+        system, parameters = checked(system, models)
     streams = Streams(system.seed, system.streams)
     with interrupts_held_back() as interrupt, ExitStack() as stack:
         instances = {name: stack.enter_context(load(path, name)) for name, path in paths.items()}
@@ -176,6 +175,21 @@ def prepared(
             interrupt=interrupt,
             started=started,
         )
+
+
+def checked(system: System, models: Mapping[str, Model]) -> tuple[System, dict[str, float]]:
+    """A system with the objectives that its FMUs can have, and their numeric parameters, as COMPONENT.NAME.
+
+    Raises `UsageError` for what they do not have or cannot take.
+    """
+    check(system, models)
+    for name, component in system.components.items():
+        _expect_clock(name, component, models[name])
+    for x in system.connections:
+        for what in ("noise", "quantisation"):
+            expand(f"connections.{x.name}.{what}", getattr(x, what), list(map(variable_of, x.start)))
+    parameters = _parameters(system, models)
+    return objectives.known(system, _signals(system, models), set(parameters)), parameters
 
 
 def _seconds(time: int | None) -> float | None:
@@ -225,19 +239,26 @@ def _set_parameters(instance: Instance, component: Component) -> None:
         instance.set(name, value)
 
 
+def _expect_clock(name: str, component: Component, model: Model) -> None:
+    """Raise `UsageError` for a clock that the FMU does not have, or that its parameters would set beside the master."""
+    sampling = component.sampling
+    if sampling is None or SAMPLE_PERIOD not in model.variables:
+        if sampling is not None and sampling.clock == "fmu":
+            raise UsageError(f"components.{name}.sampling.clock = fmu: expected an FMU with {SAMPLE_PERIOD}")
+        return
+    for parameter in (SAMPLE_PERIOD, SAMPLE_OFFSET):
+        if parameter in component.parameters:
+            raise UsageError(
+                f"components.{name}.parameters.{parameter}: expected sampling instead; the master sets it, to 0 "
+                "with clock master (the master decides when to sample) and to that of sampling with clock fmu"
+            )
+
+
 def _set_clock(instance: Instance, component: Component, model: Model) -> None:
     """A component built on `fmu_kit` samples at every step that it is given, unless it is to keep its own clock."""
     sampling = component.sampling
     if sampling is None or SAMPLE_PERIOD not in instance.variables:
-        if sampling is not None and sampling.clock == "fmu":
-            raise UsageError(f"components.{instance.name}.sampling.clock = fmu: expected an FMU with {SAMPLE_PERIOD}")
         return
-    for name in (SAMPLE_PERIOD, SAMPLE_OFFSET):
-        if name in component.parameters:
-            raise UsageError(
-                f"components.{instance.name}.parameters.{name}: expected sampling instead; the master sets it, to 0 "
-                "with clock master (the master decides when to sample) and to that of sampling with clock fmu"
-            )
     if sampling.clock == "fmu":
         instance.set(SAMPLE_PERIOD, sampling.period)
         instance.set(SAMPLE_OFFSET, sampling.offset)

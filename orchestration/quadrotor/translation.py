@@ -10,8 +10,9 @@ from orchestration.errors import UsageError
 from orchestration.nominal_model import mismatch
 from orchestration.scenario import Scenario
 from orchestration.system.model import System
-from orchestration.system.paths import changed
+from orchestration.system.paths import TOP, changed
 from orchestration.system.system_file import load_system
+from orchestration.timing import TIMING_KEYS
 from orchestration.wiring import REFERENCE, RIGID_BODY, USE_REFERENCE_INPUTS
 
 
@@ -29,10 +30,14 @@ def in_its_own_words(asked: object) -> Iterator[None]:
     except UsageError as error:
         if not isinstance(asked, Scenario):
             raise
-        text = str(error)
-        for place, meant in PLACES.items():
-            text = text.replace(place, meant)
-        raise type(error)(text) from error
+        raise type(error)(in_words_of_a_scenario(str(error))) from error
+
+
+def in_words_of_a_scenario(text: str) -> str:
+    """`text` with the paths of a system as a scenario calls them."""
+    for place, meant in PLACES.items():
+        text = text.replace(place, meant)
+    return text
 
 
 def warnings(scenario: Scenario, parameters: Mapping[str, float]) -> tuple[str, ...]:
@@ -51,18 +56,10 @@ def warnings(scenario: Scenario, parameters: Mapping[str, float]) -> tuple[str, 
 def system_of(scenario: Scenario) -> System:
     """The system that a scenario means: the quadrotor with the scenario's values."""
     timing, sides = scenario.timing, {"plant": scenario.plant, "controller": scenario.controller}
-    changes: dict[str, Any] = {
-        "stop_time": scenario.stop_time,
-        "seed": scenario.seed,
-        "components.plant.step": timing.plant_interval,
-        **{f"components.controller.sampling.{key}": getattr(timing, key) for key in SAMPLING},
-        **{f"connections.command.{key}": getattr(timing, key) for key in COMMAND},
-        "connections.measurement.loss": timing.measurement_loss,
-        "connections.command.loss": timing.command_loss,
-        "connections.measurement.burst_length": timing.burst_length,
-        "connections.command.burst_length": timing.burst_length,
-    }
-    for kind in ("noise", "quantisation"):
+    changes: dict[str, Any] = {"stop_time": scenario.stop_time, "seed": scenario.seed}
+    for key, paths in TIMING.items():
+        changes |= {path: getattr(timing, key) for path in paths}
+    for kind in BY_MEASUREMENT:
         changes |= {f"connections.measurement.{kind}.{name}": v for name, v in getattr(timing, kind).items()}
     for side, choice in sides.items():
         changes[f"components.{side}.fmu"] = choice.fmu
@@ -78,6 +75,29 @@ def system_of(scenario: Scenario) -> System:
     elif scenario.controller.parameters.get(USE_REFERENCE_INPUTS) is True:
         raise UsageError(f"controller.{USE_REFERENCE_INPUTS}: expected [reference] file = … to feed them")
     return changed(quadrotor(), changes)
+
+
+def paths_of(target: str) -> tuple[str, ...]:
+    """The paths of what a scenario calls `timing.KEY`, `controller.NAME` or `plant.NAME`; a path is one by itself.
+
+    Raises `UsageError` for a name that is none of them.
+    """
+    table, _, key = target.partition(".")
+    kind, _, measurement = key.partition(".")
+    if target in TOP or table in ("components", "connections", "sources"):
+        return (target,)
+    if table == "timing" and key == "loss":
+        return (*TIMING["measurement_loss"], *TIMING["command_loss"])
+    if table == "timing" and key in TIMING:
+        return TIMING[key]
+    if table == "timing" and kind in BY_MEASUREMENT and measurement:
+        return (f"connections.measurement.{key}",)
+    if table in ("controller", "plant") and key:
+        return (f"components.{table}.fmu" if key == "fmu" else f"components.{table}.parameters.{key}",)
+    raise UsageError(
+        f"{target}: expected controller.NAME, plant.NAME, seed, stop_time, timing.loss, timing.noise.NAME, "
+        f"timing.quantisation.NAME or timing.KEY with KEY one of {', '.join(_SINGLE)}"
+    )
 
 
 PLACES = {
@@ -97,11 +117,30 @@ PLACES = {
     "connections.measurement.quantisation": "timing.quantisation",
     "connections.measurement.loss": "timing.measurement_loss",
     "connections.command.loss": "timing.command_loss",
+    "connections.measurement.burst_length": "timing.burst_length",
     "connections.command.": "timing.",
     "sources.reference.": "reference.",
 }
 """Where a scenario says what its system says elsewhere."""
 
-SAMPLING = ("period", "offset", "jitter", "jitter_distribution", "clock_ratio", "clock")
-COMMAND = ("order", "hold", "delay", "delay_jitter", "jitter_distribution")
-"""Keys of `[timing]` that belong to the controller's sampling, and to the connection of its command."""
+_SAMPLING, _COMMAND = "components.controller.sampling", "connections.command"
+TIMING: dict[str, tuple[str, ...]] = {
+    "period": (f"{_SAMPLING}.period",),
+    "offset": (f"{_SAMPLING}.offset",),
+    "plant_interval": ("components.plant.step",),
+    "order": (f"{_COMMAND}.order",),
+    "delay": (f"{_COMMAND}.delay",),
+    "delay_jitter": (f"{_COMMAND}.delay_jitter",),
+    "jitter": (f"{_SAMPLING}.jitter",),
+    "jitter_distribution": (f"{_SAMPLING}.jitter_distribution", f"{_COMMAND}.jitter_distribution"),
+    "measurement_loss": ("connections.measurement.loss",),
+    "command_loss": (f"{_COMMAND}.loss",),
+    "burst_length": ("connections.measurement.burst_length", f"{_COMMAND}.burst_length"),
+    "clock_ratio": (f"{_SAMPLING}.clock_ratio",),
+    "hold": (f"{_COMMAND}.hold",),
+    "clock": (f"{_SAMPLING}.clock",),
+}
+"""Keys of `[timing]`, and the paths that they are"""
+BY_MEASUREMENT = ("noise", "quantisation")
+"""Keys of `[timing]` that are tables by measurement"""
+_SINGLE = tuple(key for key in TIMING_KEYS if key not in BY_MEASUREMENT)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from orchestration.flags import FlightFlags, flies, scenario_from
+from orchestration.flags import FlightFlags, flies, request_from
 from orchestration.terminal import runs_bar, say
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file.", metavar="STUDY.toml", show_default=False)]
@@ -67,14 +67,16 @@ def export(study: StudyFile, out: Out = None) -> None:
 def draw(
     study: StudyFile,
     out: Out = None,
-    metric: Annotated[str, typer.Option("--metric", help="What to draw.")] = "ultimate_bound",
+    metric: Annotated[
+        str | None, typer.Option("--metric", help="What to draw; what the criterion is about unless told.")
+    ] = None,
 ) -> None:
-    """Draw a study: a metric over one or two axes with what flies, or sensitivity bars."""
-    from orchestration.studies.drawing import draw_study, expect_metric
+    """Draw a study: a metric over one or two axes with what is good, or sensitivity bars."""
+    from orchestration.studies.drawing import draw_study, metric_of
     from orchestration.studies.study_file import load_study
 
     chosen = load_study(study)
-    expect_metric(chosen, metric)
+    metric = metric_of(chosen, metric)
     _current_store(study, out)
     for written in draw_study(chosen, out, metric):
         print(written)
@@ -83,9 +85,21 @@ def draw(
 @flies
 def limit(
     scenario: Annotated[
-        Path | None, typer.Argument(help="Scenario file; without one, the paper's flight.", show_default=False)
+        Path | None,
+        typer.Argument(help="System or scenario file; without one, the paper's flight.", show_default=False),
     ] = None,
-    of: Annotated[str, typer.Option("--of", help="The quantity.", metavar="period|delay|jitter|loss")] = "period",
+    of: Annotated[
+        str,
+        typer.Option(
+            "--of",
+            help="The quantity: of the quadrotor by name, of any system by path.",
+            metavar="period|delay|jitter|loss|PATH",
+        ),
+    ] = "period",
+    first: Annotated[
+        float | None, typer.Option("--from", help="Where the scan begins.", metavar="A", show_default=False)
+    ] = None,
+    last: Annotated[float | None, typer.Option("--to", help="Where it ends.", metavar="B", show_default=False)] = None,
     tolerance: Annotated[
         float | None, typer.Option("--tolerance", help="Width of the last bracket.", show_default=False)
     ] = None,
@@ -93,7 +107,7 @@ def limit(
         float | None, typer.Option("--scan", help="Step of the scan upward.", metavar="STEP", show_default=False)
     ] = None,
     confidence: Annotated[
-        float, typer.Option("--confidence", help="For random quantities: that nine seeds in ten fly.")
+        float, typer.Option("--confidence", help="For random quantities: that nine seeds in ten are good.")
     ] = 0.95,
     continuous: Annotated[
         bool, typer.Option("--continuous", help="Fly near continuous time too (as long as ten flights at 1 ms).")
@@ -106,13 +120,13 @@ def limit(
     *,
     flags: FlightFlags,
 ) -> None:
-    """Find the largest period, delay, jitter or loss that still flies, measured and by linear theory."""
+    """Find the largest value that is still good (a period, delay, jitter, loss, any path), and the local limit."""
     from orchestration.studies import limit as limits
 
-    chosen = scenario_from(scenario, flags)
+    chosen = request_from(scenario, flags)
     found = limits.find(
-        chosen, of, tolerance=tolerance, scan=scan, confidence=confidence, continuous=continuous, workers=workers,
-        announce=say,
+        chosen, of, first=first, last=last, tolerance=tolerance, scan=scan, confidence=confidence,
+        continuous=continuous, workers=workers, announce=say,
     )  # fmt: skip
     if out is not None:
         from orchestration.studies.drawing import draw_limit

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import tempfile
 import threading
+from collections.abc import Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -16,9 +17,8 @@ from typing import Any
 
 from orchestration import child, scratch
 from orchestration.errors import QuadcosimError
-from orchestration.scenario import ReferenceChoice
+from orchestration.studies.files import Files, with_files
 from orchestration.studies.identity import versions
-from orchestration.studies.study import Fmus
 from orchestration.studies.worker import Broken, BrokenPlaceError, Outcome, Ready, Task, row_of
 
 ATTEMPTS = 3
@@ -33,20 +33,19 @@ _FROM_OUTSIDE = {-getattr(signal, name) for name in ("SIGKILL", "SIGTERM", "SIGH
 class Package:
     """What every run of a study needs, by content: this is what was hashed, wherever it is flown."""
 
-    plant: bytes
-    controller: bytes
-    reference: bytes | None
+    contents: Mapping[str, bytes]
+    """files, by what systems call them"""
     versions: dict[str, str]
 
     @classmethod
-    def of(cls, fmus: Fmus, reference: bytes | None = None) -> "Package":
-        """The content of `fmus` and of a reference file."""
-        return cls(**fmus.contents, reference=reference, versions=versions())
+    def of(cls, files: Files) -> "Package":
+        """The content of `files`."""
+        return cls(contents=files.contents, versions=versions())
 
     @cached_property
     def digest(self) -> str:
         """A hash of the whole."""
-        return hashlib.sha256(pickle.dumps((self.plant, self.controller, self.reference, self.versions))).hexdigest()
+        return hashlib.sha256(pickle.dumps((dict(self.contents), self.versions))).hexdigest()
 
 
 class Died(Exception):
@@ -212,7 +211,7 @@ class Crew:
         self._scratch = scratch.temporary()
         self._root = self._scratch.path
         self._package = package
-        self._files = {name: self._unpack(name) for name in ("plant", "controller", "reference")}
+        self._paths = {name: self._unpack(i, name) for i, name in enumerate(package.contents)}
         self._idle: queue.SimpleQueue[Pilot] = queue.SimpleQueue()
         self._pilots: list[Pilot] = []
 
@@ -224,7 +223,7 @@ class Crew:
             pilot = Pilot(self._root, self._package)
             self._pilots.append(pilot)
         try:
-            return pilot.fly(self._with_files(task))
+            return pilot.fly(replace(task, system=with_files(task.system, self._paths)))
         finally:
             self._idle.put(pilot)
 
@@ -234,19 +233,7 @@ class Crew:
             pilot.close()
         self._scratch.remove()
 
-    def _unpack(self, name: str) -> Path | None:
-        content = getattr(self._package, name)
-        if content is None:
-            return None
-        path = self._root / f"{name}.{'csv' if name == 'reference' else 'fmu'}"
-        path.write_bytes(content)
+    def _unpack(self, number: int, name: str) -> Path:
+        path = self._root / f"{number}-{Path(name).stem}{'.csv' if Path(name).suffix == '.csv' else '.fmu'}"
+        path.write_bytes(self._package.contents[name])
         return path
-
-    def _with_files(self, task: Task) -> Task:
-        plant, controller, reference = self._files["plant"], self._files["controller"], self._files["reference"]
-        assert plant is not None
-        assert controller is not None
-        scenario = task.scenario.with_fmus(plant=plant, controller=controller)
-        if reference is not None:
-            scenario = replace(scenario, reference=ReferenceChoice(file=reference))
-        return replace(task, scenario=scenario)

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from orchestration.errors import UsageError
+from orchestration.expressions.syntax import Name, Number, Operation, names, parse
+from orchestration.request import Request
 from orchestration.scenario import Scenario
 from orchestration.simulator import Floats
 from orchestration.studies import figures, sensitivity
@@ -13,28 +15,32 @@ from orchestration.studies.axes import Axis, unit_points
 from orchestration.studies.limit import Limit
 from orchestration.studies.linear import HoverLoop
 from orchestration.studies.local import radius
-from orchestration.studies.store import METRICS, TEXTS
+from orchestration.studies.store import TEXTS, metrics_with
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import store_path
 from orchestration.studies.table import frame
+from orchestration.system.model import System
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-def expect_metric(study: Study, metric: str) -> None:
-    """Raise `UsageError` for a metric of which `study` has no figure."""
-    known = [name for name in METRICS if name not in TEXTS or _is_screened(study)]
-    if metric not in known:
-        raise UsageError(f"--metric {metric}: expected one of {', '.join(known)}; every figure shows the outcome")
+def metric_of(study: Study, metric: str | None) -> str:
+    """The metric that was asked for, else the one that the criterion is about; raises `UsageError` for none."""
+    system = study.origin
+    known = [name for name in metrics_with(system.objectives) if name not in TEXTS or _is_screened(study)]
+    chosen = judged(system) if metric is None else metric
+    if chosen not in known:
+        raise UsageError(f"--metric {chosen}: expected one of {', '.join(known)}; every figure shows the outcome")
+    return chosen
 
 
-def draw_study(study: Study, folder: Path | None, metric: str) -> list[Path]:
-    """Draw what is in the store of `study`; the paths of the figures and tables.
+def draw_study(study: Study, folder: Path | None, metric: str | None = None) -> list[Path]:
+    """Draw what is in the store of `study`, by default what its criterion is about; the paths of figures and tables.
 
     Raises `UsageError` for a metric that does not exist, or axes that no figure here is for.
     """
-    expect_metric(study, metric)
+    metric, system = metric_of(study, metric), study.origin
     path = store_path(study.name, folder)
     table = frame(path)
     if _is_screened(study):
@@ -44,26 +50,51 @@ def draw_study(study: Study, folder: Path | None, metric: str) -> list[Path]:
     axes = tuple(axis for axis in study.axes if _is_numeric(axis))
     if len(axes) != len(study.axes):
         raise UsageError(f"{study.name}: expected axes of numbers to draw")
+    words = system.criterion.outcomes
     if len(axes) > 2:
-        return [figures.save(lambda: figures.scatter(table, axes, metric), path.parent / f"{metric}.png")]
-    written = [figures.save(lambda: figures.lines(table, axes, metric), path.parent / f"{metric}.png")]
+        return [figures.save(lambda: figures.scatter(table, axes, metric, words), path.parent / f"{metric}.png")]
+    written = [
+        figures.save(
+            lambda: figures.lines(table, axes, metric, words, edge(system, metric)), path.parent / f"{metric}.png"
+        )
+    ]
     if len(axes) == 2 and all(axis.values is not None for axis in axes):
-        written.append(figures.save(lambda: figures.heat_map(table, axes, metric), path.parent / f"{metric}_map.png"))
+        written.append(
+            figures.save(lambda: figures.heat_map(table, axes, metric, words), path.parent / f"{metric}_map.png")
+        )
     return written
 
 
-def draw_limit(scenario: Scenario, found: Limit, folder: Path) -> Path:
+def judged(system: System) -> str:
+    """The objective that the criterion is about, or the first one; `horizon` where there is none."""
+    named = names(parse(system.criterion.good)) if system.criterion.good is not None else iter(())
+    return next((name for name in named if name in system.objectives), next(iter(system.objectives), "horizon"))
+
+
+def edge(system: System, metric: str) -> float | None:
+    """The bound of a criterion that is `metric < number` and no more, or with another comparison."""
+    if system.criterion.good is None:
+        return None
+    match parse(system.criterion.good):
+        case Operation("<" | "<=" | ">" | ">=", (Name(name), Number(bound))) if name == metric:
+            return bound
+    return None
+
+
+def draw_limit(request: Request, found: Limit, folder: Path) -> Path:
     """Draw the spectral radius over the period or the delay, with both limits; the path of the figure.
 
     Raises `UsageError` if linear theory does not apply.
     """
+    if not isinstance(request, Scenario):
+        raise UsageError("--out: the spectral radius is drawn of the quadrotor only")
     if found.of not in ("period", "delay"):
         raise UsageError(f"--out: expected --of period or delay to draw the spectral radius over, got {found.of}")
     ends = [limit for limit in (found.local_limit, found.large_signal_limit) if limit is not None]
     last = 1.3 * max(ends, default=0.1)
     values = np.array([0.001 + i / 199.0 * (last - 0.001) for i in range(200)])
-    loop = HoverLoop.of(scenario)
-    radii = np.array([radius(loop, scenario, found.of, value) for value in values])
+    loop = HoverLoop.of(request)
+    radii = np.array([radius(loop, request, found.of, value) for value in values])
     return figures.save(
         lambda: figures.spectral_radius(
             found.of,
@@ -90,7 +121,7 @@ def indices_of(study: Study, values: Floats, metric: str) -> list[sensitivity.In
 
 
 def numbers(table: "pd.DataFrame", metric: str) -> Floats:
-    """A metric run by run, shape (n,); of the outcome, 1 for a run that flies, 0 for one that does not."""
+    """A metric run by run, shape (n,); of the outcome, 1 for a run that is good, 0 for one that is not."""
     values = figures.flew(table).astype(float).where(table["outcome"].notna()) if metric == "outcome" else table[metric]
     return np.asarray(values.to_numpy(float, na_value=np.nan))
 

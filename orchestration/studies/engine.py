@@ -13,10 +13,10 @@ from itertools import islice
 from typing import Any
 
 from orchestration.errors import QuadcosimError, UsageError
-from orchestration.scenario import Scenario
 from orchestration.studies.crew import Crew, InterruptedWorker, Package
-from orchestration.studies.study import Fmus
+from orchestration.studies.files import Files
 from orchestration.studies.worker import Outcome, Task
+from orchestration.system.model import System
 
 Submit = Callable[[Task], "Future[Outcome]"]
 _PATIENCE = 10.0
@@ -27,27 +27,27 @@ _ADDRESS = re.compile(r"(?:(?:tcp|tls|ws|wss)://)?(\[[0-9a-fA-F:.]+\]|[^\s:/\[\]
 class Pool:
     """Flies a few runs at a time for someone who decides by their metrics what to fly next."""
 
-    def __init__(self, fmus: Fmus, workers: int) -> None:
+    def __init__(self, files: Files, workers: int) -> None:
         if workers < 1:
             raise UsageError(f"--workers {workers}: expected at least 1")
-        self._fmus, self._workers = fmus, workers
+        self._files, self._workers = files, workers
         self._stack = ExitStack()
 
     def __enter__(self) -> "Pool":
-        self._submit = _local_submit(self._stack, Package.of(self._fmus), self._workers)
+        self._submit = _local_submit(self._stack, Package.of(self._files), self._workers)
         return self
 
     def __exit__(self, *exception: object) -> None:
         self._stack.close()
 
-    def fly(self, scenarios: Sequence[Scenario], stop: Callable[[Any], bool]) -> list[Any]:
+    def fly(self, systems: Sequence[System], stop: Callable[[Any], bool]) -> list[Any]:
         """The metrics of the runs in their order, up to the first whose metrics `stop`, with any number of workers.
 
         Raises `QuadcosimError` if a run fails.
         """
         futures = [
-            self._submit(Task(index=i, key="", settings={}, scenario=scenario, keep_signals=False))
-            for i, scenario in enumerate(scenarios)
+            self._submit(Task(index=i, key="", settings={}, system=system, keep_signals=False))
+            for i, system in enumerate(systems)
         ]
         found = []
         try:

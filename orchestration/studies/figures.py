@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from orchestration.plots import BLUE, GREY, ORANGE, RED, STYLE
-from orchestration.quadrotor.measures import OUTCOMES, SETTLED
 from orchestration.simulator import Floats
 from orchestration.statistics import wilson
 from orchestration.studies.axes import Axis
+from orchestration.studies.ranges import is_in_seconds
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,8 +23,10 @@ if TYPE_CHECKING:
     from orchestration.studies.sensitivity import Index
 
 
-def lines(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str) -> Figure:
-    """A metric against the first axis, one line for each value of the second; what is bounded is crossed.
+def lines(
+    table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str, words: tuple[str, str], edge: float | None = None
+) -> Figure:
+    """A metric against the first axis, one line for each value of the second; what is not good is crossed.
 
     What diverged has no metric; it is marked along the lower edge.
     """
@@ -43,12 +45,12 @@ def lines(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str) -> Figure:
         panel.plot(
             down, np.full(len(down), 0.02), "v", color=color, markersize=4, transform=panel.get_xaxis_transform()
         )
-    panel.plot([], [], "x", color=GREY, label="bounded")
+    panel.plot([], [], "x", color=GREY, label=words[1])
     panel.plot([], [], "v", color=GREY, markersize=4, label="diverged")
     panel.set(xlabel=_label(x), ylabel=metric, yscale=_scale(table[metric]))
     panel.set_xscale("log" if x.scale == "logarithmic" else "linear")
-    if metric == "ultimate_bound":
-        panel.axhline(SETTLED, color=RED, linewidth=0.8, linestyle="--", label=f"{SETTLED:g} m: flies below")
+    if edge is not None:
+        panel.axhline(edge, color=RED, linewidth=0.8, linestyle="--", label=f"{edge:g}: edge of {words[0]}")
     handles, labels = panel.get_legend_handles_labels()
     figure.legend(
         handles, labels, title=None if len(axes) == 1 else axes[1].name, loc="outside right upper", fontsize=8
@@ -56,8 +58,8 @@ def lines(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str) -> Figure:
     return figure
 
 
-def scatter(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str) -> Figure:
-    """A metric against each of many axes; what is bounded is crossed, what diverged marked along the lower edge."""
+def scatter(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str, words: tuple[str, str]) -> Figure:
+    """A metric against each of many axes; what is not good is crossed, what diverged marked along the lower edge."""
     figure = Figure(figsize=(8.0, 2.4 * math.ceil(len(axes) / 2)))
     panels = figure.subplots(math.ceil(len(axes) / 2), 2, squeeze=False, sharey=True).ravel()
     fell = ~flew(table)
@@ -71,20 +73,22 @@ def scatter(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str) -> Figur
     for panel in panels[len(axes) :]:
         panel.set_visible(False)
     figure.supylabel(metric)
-    counts = [f"{int((table['outcome'] == kind).sum())} {kind} ({mark})" for kind, mark in _MARKS.items()]
+    kinds = zip((*words, DIVERGED), ("dots", "crosses", "below"), strict=True)
+    counts = [f"{int((table['outcome'] == kind).sum())} {kind} ({mark})" for kind, mark in kinds]
     low, high = wilson(int((~fell).sum()), len(table))
     figure.suptitle(
         f"{len(table)} runs: {', '.join(counts)}{_by_horizon(table)}\n"
-        f"share that is settled {(~fell).mean():.0%}, 95 % interval {low:.0%} to {high:.0%}",
+        f"share that is {words[0]} {(~fell).mean():.0%}, 95 % interval {low:.0%} to {high:.0%}",
         fontsize=10,
     )
     return figure
 
 
-def heat_map(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str) -> Figure:
-    """A metric over two axes where it flies, the outcome where it does not, and the boundary between the two."""
+def heat_map(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str, words: tuple[str, str]) -> Figure:
+    """A metric over two axes where runs are good, the outcome where not, and the boundary between the two."""
     x, y = axes[0], axes[1]
-    coded = table.assign(flew=flew(table).astype(float), code=table["outcome"].map(_CODES).astype(float))
+    codes_of = {words[0]: 0, words[1]: 1, DIVERGED: 2}
+    coded = table.assign(flew=flew(table).astype(float), code=table["outcome"].map(codes_of).astype(float))
     values, flying, codes = (
         coded.pivot_table(index=y.name, columns=x.name, values=name, dropna=False) for name in (metric, "flew", "code")
     )
@@ -96,11 +100,11 @@ def heat_map(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str) -> Figu
     panel.pcolormesh(columns, index, fell, cmap=ListedColormap(_FELL), vmin=0.5, vmax=2.5, shading="nearest")
     norm = LogNorm() if (shown > 0.0).any() else None
     mesh = panel.pcolormesh(columns, index, shown, norm=norm, cmap="viridis", shading="nearest")
-    figure.colorbar(mesh, ax=panel, label=f"{metric}, where it flies")
+    figure.colorbar(mesh, ax=panel, label=f"{metric}, where {words[0]}")
     if 0.0 < float(np.nanmean(flying.to_numpy())) < 1.0:
         panel.contour(columns, index, flying.to_numpy(), levels=[0.5], colors=RED, linewidths=1.5)
-    panel.set(xlabel=_label(x), ylabel=_label(y), title=f"red: boundary of what flies{_by_horizon(table)}")
-    kinds = [Patch(color=color, label=kind) for kind, color in zip(OUTCOMES[1:], _FELL, strict=True)]
+    panel.set(xlabel=_label(x), ylabel=_label(y), title=f"red: boundary of what is {words[0]}{_by_horizon(table)}")
+    kinds = [Patch(color=color, label=kind) for kind, color in zip((words[1], DIVERGED), _FELL, strict=True)]
     figure.legend(handles=kinds, loc="outside lower center", ncols=len(kinds), fontsize=8)
     panel.grid(False)
     return figure
@@ -153,8 +157,8 @@ def sensitivity_bars(indices: "list[Index]", metric: str) -> Figure:
 
 
 def flew(table: "pd.DataFrame") -> "pd.Series":
-    """Which runs fly: those that settle by their horizon."""
-    return table["outcome"] == "settled"
+    """Which runs meet the criterion; of the quadrotor, fly: those that settle by their horizon."""
+    return table["good"].eq(1).fillna(False).astype(bool)
 
 
 def save(make: Callable[[], Figure], path: Path) -> Path:
@@ -172,9 +176,8 @@ def _by_horizon(table: "pd.DataFrame") -> str:
 
 
 _FELL = ("#d9d9d9", "#6e6e6e")
-"""Colours of bounded and diverged."""
-_CODES = {kind: code for code, kind in enumerate(OUTCOMES)}
-_MARKS = {"settled": "dots", "bounded": "crosses", "diverged": "below"}
+"""Colours of what is not good, and of what diverged."""
+DIVERGED = "diverged"
 
 
 def _scale(values: "pd.Series") -> str:
@@ -182,9 +185,8 @@ def _scale(values: "pd.Series") -> str:
 
 
 def _label(axis: Axis) -> str:
-    seconds = all(target in _SECONDS for target in axis.targets)
+    seconds = all(is_in_seconds(target) for target in axis.targets)
     return f"{axis.name} [s]" if seconds and not axis.multiplies else axis.name
 
 
-_OF = {"outcome": "whether a run flies"}
-_SECONDS = {f"timing.{key}" for key in ("period", "offset", "plant_interval", "delay", "delay_jitter", "jitter")}
+_OF = {"outcome": "whether a run is good"}

@@ -7,13 +7,17 @@ import hashlib
 import importlib.metadata
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from pathlib import Path
 from typing import Any
 
+from orchestration.fmi.model import Model
 from orchestration.quadrotor import translation
+from orchestration.quadrotor.translation import in_words_of_a_scenario
 from orchestration.scenario import Scenario
-from orchestration.studies.study import Fmus, Study
+from orchestration.studies.files import Files, tables_of
+from orchestration.studies.study import Study
+from orchestration.system.model import Component, Source, System
 
 ROOTS = ("orchestration.simulation", "orchestration.studies.worker")
 """Where the code that flies begins."""
@@ -84,37 +88,76 @@ def _processor_flags() -> list[str]:
     return next((line.partition(":")[2].split() for line in lines if line.startswith(("flags", "Features"))), [])
 
 
-def reference_content(scenario: Scenario) -> bytes | None:
-    """The reference file of a scenario; None if it has none."""
-    return None if scenario.reference.file is None else scenario.reference.file.read_bytes()
-
-
-def run_key(scenario: Scenario, fmus: Fmus, reference: bytes | None) -> str:
+def run_key(system: System, files: Files) -> str:
     """The hash of everything that determines a run.
 
     A parameter that has the value with which its FMU starts counts as not given.
     """
-    content: dict[str, Any] = dataclasses.asdict(scenario)
-    content.pop("model_mismatch")  # says something of the run, and changes none
-    for side in ("plant", "controller"):
-        given = content.pop(side)["parameters"]
-        content[side] = {name: v for name, v in given.items() if v != fmus.starts.get(f"{side}.{name}")}
-    content["reference"] = None if reference is None else hashlib.sha256(reference).hexdigest()
-    content |= {"fmus": fmus.hashes, "versions": versions()}
+    content = {
+        **{key: getattr(system, key) for key in ("stop_time", "seed", "objectives", "streams")},
+        "components": [_component_of(name, component, files) for name, component in system.components.items()],
+        "connections": [dataclasses.asdict(x) for x in system.connections],
+        "sources": [[name, _source_of(source, files)] for name, source in system.sources.items()],
+        "criterion": dataclasses.asdict(system.criterion),
+        "versions": versions(),
+    }
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _component_of(name: str, component: Component, files: Files) -> dict[str, Any]:
+    starts = _starts(files.models[component.fmu])
+    content = {f.name: getattr(component, f.name) for f in dataclasses.fields(component)}
+    return {
+        **content,
+        "name": name,
+        "fmu": files.hashes[component.fmu],
+        "parameters": {key: v for key, v in component.parameters.items() if key not in starts or v != starts[key]},
+        "sampling": None if component.sampling is None else dataclasses.asdict(component.sampling),
+    }
+
+
+def _starts(model: Model) -> dict[str, float]:
+    return {v.name: float(v.start) for v in model.variables.values() if v.kind == "Real" and v.start is not None}
+
+
+def _source_of(source: Source, files: Files) -> dict[str, Any]:
+    content = dataclasses.asdict(source)
+    return {**content, "file": None if source.file is None else files.hashes[str(source.file)]}
 
 
 def study_parts(study: Study) -> dict[str, str]:
     """What a study file says of the runs, part by part, so that a difference can be named."""
-    base = dataclasses.asdict(study.base)
-    reference = reference_content(study.base)
-    parts: dict[str, Any] = {
-        "reference": None if reference is None else hashlib.sha256(reference).hexdigest(),
-        **{f"timing.{key}": value for key, value in base["timing"].items()},
-        **{f"{side}.{name}": v for side in ("controller", "plant") for name, v in base[side]["parameters"].items()},
-        **{key: base[key] for key in ("stop_time", "seed", "record")},
-    }
-    return {name: json.dumps(value, sort_keys=True) for name, value in parts.items()}
+    system = study.origin
+    tables = Files(fmus={}, tables=tables_of(system))
+    parts: dict[str, Any] = {key: getattr(system, key) for key in ("stop_time", "seed")}
+    for name, component in system.components.items():
+        parts |= _parts(f"components.{name}", component, without=("fmu",))
+    for x in system.connections:
+        parts |= _parts(f"connections.{x.name}", x)
+    for name, source in system.sources.items():
+        parts |= {f"sources.{name}.{key}": value for key, value in _source_of(source, tables).items()}
+    parts |= {f"objectives.{name}": text for name, text in system.objectives.items()}
+    parts |= _parts("criterion", system.criterion)
+    words = in_words_of_a_scenario if isinstance(study.base, Scenario) else str
+    said: dict[str, str] = {}
+    for path, value in parts.items():
+        name = words(path)
+        said[path if name in said else name] = json.dumps(value, sort_keys=True)
+    return said
+
+
+def _parts(place: str, of: Any, without: Container[str] = ()) -> dict[str, Any]:
+    """Every value of `of`, by path; what is `None` is not there."""
+    found: dict[str, Any] = {}
+    for field in dataclasses.fields(of):
+        value, path = getattr(of, field.name), f"{place}.{field.name}"
+        if dataclasses.is_dataclass(value):
+            found |= _parts(path, value)
+        elif field.name == "parameters":
+            found |= {f"{path}.{name}": given for name, given in value.items()}
+        elif value is not None and field.name not in without:
+            found[path] = value
+    return found
 
 
 def design_parts(study: Study) -> dict[str, str]:
@@ -129,10 +172,10 @@ def design_parts(study: Study) -> dict[str, str]:
     return {name: json.dumps(value, sort_keys=True) for name, value in parts.items()}
 
 
-def place_parts(fmus: Fmus) -> dict[str, str]:
+def place_parts(study: Study, files: Files) -> dict[str, str]:
     """What the rows of a store came from beside the study file."""
     return {
-        **{f"FMU of the {side}": digest for side, digest in fmus.hashes.items()},
+        **{f"FMU of the {name}": files.hashes[one.fmu] for name, one in study.origin.components.items()},
         **{f"version of {name}": version for name, version in versions().items()},
         "machine": machine(),
     }

@@ -1,20 +1,22 @@
-"""The largest period, delay, jitter or loss that still flies: measured, and beside it what linear theory says."""
+"""The largest value of a quantity that is still good: measured, and beside it the local limit."""
 
 import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import get_args
 
 from orchestration.errors import UsageError
 from orchestration.quadrotor.measures import Outcome
+from orchestration.quadrotor.translation import in_its_own_words
+from orchestration.request import Request, system_meant
 from orchestration.scenario import Record, Scenario
+from orchestration.simulation import checked
 from orchestration.studies.engine import Pool
-from orchestration.studies.local import local_limits
-from orchestration.studies.ranges import Quantity, Range, range_of
+from orchestration.studies.files import Files, files_of
+from orchestration.studies.local import Local, local_limits
+from orchestration.studies.ranges import Range, Varied, range_asked_for
 from orchestration.studies.search import Bracket, bisected, first_failure
-from orchestration.studies.study import locate_fmus
-from orchestration.studies.trials import RELIABILITY, Trials, Tried, said
+from orchestration.studies.trials import RELIABILITY, Trials, Tried, is_random, said
 from orchestration.timing import Timing
 
 GAP = 0.1
@@ -40,13 +42,18 @@ class Continuous:
 
 @dataclass(frozen=True, kw_only=True)
 class Limit:
-    """The last value that flies and what it rests on; in seconds, a loss as a probability."""
+    """The last value that is good (of the quadrotor: flies) and what it rests on; in the quantity's unit."""
 
     of: str
     local_limit: float | None
-    """where the spectral radius about hover first crosses one from below; None: not defined, or not reached"""
+    """where what is small about the operating point (hover) first ceases to decay; None: not defined, or not reached"""
+    local_method: str | None = None
+    """how it was found; None: it was not"""
+    local_accuracy: float | None = None
+    """of it, in its unit, as far as the method knows"""
     local_limit_outside: float | None
-    """likewise, with the gain that the law has just outside its boundary layer; None also without such a layer"""
+    """of the quadrotor: likewise, with the gain that the law has just outside its boundary layer; None also
+    without such a layer"""
     large_signal_limit: float | None
     """from the scenario's own initial state; None: nothing in the range failed, or the first value did"""
     refuted_limit: float | None
@@ -72,9 +79,11 @@ class Limit:
 
 
 def find(
-    scenario: Scenario,
+    request: Request,
     of: str,
     *,
+    first: float | None = None,
+    last: float | None = None,
     tolerance: float | None = None,
     scan: float | None = None,
     confidence: float = 0.95,
@@ -82,20 +91,24 @@ def find(
     workers: int = 1,
     announce: Callable[[str], None] | None = None,
 ) -> Limit:
-    """The limit of `scenario` in one quantity, all else as it is; `scan` is the step, `continuous` adds that flight.
+    """The limit of a system or a scenario in one quantity, all else as it is.
 
-    Raises `UsageError` for a quantity, tolerance, step or confidence that cannot be.
+    `of` is a path, or of the quadrotor `period`, `delay`, `jitter` or `loss`; it is looked for from `first` to `last`,
+    `scan` is the step, `continuous` adds that flight (of the quadrotor).
+
+    Raises `UsageError` for a quantity, range, tolerance, step or confidence that cannot be.
     """
-    span = _range_asked_for(scenario, of, tolerance, scan)
-    if not 0.0 < confidence < 1.0:
-        raise UsageError(f"--confidence {confidence}: expected a number between 0 and 1")
-    random = of in ("jitter", "loss") or not scenario.timing.is_deterministic()
+    varied, files = _checked(request, of, confidence, continuous)
+    models = files.models_of(varied.system)
+    span = range_asked_for(varied, models, first=first, last=last, tolerance=tolerance, scan=scan)
+    with in_its_own_words(request):
+        for value in span.values():
+            checked(varied.at(value), models)
+    random = is_random(varied.at(span.last))
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
-    local, outside, reason = local_limits(scenario, of)
-    with Pool(locate_fmus(scenario), workers) as pool:
-        trials = Trials(
-            scenario, of, span, seeds, confidence if random else None, pool, announce or (lambda line: None)
-        )
+    local = local_limits(varied, span)
+    with Pool(files, workers) as pool:
+        trials = Trials(varied, span, seeds, confidence if random else None, pool, announce or (lambda line: None))
         values = span.values()
         bracket = first_failure(trials.fails, values, span.tolerance, parts=FINER)
         above = [value for value in values if bracket is not None and value >= bracket.bad]
@@ -103,19 +116,29 @@ def find(
         if not random:
             for value in [value for value in above if value not in trials.tried][:BEYOND]:
                 trials.fails(value)
-        ideal = _near_continuous(scenario, pool) if continuous else None
+        ideal = _near_continuous(request, pool) if continuous and isinstance(request, Scenario) else None
     tried = tuple(trials.tried[value] for value in sorted(trials.tried))
     return Limit(
-        of=of, local_limit=local, local_limit_outside=outside,
-        large_signal_limit=None if bracket is None else bracket.good, refuted_limit=refuted,
-        horizon=scenario.stop_time, tolerance=span.tolerance, scan=span.step,
+        of=of, local_limit=local.limit, local_limit_outside=local.outside, local_method=local.method,
+        local_accuracy=local.accuracy, large_signal_limit=None if bracket is None else bracket.good,
+        refuted_limit=refuted, horizon=varied.system.stop_time, tolerance=span.tolerance, scan=span.step,
         confidence=confidence if random else None, seeds=seeds,
         flies_above=tuple(
             one.value for one in tried if bracket is not None and one.value > bracket.bad and one.flew == seeds
         ),
-        continuous=ideal, tried=tried,
-        note="; ".join(_note(span, bracket, trials, refuted, local, reason)),
+        continuous=ideal, tried=tried, note="; ".join(_note(span, bracket, trials, refuted, local)),
     )  # fmt: skip
+
+
+def _checked(request: Request, of: str, confidence: float, continuous: bool) -> tuple[Varied, Files]:
+    if not 0.0 < confidence < 1.0:
+        raise UsageError(f"--confidence {confidence}: expected a number between 0 and 1")
+    if continuous and not isinstance(request, Scenario):
+        raise UsageError("--continuous: for the quadrotor only")
+    varied = Varied(request=request, of=of)
+    if varied.system.criterion.good is None:
+        raise UsageError("criterion.good: expected in the system file, for it says what the limit is of")
+    return varied, files_of(varied.system)
 
 
 def as_text(found: Limit) -> dict[str, str]:
@@ -128,20 +151,6 @@ def as_text(found: Limit) -> dict[str, str]:
     known = [f"{one.value:.6g}: {said(one)}" for one in found.tried if one.share is not None]
     shown["tried"] = "; ".join(known) or f"{len(found.tried)} values"
     return shown
-
-
-def _range_asked_for(scenario: Scenario, of: str, tolerance: float | None, scan: float | None) -> Range:
-    if of not in get_args(Quantity):
-        raise UsageError(f"--of {of}: expected one of {', '.join(get_args(Quantity))}")
-    for flag, value in (("tolerance", tolerance), ("scan", scan)):
-        if value is not None and not (value > 0.0 and math.isfinite(value)):
-            raise UsageError(f"--{flag} {value}: expected a positive number")
-    span = range_of(scenario, of)
-    return dataclasses.replace(
-        span,
-        tolerance=span.tolerance if tolerance is None else tolerance,
-        step=span.step if scan is None else scan,
-    )
 
 
 def _refuted(trials: Trials, bracket: Bracket | None, above: list[float]) -> float | None:
@@ -163,28 +172,27 @@ def _near_continuous(scenario: Scenario, pool: Pool) -> Continuous:
         timing=Timing(period=CONTINUOUS, plant_interval=scenario.timing.plant_interval),
         record=Record(plant=(), controller=()),
     )
-    (metrics,) = pool.fly([ideal], stop=lambda metrics: False)
+    (metrics,) = pool.fly([system_meant(ideal)], stop=lambda metrics: False)
     return Continuous(period=CONTINUOUS, outcome=metrics["outcome"], settling_time=metrics["settling_time"])
 
 
-def _note(
-    span: Range, bracket: Bracket | None, trials: Trials, refuted: float | None, local: float | None, reason: str
-) -> list[str]:
+def _note(span: Range, bracket: Bracket | None, trials: Trials, refuted: float | None, found: Local) -> list[str]:
+    local = found.limit
     if bracket is None:
-        parts = [f"flies throughout the range, to {span.last:g}{span.unit}"]
+        parts = [f"good throughout the range, to {span.last:g}{span.unit}"]
     elif bracket.good is None:
         fell = said(trials.tried[bracket.bad])
-        parts = [f"does not fly at {bracket.bad:g}{span.unit}, the first value of the range ({fell})"]
+        parts = [f"not good at {bracket.bad:g}{span.unit}, the first value of the range ({fell})"]
     else:
         fell = said(trials.tried[bracket.bad])
-        parts = [f"flies at {bracket.good:.6g}{span.unit} and not at {bracket.bad:.6g}{span.unit} ({fell})"]
+        parts = [f"good at {bracket.good:.6g}{span.unit} and not at {bracket.bad:.6g}{span.unit} ({fell})"]
     if refuted is not None:
         parts.append(
-            f"that nine seeds in ten fly is refuted at {refuted:.6g}{span.unit}: {said(trials.tried[refuted])}"
+            f"that nine seeds in ten are good is refuted at {refuted:.6g}{span.unit}: {said(trials.tried[refuted])}"
         )
     parts.append(f"what is narrower than the scan, {span.step:g}{span.unit}, is not seen")
     if local is None:
-        return [*parts, reason]
+        return [*parts, found.reason]
     measured = None if bracket is None else bracket.good
     if measured is None or abs(measured - local) > GAP * local:
         return [*parts, f"more than a tenth from the local limit of {local:.6g}{span.unit}: large signals decide"]

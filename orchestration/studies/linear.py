@@ -16,14 +16,15 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from orchestration import wiring
+from orchestration import fmus, wiring
 from orchestration.errors import UsageError
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.reuse import Instances
+from orchestration.quadrotor.translation import system_of
 from orchestration.scenario import Scenario
 from orchestration.simulation import prepared
 from orchestration.simulator import Floats
-from orchestration.studies.study import locate_fmus
+from orchestration.studies.files import files_of
 
 STEP = 1e-6
 """of each coordinate in a difference; a thousandth of a boundary layer that is smaller than 1 mm"""
@@ -56,7 +57,8 @@ def at_edge(scenario: Scenario) -> Scenario | None:
 
     That is the slope of k_s |e|^β_t sgn(e) at |e| = ε. None for a controller without parameters of these names.
     """
-    known = {**locate_fmus(scenario).starts}
+    system = system_of(scenario)
+    known = files_of(system).starts_of(system)
     known |= {f"controller.{name}": float(value) for name, value in scenario.controller.parameters.items()}
     names = [f"controller.{name}" for name in (wiring.SURFACE_GAIN, wiring.SURFACE_EXPONENT, wiring.BOUNDARY_LAYER)]
     if any(name not in known for name in names):
@@ -67,8 +69,7 @@ def at_edge(scenario: Scenario) -> Scenario | None:
 
 def _located(hover: Scenario) -> Scenario:
     """`hover` with its FMUs by their paths."""
-    fmus = locate_fmus(hover)
-    return hover.with_fmus(plant=fmus.plant, controller=fmus.controller)
+    return hover.with_fmus(plant=fmus.locate(hover.plant.fmu), controller=fmus.locate(hover.controller.fmu))
 
 
 class HoverLoop:

@@ -1,10 +1,33 @@
-"""Local limits: where the sampled loop about hover ceases to be stable, by its spectral radius."""
+"""Local limits: where what is small about an operating point ceases to decay."""
+
+from dataclasses import dataclass
 
 from orchestration.errors import UsageError
+from orchestration.fmi.reuse import Instances
 from orchestration.scenario import Scenario
 from orchestration.studies.linear import HoverLoop, at_edge
-from orchestration.studies.ranges import range_of
+from orchestration.studies.ranges import Range, Varied, range_of
 from orchestration.studies.search import first_failure
+from orchestration.studies.twins import growth_of
+
+LINEAR = "spectral radius of the sampled loop about hover, by differences through saved states"
+LINEAR_ACCURACY = 1e-3
+"""of the limit, relative: what the differences leave"""
+TWINS = "growth of the difference of twin runs from the operating point, one of them struck by a pulse"
+FINER = 0.2
+"""of the tolerance of the measured limit"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Local:
+    """A local limit, None where there is none, and why."""
+
+    limit: float | None = None
+    outside: float | None = None
+    """of the quadrotor: with the gain just outside of its boundary layer"""
+    method: str | None = None
+    accuracy: float | None = None
+    reason: str
 
 
 def local_limit(loop: HoverLoop, scenario: Scenario, of: str) -> float | None:
@@ -24,17 +47,47 @@ def radius(loop: HoverLoop, scenario: Scenario, of: str, value: float) -> float:
     return loop.spectral_radius(period, delay)
 
 
-def local_limits(scenario: Scenario, of: str) -> tuple[float | None, float | None, str]:
-    """The local limits inside the boundary layer and just outside of it, None where there is none, and why."""
+def local_limits(varied: Varied, span: Range) -> Local:
+    """The local limit of a quantity: of the quadrotor by linear theory, of any other system by perturbed twin runs."""
+    if isinstance(varied.request, Scenario):
+        return about_hover(varied.request, varied.of)
+    if not varied.system.operating_point:
+        return Local(reason="no local limit: the system file names no operating_point")
+    return _by_twins(varied, span)
+
+
+def about_hover(scenario: Scenario, of: str) -> Local:
+    """The local limits of the quadrotor by linear theory, inside its boundary layer and just outside of it."""
     if of not in ("period", "delay"):
-        return None, None, f"linear theory has no local limit of {of}"
+        return Local(reason=f"linear theory has no local limit of {of}")
     if scenario.timing.hold != "zero":
-        return None, None, "the linear loop is for zero-order hold only"
+        return Local(reason="the linear loop is for zero-order hold only")
     try:
         loop = HoverLoop.of(scenario)
     except UsageError as error:
-        return None, None, str(error)
+        return Local(reason=str(error))
     edge = at_edge(scenario)
-    outside = None if edge is None else local_limit(loop.with_law(edge), edge, of)
-    reason = "the spectral radius about hover stays below one in the range, or above"
-    return local_limit(loop, scenario, of), outside, reason
+    limit = local_limit(loop, scenario, of)
+    return Local(
+        limit=limit,
+        outside=None if edge is None else local_limit(loop.with_law(edge), edge, of),
+        method=LINEAR,
+        accuracy=None if limit is None else LINEAR_ACCURACY * limit,
+        reason="the spectral radius about hover stays below one in the range, or above",
+    )
+
+
+def _by_twins(varied: Varied, span: Range) -> Local:
+    """By the growth of the difference of twin runs, up through the scan, and bisected."""
+    width, instances = span.tolerance * FINER, Instances()
+    try:
+        bracket = first_failure(lambda value: growth_of(varied.at(value), instances).rate > 0.0, span.values(), width)
+    except UsageError as error:
+        return Local(reason=f"no local limit: {error}")
+    finally:
+        instances.close()
+    if bracket is None or bracket.good is None:
+        return Local(
+            method=TWINS, reason=f"what is small {'decays' if bracket is None else 'grows'} throughout the range"
+        )
+    return Local(limit=0.5 * (bracket.good + bracket.bad), method=TWINS, accuracy=width, reason="")

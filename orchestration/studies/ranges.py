@@ -1,12 +1,23 @@
 """Where a limit is looked for: the quantities, and how each is scanned."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
+from orchestration.errors import UsageError
+from orchestration.fmi.model import Model
+from orchestration.quadrotor.translation import in_its_own_words
+from orchestration.request import Request, system_meant
 from orchestration.scenario import Scenario
+from orchestration.studies.study import paths_in, with_values
+from orchestration.system.model import System
+from orchestration.system.paths import value_at
 
 Quantity = Literal["period", "delay", "jitter", "loss"]
+"""Of the quadrotor, by name; of any system a path"""
+STEPS, PARTS = 20, 50
+"""of a range that is given: values of the scan, and parts of its step to which the last bracket is brought together"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,6 +38,81 @@ class Range:
         return [*(value for value in self.before if value < self.first), *steps]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Varied:
+    """A system, or a scenario of the quadrotor, in one quantity, all else as it is."""
+
+    request: Request
+    of: str
+    """`period`, `delay`, `jitter` or `loss` of the quadrotor, or a path"""
+
+    def __post_init__(self) -> None:
+        for path in self.paths:
+            value = value_at(self.system, path)
+            if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float))):
+                raise UsageError(f"--of {self.of}: expected the path of a number")
+
+    @property
+    def system(self) -> System:
+        """As it is."""
+        return system_meant(self.request)
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """What is changed; raises `UsageError` for what is not there."""
+        named = self.of in get_args(Quantity)
+        if named and isinstance(self.request, Scenario):
+            return paths_in(self.request, f"timing.{self.of}")
+        if named:
+            raise UsageError(f"--of {self.of}: for the quadrotor only; expected a path, as connections.NAME.delay")
+        if "." not in self.of:
+            raise UsageError(f"--of {self.of}: expected one of {', '.join(get_args(Quantity))}, or a path")
+        return paths_in(self.request, self.of)
+
+    def at(self, value: float) -> System:
+        """With another value; raises `UsageError` for one that cannot be."""
+        with in_its_own_words(self.request):
+            return with_values(self.system, dict.fromkeys(self.paths, value))
+
+
+def range_asked_for(
+    varied: Varied,
+    models: Mapping[str, Model],
+    *,
+    first: float | None,
+    last: float | None,
+    tolerance: float | None,
+    scan: float | None,
+) -> Range:
+    """The range in which a quantity is looked for; raises `UsageError` for one that cannot be."""
+    for flag, value in (("tolerance", tolerance), ("scan", scan)):
+        if value is not None and not (value > 0.0 and math.isfinite(value)):
+            raise UsageError(f"--{flag} {value}: expected a positive number")
+    known = _usual(varied)
+    if known is None and (first is None or last is None):
+        raise UsageError(f"--of {varied.of}: expected --from and --to, between which it is looked for")
+    low = first if first is not None else known.first if known is not None else 0.0
+    high = last if last is not None else known.last if known is not None else 0.0
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        raise UsageError(f"--from {low:g} --to {high:g}: expected finite numbers, the first one smaller")
+    step = scan if scan is not None else known.step if known is not None else (high - low) / STEPS
+    return Range(
+        before=known.before if known is not None and first is None else (),
+        first=low,
+        step=step,
+        last=high,
+        tolerance=tolerance if tolerance is not None else known.tolerance if known is not None else step / PARTS,
+        unit=known.unit if known is not None else _unit(varied.paths[0], models),
+    )
+
+
+def _usual(varied: Varied) -> Range | None:
+    """The range of a quantity of the quadrotor; None for a path."""
+    if not isinstance(varied.request, Scenario) or varied.of not in get_args(Quantity):
+        return None
+    return range_of(varied.request, varied.of)
+
+
 def range_of(scenario: Scenario, of: str) -> Range:
     """The range in which a quantity of this scenario is looked for."""
     period = scenario.timing.period
@@ -41,3 +127,22 @@ def range_of(scenario: Scenario, of: str) -> Range:
         return Range(first=0.0, step=period / 10.0, last=0.999 * period, tolerance=period / 100.0)
     length = scenario.timing.burst_length
     return Range(first=0.0, step=0.05, last=1.0 if length is None else length / (length + 1.0), tolerance=0.01, unit="")
+
+
+def is_in_seconds(path: str) -> bool:
+    """Whether the value at a path is a time [s]."""
+    return ".parameters." not in path and path.rpartition(".")[2] in _SECONDS
+
+
+_SECONDS = ("period", "offset", "step", "plant_interval", "jitter", "delay", "delay_jitter", "stop_time")
+
+
+def _unit(path: str, models: Mapping[str, Model]) -> str:
+    if is_in_seconds(path) and not (path.startswith("connections.") and path.endswith(".offset")):
+        return " s"
+    for name, model in models.items():
+        prefix = f"components.{name}.parameters."
+        variable = model.variables.get(path.removeprefix(prefix)) if path.startswith(prefix) else None
+        if variable is not None and variable.unit:
+            return f" {variable.unit}"
+    return ""

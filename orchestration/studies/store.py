@@ -16,35 +16,58 @@ import filelock
 
 from orchestration.errors import QuadcosimError, UsageError
 
-METRICS = (
-    "outcome", "horizon",
-    "position_rmse", "position_iae", "position_itae", "position_max", "settling_time", "ultimate_bound",
-    "attitude_error_rmse", "attitude_error_max", "control_effort.thrust", "control_effort.torque",
-    "total_variation.thrust", "total_variation.torque", "energy_growth_share", "saturation_share", "diverged",
-    "divergence_time", "steps",
-)  # fmt: skip
-"""Metrics of a row; the wall time of a run is its duration."""
+FIXED = ("outcome", "good", "horizon", "diverged", "divergence_time", "steps")
+"""Metrics of every system, beside its objectives; the wall time of a run is its duration."""
 TEXTS = ("outcome",)
 """Metrics that are words; all others are numbers."""
+MOST_OBJECTIVES = 1000
+"""that SQLite has columns for"""
 
-_TYPED = ", ".join(f'"{name}" {"TEXT" if name in TEXTS else "REAL"}' for name in METRICS)
-_RUN = ("key", "status", "message", "seed", "duration", "machine", *METRICS)
-COLUMNS = ("design_index", *_RUN)
-"""Of the table of runs, beside the axes."""
+_RUN = ("key", "status", "message", "seed", "duration", "machine")
+_OWN = ("design_index", *_RUN, "checksum", "settings")
 _ORIGINS = ("guid.", "version.")
+OBJECTIVES = "objectives"
+"""What a store is about says them by this name; they are written when it is made."""
 # Runs are found by what determines them, so that they stay when the design around them changes.
-_TABLES = {
-    "about": "CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL, checksum TEXT NOT NULL)",
-    "design": "CREATE TABLE design (design_index INTEGER PRIMARY KEY, key TEXT NOT NULL, settings TEXT NOT NULL, "
-    "checksum TEXT NOT NULL)",
-    "runs": "CREATE TABLE runs (key TEXT PRIMARY KEY, status TEXT NOT NULL, message TEXT, seed INTEGER NOT NULL, "
-    f"duration REAL, machine TEXT, {_TYPED}, checksum TEXT NOT NULL)",
-}
+_ABOUT = "CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL, checksum TEXT NOT NULL)"
 
 
-def is_column(name: str) -> bool:
+def _tables(metrics: Iterable[str]) -> dict[str, str]:
+    typed = ", ".join(f"{_quoted(name)} {'TEXT' if name in TEXTS else 'REAL'}" for name in metrics)
+    return {
+        "about": _ABOUT,
+        "design": "CREATE TABLE design (design_index INTEGER PRIMARY KEY, key TEXT NOT NULL, settings TEXT NOT NULL, "
+        "checksum TEXT NOT NULL)",
+        "runs": "CREATE TABLE runs (key TEXT PRIMARY KEY, status TEXT NOT NULL, message TEXT, seed INTEGER NOT NULL, "
+        f"duration REAL, machine TEXT, {typed}, checksum TEXT NOT NULL)",
+    }
+
+
+def _quoted(name: str) -> str:
+    doubled = name.replace('"', '""')
+    return f'"{doubled}"'
+
+
+def metrics_with(objectives: Iterable[str]) -> tuple[str, ...]:
+    """The metrics of a row, in the order of a run's metrics."""
+    return (*FIXED[:3], *objectives, *FIXED[3:])
+
+
+def is_column(name: str, objectives: Iterable[str]) -> bool:
     """Whether the table of runs has a column of that name, whatever the axes are."""
-    return name in COLUMNS or name.startswith(_ORIGINS)
+    return name in (*_OWN, *metrics_with(objectives)) or name.startswith(_ORIGINS)
+
+
+def expect_columns(objectives: Iterable[str]) -> None:
+    """Raise `UsageError` for objectives that cannot be columns: SQLite tells no capitals from small letters."""
+    taken = [*_OWN, *FIXED]
+    for name in objectives:
+        lower = name.lower()
+        if not name or "\0" in name or lower in map(str.lower, taken) or lower.startswith(_ORIGINS):
+            raise UsageError(f"objectives.{name}: the table of runs has a column of that name, expected another")
+        taken.append(name)
+    if len(taken) > MOST_OBJECTIVES:
+        raise UsageError(f"objectives: {len(taken)} columns, expected at most {MOST_OBJECTIVES}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,9 +111,13 @@ class Store:
     Raises `QuadcosimError` in one line if the file cannot be used.
     """
 
-    def __init__(self, path: Path, connection: sqlite3.Connection) -> None:
+    def __init__(self, path: Path, connection: sqlite3.Connection, objectives: Iterable[str]) -> None:
         self.path = path
         self._connection = connection
+        self.metrics = metrics_with(objectives)
+        """of a row"""
+        self.columns = ("design_index", *_RUN, *self.metrics)
+        """of the table of runs, beside the axes"""
 
     def about(self) -> dict[str, str]:
         """What the store says of its study, by name."""
@@ -132,33 +159,40 @@ class Store:
         rows = list(rows)
         with _explained(self.path), self._connection:
             self._insert("design", ((row.index, row.key, json.dumps(row.settings)) for row in rows))
-            self._insert("runs", map(_values, rows))
+            self._insert("runs", (_values(row, self.metrics) for row in rows))
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """All rows of the design sorted by its index, each a value by column; `settings` is a dictionary."""
-        columns = ", ".join(f'runs."{name}"' for name in _RUN)
+        columns = ", ".join(f"runs.{_quoted(name)}" for name in self.columns[1:])
         with _explained(self.path):
             cursor = self._connection.execute(
                 f"SELECT design_index, {columns}, settings FROM design JOIN runs USING (key) ORDER BY design_index"
             )
             for values in cursor:
-                row = dict(zip((*COLUMNS, "settings"), values, strict=True))
+                row = dict(zip((*self.columns, "settings"), values, strict=True))
                 row["settings"] = json.loads(row["settings"])
                 yield row
 
     def _insert(self, table: str, rows: Iterable[tuple[Any, ...]]) -> None:
-        summed = ((*row, _checksum(row)) for row in rows)
-        first = next(summed, None)
-        if first is not None:
-            marks = ", ".join("?" * len(first))
-            statement = f"INSERT OR REPLACE INTO {table} VALUES ({marks})"
-            self._connection.execute(statement, first)
-            self._connection.executemany(statement, summed)
+        _insert(self._connection, table, rows)
+
+
+def _insert(connection: sqlite3.Connection, table: str, rows: Iterable[tuple[Any, ...]]) -> None:
+    summed = ((*row, _checksum(row)) for row in rows)
+    first = next(summed, None)
+    if first is not None:
+        marks = ", ".join("?" * len(first))
+        statement = f"INSERT OR REPLACE INTO {table} VALUES ({marks})"
+        connection.execute(statement, first)
+        connection.executemany(statement, summed)
 
 
 @contextmanager
-def open_for_writing(path: Path) -> Iterator[Store]:
-    """The store at `path`, made if need be, for this process alone until the end of the block."""
+def open_for_writing(path: Path, objectives: Iterable[str]) -> Iterator[Store]:
+    """The store at `path`, made if need be with columns for these, for this process alone until the end of the block.
+
+    One that is there has the objectives that it was made with.
+    """
     with _explained(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         lock = filelock.FileLock(f"{path}.lock", timeout=0)
@@ -175,10 +209,12 @@ def open_for_writing(path: Path) -> Iterator[Store]:
                 connection.execute("PRAGMA synchronous=NORMAL")
                 if not _schema(connection):
                     with connection:
-                        for statement in _TABLES.values():
+                        named = list(objectives)
+                        for statement in _tables(metrics_with(named)).values():
                             connection.execute(statement)
-                _expect_whole(path, connection)
-            yield Store(path, connection)
+                        _insert(connection, "about", [(OBJECTIVES, json.dumps(named))])
+                there = _expect_whole(path, connection)
+            yield Store(path, connection, there)
             with _explained(path):
                 connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     finally:
@@ -204,8 +240,8 @@ def open_for_reading(path: Path) -> Iterator[Store]:
             raise QuadcosimError(f"{path}: expected the store of a study: {_line(error)}") from error
         with closing(connection):
             with _explained(path):
-                _expect_whole(path, connection)
-            yield Store(path, connection)
+                there = _expect_whole(path, connection)
+            yield Store(path, connection, there)
 
 
 def _read_only(path: Path) -> sqlite3.Connection:
@@ -221,19 +257,36 @@ def _read_only(path: Path) -> sqlite3.Connection:
 # -- damage -----------------------------------------------------------------------------------------------
 
 
-def _expect_whole(path: Path, connection: sqlite3.Connection) -> None:
-    """Raise `QuadcosimError` unless the file is sound and every row has the checksum that it was written with."""
-    if _schema(connection) != _TABLES:
+def _expect_whole(path: Path, connection: sqlite3.Connection) -> list[str]:
+    """The objectives of a store.
+
+    Raises `QuadcosimError` unless the file is sound and every row has the checksum that it was written with.
+    """
+    schema, objectives = _schema(connection), _objectives(connection)
+    if objectives is None or schema != _tables(metrics_with(objectives)):
         raise QuadcosimError(
             f"{path}: no store of this version of quadcosim; expected one: take another --out, or remove it"
         )
     found = connection.execute("PRAGMA integrity_check(1)").fetchone()[0]
     if found != "ok":
         raise QuadcosimError(f"{path}: the store is damaged ({' '.join(found.split())}); {_REMEDY}")
-    for table in _TABLES:
+    for table in schema:
         for *row, checksum in connection.execute(f"SELECT * FROM {table}"):
             if _checksum(row) != checksum:
                 raise QuadcosimError(f"{path}: the store is damaged ({table}: {str(row[0])[:16]!r}); {_REMEDY}")
+    return objectives
+
+
+def _objectives(connection: sqlite3.Connection) -> list[str] | None:
+    """What a store says that its objectives are; None if it says nothing of the kind."""
+    if _schema(connection).get("about") != _ABOUT:
+        return None
+    row = connection.execute("SELECT value FROM about WHERE name = ?", (OBJECTIVES,)).fetchone()
+    try:
+        found = json.loads(row[0]) if row else None
+    except (TypeError, ValueError):
+        return None
+    return found if isinstance(found, list) and all(isinstance(name, str) for name in found) else None
 
 
 _REMEDY = "expected it as it was written: put back a copy, or remove it"
@@ -248,8 +301,8 @@ def _checksum(row: Iterable[Any]) -> str:
     return hashlib.sha256(repr(tuple(row)).encode("utf-8", "surrogatepass")).hexdigest()[:16]
 
 
-def _values(row: Row) -> tuple[Any, ...]:
-    measured = {name: (row.metrics or {}).get(name) for name in METRICS}
+def _values(row: Row, metrics: Iterable[str]) -> tuple[Any, ...]:
+    measured = {name: (row.metrics or {}).get(name) for name in metrics}
     return (
         row.key, row.status, row.message, row.seed, _real(row.duration), row.machine,
         *(_text(value) if name in TEXTS else _real(value) for name, value in measured.items()),

@@ -1,7 +1,6 @@
-"""What a study is: a base scenario, axes, and the runs that they make."""
+"""What a study is: a base system, axes, and the runs that they make."""
 
 import hashlib
-import io
 import json
 import re
 from collections.abc import Mapping, Sequence
@@ -10,22 +9,23 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import fmpy
-
-from orchestration import fmus
-from orchestration.errors import QuadcosimError, UsageError
-from orchestration.scenario import FmuChoice, Scenario
+from orchestration.errors import UsageError
+from orchestration.quadrotor.translation import in_its_own_words, paths_of
+from orchestration.request import Request, system_meant
+from orchestration.scenario import Scenario
 from orchestration.studies.axes import Axis, Method, Points, Value
+from orchestration.studies.files import Files, files_of
 from orchestration.studies.store import is_column
-from orchestration.timing import TIMING_KEYS
+from orchestration.system.model import System
+from orchestration.system.paths import changed, value_at
 
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """Runs of a base scenario over axes."""
+    """Runs of a base system, or a scenario of the quadrotor, over axes."""
 
     name: str
-    base: Scenario
+    base: Request
     axes: tuple[Axis, ...]
     method: Method = "sobol"
     samples: int = 0
@@ -44,35 +44,90 @@ class Study:
                 f"name = {self.name!r}: expected the name of a folder: at most 100 letters, digits, spaces and - _ . +"
             )
         for axis in self.axes:
-            if is_column(axis.name) and (axis.name, axis.targets, axis.multiplies) != ("seed", ("seed",), False):
+            is_of_seeds = (axis.name, axis.targets, axis.multiplies) == ("seed", ("seed",), False)
+            if is_column(axis.name, self.origin.objectives) and not is_of_seeds:
                 raise UsageError(f"axis {axis.name}: the table of runs has a column of that name, expected another")
+        assert self._paths is not None  # every target is known, or said not to be
+
+    @cached_property
+    def origin(self) -> System:
+        """The system that the base means."""
+        with in_its_own_words(self.base):
+            return system_meant(self.base)
 
     @cached_property
     def points(self) -> Sequence[Mapping[str, Value]]:
         """The value of each axis, run by run; made when it is asked for."""
         return Points(self.axes, self.method, self.samples, self.design_seed)
 
-    def scenario(self, index: int, starts: Mapping[str, float]) -> Scenario:
-        """The scenario of one run; `starts` are the FMUs' own parameters, as `controller.NAME`, `plant.NAME`.
+    @cached_property
+    def _paths(self) -> dict[str, tuple[str, ...]]:
+        """By axis, the paths that it sets or multiplies."""
+        return {
+            axis.name: tuple(path for target in axis.targets for path in paths_in(self.base, target))
+            for axis in self.axes
+        }
+
+    def system(self, index: int, starts: Mapping[str, float]) -> System:
+        """The system of one run; `starts` are the FMUs' own parameters, as COMPONENT.NAME.
 
         Raises `UsageError` for a value that cannot be.
         """
         point = self.points[index]
         changes: dict[str, Any] = {}
         if self.vary_seed and "seed" not in point:
-            changes["seed"] = _own_seed(self.base.seed, point)
-        for axis in self.axes:
-            value = point[axis.name]
-            for target in axis.targets:
-                changes[target] = _product(value, target, self.base, starts) if axis.multiplies else value
-        return changed(self.base, changes)
+            changes["seed"] = _own_seed(self.origin.seed, point)
+        with in_its_own_words(self.base):
+            for axis in self.axes:
+                value = point[axis.name]
+                for path in self._paths[axis.name]:
+                    changes[path] = _product(value, path, self.origin, starts) if axis.multiplies else value
+            return with_values(self.origin, changes)
 
     def keeps_signals(self, index: int) -> bool:
         """Whether the signals of a run are kept."""
         return self.keep_signals if isinstance(self.keep_signals, bool) else index in self.keep_signals
 
+    def files(self) -> Files:
+        """The files of all runs, FMUs built if need be."""
+        values = [(path, str(v)) for axis in self.axes for path in self._paths[axis.name] for v in axis.values or ()]
+        return files_of(
+            self.origin,
+            fmus_too=[value for path, value in values if names_fmu(path)],
+            tables_too=[value for path, value in values if names_table(path)],
+        )
+
 
 _NAME = re.compile(r"[^\W_][\w .+-]{0,99}")
+
+
+def paths_in(base: Request, target: str) -> tuple[str, ...]:
+    """The paths of a target in the system that `base` means; raises `UsageError` where there is no such."""
+    paths = paths_of(target) if isinstance(base, Scenario) else (target,)
+    for path in paths:
+        value_at(system_meant(base), path)
+    return paths
+
+
+def names_fmu(path: str) -> bool:
+    """Whether the value at a path is that of an FMU."""
+    return path.startswith("components.") and path.endswith(".fmu") and ".parameters." not in path
+
+
+def names_table(path: str) -> bool:
+    """Whether the value at a path is the file of a source."""
+    return path.startswith("sources.") and path.endswith(".file")
+
+
+def with_values(system: System, changes: Mapping[str, Any]) -> System:
+    """`system` with other values by path; of a range of seeds, 1.0 is the seed 1."""
+    meant = dict(changes)
+    for path, value in changes.items():
+        if path == "seed" and isinstance(value, float) and value.is_integer():
+            meant[path] = int(value)
+        elif names_table(path):
+            meant[path] = Path(str(value))
+    return changed(system, meant)
 
 
 def _own_seed(seed: int, point: Mapping[str, Value]) -> int:
@@ -81,110 +136,12 @@ def _own_seed(seed: int, point: Mapping[str, Value]) -> int:
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:6], "big")
 
 
-def expect_target(target: str) -> None:
-    """Raise `UsageError` naming what an axis can set, unless `target` is among it; FMUs know their own names."""
-    side, _, key = target.partition(".")
-    kind, _, measurement = key.partition(".")
-    if side == "timing":
-        known = bool(measurement) if kind in _BY_MEASUREMENT else key == "loss" or key in TIMING_KEYS
-    else:
-        known = target in ("seed", "stop_time") or (side in ("controller", "plant") and bool(key))
-    if not known:
-        keys = ", ".join(key for key in TIMING_KEYS if key not in _BY_MEASUREMENT)
-        raise UsageError(
-            f"{target}: expected controller.NAME, plant.NAME, seed, stop_time, timing.loss, timing.noise.NAME, "
-            f"timing.quantisation.NAME or timing.KEY with KEY one of {keys}"
-        )
-
-
-_BY_MEASUREMENT = ("noise", "quantisation")
-
-
-def changed(base: Scenario, changes: Mapping[str, Any]) -> Scenario:
-    """`base` with other values of `timing.KEY`, `controller.NAME`, `plant.NAME`, `seed` or `stop_time`."""
-    timing: dict[str, Any] = {}
-    parameters: dict[str, Any] = {}
-    top: dict[str, Any] = {}
-    for target, value in changes.items():
-        expect_target(target)
-        side, _, key = target.partition(".")
-        if side == "timing" and key == "loss":
-            timing |= {"measurement_loss": value, "command_loss": value}
-        elif side == "timing" and key.partition(".")[0] in _BY_MEASUREMENT:
-            kind, _, measurement = key.partition(".")
-            timing[kind] = {**timing.get(kind, getattr(base.timing, kind)), measurement: value}
-        elif side == "timing":
-            timing[key] = value
-        elif side in ("controller", "plant"):
-            parameters[target] = value
-        else:
-            whole = isinstance(value, float) and value.is_integer()  # as in a range: 1.0 for the seed 1
-            top[target] = int(value) if target == "seed" and whole else value
-    return base.with_changes(timing=timing, parameters=parameters, **top)
-
-
-def _product(value: Value, target: str, base: Scenario, starts: Mapping[str, float]) -> float:
+def _product(value: Value, path: str, origin: System, starts: Mapping[str, float]) -> float:
     if not isinstance(value, (int, float)):
-        raise UsageError(f"{target}: expected a number to multiply with, got {value}")
-    side, _, key = target.partition(".")
-    if side == "timing" and isinstance(getattr(base.timing, key, None), float):
-        return float(value) * float(getattr(base.timing, key))
-    choice: FmuChoice | None = getattr(base, side, None) if side in ("controller", "plant") else None
-    if choice is not None and key in choice.parameters:
-        return float(value) * float(choice.parameters[key])
-    if target in starts:
-        return float(value) * starts[target]
-    raise UsageError(f"{target}: expected a number of the base scenario or of an FMU to multiply")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Fmus:
-    """The FMU files of a study, read once: what is described, hashed and flown is this content."""
-
-    plant: Path
-    controller: Path
-
-    @cached_property
-    def contents(self) -> dict[str, bytes]:
-        """The files by side."""
-        return {side: getattr(self, side).read_bytes() for side in ("plant", "controller")}
-
-    @cached_property
-    def hashes(self) -> dict[str, str]:
-        """The hash of each file by side."""
-        return {side: hashlib.sha256(content).hexdigest() for side, content in self.contents.items()}
-
-    @cached_property
-    def descriptions(self) -> dict[str, Any]:
-        """Model descriptions by side; raises `QuadcosimError` for a file without one."""
-        found = {}
-        for side, content in self.contents.items():
-            try:
-                found[side] = fmpy.read_model_description(io.BytesIO(content))
-            except Exception as error:
-                raise QuadcosimError(f"{getattr(self, side)}: expected an FMU: {error}") from error
-        return found
-
-    @cached_property
-    def guids(self) -> dict[str, str]:
-        """GUIDs by side."""
-        return {side: description.guid for side, description in self.descriptions.items()}
-
-    @cached_property
-    def variables(self) -> dict[str, Any]:
-        """The variables of both FMUs, as `side.NAME`."""
-        return {f"{side}.{v.name}": v for side, found in self.descriptions.items() for v in found.modelVariables}
-
-    @cached_property
-    def starts(self) -> dict[str, float]:
-        """The start values of all Real parameters, as `side.NAME`."""
-        return {
-            name: float(v.start)
-            for name, v in self.variables.items()
-            if v.type == "Real" and v.causality == "parameter"
-        }
-
-
-def locate_fmus(base: Scenario) -> Fmus:
-    """The FMUs of a scenario, built if need be."""
-    return Fmus(plant=fmus.locate(base.plant.fmu), controller=fmus.locate(base.controller.fmu))
+        raise UsageError(f"{path}: expected a number to multiply with, got {value}")
+    base = value_at(origin, path)
+    if base is None:
+        base = starts.get(path.removeprefix("components.").replace(".parameters.", ".", 1))
+    if isinstance(base, bool) or not isinstance(base, (int, float)):
+        raise UsageError(f"{path}: expected a number of the base or of an FMU to multiply")
+    return float(value) * float(base)

@@ -9,9 +9,10 @@ import pydantic
 
 from orchestration.documents import read_toml
 from orchestration.errors import UsageError
-from orchestration.scenario_file import first_problem, load_scenario, scenario_from_tables
+from orchestration.request import load_request, request_from_tables
+from orchestration.scenario_file import first_problem
 from orchestration.studies.axes import Axis, Method, Scale, Value, span
-from orchestration.studies.study import Study, expect_target
+from orchestration.studies.study import Study, names_fmu, names_table
 
 _FORBID: dict[str, str] = {"extra": "forbid"}
 
@@ -46,7 +47,7 @@ class DesignTable:
 
 @dataclass(frozen=True, kw_only=True)
 class StudyFile:
-    """The file: the base as a scenario's tables or the path of one, axes, design."""
+    """The file: the base as the tables of a system or a scenario, or the path of one; axes, design."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
@@ -81,11 +82,11 @@ def _study(tables: dict[str, Any], path: Path) -> Study:
         raise UsageError("scenario and base: expected one of them")
     if file.design.seed < 0:
         raise UsageError(f"design.seed = {file.design.seed}: expected a whole number from 0")
-    base = load_scenario(path.parent / file.scenario) if file.scenario else scenario_from_tables(file.base, path.parent)
+    base = load_request(path.parent / file.scenario) if file.scenario else request_from_tables(file.base, path.parent)
     study = Study(
         name=file.name or path.stem,
         base=base,
-        axes=tuple(map(_axis, file.axes)),
+        axes=tuple(_axis(table, path.parent) for table in file.axes),
         method=file.design.method,
         samples=file.design.samples,
         design_seed=file.design.seed,
@@ -97,16 +98,14 @@ def _study(tables: dict[str, Any], path: Path) -> Study:
     return study
 
 
-def _axis(table: AxisTable) -> Axis:
+def _axis(table: AxisTable, folder: Path) -> Axis:
     if table.sets is not None and table.multiplies is not None:
         raise UsageError(f"axis {table.name}: expected sets or multiplies, not both")
     targets = tuple(table.multiplies or table.sets or [table.name])
-    for target in targets:
-        expect_target(target)
     ranged = table.start is not None and table.stop is not None
     if (table.values is None) != ranged or (table.values is not None and table.number is not None):
         raise UsageError(f"axis {table.name}: expected values, or start and stop, with number or to be sampled")
-    values: tuple[Value, ...] | None = None if table.values is None else tuple(table.values)
+    values: tuple[Value, ...] | None = None if table.values is None else _values(table.values, targets, folder)
     low, high = table.start or 0.0, 1.0 if table.stop is None else table.stop
     if table.number is not None:
         values = span(table.name, low, high, table.number, table.scale)
@@ -118,4 +117,12 @@ def _axis(table: AxisTable) -> Axis:
         low=low,
         high=high,
         scale=table.scale,
+    )
+
+
+def _values(given: list[Value], targets: tuple[str, ...], folder: Path) -> tuple[Value, ...]:
+    """Listed values; paths of FMUs and tables are relative to the study file."""
+    are_paths = all(names_fmu(target) or names_table(target) or target.endswith(".fmu") for target in targets)
+    return tuple(
+        str(folder / str(value)) if are_paths and str(value).endswith((".fmu", ".csv")) else value for value in given
     )

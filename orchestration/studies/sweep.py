@@ -12,16 +12,16 @@ from orchestration.interrupt import Interrupted
 from orchestration.studies import engine, store
 from orchestration.studies.checks import described, expect_flyable
 from orchestration.studies.crew import Package
+from orchestration.studies.files import Files
 from orchestration.studies.identity import (
     design_parts,
     difference,
     place_parts,
-    reference_content,
     run_key,
     study_parts,
     versions,
 )
-from orchestration.studies.study import Fmus, Study, locate_fmus
+from orchestration.studies.study import Study
 from orchestration.studies.worker import Outcome, Task
 
 Progress = Callable[[int, int], None]
@@ -71,15 +71,14 @@ def sweep(
     if dask is not None:
         engine.expect_scheduler(dask)
     path = store_path(study.name, folder)
-    fmus = locate_fmus(study.base)
-    reference = reference_content(study.base)
-    expect_flyable(study, fmus)
-    with store.open_for_writing(path) as opened:
-        _describe(opened, study, fmus, reference)
+    files = study.files()
+    expect_flyable(study, files)
+    with store.open_for_writing(path, study.origin.objectives) as opened:
+        _describe(opened, study, files)
         missing = _missing(opened, study, retry_failed)
         counted = _Counted(len(study.points), opened, progress, announce)
-        package = Package.of(fmus, reference)
-        tasks = (_task(study, index, fmus, reference) for index in missing)
+        package = Package.of(files)
+        tasks = (_task(study, index, files) for index in missing)
         outcomes = (
             engine.run_on_dask(tasks, package, dask)
             if dask is not None
@@ -137,10 +136,10 @@ class _Counted:
             self._progress(self.done, self.total)
 
 
-def _task(study: Study, index: int, fmus: Fmus, reference: bytes | None) -> Task:
-    scenario = study.scenario(index, fmus.starts)
+def _task(study: Study, index: int, files: Files) -> Task:
+    system = study.system(index, files.starts_of(study.origin))
     return Task(
-        index=index, key=run_key(scenario, fmus, reference), settings=dict(study.points[index]), scenario=scenario,
+        index=index, key=run_key(system, files), settings=dict(study.points[index]), system=system,
         keep_signals=study.keeps_signals(index),
     )  # fmt: skip
 
@@ -175,10 +174,10 @@ def _keep(outcome: Outcome, opened: store.Store) -> None:
     opened.add([outcome.row])
 
 
-def _describe(opened: store.Store, study: Study, fmus: Fmus, reference: bytes | None) -> None:
+def _describe(opened: store.Store, study: Study, files: Files) -> None:
     """A store belongs to one study, whose design may grow; a changed one is told what changed."""
     about = opened.about()
-    parts, place = study_parts(study), place_parts(fmus)
+    parts, place = study_parts(study), place_parts(study, files)
     if STUDY_PARTS in about:
         changes = difference(
             {**json.loads(about[STUDY_PARTS]), **json.loads(about[PLACE_PARTS])}, {**parts, **place}
@@ -200,14 +199,15 @@ def _describe(opened: store.Store, study: Study, fmus: Fmus, reference: bytes | 
             TOTAL: str(len(study.points)),
             AXES: json.dumps([axis.name for axis in study.axes]),
             "grid": json.dumps(grid if all(axis.values is not None for axis in study.axes) else None),
-            "guids": json.dumps(fmus.guids),
+            "guids": json.dumps({name: m.description.guid for name, m in files.models_of(study.origin).items()}),
             "versions": json.dumps(versions()),
         },
-        _places(study, fmus, reference),
+        _places(study, files),
     )
 
 
-def _places(study: Study, fmus: Fmus, reference: bytes | None) -> Iterator[store.Place]:
+def _places(study: Study, files: Files) -> Iterator[store.Place]:
+    starts = files.starts_of(study.origin)
     for index, point in enumerate(study.points):
-        key = run_key(study.scenario(index, fmus.starts), fmus, reference)
+        key = run_key(study.system(index, starts), files)
         yield store.Place(index=index, key=key, settings=point)

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from orchestration.errors import UsageError
-from orchestration.studies.store import COLUMNS, METRICS, TEXTS, open_for_reading
+from orchestration.studies.store import TEXTS, open_for_reading
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,11 +20,12 @@ def frame(path: Path) -> "pd.DataFrame":
         about = opened.about()
         if "axes" not in about:
             raise UsageError(f"{path}: expected the store of a study that has begun")
-        rows = list(opened.rows())
+        rows, columns = list(opened.rows()), opened.columns
     axes = json.loads(about["axes"])
     settings = pd.DataFrame([row.pop("settings") for row in rows], columns=axes)
-    table = pd.DataFrame(rows, columns=list(COLUMNS))
-    table["diverged"] = table["diverged"].astype("boolean")
+    table = pd.DataFrame(rows, columns=list(columns))
+    for name in ("diverged", "good"):
+        table[name] = table[name].astype("boolean")
     for name in ("steps", "design_index", "seed"):
         table[name] = table[name].astype("Int64")
     settings = settings.drop(columns=[name for name in settings if name in table])  # no axis but the seed's can be
@@ -40,10 +41,10 @@ def dataset(path: Path) -> "xr.Dataset":
     import xarray as xr
 
     with open_for_reading(path) as opened:
-        grid = json.loads(opened.about()["grid"])
+        grid, metrics = json.loads(opened.about()["grid"]), opened.metrics
     if grid is None:
         raise UsageError(f"{path}: expected a study whose axes all list their values, to make a grid of it")
-    kept = [name for name in (*METRICS, "seed", "duration") if name not in grid]
+    kept = [name for name in (*metrics, "seed", "duration") if name not in grid]
     table = frame(path).set_index(list(grid))[kept]
     table = table.astype({name: float for name in kept if name not in TEXTS})
     cube: xr.Dataset = xr.Dataset.from_dataframe(table).reindex(grid)

@@ -1,84 +1,92 @@
-"""Flights that decide whether a value of a quantity flies, with one seed or many."""
+"""Runs that decide whether a value of a quantity is good, with one seed or many."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from orchestration.quadrotor.measures import Outcome
-from orchestration.scenario import Scenario
 from orchestration.statistics import refutes, wilson
 from orchestration.studies.engine import Pool
-from orchestration.studies.ranges import Range
-from orchestration.studies.study import changed
+from orchestration.studies.ranges import Range, Varied
+from orchestration.system.model import System
 
 RELIABILITY = 0.9
-"""For random quantities: the share of seeds that fly, which the stated confidence is in."""
+"""For random quantities: the share of seeds that are good, which the stated confidence is in."""
 
 
-def flies(metrics: dict[str, Any]) -> bool:
-    """The criterion: settled, which is not diverged and within 5 cm in the last third of the run."""
-    return bool(metrics["outcome"] == "settled")
+def is_good(metrics: dict[str, Any]) -> bool:
+    """Whether a run meets the criterion of its system; of the quadrotor, whether it flies."""
+    return bool(metrics["good"])
+
+
+def is_random(system: System) -> bool:
+    """Whether seeds make a difference."""
+    return (
+        any(one.sampling is not None and one.sampling.jitter > 0.0 for one in system.components.values())
+        or any(x.delay_jitter > 0.0 or x.loss > 0.0 or any(x.noise.values()) for x in system.connections)
+        or any(source.noise for source in system.sources.values())
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Tried:
-    """One value that was flown, with one seed or many."""
+    """One value that was run, with one seed or many."""
 
     value: float
-    outcome: Outcome
-    """settled if all were; else that of the first seed that did not settle"""
+    outcome: str
+    """that of a good run if all were; else that of the first seed that was not"""
     divergence_time: float | None
     """of that seed [s]"""
     flew: int
+    """how many were good"""
     runs: int
-    """how many were flown: all seeds, or up to the first that did not fly"""
+    """how many were run: all seeds, or up to the first that was not good"""
     share: tuple[float, float] | None
-    """Wilson interval of the share of seeds that fly, at the confidence; None: nothing is random, or not all flown"""
+    """Wilson interval of the share of seeds that are good, at the confidence; None: no chance, or not all run"""
 
 
 class Trials:
-    """Flies values of a quantity, each with all seeds, and keeps what became of them."""
+    """Runs values of a quantity, each with all seeds, and keeps what became of them."""
 
     def __init__(
         self,
-        scenario: Scenario,
-        of: str,
+        varied: Varied,
         span: Range,
         seeds: int,
         confidence: float | None,
         pool: Pool,
         announce: Callable[[str], None],
     ) -> None:
-        self._scenario, self._of, self._span, self._seeds = scenario, of, span, seeds
+        self._varied, self._span, self._seeds = varied, span, seeds
         self._confidence, self._pool, self._announce = confidence, pool, announce
         self.tolerance = span.tolerance
         self.tried: dict[float, Tried] = {}
 
     def fails(self, value: float) -> bool:
-        """Whether a seed does not fly; the rest is not flown then."""
-        return self._fly(value, stop=lambda metrics: not flies(metrics)).outcome != "settled"
+        """Whether a seed is not good; the rest is not run then."""
+        found = self._run(value, stop=lambda metrics: not is_good(metrics))
+        return found.flew < found.runs
 
     def is_refuted(self, value: float) -> bool:
-        """Whether so many of all seeds do not fly that `RELIABILITY` is refuted at the confidence."""
-        found = self._fly(value, stop=lambda metrics: False)
+        """Whether so many of all seeds are not good that `RELIABILITY` is refuted at the confidence."""
+        found = self._run(value, stop=lambda metrics: False)
         return self._confidence is not None and refutes(found.flew, found.runs, RELIABILITY, self._confidence)
 
-    def _fly(self, value: float, stop: Callable[[Any], bool]) -> Tried:
-        varied = changed(self._scenario, {f"timing.{self._of}": value})
-        runs = [varied.with_changes(seed=self._scenario.seed + i) for i in range(self._seeds)]
-        flown = self._pool.fly(runs, stop=stop)
-        down = next((metrics for metrics in flown if not flies(metrics)), None)
-        flew = sum(map(flies, flown))
-        known = self._confidence is not None and len(flown) == self._seeds
+    def _run(self, value: float, stop: Callable[[Any], bool]) -> Tried:
+        system = self._varied.at(value)
+        runs = [replace(system, seed=system.seed + i) for i in range(self._seeds)]
+        metrics = self._pool.fly(runs, stop=stop)
+        down = next((one for one in metrics if not is_good(one)), None)
+        flew = sum(map(is_good, metrics))
+        known = self._confidence is not None and len(metrics) == self._seeds
         found = self.tried[value] = Tried(
             value=value,
-            outcome="settled" if down is None else down["outcome"],
+            outcome=system.criterion.outcomes[0] if down is None else down["outcome"],
             divergence_time=None if down is None else down["divergence_time"],
             flew=flew,
-            runs=len(flown),
-            share=wilson(flew, len(flown), self._confidence) if known and self._confidence is not None else None,
+            runs=len(metrics),
+            share=wilson(flew, len(metrics), self._confidence) if known and self._confidence is not None else None,
         )
-        self._announce(f"{self._of} {value:.6g}{self._span.unit}: {said(found)}")
+        self._announce(f"{self._varied.of} {value:.6g}{self._span.unit}: {said(found)}")
         return found
 
 
@@ -86,7 +94,8 @@ def said(tried: Tried) -> str:
     """What became of a value, in words."""
     if tried.share is not None:
         low, high = tried.share
-        return f"{tried.flew} of {tried.runs} seeds fly, a share of {low:.2f} to {high:.2f}"
-    if tried.outcome == "settled":
-        return "flies"
-    return "fails, bounded" if tried.divergence_time is None else f"fails, diverged at {tried.divergence_time:.3g} s"
+        return f"{tried.flew} of {tried.runs} seeds are good, a share of {low:.2f} to {high:.2f}"
+    if tried.flew == tried.runs:
+        return tried.outcome
+    at = "" if tried.divergence_time is None else f" at {tried.divergence_time:.3g} s"
+    return f"fails, {tried.outcome}{at}"

@@ -13,9 +13,9 @@ from orchestration.fmi.instance import Instance
 from orchestration.fmi.model import read_model
 from orchestration.fmi.reuse import Instances
 from orchestration.result import Result
-from orchestration.scenario import Scenario
 from orchestration.simulation import prepared
 from orchestration.studies.store import Row
+from orchestration.system.model import System
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,7 +25,7 @@ class Task:
     index: int
     key: str
     settings: dict[str, Any]
-    scenario: Scenario
+    system: System
     keep_signals: bool
 
 
@@ -70,9 +70,9 @@ class Hangar:
         """
         started = time.perf_counter()
         metrics, message, signals = None, None, None
-        _expect_files(task.scenario)
+        _expect_files(task.system)
         try:
-            with prepared(task.scenario, load=self._load) as flight:
+            with prepared(task.system, load=self._load) as flight:
                 flight.master.initialise()
                 flight.master.run()
                 result = flight.result()
@@ -103,14 +103,16 @@ class Hangar:
         self._fleet.close()
 
 
-def _expect_files(scenario: Scenario) -> None:
+def _expect_files(system: System) -> None:
     """Raise `BrokenPlaceError` if a file of a run is not there, or is not the FMU that the coordinator has read."""
-    for file in (scenario.plant.fmu, scenario.controller.fmu, scenario.reference.file):
-        if file is not None and not Path(file).is_file():
+    tables = [source.file for source in system.sources.values() if source.file is not None]
+    fmus = [Path(component.fmu) for component in system.components.values()]
+    for file in (*fmus, *tables):
+        if not file.is_file():
             raise BrokenPlaceError(f"{file}: is no longer there")
     try:
-        for fmu in (scenario.plant.fmu, scenario.controller.fmu):
-            read_model(Path(fmu))
+        for fmu in fmus:
+            read_model(fmu)
     except QuadcosimError as error:
         raise BrokenPlaceError(str(error)) from error
 
@@ -120,7 +122,7 @@ def row_of(
 ) -> Row:
     """The row of a task; without metrics it has failed."""
     return Row(
-        index=task.index, key=task.key, settings=task.settings, seed=task.scenario.seed, metrics=metrics,
+        index=task.index, key=task.key, settings=task.settings, seed=task.system.seed, metrics=metrics,
         message=message, duration=duration, machine=machine,
     )  # fmt: skip
 

@@ -68,6 +68,7 @@ class Component:
 
     def __post_init__(self) -> None:
         _choice(self, align=Align)
+        _require(isinstance(self.fmu, str), "fmu", self.fmu, "a name or the path of an .fmu file")
         if self.sampling is None:
             _require(self.step is not None, "step", "none", "step (continuous time) or sampling (a digital task)")
             _positive(self, "step")
@@ -109,12 +110,14 @@ class Connection:
     def __post_init__(self) -> None:
         _choice(self, order=Order, hold=Hold, jitter_distribution=Distribution)
         _not_negative(self, "delay", "delay_jitter")
-        _require(0.0 <= self.loss <= 1.0, "loss", self.loss, "a probability in [0, 1]")
+        _require(_is_number(self.loss) and 0.0 <= self.loss <= 1.0, "loss", self.loss, "a probability in [0, 1]")
         for what, values in (("noise", self.noise), ("quantisation", self.quantisation)):
             for name, value in values.items():
-                _require(math.isfinite(value) and value >= 0.0, f"{what} of {name}", value, "zero or positive")
+                positive = _is_number(value) and math.isfinite(value) and value >= 0.0
+                _require(positive, f"{what} of {name}", value, "zero or positive")
         for what in ("scale", "offset"):
-            _require(math.isfinite(getattr(self, what)), what, getattr(self, what), "a finite number")
+            value = getattr(self, what)
+            _require(_is_number(value) and math.isfinite(value), what, value, "a finite number")
         _require(
             len(self.start) == len(self.end) > 0, "to", len(self.end), f"{len(self.start)} inputs, one for each output"
         )
@@ -123,7 +126,7 @@ class Connection:
             _require(len(owners) == 1, what, ", ".join(ends), "variables of one component")
         if self.burst_length is not None:
             length = self.burst_length
-            _require(1.0 <= length < math.inf, "burst_length", length, "at least 1 loss")
+            _require(_is_number(length) and 1.0 <= length < math.inf, "burst_length", length, "at least 1 loss")
             possible = length / (length + 1.0)
             _require(
                 self.loss <= possible or self.loss == 1.0, "loss", self.loss,
@@ -211,7 +214,8 @@ class System:
 
     def __post_init__(self) -> None:
         _positive(self, "stop_time")
-        _require(0 <= self.seed < 2**63, "seed", self.seed, "a whole number from 0 to 2^63 - 1")
+        whole = isinstance(self.seed, int) and not isinstance(self.seed, bool)
+        _require(whole and 0 <= self.seed < 2**63, "seed", self.seed, "a whole number from 0 to 2^63 - 1")
         if "rows" in self.components:
             raise UsageError("components.rows: expected another name; this one is taken")
         _require(len(self.components) > 0, "components", "none", "at least one")

@@ -13,10 +13,14 @@ from pathlib import Path
 from typing import Any
 
 from orchestration import QuadcosimError, Scenario, Timing
+from orchestration.quadrotor.translation import paths_of, quadrotor, system_of
 from orchestration.studies.axes import Axis
-from orchestration.studies.store import Row, open_for_reading
-from orchestration.studies.study import Study, locate_fmus
+from orchestration.studies.files import Files, files_of
+from orchestration.studies.store import Row, metrics_with, open_for_reading
+from orchestration.studies.study import Study
 from orchestration.studies.sweep import store_path, sweep
+from orchestration.system.model import System
+from orchestration.system.paths import value_at
 from tests.commands import Done
 
 SCRIPT = shutil.which("quadcosim", path=str(Path(sys.executable).parent))
@@ -43,6 +47,8 @@ values = [0.0, 0.003, 0.012, 0.02]
 vary_seed = true
 """
 RUNS = 16
+OBJECTIVES = tuple(quadrotor().objectives)
+METRICS = metrics_with(OBJECTIVES)
 
 GRID = """
 [base]
@@ -80,15 +86,27 @@ def swept(chosen: Study, folder: Path, **options: Any) -> Path:
 
 
 def starts() -> dict[str, float]:
-    return locate_fmus(Scenario()).starts
+    return files_in().starts_of(system_of(Scenario()))
+
+
+def files_in(scenario: Scenario | None = None) -> Files:
+    """The files that a flight needs, the paper's unless told."""
+    return files_of(system_of(scenario or Scenario()))
+
+
+def at(system: System, target: str) -> Any:
+    """What a system has where a scenario says `timing.KEY`, `controller.NAME` or `plant.NAME`."""
+    found = [value_at(system, path) for path in paths_of(target)]
+    assert found.count(found[0]) == len(found)
+    return found[0]
 
 
 def row(index: int = 0, **fields: Any) -> Row:
     """A row that was never flown."""
     given: dict[str, Any] = {
         "index": index, "key": f"key {index}", "settings": {"timing.period": 0.001 * index}, "seed": index,
-        "metrics": {"outcome": "settled", "position_rmse": 0.5, "diverged": False, "steps": 3}, "message": None,
-        "duration": 0.1,
+        "metrics": {"outcome": "settled", "good": True, "position_rmse": 0.5, "diverged": False, "steps": 3},
+        "message": None, "duration": 0.1,
     }  # fmt: skip
     return Row(**{**given, **fields})
 

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from orchestration.scenario import Scenario
-from orchestration.studies.study import locate_fmus
+from orchestration import fmus
+from orchestration.wiring import DEFAULT_PLANT
 from tests.fmus.archive import files_of
 from tests.fmus.damage import with_its_guid, write_fmu
 
@@ -27,7 +27,7 @@ _SICKNESS = f"""
 
 def sick_plant(folder: Path) -> Path:
     """The FMU, in `folder`."""
-    files = files_of(locate_fmus(Scenario()).plant)
+    files = files_of(fmus.locate(DEFAULT_PLANT))
     (name,) = (name for name in files if name.endswith("plant_fmu/slave.py"))
     text = files[name].decode()
     assert _BEFORE in text

@@ -18,9 +18,10 @@ from orchestration.studies.sensitivity import Index
 from orchestration.studies.store import open_for_writing
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import store_path
-from tests.studies.common import axis, row, short, study
+from tests.studies.common import OBJECTIVES, axis, row, short, study
 
 PERIODS = axis("timing.period", 0.01, 0.02, 0.03, 0.04)
+WORDS = ("settled", "bounded")
 DELAYS = axis("timing.delay", 0.0, 0.005, 0.01)
 
 
@@ -31,10 +32,15 @@ def invented(folder: Path, chosen: Study) -> Study:
     for index, point in enumerate(chosen.points):
         size = sum(float(value) for value in point.values() if isinstance(value, (int, float)))
         outcome = "diverged" if size > 0.2 else "settled" if 0.5 * size < 0.05 else "bounded"
-        metrics = {"outcome": outcome, "ultimate_bound": 0.5 * size, "position_rmse": 0.1 + size}
+        metrics = {
+            "outcome": outcome,
+            "good": outcome == "settled",
+            "ultimate_bound": 0.5 * size,
+            "position_rmse": 0.1 + size,
+        }
         failed = index == 2
         rows.append(row(index, settings=point, metrics=None if failed else metrics, message="no" if failed else None))
-    with open_for_writing(store_path(chosen.name, folder)) as store:
+    with open_for_writing(store_path(chosen.name, folder), OBJECTIVES) as store:
         about: dict[str, Any] = {"axes": names, "grid": None, "guids": {}, "versions": {}}
         store.describe({name: json.dumps(value) for name, value in about.items()})
         store.add(rows)
@@ -61,6 +67,11 @@ def table(number: int = 5) -> pd.DataFrame:
             "ultimate_bound": bounds[::-1],
         }
     )
+
+
+def judged(runs: pd.DataFrame) -> pd.DataFrame:
+    """With what a run's metrics say beside its outcome."""
+    return runs.assign(good=(runs["outcome"] == "settled").astype("boolean").where(runs["outcome"].notna()))
 
 
 def lines_of(figure: matplotlib.figure.Figure) -> list[Any]:
@@ -99,7 +110,7 @@ def test_more_axes_are_drawn_as_dots_over_each(tmp_path: Path) -> None:
 
 
 def test_a_metric_that_does_not_exist_is_told_with_those_that_do(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="--metric beauty: expected one of horizon, position_rmse"):
+    with pytest.raises(UsageError, match="--metric beauty: expected one of good, horizon, position_rmse"):
         draw_study(invented(tmp_path, study(PERIODS)), tmp_path, "beauty")
 
 
@@ -124,11 +135,11 @@ def test_a_study_that_was_never_flown_is_told(tmp_path: Path) -> None:
 def test_what_flies_has_settled() -> None:
     runs = table(4)
     runs["outcome"] = ["settled", "bounded", "diverged", None]  # the last of a run that failed
-    assert figures.flew(runs).tolist() == [True, False, False, False]
+    assert figures.flew(judged(runs)).tolist() == [True, False, False, False]
 
 
 def test_a_line_goes_through_what_flies_in_order_and_the_rest_is_crossed() -> None:
-    line, crosses, *_ = lines_of(figures.lines(table(), (axis("timing.period", 1),), "ultimate_bound"))
+    line, crosses, *_ = lines_of(figures.lines(judged(table()), (axis("timing.period", 1),), "ultimate_bound", WORDS))
     assert line.get_xdata().tolist() == pytest.approx([0.01, 0.02, 0.03, 0.04, 0.05])
     assert np.isnan(line.get_ydata()).tolist() == [False] * 4 + [True]
     assert crosses.get_xdata().tolist() == pytest.approx([0.05])
@@ -139,7 +150,7 @@ def test_there_is_a_line_for_each_value_of_the_second_axis() -> None:
     runs = pd.concat([table().assign(delay=delay) for delay in (0.0, 0.01, 0.02)])
     second = axis("timing.delay", 0.0, 0.01, 0.02)
     runs = runs.rename(columns={"delay": "timing.delay"})
-    figure = figures.lines(runs, (axis("timing.period", 1), second), "ultimate_bound")
+    figure = figures.lines(judged(runs), (axis("timing.period", 1), second), "ultimate_bound", WORDS)
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.get_texts()][:3] == ["0", "0.01", "0.02"]
     assert legend.get_title().get_text() == "timing.delay"
@@ -149,13 +160,15 @@ def test_the_axes_of_time_have_their_unit_and_the_others_none() -> None:
     for target, label in (("timing.period", "timing.period [s]"), ("plant.mass", "plant.mass"),
                           ("timing.loss", "timing.loss")):  # fmt: skip
         runs = table().rename(columns={"timing.period": target})
-        figure = figures.lines(runs, (axis(target, 1),), "ultimate_bound")
+        figure = figures.lines(judged(runs), (axis(target, 1),), "ultimate_bound", WORDS)
         assert figure.axes[0].get_xlabel() == label
 
 
 def test_a_map_has_a_cell_for_each_run_and_the_boundary_of_what_flies() -> None:
     runs = pd.concat([table().assign(**{"timing.delay": delay}) for delay in (0.0, 0.01, 0.02)])
-    figure = figures.heat_map(runs, (axis("timing.period", 1), axis("timing.delay", 1)), "ultimate_bound")
+    figure = figures.heat_map(
+        judged(runs), (axis("timing.period", 1), axis("timing.delay", 1)), "ultimate_bound", WORDS
+    )
     _, mesh, boundary = figure.axes[0].collections
     values = np.ma.filled(mesh.get_array(), np.nan).reshape(3, 5)
     assert np.isnan(values).tolist() == [[False] * 4 + [True]] * 3
@@ -169,7 +182,9 @@ def test_a_map_tells_bounded_from_diverged_with_the_horizon_beside_them() -> Non
     runs["outcome"] = ["settled", "bounded", "diverged", None, "settled"] * 2  # periods from 0.05 down
     runs.loc[runs["outcome"] == "diverged", "ultimate_bound"] = np.nan
     runs["horizon"] = 30.0
-    figure = figures.heat_map(runs, (axis("timing.period", 1), axis("timing.delay", 1)), "ultimate_bound")
+    figure = figures.heat_map(
+        judged(runs), (axis("timing.period", 1), axis("timing.delay", 1)), "ultimate_bound", WORDS
+    )
     fell = np.ma.filled(figure.axes[0].collections[0].get_array(), np.nan).reshape(2, 5)[0]
     assert fell == pytest.approx([np.nan, np.nan, 2.0, 1.0, np.nan], nan_ok=True)
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["bounded", "diverged"]
@@ -180,13 +195,15 @@ def test_a_line_marks_what_diverged_where_it_has_no_value() -> None:
     runs = table()
     runs["outcome"] = ["diverged", *runs["outcome"][1:]]
     runs.loc[runs["outcome"] == "diverged", "ultimate_bound"] = np.nan
-    _, _, down, *_ = lines_of(figures.lines(runs, (axis("timing.period", 1),), "ultimate_bound"))
+    _, _, down, *_ = lines_of(figures.lines(judged(runs), (axis("timing.period", 1),), "ultimate_bound", WORDS))
     assert (down.get_marker(), down.get_xdata().tolist()) == ("v", pytest.approx([0.05]))
 
 
 def test_where_everything_flies_a_map_has_no_boundary() -> None:
     runs = pd.concat([table(4).assign(**{"timing.delay": delay}) for delay in (0.0, 0.01)])
-    figure = figures.heat_map(runs, (axis("timing.period", 1), axis("timing.delay", 1)), "ultimate_bound")
+    figure = figures.heat_map(
+        judged(runs), (axis("timing.period", 1), axis("timing.delay", 1)), "ultimate_bound", WORDS
+    )
     assert len(figure.axes[0].collections) == 2, "what fell, and what flies"
 
 
@@ -226,7 +243,7 @@ def test_a_limit_that_linear_theory_does_not_have_is_not_drawn(tmp_path: Path) -
 def test_dots_of_many_axes_are_apart_by_what_flies() -> None:
     runs = table().assign(**{"plant.mass": 1.0, "timing.delay": 0.0})
     axes = (axis("timing.period", 1), axis("plant.mass", 1), axis("timing.delay", 1))
-    figure = figures.scatter(runs, axes, "ultimate_bound")
+    figure = figures.scatter(judged(runs), axes, "ultimate_bound", WORDS)
     for panel in figure.axes[:3]:
         dots, crosses, _ = panel.get_lines()
         assert (len(dots.get_xdata()), len(crosses.get_xdata())) == (4, 1)

@@ -17,20 +17,23 @@ from hypothesis import strategies as st
 import orchestration
 from orchestration import Result, Scenario, Timing, UsageError
 from orchestration.fmi.reuse import Instances
-from orchestration.scenario import FmuChoice
+from orchestration.quadrotor.translation import system_of
+from orchestration.scenario import FmuChoice, Record
 from orchestration.simulation import prepared
 from orchestration.simulator import Floats
 from orchestration.statistics import wilson
 from orchestration.studies import limit as limits
 from orchestration.studies.limit import Continuous, find
 from orchestration.studies.linear import COORDINATES, HoverLoop, hover_of
-from orchestration.studies.local import local_limit, local_limits
+from orchestration.studies.local import Local, local_limit, local_limits
+from orchestration.studies.ranges import Range, Varied, range_of
 from orchestration.studies.search import first_failure
-from orchestration.studies.trials import flies
+from orchestration.studies.trials import is_good
+from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS
 from orchestration.wiring import COMMAND
 from tests.fmus import source_tree
-from tests.studies.common import one_line, short
+from tests.studies.common import at, one_line, short
 
 SAMPLED = [f"plant.{name}" for name in COORDINATES]
 HELD = [f"plant.{name}" for name in COMMAND]
@@ -122,9 +125,9 @@ def test_the_search_says_when_nothing_fails_and_when_the_first_does() -> None:
     assert first_failure(lambda value: True, [1.0, 2.0], 0.1) == (None, 1.0)
 
 
-@pytest.mark.parametrize(("outcome", "expected"), [("settled", True), ("bounded", False), ("diverged", False)])
-def test_what_flies_has_settled(outcome: str, expected: bool) -> None:
-    assert flies({"outcome": outcome}) is expected
+@pytest.mark.parametrize(("given", "expected"), [(True, True), (1.0, True), (False, False), (None, False)])
+def test_what_is_good_meets_the_criterion(given: float | None, expected: bool) -> None:
+    assert is_good({"good": given}) is expected
 
 
 # -- linear theory ----------------------------------------------------------------------------------------
@@ -272,9 +275,9 @@ def test_the_lag_that_an_fmu_has_by_itself_is_in_the_loop(tmp_path: Path) -> Non
 @pytest.mark.parametrize(("exponent", "limit"), [(0.5, 0.0085), (0.99, 0.0801)])
 def test_at_the_edge_of_the_boundary_layer_the_exponent_matters(exponent: float, limit: float) -> None:
     scenario = scenario_of().with_changes(parameters={"controller.surface_exponent": exponent})
-    inside, outside, _ = known_local_limits(scenario, "period")
-    assert inside == theory()
-    assert outside == pytest.approx(limit, abs=1e-4)
+    found = known_local_limits(Varied(request=scenario, of="period"), range_of(scenario, "period"))
+    assert found.limit == theory()
+    assert found.outside == pytest.approx(limit, abs=1e-4)
 
 
 def test_differences_stay_inside_a_boundary_layer_that_is_small() -> None:
@@ -331,7 +334,7 @@ def test_a_controller_with_another_mass_has_no_hover_to_linearise_about() -> Non
 class StubPool:
     """In place of flights: what flies is decided by a rule, and what was asked for is kept."""
 
-    flown: list[Scenario]
+    flown: list[System]
 
     def __init__(self, *arguments: Any) -> None:
         StubPool.flown = []
@@ -342,21 +345,23 @@ class StubPool:
     def __exit__(self, *exception: object) -> None:
         return None
 
-    def fly(self, scenarios: Sequence[Scenario], stop: Any) -> list[dict[str, Any]]:
+    def fly(self, systems: Sequence[System], stop: Any) -> list[dict[str, Any]]:
         found: list[dict[str, Any]] = []
-        for scenario in scenarios:
-            self.flown.append(scenario)
-            bound = self.bound(scenario)
+        for system in systems:
+            self.flown.append(system)
+            bound = self.bound(system)
             outcome = "settled" if bound < 0.05 else "bounded" if bound < math.inf else "diverged"
             divergence_time = 3.25 if outcome == "diverged" else None
-            found.append({"outcome": outcome, "divergence_time": divergence_time, "settling_time": 1.5})
+            found.append(
+                {"outcome": outcome, "good": bound < 0.05, "divergence_time": divergence_time, "settling_time": 1.5}
+            )
             if stop(found[-1]):
                 break
         return found
 
     @staticmethod
-    def bound(scenario: Scenario) -> float:
-        return 0.01 if scenario.timing.period < 0.0317 and scenario.timing.delay < 0.0123 else 1.0
+    def bound(system: System) -> float:
+        return 0.01 if at(system, "timing.period") < 0.0317 and at(system, "timing.delay") < 0.0123 else 1.0
 
 
 @pytest.fixture
@@ -366,15 +371,19 @@ def stubbed(monkeypatch: pytest.MonkeyPatch) -> type[StubPool]:
     return StubPool
 
 
-_KNOWN: dict[str, tuple[float | None, float | None, str]] = {}
+_KNOWN: dict[str, Local] = {}
 
 
-def known_local_limits(scenario: Scenario, of: str) -> tuple[float | None, float | None, str]:
+def known_local_limits(varied: Varied, span: Range) -> Local:
     """Those of linear theory, once for the many tests with the same scenario."""
-    key = f"{of} {scenario}"
+    key = f"{varied.of} {varied.request}"
     if key not in _KNOWN:
-        _KNOWN[key] = local_limits(scenario, of)
+        _KNOWN[key] = local_limits(varied, span)
     return _KNOWN[key]
+
+
+def unseeded(system: System) -> System:
+    return dataclasses.replace(system, seed=0)
 
 
 @pytest.mark.usefixtures("stubbed")
@@ -390,7 +399,9 @@ def test_what_varies_is_the_quantity_alone(stubbed: type[StubPool]) -> None:
     base = scenario_of(period=0.02)
     found = find(base, "delay")
     assert found.large_signal_limit == pytest.approx(0.0123, abs=0.0005)
-    assert all(flown == base.with_changes(timing={"delay": flown.timing.delay}) for flown in stubbed.flown)
+    assert all(
+        flown == system_of(base.with_changes(timing={"delay": at(flown, "timing.delay")})) for flown in stubbed.flown
+    )
 
 
 @pytest.mark.usefixtures("stubbed")
@@ -401,21 +412,21 @@ def test_a_gap_of_more_than_a_tenth_of_the_local_limit_is_said() -> None:
 
 
 def test_within_a_tenth_of_the_local_limit_is_said(stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stubbed, "bound", lambda self, scenario: 0.01 if scenario.timing.period < 0.078 else 1.0)
+    monkeypatch.setattr(stubbed, "bound", lambda self, system: 0.01 if at(system, "timing.period") < 0.078 else 1.0)
     assert "within a tenth of the local limit" in find(scenario_of(), "period").note
 
 
 def test_nothing_that_fails_and_nothing_that_flies_are_said(
     stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(stubbed, "bound", lambda self, scenario: 0.01)
+    monkeypatch.setattr(stubbed, "bound", lambda self, system: 0.01)
     nothing_fails = find(scenario_of(), "jitter")
     assert nothing_fails.large_signal_limit is None
-    assert "flies throughout the range" in nothing_fails.note
-    monkeypatch.setattr(stubbed, "bound", lambda self, scenario: 1.0)
+    assert "good throughout the range" in nothing_fails.note
+    monkeypatch.setattr(stubbed, "bound", lambda self, system: 1.0)
     nothing_flies = find(scenario_of(), "delay")
     assert nothing_flies.large_signal_limit is None
-    assert "does not fly at 0 s, the first value of the range" in nothing_flies.note
+    assert "not good at 0 s, the first value of the range" in nothing_flies.note
 
 
 @pytest.mark.parametrize(
@@ -431,14 +442,14 @@ def test_of_random_quantities_so_many_seeds_fly_that_nine_in_ten_do_at_the_confi
     found = find(base, of, confidence=confidence)
     assert (found.seeds, found.confidence) == (seeds, confidence)
     assert 0.9**seeds <= 1.0 - confidence < 0.9 ** (seeds - 1)  # the success run
-    flown = [[one.seed for one in group] for _, group in itertools.groupby(stubbed.flown, key=lambda one: one.timing)]
+    flown = [[one.seed for one in group] for _, group in itertools.groupby(stubbed.flown, key=unseeded)]
     assert flown[0] == list(range(5, 5 + seeds))
     assert {seed for group in flown for seed in group} == set(flown[0])
 
 
 def test_one_seed_that_does_not_fly_is_enough_to_fail(stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch) -> None:
-    def bound(self: StubPool, scenario: Scenario) -> float:
-        return 1.0 if scenario.seed == 28 and scenario.timing.measurement_loss > 0.222 else 0.01
+    def bound(self: StubPool, system: System) -> float:
+        return 1.0 if system.seed == 28 and at(system, "timing.loss") > 0.222 else 0.01
 
     monkeypatch.setattr(stubbed, "bound", bound)
     found = find(scenario_of(), "loss")
@@ -448,8 +459,8 @@ def test_one_seed_that_does_not_fly_is_enough_to_fail(stubbed: type[StubPool], m
 
 
 def test_what_flies_again_above_the_limit_is_told(stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch) -> None:
-    def bound(self: StubPool, scenario: Scenario) -> float:
-        return 1.0 if 0.0317 < scenario.timing.period < 0.042 else 0.01
+    def bound(self: StubPool, system: System) -> float:
+        return 1.0 if 0.0317 < at(system, "timing.period") < 0.042 else 0.01
 
     monkeypatch.setattr(stubbed, "bound", bound)
     found = find(scenario_of(), "period")
@@ -468,7 +479,7 @@ def test_what_flies_again_above_the_limit_is_told(stubbed: type[StubPool], monke
 def test_what_the_value_that_fails_did_is_told(
     stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch, bound: float, said: str
 ) -> None:
-    monkeypatch.setattr(stubbed, "bound", lambda self, scenario: 0.01 if scenario.timing.period < 0.03 else bound)
+    monkeypatch.setattr(stubbed, "bound", lambda self, system: 0.01 if at(system, "timing.period") < 0.03 else bound)
     found = find(scenario_of(), "period")
     assert said in found.note
     assert found.horizon == 30.0
@@ -477,17 +488,17 @@ def test_what_the_value_that_fails_did_is_told(
 def test_of_a_random_quantity_the_value_at_which_nine_in_ten_is_refuted_is_told_with_its_interval(
     stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def bound(self: StubPool, scenario: Scenario) -> float:  # the more is lost, the fewer of the 29 seeds fly
-        return 1.0 if scenario.seed % 29 < 100.0 * (scenario.timing.measurement_loss - 0.26) else 0.01
+    def bound(self: StubPool, system: System) -> float:  # the more is lost, the fewer of the 29 seeds fly
+        return 1.0 if system.seed % 29 < 100.0 * (at(system, "timing.loss") - 0.26) else 0.01
 
     monkeypatch.setattr(stubbed, "bound", bound)
     found = find(scenario_of(), "loss")
     assert found.large_signal_limit == pytest.approx(0.26, abs=0.01)
     assert found.refuted_limit == pytest.approx(0.32, abs=0.011)  # 6 of 29 down is not enough, 7 are
-    at = {one.value: one for one in found.tried}[found.refuted_limit or 0.0]
-    assert (at.flew, at.runs) == (22, 29)
-    assert at.share == wilson(22, 29)
-    assert "22 of 29 seeds fly, a share of 0.58 to 0.88" in found.note
+    by_value = {one.value: one for one in found.tried}[found.refuted_limit or 0.0]
+    assert (by_value.flew, by_value.runs) == (22, 29)
+    assert by_value.share == wilson(22, 29)
+    assert "22 of 29 seeds are good, a share of 0.58 to 0.88" in found.note
     passed = {one.value: one for one in found.tried}[0.25]
     assert (passed.flew, passed.share) == (29, wilson(29, 29))
 
@@ -495,7 +506,7 @@ def test_of_a_random_quantity_the_value_at_which_nine_in_ten_is_refuted_is_told_
 def test_where_the_first_value_fails_for_some_seeds_it_may_still_fly_for_nine_in_ten(
     stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(stubbed, "bound", lambda self, scenario: 1.0 if scenario.seed == 3 else 0.01)
+    monkeypatch.setattr(stubbed, "bound", lambda self, system: 1.0 if system.seed == 3 else 0.01)
     found = find(scenario_of(), "loss")
     assert (found.large_signal_limit, found.refuted_limit) == (None, None)
     assert found.tried[0].share == wilson(28, 29)
@@ -507,9 +518,11 @@ def test_near_continuous_time_nothing_digital_is_left(stubbed: type[StubPool]) -
     )
     base = base.with_changes(parameters={"plant.mass": 1.0, "plant.actuator_time_constant": 0.02})
     found = find(base, "delay", continuous=True)
-    ideal = [flown for flown in stubbed.flown if flown.timing.period == 1e-4]
-    assert [flown.timing for flown in ideal] == [Timing(period=1e-4, plant_interval=0.02)]
-    assert (ideal[0].plant, ideal[0].controller, ideal[0].stop_time) == (base.plant, base.controller, base.stop_time)
+    (ideal,) = [flown for flown in stubbed.flown if at(flown, "timing.period") == 1e-4]
+    clear = dataclasses.replace(
+        base, timing=Timing(period=1e-4, plant_interval=0.02), record=Record(plant=(), controller=())
+    )
+    assert ideal == system_of(clear)
     assert found.continuous == Continuous(period=1e-4, outcome="settled", settling_time=1.5)
     assert find(base, "delay").continuous is None
 
@@ -530,8 +543,8 @@ def test_where_nothing_is_random_one_run_decides_and_there_is_no_confidence() ->
 def test_each_value_is_announced() -> None:
     said: list[str] = []
     find(scenario_of(), "period", announce=said.append)
-    assert said[0] == "period 0.001 s: flies"
-    assert "period 0.03 s: flies" in said
+    assert said[0] == "period 0.001 s: settled"
+    assert "period 0.03 s: settled" in said
     assert "period 0.035 s: fails, bounded" in said
 
 
@@ -557,12 +570,13 @@ def test_find_flies_the_scenario_and_its_result_is_json() -> None:
     found = find(base, "period", tolerance=0.02)
     fields = json.loads(json.dumps(dataclasses.asdict(found)))
     assert fields.keys() == {
-        "of", "local_limit", "local_limit_outside", "large_signal_limit", "refuted_limit", "horizon", "tolerance",
+        "of", "local_limit", "local_method", "local_accuracy", "local_limit_outside",
+        "large_signal_limit", "refuted_limit", "horizon", "tolerance",
         "scan", "confidence", "seeds", "flies_above", "continuous", "tried", "note",
     }  # fmt: skip
     limit = found.large_signal_limit
     assert limit is not None
-    assert flies(orchestration.run(base.with_changes(timing={"period": limit})).metrics)
+    assert is_good(orchestration.run(base.with_changes(timing={"period": limit})).metrics)
     assert fields["local_limit"] == pytest.approx(0.080, abs=0.0005)
     assert (fields["of"], fields["tolerance"], fields["confidence"]) == ("period", 0.02, None)
     assert (fields["horizon"], fields["scan"], fields["continuous"]) == (2.0, 0.005, None)
@@ -577,13 +591,13 @@ def test_find_of_a_random_quantity_is_the_same_with_any_number_of_workers(worker
     base = dataclasses.replace(hover_of(short()), stop_time=0.05)
     found = find(base, "loss", confidence=0.2, tolerance=0.5, workers=workers)
     assert (found.seeds, found.large_signal_limit) == (3, None)
-    assert found.note.startswith("flies throughout the range, to 1;")
+    assert found.note.startswith("good throughout the range, to 1;")
 
 
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"of": "mass"}, "--of mass: expected one of period, delay, jitter, loss"),
+        ({"of": "mass"}, "--of mass: expected one of period, delay, jitter, loss, or a path"),
         ({"tolerance": 0.0}, "--tolerance 0.0: expected a positive number"),
         ({"tolerance": -1.0}, "--tolerance -1.0: expected a positive number"),
         ({"tolerance": math.nan}, "--tolerance nan: expected a positive number"),

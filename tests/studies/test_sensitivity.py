@@ -149,5 +149,5 @@ def test_the_outcome_has_indices_of_whether_a_run_flies(flown: tuple[Study, Path
 
 
 def test_the_outcome_is_one_for_a_run_that_flies_and_missing_for_one_that_failed() -> None:
-    runs = pd.DataFrame({"outcome": ["settled", "bounded", "diverged", None]})
+    runs = pd.DataFrame({"outcome": ["settled", "bounded", "diverged", None], "good": [1.0, 0.0, 0.0, None]})
     assert numbers(runs, "outcome").tolist() == pytest.approx([1.0, 0.0, 0.0, math.nan], nan_ok=True)

@@ -2,6 +2,8 @@
 
 import contextlib
 import dataclasses
+import functools
+import json
 import math
 import random
 import shutil
@@ -16,13 +18,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestration import QuadcosimError, Scenario, UsageError
+from orchestration import QuadcosimError, Scenario, UsageError, fmus
+from orchestration.quadrotor.translation import system_of
 from orchestration.scenario import FmuChoice, ReferenceChoice
 from orchestration.studies import store as stores
-from orchestration.studies.identity import flight_sources, reference_content, run_key, sources_hash, versions
-from orchestration.studies.store import METRICS, TEXTS, Place, Row, open_for_reading, open_for_writing
-from orchestration.studies.study import Fmus, locate_fmus
-from tests.studies.common import one_line, row
+from orchestration.studies.files import Files
+from orchestration.studies.identity import flight_sources, run_key, sources_hash, versions
+from orchestration.studies.store import TEXTS, Place, Row, open_for_reading, open_for_writing
+from orchestration.wiring import DEFAULT_PLANT
+from tests.studies.common import METRICS, OBJECTIVES, files_in, one_line, row
 
 NUMBERS = [name for name in METRICS if name not in TEXTS]
 # SQLite has one zero and keeps a NaN as NULL.
@@ -35,7 +39,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def written(path: Path, *rows: Row) -> Path:
-    with open_for_writing(path) as store:
+    with open_for_writing(path, OBJECTIVES) as store:
         store.describe({"name": "value"})
         store.add(rows)
     return path
@@ -105,7 +109,7 @@ def test_a_row_of_the_same_run_is_replaced_and_one_of_another_run_takes_its_plac
 
 
 def test_a_design_that_changes_keeps_the_rows_of_its_runs_wherever_they_are_in_it_now(path: Path) -> None:
-    with open_for_writing(path) as store:
+    with open_for_writing(path, OBJECTIVES) as store:
         store.add([row(0, seed=10), row(1, seed=11, metrics=None)])
         places = [Place(index=i, key=key, settings={}) for i, key in enumerate(["new", "key 1", "key 0", "new"])]
         store.describe({"name": "value"}, places)
@@ -116,16 +120,16 @@ def test_a_design_that_changes_keeps_the_rows_of_its_runs_wherever_they_are_in_i
 
 
 def test_what_a_store_is_about_is_replaced_by_name(path: Path) -> None:
-    with open_for_writing(path) as store:
+    with open_for_writing(path, OBJECTIVES) as store:
         store.describe({"a": "1", "b": "2"})
         store.describe({"b": "3"})
-        assert store.about() == {"a": "1", "b": "3"}
+        assert store.about() == {"objectives": json.dumps(OBJECTIVES), "a": "1", "b": "3"}
 
 
 def test_rows_that_cannot_be_written_together_are_not_written_at_all(path: Path) -> None:
     written(path, row(0))
     bad = dataclasses.replace(row(2), key=None)  # type: ignore[arg-type]
-    with open_for_writing(path) as store:
+    with open_for_writing(path, OBJECTIVES) as store:
         with pytest.raises(QuadcosimError, match="NOT NULL"):
             store.add([row(1), bad])
         assert list(store.statuses()) == ["key 0"]
@@ -135,7 +139,7 @@ def test_rows_that_cannot_be_written_together_are_not_written_at_all(path: Path)
 
 
 def test_a_second_writer_in_this_process_is_refused_in_one_line(path: Path) -> None:
-    with open_for_writing(path) as store:
+    with open_for_writing(path, OBJECTIVES) as store:
         with pytest.raises(QuadcosimError, match="another sweep is writing into it") as caught:
             written(path, row(1))
         one_line(caught.value)
@@ -147,8 +151,8 @@ WRITER = """
 import sys
 from pathlib import Path
 from orchestration.studies.store import open_for_writing
-from tests.studies.common import row
-with open_for_writing(Path(sys.argv[1])) as store:
+from tests.studies.common import OBJECTIVES, row
+with open_for_writing(Path(sys.argv[1]), OBJECTIVES) as store:
     for index in range(100):
         store.add([row(index)])
         print(index, flush=True)
@@ -209,7 +213,7 @@ def test_a_reader_does_not_keep_the_writer_from_finishing(path: Path) -> None:
     with open_for_reading(path) as store:
         reading = store.rows()
         assert next(reading)["design_index"] == 0
-        with open_for_writing(path) as writing:
+        with open_for_writing(path, OBJECTIVES) as writing:
             writing.add([row(2)])
             assert writing.counts() == {"done": 3}
             reading.close()  # lets the checkpoint at the end go through
@@ -239,7 +243,7 @@ def test_a_store_where_nothing_can_be_written_is_read_with_what_is_still_in_its_
 ) -> None:
     frozen = tmp_path / "frozen" / "study.sqlite"
     frozen.parent.mkdir()
-    with open_for_writing(path) as store:
+    with open_for_writing(path, OBJECTIVES) as store:
         store.add([row(0), row(1)])
         for suffix in ("", "-wal"):  # as if its writer had been killed now
             shutil.copyfile(f"{path}{suffix}", f"{frozen}{suffix}")
@@ -284,7 +288,7 @@ def integrity(path: Path) -> str:
 def test_a_full_disk_is_one_line_and_the_store_is_as_it_was(path: Path) -> None:
     written(path, *(row(index) for index in range(20)))
     pages = path.stat().st_size // 4096 + 2
-    with connections(f"PRAGMA max_page_count = {pages}"), open_for_writing(path) as store:
+    with connections(f"PRAGMA max_page_count = {pages}"), open_for_writing(path, OBJECTIVES) as store:
         with pytest.raises(QuadcosimError, match=r"study.sqlite: the store cannot be used: .*full") as caught:
             store.add(row(20 + index, message="x" * 1000) for index in range(100))
         one_line(caught.value)
@@ -304,7 +308,7 @@ def test_a_locked_store_is_one_line_and_is_whole_afterwards(path: Path) -> None:
     written(path, row(0))
     with contextlib.closing(sqlite3.connect(path)) as other, connections(timeout=0.05):
         other.execute("BEGIN EXCLUSIVE")
-        with open_for_writing(path) as store:
+        with open_for_writing(path, OBJECTIVES) as store:
             with pytest.raises(QuadcosimError, match=r"the store cannot be used: database is locked") as caught:
                 store.add([row(1)])
             one_line(caught.value)
@@ -321,7 +325,7 @@ def test_a_locked_store_is_still_read(path: Path) -> None:
         assert indices(path) == [0]
 
 
-@pytest.mark.parametrize("open_it", [open_for_reading, open_for_writing])
+@pytest.mark.parametrize("open_it", [open_for_reading, functools.partial(open_for_writing, objectives=OBJECTIVES)])
 def test_a_file_that_is_no_store_is_one_line_and_stays_as_it_is(tmp_path: Path, open_it: Any) -> None:
     path = tmp_path / "study.sqlite"
     path.write_bytes(b"this is no database, but it is long enough to be looked at. " * 20)
@@ -361,14 +365,14 @@ def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
 # -- keys -------------------------------------------------------------------------------------------------
 
 BASE = Scenario()
-FMUS = locate_fmus(BASE)
-OTHER_FMUS = [dataclasses.replace(FMUS) for _ in FMUS.hashes]
-for changed, (side, content) in zip(OTHER_FMUS, FMUS.contents.items(), strict=True):
-    changed.__dict__["contents"] = {**FMUS.contents, side: content + b" "}
+FILES = files_in(BASE)
+OTHER_FMUS = [dataclasses.replace(FILES) for _ in FILES.fmus]
+for changed, (name, content) in zip(OTHER_FMUS, FILES.contents.items(), strict=True):
+    changed.__dict__["contents"] = {**FILES.contents, name: content + b" "}
 
 
-def key_of(scenario: Scenario, fmus: Fmus = FMUS) -> str:
-    return run_key(scenario, fmus, reference_content(scenario))
+def key_of(scenario: Scenario, files: Files | None = None) -> str:
+    return run_key(system_of(scenario), files or files_in(scenario))
 
 
 def different_keys(tmp_path: Path) -> Iterator[str]:
@@ -388,9 +392,8 @@ def different_keys(tmp_path: Path) -> Iterator[str]:
     for name in ("plant.mass", "controller.mass", "plant.initial.position.x"):  # none starts at 1.25
         yield key_of(BASE.with_changes(parameters={name: 1.25}))
         yield key_of(BASE.with_changes(parameters={name: math.nextafter(1.25, 2.0)}))
-    for fmus in OTHER_FMUS:  # to the byte, with the same GUID
-        fmus.__dict__["descriptions"] = FMUS.descriptions
-        yield key_of(BASE, fmus)
+    for files in OTHER_FMUS:  # to the byte, with the same GUID
+        yield key_of(BASE, files)
     for content in ("time\n0\n", "time\n1\n"):
         file = tmp_path / "reference.csv"
         file.write_text(content)
@@ -413,13 +416,12 @@ def test_the_key_is_the_same_for_an_fmu_or_a_reference_that_lies_elsewhere(tmp_p
     found = []
     for folder in (tmp_path / "one", tmp_path / "two"):
         folder.mkdir()
-        fmus = locate_fmus(BASE)
-        plant = shutil.copy(fmus.plant, folder / "renamed.fmu")
+        plant = shutil.copy(fmus.locate(DEFAULT_PLANT), folder / "renamed.fmu")
         (folder / "reference.csv").write_text("time\n0\n")
         scenario = dataclasses.replace(
             BASE, plant=FmuChoice(fmu=str(plant)), reference=ReferenceChoice(file=folder / "reference.csv")
         )
-        found.append(key_of(scenario, locate_fmus(scenario)))
+        found.append(key_of(scenario))
     assert found[0] == found[1]
 
 
@@ -440,9 +442,9 @@ def test_a_parameter_given_as_its_fmu_has_it_is_the_same_run() -> None:
 
 
 @pytest.mark.parametrize(
-    "module",
-    ["orchestration.stepping.master", "orchestration.stepping.streams", "orchestration.results.objectives",
-     "fmu_kit.trajectory", "orchestration.fmi.native", "orchestration.studies.worker", "orchestration.wiring"],
+    "module", ["orchestration.stepping.master", "orchestration.stepping.agenda", "orchestration.results.objectives",
+               "fmu_kit.trajectory", "orchestration.fmi.native", "orchestration.studies.worker",
+               "orchestration.wiring"],
 )  # fmt: skip
 def test_an_edited_source_on_the_path_of_the_flight_is_other_software(module: str, tmp_path: Path) -> None:
     sources = flight_sources()
@@ -474,7 +476,7 @@ DAMAGE = [
 
 
 @pytest.mark.parametrize("statement", DAMAGE)
-@pytest.mark.parametrize("open_it", [open_for_reading, open_for_writing])
+@pytest.mark.parametrize("open_it", [open_for_reading, functools.partial(open_for_writing, objectives=OBJECTIVES)])
 def test_a_value_that_was_not_written_by_the_store_is_noticed(path: Path, statement: str, open_it: Any) -> None:
     written(path, row(0), row(1), row(2))
     with contextlib.closing(sqlite3.connect(path)) as other, other:

@@ -127,7 +127,7 @@ def test_a_study_that_was_never_flown_is_wrong_usage(folder: Path, command: str)
     ("arguments", "said"),
     [
         (("sweep", "study.toml", "--workers", "0"), "--workers 0: expected at least 1"),
-        (("draw", "study.toml", "--metric", "beauty"), "--metric beauty: expected one of horizon"),
+        (("draw", "study.toml", "--metric", "beauty"), "--metric beauty: expected one of good, horizon"),
     ],
 )
 def test_options_that_cannot_be_are_wrong_usage(folder: Path, arguments: tuple[str, ...], said: str) -> None:
@@ -163,7 +163,7 @@ def test_limit_takes_the_flags_of_a_flight(tmp_path: Path) -> None:
     done = quadcosim(*LIMIT, *still, *tilted, *flags, cwd=tmp_path)
     found = json.loads(done.stdout)
     assert (found["of"], found["confidence"], found["seeds"]) == ("loss", 0.1, 1)
-    assert found["note"].startswith("flies throughout the range, to 1;")
+    assert found["note"].startswith("good throughout the range, to 1;")
     assert len(done.stderr.splitlines()) == 21
 
 
@@ -189,7 +189,7 @@ def test_limit_draws_the_spectral_radius_on_request(tmp_path: Path) -> None:
         (("--of", "mass"), "--of mass: expected one of period, delay, jitter, loss"),
         (("--tolerance", "0"), "--tolerance 0.0: expected a positive number"),
         (("--confidence", "1"), "--confidence 1.0: expected a number between 0 and 1"),
-        (("nowhere.toml",), "nowhere.toml: expected a readable scenario file"),
+        (("nowhere.toml",), "nowhere.toml: expected a readable system or scenario file"),
         (("--period", "-1"), "timing.period = -1.0: expected a positive number"),
     ],
 )

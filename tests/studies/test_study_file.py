@@ -7,8 +7,9 @@ import pytest
 from orchestration import Scenario, UsageError
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
+from orchestration.system.model import System
 from orchestration.timing import TIMING_KEYS
-from tests.studies.common import GRID, one_line, starts
+from tests.studies.common import GRID, at, one_line, starts
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 ONE = '[[axes]]\nname = "seed"\nvalues = [1]\n'
@@ -27,9 +28,9 @@ def refused(folder: Path, text: str) -> str:
     return line
 
 
-def flown(folder: Path, text: str, index: int = 0) -> Scenario:
-    """The scenario of one run of a study."""
-    return load(folder, text).scenario(index, starts())
+def flown(folder: Path, text: str, index: int = 0) -> System:
+    """The system of one run of a study."""
+    return load(folder, text).system(index, starts())
 
 
 # -- good files -------------------------------------------------------------------------------------------
@@ -40,7 +41,7 @@ def test_every_study_of_the_repository_loads_and_all_its_runs_are_scenarios(path
     study, known = load_study(path), starts()
     assert study.name == path.stem
     for index in range(len(study.points)):
-        study.scenario(index, known)
+        study.system(index, known)
 
 
 def test_a_grid_is_read_as_it_is_written(tmp_path: Path) -> None:
@@ -48,9 +49,9 @@ def test_a_grid_is_read_as_it_is_written(tmp_path: Path) -> None:
     assert [tuple(point.values()) for point in study.points] == [
         (p, d) for p in (0.02, 0.01) for d in (0.0, 0.01, 0.005)
     ]
-    last = study.scenario(5, starts())
-    assert (last.stop_time, last.timing.plant_interval, last.timing.period) == (0.1, 0.005, 0.01)
-    assert last.timing.delay == 0.005
+    last = study.system(5, starts())
+    assert [at(last, f"timing.{key}") for key in ("plant_interval", "period", "delay")] == [0.005, 0.01, 0.005]
+    assert last.stop_time == 0.1
 
 
 def test_the_name_is_that_of_the_file_unless_one_is_given(tmp_path: Path) -> None:
@@ -72,9 +73,9 @@ def test_a_range_without_a_number_is_sampled_by_the_design(tmp_path: Path) -> No
 
 def test_sets_puts_the_value_into_each_target(tmp_path: Path) -> None:
     text = '[[axes]]\nname = "i"\nsets = ["plant.inertia.xx", "plant.inertia.yy", "timing.offset"]\nvalues = [0.25]\n'
-    scenario = flown(tmp_path, text)
-    assert scenario.plant.parameters == {"inertia.xx": 0.25, "inertia.yy": 0.25}
-    assert scenario.timing.offset == 0.25
+    system = flown(tmp_path, text)
+    assert system.components["plant"].parameters == {"inertia.xx": 0.25, "inertia.yy": 0.25}
+    assert at(system, "timing.offset") == 0.25
 
 
 def test_multiplies_scales_what_the_base_has_or_else_what_the_fmu_has(tmp_path: Path) -> None:
@@ -82,9 +83,9 @@ def test_multiplies_scales_what_the_base_has_or_else_what_the_fmu_has(tmp_path: 
         "[base.timing]\nperiod = 0.03\n[base.controller]\ngain.eta = 4.0\n[[axes]]\nname = 'f'\nvalues = [2]\n"
         "multiplies = ['controller.gain.eta', 'controller.gain.theta', 'timing.period']\n"
     )
-    scenario = flown(tmp_path, text)
-    assert scenario.controller.parameters == {"gain.eta": 8.0, "gain.theta": 30.0}
-    assert scenario.timing.period == 0.06
+    system = flown(tmp_path, text)
+    assert system.components["controller"].parameters == {"gain.eta": 8.0, "gain.theta": 30.0}
+    assert at(system, "timing.period") == 0.06
 
 
 def test_what_is_no_number_cannot_be_multiplied(tmp_path: Path) -> None:
@@ -95,14 +96,14 @@ def test_what_is_no_number_cannot_be_multiplied(tmp_path: Path) -> None:
 
 
 def test_loss_sets_both_losses(tmp_path: Path) -> None:
-    timing = flown(tmp_path, '[[axes]]\nname = "loss"\nsets = ["timing.loss"]\nvalues = [0.25]\n').timing
-    assert (timing.measurement_loss, timing.command_loss) == (0.25, 0.25)
+    system = flown(tmp_path, '[[axes]]\nname = "loss"\nsets = ["timing.loss"]\nvalues = [0.25]\n')
+    assert [x.loss for x in system.connections] == [0.25, 0.25]
 
 
 def test_noise_of_one_measurement_leaves_that_of_others(tmp_path: Path) -> None:
     axes = '[[axes]]\nname = "n"\nsets = ["timing.noise.position"]\nvalues = [0.25]\n'
     text = f"[base.timing.noise]\nvelocity = 0.5\n{axes}"
-    assert flown(tmp_path, text).timing.noise == {"velocity": 0.5, "position": 0.25}
+    assert flown(tmp_path, text).connections[0].noise == {"velocity": 0.5, "position": 0.25}
 
 
 def test_each_run_has_the_seed_of_the_base_unless_seeds_vary(tmp_path: Path) -> None:
@@ -130,6 +131,7 @@ def test_signals_are_kept_of_none_of_some_or_of_all(tmp_path: Path) -> None:
 def test_the_base_may_be_the_path_of_a_scenario_from_the_folder_of_the_study(tmp_path: Path) -> None:
     (tmp_path / "flight.toml").write_text("stop_time = 3.0\n[timing]\nperiod = 0.07\n")
     base = load(tmp_path, f'scenario = "flight.toml"\n{ONE}').base
+    assert isinstance(base, Scenario)
     assert (base.stop_time, base.timing.period) == (3.0, 0.07)
 
 
@@ -186,7 +188,7 @@ def test_a_target_that_does_not_exist_is_told_with_those_that_there_are(tmp_path
         (ONE + '[design]\nmethod = "guess"\n', "design.method = 'guess'"),
         (ONE + '[base]\n[base.timing]\nperiod = -1.0\n', "timing.period = -1.0: expected a positive number"),
         ('scenario = "flight.toml"\n[base]\nstop_time = 1.0\n' + ONE, "scenario and base: expected one of them"),
-        ('scenario = "nowhere.toml"\n' + ONE, "nowhere.toml: expected a readable scenario file"),
+        ('scenario = "nowhere.toml"\n' + ONE, "nowhere.toml: expected a readable system or scenario file"),
         ("[[axes\n", "expected TOML"),
     ],
 )  # fmt: skip
@@ -210,7 +212,7 @@ def test_the_stop_time_may_be_an_axis(tmp_path: Path) -> None:
     file = tmp_path / "study.toml"
     file.write_text('[[axes]]\nname = "stop_time"\nvalues = [0.1, 0.2]\n')
     chosen = load_study(file)
-    assert [chosen.scenario(i, {}).stop_time for i in range(2)] == [0.1, 0.2]
+    assert [chosen.system(i, {}).stop_time for i in range(2)] == [0.1, 0.2]
 
 
 def test_noise_without_a_measurement_is_no_target(tmp_path: Path) -> None:

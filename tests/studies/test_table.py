@@ -10,13 +10,14 @@ import pytest
 
 import orchestration
 from orchestration import Scenario, UsageError
+from orchestration.quadrotor.translation import system_of
 from orchestration.studies.axes import Axis
 from orchestration.studies.identity import versions
-from orchestration.studies.store import METRICS, Row, open_for_reading, open_for_writing
-from orchestration.studies.study import Study, locate_fmus
+from orchestration.studies.store import Row, open_for_reading, open_for_writing
+from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
 from orchestration.studies.table import dataset, export, frame
-from tests.studies.common import GRID, axis, row, starts, study, swept
+from tests.studies.common import GRID, METRICS, OBJECTIVES, axis, files_in, row, starts, study, swept
 
 GRIDDED = {"timing.period": [0.02, 0.01], "timing.delay": [0.0, 0.01, 0.005]}
 
@@ -32,7 +33,7 @@ def grid(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
 
 def stored(path: Path, rows: list[Row], grid: dict[str, list[Any]] | None) -> Path:
     """A store of rows that were never flown."""
-    with open_for_writing(path) as store:
+    with open_for_writing(path, OBJECTIVES) as store:
         about = {"axes": ["timing.period"], "grid": grid, "guids": {"plant": "{p}"}, "versions": {"numpy": "1"}}
         store.describe({name: json.dumps(value) for name, value in about.items()})
         store.add(rows)
@@ -56,7 +57,8 @@ def test_a_frame_has_settings_metrics_seeds_guids_and_versions(grid: tuple[Study
         "duration",
         "machine",
     }
-    guids, software = locate_fmus(Scenario()).guids, versions()
+    models = files_in().models_of(system_of(Scenario()))
+    guids, software = {name: model.description.guid for name, model in models.items()}, versions()
     origin = {f"guid.{side}" for side in guids} | {f"version.{name}" for name in software}
     assert set(table.columns) == expected | set(METRICS) | origin
     assert set(table["guid.plant"]) == {guids["plant"]}
@@ -75,7 +77,7 @@ def test_a_frame_has_the_metrics_of_direct_runs(grid: tuple[Study, Path]) -> Non
     chosen, path = grid
     table = frame(path)
     for index in (0, 4):
-        direct = orchestration.run(chosen.scenario(index, starts())).metrics
+        direct = orchestration.run(chosen.system(index, starts())).metrics
         for name in METRICS:
             value = table.loc[index, name]
             assert pd.isna(value) if direct[name] is None else value == direct[name], name
@@ -168,7 +170,7 @@ def test_a_failed_run_is_exported_with_its_message(tmp_path: Path) -> None:
 
 def test_a_hundred_thousand_rows_open_count_and_export(tmp_path: Path) -> None:
     number = 100_000
-    measured = dict.fromkeys(METRICS, 0.1 + 0.2) | {"diverged": False, "steps": 30000}
+    measured = dict.fromkeys(METRICS, 0.1 + 0.2) | {"good": True, "diverged": False, "steps": 30000}
     rows = [row(i, metrics={**measured, "position_rmse": 0.001 * i}) for i in reversed(range(number))]
     path = stored(tmp_path / "study.sqlite", rows, {"timing.period": [0.001 * i for i in range(number)]})
     with open_for_reading(path) as store:

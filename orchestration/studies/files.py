@@ -1,0 +1,78 @@
+"""The files of a study: FMUs and tables of sources, read once; what is described, hashed and flown is this content."""
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+from orchestration import fmus
+from orchestration.errors import QuadcosimError
+from orchestration.fmi.model import Model, read_model
+from orchestration.system.model import System
+
+
+@dataclass(frozen=True, kw_only=True)
+class Files:
+    """Files by what systems call them."""
+
+    fmus: Mapping[str, Path]
+    tables: Mapping[str, Path]
+
+    @cached_property
+    def contents(self) -> dict[str, bytes]:
+        """All files; raises `QuadcosimError` for one that cannot be read."""
+        try:
+            return {name: path.read_bytes() for name, path in {**self.fmus, **self.tables}.items()}
+        except OSError as error:
+            raise QuadcosimError(f"{error.filename}: expected a file that can be read: {error.strerror}") from error
+
+    @cached_property
+    def hashes(self) -> dict[str, str]:
+        """The hash of each."""
+        return {name: hashlib.sha256(content).hexdigest() for name, content in self.contents.items()}
+
+    @cached_property
+    def models(self) -> dict[str, Model]:
+        """What each FMU says of itself; raises `UsageError` for a file that is none."""
+        assert self.contents is not None
+        return {name: read_model(path) for name, path in self.fmus.items()}
+
+    def models_of(self, system: System) -> dict[str, Model]:
+        """The models of its components."""
+        return {name: self.models[component.fmu] for name, component in system.components.items()}
+
+    def starts_of(self, system: System) -> dict[str, float]:
+        """The start values of all Real parameters, as COMPONENT.NAME."""
+        return {
+            f"{name}.{variable.name}": float(variable.start)
+            for name, model in self.models_of(system).items()
+            for variable in model.variables.values()
+            if variable.kind == "Real" and variable.causality == "parameter" and variable.start is not None
+        }
+
+
+def files_of(system: System, fmus_too: Iterable[str] = (), tables_too: Iterable[str] = ()) -> Files:
+    """The files of a system, FMUs built if need be; raises `UsageError` for an FMU that is not there."""
+    named = dict.fromkeys([*(component.fmu for component in system.components.values()), *fmus_too])
+    tables = {**tables_of(system), **{name: Path(name) for name in tables_too}}
+    return Files(fmus={name: fmus.locate(name) for name in named}, tables=tables)
+
+
+def tables_of(system: System) -> dict[str, Path]:
+    """The files of the sources of a system, by what it calls them."""
+    return {str(source.file): source.file for source in system.sources.values() if source.file is not None}
+
+
+def with_files(system: System, paths: Mapping[str, Path]) -> System:
+    """`system` with its files at these paths, by what it calls them, so that none is looked for."""
+    return replace(
+        system,
+        components={
+            name: replace(component, fmu=str(paths[component.fmu])) for name, component in system.components.items()
+        },
+        sources={
+            name: source if source.file is None else replace(source, file=paths[str(source.file)])
+            for name, source in system.sources.items()
+        },
+    )

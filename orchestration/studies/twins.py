@@ -1,0 +1,219 @@
+"""How the difference of two runs grows, one of which a short pulse has struck: for any system, whatever its FMUs save.
+
+Both begin at the operating point, without jitter, loss, noise and quantisation. The pulse is added to every Real input
+of every component until its first step is done. While the difference is small it follows a linear law, the same for
+every period of the loop; that law is fitted to what is exchanged, by the singular values of its delayed values
+(dynamic mode decomposition), and its largest eigenvalue is the growth.
+"""
+
+import math
+import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from orchestration.errors import UsageError
+from orchestration.fmi.instance import Instance, Loader
+from orchestration.fmi.reuse import Instances
+from orchestration.simulation import prepared
+from orchestration.simulator import Floats, Transfer
+from orchestration.system.model import Component, Criterion, System
+from orchestration.system.paths import changed
+from orchestration.system.times import NANOSECONDS, exact_nanoseconds
+
+PULSE = 1e-6
+"""of an input: of its value, or absolute where that is smaller than 1"""
+LARGE, SMALL = 1e-3, 1e-13
+"""sizes, likewise, between which a difference is followed: linear, and above what rounding leaves"""
+AT_REST = 1e-6
+"""what may move in the first periods of the run that nothing strikes"""
+FEWEST, MOST = 100, 400
+"""instants of a run at which the twins are compared"""
+DELAYS = 24
+"""values of each signal that the law is fitted over, beside those that are on their way"""
+NOISE = 1e-9
+"""of the largest singular value: what is smaller is taken for noise"""
+SHORTEST = 8
+"""instants that a law is fitted to; over fewer the growth is that from the first to the last"""
+_NOTHING, _TOO_MUCH = 1e-6, 1e3
+"""of the difference at the end: a mode that is smaller is taken for none, a larger one for an error of the fit"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Growth:
+    """How what is small about an operating point grows."""
+
+    rate: float
+    """[1/s], of its logarithm; negative: it decays"""
+    horizon: float
+    """[s] of the two runs"""
+
+
+def growth_of(system: System, instances: Instances) -> Growth:
+    """The growth about the operating point of `system`; raises `UsageError` where the system does not rest there."""
+    nominal, interval = _at_rest(system)
+    calm, struck = (_exchanged(nominal, load, interval) for load in (instances.load, _striking(instances)))
+    _expect_rest(nominal, calm)
+    count = min(len(calm), len(struck))
+    scale = np.maximum(1.0, np.abs(calm[0]))
+    difference = (struck[:count] - calm[:count]) / scale
+    size = np.abs(difference).max(axis=1)
+    if not size.any():
+        raise UsageError("a pulse on the inputs moves nothing that is exchanged")
+    begin = 2  # the pulse is over
+    ends = np.flatnonzero((size[begin:] > LARGE) | (size[begin:] < SMALL))
+    end = begin + int(ends[0]) if len(ends) else count
+    seconds = float(interval) / NANOSECONDS
+    window = difference[begin:end]
+    rounding = float(np.finfo(float).eps * (np.abs(calm[begin:end]) / scale).max(initial=0.0))
+    delays = DELAYS + math.ceil(max((x.delay for x in nominal.connections), default=0.0) / seconds)
+    fitted = _rate(window, delays, rounding) if len(window) >= SHORTEST else None
+    rate = _between(size, begin, min(end, count - 1)) if fitted is None else fitted
+    return Growth(rate=rate / seconds, horizon=nominal.stop_time)
+
+
+def _rate(window: Floats, delays: int, rounding: float) -> float | None:
+    """The logarithm of the largest eigenvalue of the linear law that rows, shape (n, signals), follow but for rounding.
+
+    Of the law's modes those count that are seen at the end, and are no larger there than what is seen; None: none is.
+    """
+    delays = min(delays, len(window) // 3)
+    stacked = np.stack([window[i : len(window) - delays + i + 1].ravel(order="C") for i in range(delays)])
+    stacked = stacked.reshape(delays, -1, window.shape[1]).transpose(0, 2, 1).reshape(delays * window.shape[1], -1)
+    left, values, right = np.linalg.svd(stacked[:, :-1], full_matrices=False)
+    noise = max(NOISE, 100.0 * rounding / float(np.abs(window).max()))
+    kept = values > noise * values[0]
+    left, values, right = left[:, kept], values[kept], right[kept]
+    law = left.T @ stacked[:, 1:] @ right.T / values
+    eigenvalues, modes = np.linalg.eig(law)
+    shares = np.linalg.lstsq(modes, (left.T @ stacked[:, 0]).astype(complex), rcond=None)[0]
+    with np.errstate(over="ignore"):
+        at_end = np.abs(shares) * np.abs(eigenvalues) ** (stacked.shape[1] - 1)
+    seen = float(np.linalg.norm(left.T @ stacked[:, -1]))
+    present = (at_end > _NOTHING * seen) & (at_end < _TOO_MUCH * seen)
+    return math.log(float(np.abs(eigenvalues[present]).max())) if present.any() else None
+
+
+def _between(size: Floats, begin: int, end: int) -> float:
+    """The mean growth of the logarithm from one instant to another, of what is soon too large or too small."""
+    if size[end] == 0.0 or end <= begin:
+        return -math.inf
+    return math.log(float(size[end] / max(size[begin], SMALL))) / (end - begin)
+
+
+def _at_rest(system: System) -> tuple[System, Fraction]:
+    """`system` at its operating point with nothing random, and the time between instants that are compared [ns]."""
+    chosen = changed(system, system.operating_point)
+    interval = _period(chosen)
+    horizon = max(exact_nanoseconds(chosen.stop_time), FEWEST * interval)
+    return replace(
+        chosen,
+        stop_time=float(horizon) / NANOSECONDS,
+        components={name: _punctual(component) for name, component in chosen.components.items()},
+        connections=tuple(
+            replace(x, delay_jitter=0.0, loss=0.0, burst_length=None, noise={}, quantisation={})
+            for x in chosen.connections
+        ),
+        sources={
+            name: source if source.noise is None else replace(source, noise=0.0)
+            for name, source in chosen.sources.items()
+        },
+        objectives={},
+        criterion=Criterion(diverged=chosen.criterion.diverged),
+    ), interval * max(1, math.floor(horizon / interval / MOST))
+
+
+def _punctual(component: Component) -> Component:
+    if component.sampling is None:
+        return replace(component, record=())
+    return replace(component, record=(), sampling=replace(component.sampling, jitter=0.0))
+
+
+def _period(system: System) -> Fraction:
+    """The time after which all sampled components are due together again, or the longest period if that is long."""
+    periods = [
+        exact_nanoseconds(one.sampling.period) / Fraction(one.sampling.clock_ratio)
+        for one in system.components.values()
+        if one.sampling is not None
+    ] or [exact_nanoseconds(one.step) for one in system.components.values() if one.step is not None]
+    denominator = math.lcm(*(period.denominator for period in periods))
+    together = Fraction(math.lcm(*(int(period * denominator) for period in periods)), denominator)
+    return together if together <= 20 * max(periods) else max(periods)
+
+
+def _exchanged(system: System, load: Loader, interval: Fraction) -> Floats:
+    """What connections carry at each instant that is compared, shape (n, signals)."""
+    with prepared(system, load=load) as simulation:
+        simulation.master.initialise()
+        simulation.master.run()
+        result = simulation.result()
+    times = np.round(result.rows[:, 0] * NANOSECONDS).astype(np.int64)
+    count = math.floor(Fraction(int(times[-1])) / interval)  # at the stop itself nobody samples
+    offsets = [exact_nanoseconds(c.sampling.offset) for c in system.components.values() if c.sampling is not None]
+    instants = [math.floor(max(offsets, default=Fraction(0)) + k * interval) + 1 for k in range(count)]
+    rows = np.searchsorted(times, instants, side="right") - 1
+    columns = [result.columns.index(name) for name in _signals(system)]
+    found: Floats = result.rows[rows][:, columns]
+    return found
+
+
+def _signals(system: System) -> Sequence[str]:
+    return tuple(dict.fromkeys(start for x in system.connections for start in x.start))
+
+
+def _expect_rest(system: System, calm: Floats) -> None:
+    first = calm[1 : min(6, len(calm))]
+    moved = np.abs(first - first[0]).max(axis=0) / np.maximum(1.0, np.abs(first[0]))
+    worst = int(moved.argmax())
+    if moved[worst] > AT_REST:
+        raise UsageError(f"the operating point is not at rest: {_signals(system)[worst]} moves by {moved[worst]:.2g}")
+
+
+def _striking(instances: Instances) -> Loader:
+    @contextmanager
+    def load(path: Path, instance_name: str) -> Iterator[Instance]:
+        with instances.load(path, instance_name) as fmu:
+            yield cast(Instance, Struck(fmu))
+
+    return load
+
+
+class Struck:
+    """An FMU whose Real inputs get a pulse on top until its first step is done."""
+
+    def __init__(self, fmu: Instance) -> None:
+        self._fmu = fmu
+        self._stepped = False
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._fmu, name)
+
+    def writer(self, names: Sequence[str], source: Floats) -> Transfer:
+        """As `Simulator`."""
+        given: Floats = np.zeros(len(names))
+        write = self._fmu.writer(names, given)
+        real = [self._fmu.model.variables[name].kind == "Real" for name in names]
+        pulse = np.array([PULSE * _weight(name) if is_real else 0.0 for name, is_real in zip(names, real)])
+
+        def transfer() -> None:
+            given[:] = source
+            if not self._stepped:
+                given[:] += pulse * np.maximum(1.0, np.abs(source))
+            write()
+
+        return transfer
+
+    def step(self, t: float, h: float) -> None:
+        """As `Simulator`."""
+        self._fmu.step(t, h)
+        self._stepped = True
+
+
+def _weight(name: str) -> float:
+    """Between 0.5 and 1.5, another for each input: no two of them cancel."""
+    return 0.5 + zlib.crc32(name.encode()) / 2**32
