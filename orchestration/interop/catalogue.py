@@ -4,7 +4,7 @@ import importlib
 import importlib.metadata
 import os
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,14 +15,15 @@ from orchestration.interop.job import Job, Rows
 
 @dataclass(frozen=True, kw_only=True)
 class Tool:
-    """One way of one tool to fly both FMUs, or one of them."""
+    """One way of one tool to fly a system, or one component of it."""
 
     name: str
     packages: tuple[str, ...]
     """that pip installs for it"""
     call: str
     """module:function in `orchestration.interop.tools`"""
-    components: tuple[str, ...] = ("controller", "plant")
+    alone: str | None = None
+    """the component that it flies, if it is no master"""
     python: str | None = None
     """environment variable that names a Python with its packages, where they do not go with those of this project"""
 
@@ -86,20 +87,25 @@ TOOLS = {
         Tool(name="fmucontainer -sequential", packages=("fmu-manipulation-toolbox",), call="container:fly_sequential"),
         Tool(name="cofmupy", packages=("cofmupy",), call="cofmupy:fly_jacobi", python=COFMUPY),
         Tool(name="cofmupy gauss_seidel", packages=("cofmupy",), call="cofmupy:fly_gauss_seidel", python=COFMUPY),
-        Tool(name="fmpy, plant alone", packages=("fmpy",), call="fmpy:fly_plant", components=("plant",)),
-        Tool(name="fmpy, controller alone", packages=("fmpy",), call="fmpy:fly_controller", components=("controller",)),
+        Tool(name="fmpy, plant alone", packages=("fmpy",), call="fmpy:fly_plant", alone="plant"),
+        Tool(name="fmpy, controller alone", packages=("fmpy",), call="fmpy:fly_controller", alone="controller"),
     )
 }
 
 
-def chosen(names: Sequence[str] | None) -> list[Tool]:
+def chosen(names: Sequence[str] | None, components: Collection[str]) -> list[Tool]:
     """The tools of these names, each once; raises `UsageError` naming those that exist.
 
-    Without names, all but those that need a Python of their own which no environment variable names.
+    Without names, all but those that need a Python of their own which no environment variable names, or a
+    component that a system of these `components` does not have.
     """
     for name in names or ():
         if name not in TOOLS:
             raise UsageError(f"--tool {name}: expected one of {'; '.join(TOOLS)}")
+        alone = TOOLS[name].alone
+        if alone is not None and alone not in components:
+            raise UsageError(f"--tool {name}: expected a system with a component {alone}")
     if not names:
-        return [tool for tool in TOOLS.values() if tool.python is None or os.environ.get(tool.python)]
+        possible = [tool for tool in TOOLS.values() if tool.alone is None or tool.alone in components]
+        return [tool for tool in possible if tool.python is None or os.environ.get(tool.python)]
     return [TOOLS[name] for name in dict.fromkeys(names)]

@@ -6,15 +6,17 @@ from typing import Annotated
 
 import typer
 
-from orchestration.flags import FlightFlags, flies, scenario_from
+from orchestration.flags import FlightFlags, Timing, flies, request_from
 from orchestration.terminal import progress_bar, say
 
 
 @flies
 def interop(
     scenario: Annotated[
-        Path | None, typer.Argument(help="Scenario file; without one, the paper's flight.", show_default=False)
+        Path | None,
+        typer.Argument(help="System or scenario file, or SSP; without one, the paper's flight.", show_default=False),
     ] = None,
+    timing: Timing = None,
     tool: Annotated[
         list[str] | None, typer.Option("--tool", help="Only this tool; may be repeated.", metavar="NAME")
     ] = None,
@@ -25,17 +27,19 @@ def interop(
     *,
     flags: FlightFlags,
 ) -> None:
-    """Fly a scenario in other people's masters and compare every signal with this one's.
+    """Fly a system in other people's masters and compare every signal with this one's.
 
     Exit code 1 if a tool is farther than 1e-9 in a state, its own first inputs given to this master too.
     """
     from orchestration.interop import table
     from orchestration.interop.catalogue import chosen
     from orchestration.interop.compare import agreements
+    from orchestration.request import system_meant
 
-    tools = chosen(tool)
+    asked = request_from(scenario, flags, timing)
+    tools = chosen(tool, system_meant(asked).components)
     with progress_bar("flying in other masters") as progress:
-        found = agreements(scenario_from(scenario, flags), tools, announce=say, progress=progress)
+        found = agreements(asked, tools, announce=say, progress=progress)
     if out is not None:
         from orchestration.interop.figure import draw
 

@@ -14,14 +14,10 @@ import numpy as np
 from orchestration.errors import QuadcosimError
 from orchestration.interop.catalogue import Tool
 from orchestration.interop.flights import Flights
-from orchestration.interop.job import SIGNALS
 from orchestration.interop.trace import Trace
 from orchestration.scenario import Scenario
 from orchestration.simulator import Floats
-from orchestration.wiring import MEASUREMENT
-
-STATES = len(MEASUREMENT)
-"""The first so many of `SIGNALS` are the state of the plant, the others the command."""
+from orchestration.system.model import System, component_of
 
 MISSING = 1
 """Steps before the end that a tool may leave out: some stop where the next step would end beyond it."""
@@ -39,32 +35,37 @@ class Agreement:
     same_start: dict[str, float]
     """the same, with the tool's inputs until the end of the first step given to this project's master too"""
 
+    states: frozenset[str]
+    """signals of components in continuous time; the others are commands"""
+
     def both(self) -> tuple[dict[str, float], dict[str, float]]:
         """As it comes, and with the same start."""
         return self.as_it_comes, self.same_start
 
     def largest(self, differences: dict[str, float]) -> tuple[float, str]:
-        """The largest difference of a state, or of a command if the tool flew no plant, and the signal it is in."""
-        return max((value, name) for name, value in differences.items() if name in _compared(self.tool))
+        """The largest difference of a state, or of a command if the tool flew no state, and the signal it is in."""
+        flown = {name: value for name, value in differences.items() if name in self.states} or differences
+        return max((value, name) for name, value in flown.items())
 
 
 def agreements(
-    scenario: Scenario,
+    asked: Scenario | System,
     tools: Iterable[Tool],
     *,
     announce: Callable[[str], None] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> list[Agreement]:
-    """Fly `scenario` in each tool, as many at a time as there are processors.
+    """Fly a system in each tool, as many at a time as there are processors.
 
-    Its plant interval is the communication step of both FMUs, its period that of the controller's own clock.
-    Raises `ModuleNotFoundError` if a tool is not installed, `UsageError` for a scenario that an SSP cannot
-    carry or whose times are no multiples of that step, `QuadcosimError` with a tool's last words if it fails.
+    The step of its components in continuous time is the communication step of all; a period is that of a
+    component's own clock, or that step. Raises `ModuleNotFoundError` if a tool is not installed, `UsageError` for a
+    system that an SSP cannot carry or whose times are no multiples of that step, `QuadcosimError` with a tool's last
+    words if it fails.
     """
     tools = list(tools)
     versions = {tool.name: tool.versions() for tool in tools}
     with tempfile.TemporaryDirectory(prefix="quadcosim_") as folder:
-        flights = Flights(scenario, Path(folder), announce)
+        flights = Flights(asked, Path(folder), announce)
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             seen = [pool.submit(flights.seen, tool) for tool in tools]
             flown = [pool.submit(flights.flown, tool) for tool in tools]
@@ -100,24 +101,23 @@ def _agreement(flights: Flights, tool: Tool, versions: dict[str, str], trace: Tr
         tool=tool,
         versions=versions,
         trace=trace,
-        as_it_comes=_differences(tool, rows, flights.rows_of_master(order, {})),
-        same_start=_differences(tool, rows, flights.rows_of_master(order, {} if trace.order == "alone" else given)),
+        as_it_comes=_differences(tool, rows, flights, flights.rows_of_master(order, {})),
+        same_start=_differences(
+            tool, rows, flights, flights.rows_of_master(order, {} if trace.order == "alone" else given)
+        ),
+        states=frozenset(flights.loop.states),
     )
 
 
-def _compared(tool: Tool) -> tuple[str, ...]:
-    """The states; the command of a tool that flew no plant."""
-    return SIGNALS[:STATES] if "plant" in tool.components else SIGNALS[STATES:]
-
-
-def _differences(tool: Tool, rows: Floats, own: Floats) -> dict[str, float]:
+def _differences(tool: Tool, rows: Floats, flights: Flights, own: Floats) -> dict[str, float]:
     """By signal, the largest difference of a tool's rows, which are of the ends of steps, from this project's."""
-    count = min(len(rows), len(own) - 1)
-    expected = np.column_stack([own[1 : count + 1, 1 : STATES + 1], own[:count, STATES + 1 :]])
+    count, states = min(len(rows), len(own) - 1), 1 + len(flights.loop.states)
+    expected = np.column_stack([own[1 : count + 1, 1:states], own[:count, states:]])
     differences = np.abs(rows[:count, 1:] - expected).max(axis=0)
-    flown = {name: float(value) for name, value in zip(SIGNALS, differences, strict=True) if _flies(tool, name)}
-    return {name: math.inf if math.isnan(value) else value for name, value in flown.items()}
-
-
-def _flies(tool: Tool, signal: str) -> bool:
-    return signal.partition(".")[0] in tool.components
+    found = dict(zip(flights.loop.signals, map(float, differences), strict=True))
+    components = flights.flown_by(tool)
+    return {
+        name: math.inf if math.isnan(value) else value
+        for name, value in found.items()
+        if component_of(name) in components
+    }

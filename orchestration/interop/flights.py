@@ -1,22 +1,28 @@
-"""The flights of one scenario: by tools, in processes of their own, and by this project's master."""
+"""The flights of one system: by tools, in processes of their own, and by this project's master."""
 
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from orchestration import child, fmus
+from orchestration import child
 from orchestration.errors import QuadcosimError, UsageError
 from orchestration.fmi.fmi2 import Fmi2Instance
+from orchestration.fmi.instance import Instance
+from orchestration.fmi.instances import open_instance
 from orchestration.interop.catalogue import Tool
-from orchestration.interop.job import SIGNALS, Job
-from orchestration.interop.trace import PORTS, Trace, read_trace, traced_copy
+from orchestration.interop.job import Job, loop_of
+from orchestration.interop.trace import Trace, read_trace, traced_copy
+from orchestration.quadrotor.translation import in_its_own_words, system_of
 from orchestration.scenario import Scenario
 from orchestration.simulation import prepared
 from orchestration.simulator import Floats, Transfer
 from orchestration.ssp import writing
-from orchestration.ssp.carried import carried
+from orchestration.ssp.carried import carried, has_clock
+from orchestration.system.model import System
+from orchestration.system.paths import changed
 from orchestration.system.times import exact_nanoseconds
 
 _TEMPORARY = ("TMPDIR", "TEMP", "TMP")
@@ -27,45 +33,52 @@ Start = dict[str, tuple[tuple[float, ...], tuple[float, ...]]]
 
 
 class Flights:
-    """One scenario, flown by whom it is asked of; raises as `compare.agreements` does."""
+    """One system, flown by whom it is asked of; raises as `compare.agreements` does."""
 
-    def __init__(self, scenario: Scenario, folder: Path, announce: Callable[[str], None] | None) -> None:
+    def __init__(self, asked: Scenario | System, folder: Path, announce: Callable[[str], None] | None) -> None:
         self._folder = folder
-        self._scenario = scenario.with_fmus(
-            plant=fmus.locate(scenario.plant.fmu, announce).absolute(),
-            controller=fmus.locate(scenario.controller.fmu, announce).absolute(),
-        )
-        _expect_common_grid(self._scenario)
-        self.step = scenario.timing.plant_interval
-        """[s]"""
-        self.steps = round(scenario.stop_time / self.step)
+        with in_its_own_words(asked):
+            system = _in_order(system_of(asked) if isinstance(asked, Scenario) else asked, "gauss-seidel")
+            given = carried(system, announce)
+            self._fmus = {part.name: part.fmu.absolute() for part in given.parts}
+            self._system = _with_fmus(system, self._fmus)
+            self._clocks = {part.name for part in given.parts if has_clock(part.model)}
+            self.loop = loop_of(given)
+            self.step = given.step
+            """[s]"""
+            _expect_common_grid(system, given.step)
+        self.steps = round(system.stop_time / self.step)
         self._own: dict[tuple[str, str], Floats] = {}
         np.save(folder / "recorded.npy", self.rows_of_master("gauss-seidel", {})[:-1])
 
     def flown(self, tool: Tool) -> Floats:
         """A tool's rows, from the FMUs as they are."""
-        return self._in_a_process(tool, "flown", lambda path, component, folder: path)
+        return self._in_a_process(tool, "flown", lambda component, folder: self._fmus[component])
 
     def seen(self, tool: Tool) -> Trace:
         """How a tool flies, from traced copies."""
-        self._in_a_process(tool, "seen", traced_copy)
+        ports = self.loop.ports
+        self._in_a_process(tool, "seen", lambda name, folder: traced_copy(self._fmus[name], name, ports[name], folder))
         folder = self._folder / tool.call.replace(":", "_") / "seen"
-        return read_trace(folder, {name: self._path(name) for name in tool.components}, self.step)
+        return read_trace(folder, {name: self._fmus[name] for name in self.flown_by(tool)}, self.loop, self.step)
 
-    def _path(self, component: str) -> Path:
-        return Path(getattr(self._scenario, component).fmu)
+    def flown_by(self, tool: Tool) -> tuple[str, ...]:
+        """The components that a tool flies."""
+        return tuple(self.loop.ports) if tool.alone is None else (tool.alone,)
 
-    def _in_a_process(self, tool: Tool, purpose: str, prepare: Callable[[Path, str, Path], Path]) -> Floats:
+    def _in_a_process(self, tool: Tool, purpose: str, prepare: Callable[[str, Path], Path]) -> Floats:
         folder = self._folder / tool.call.replace(":", "_") / purpose
         folder.mkdir(parents=True)
-        paths = {name: prepare(self._path(name), name, folder) for name in ("controller", "plant")}
-        scenario = self._scenario.with_fmus(**paths)
+        system = _with_fmus(self._system, {name: prepare(name, folder) for name in self._fmus})
+        parts = carried(system).parts
         job = Job(
-            **paths,
-            ssp=writing.write(scenario, folder / "loop.ssp"),
+            fmus={part.name: part.fmu for part in parts},
+            ssp=writing.write(system, folder / "loop.ssp"),
             step=self.step,
-            stop=self._scenario.stop_time,
-            parameters={component.name: component.parameters for component in carried(scenario).parts},
+            stop=system.stop_time,
+            parameters={part.name: part.parameters for part in parts},
+            connections=self.loop.connections,
+            signals=self.loop.signals,
             recorded=self._folder / "recorded.npy",
             folder=folder,
         )
@@ -82,33 +95,60 @@ class Flights:
         return np.asarray(np.load(folder / "rows.npy"))
 
     def rows_of_master(self, order: str, start: Start) -> Floats:
-        """This project's flight: the time, `SIGNALS`; the command is the one computed at the row's time."""
+        """This project's flight: the time, the signals; a command is the one computed at the row's time."""
         key = (order, repr(start))
         if key not in self._own:
-            late = 0.0 if order == "gauss-seidel" else self.step
-            scenario = self._scenario.with_changes(timing={"clock": "fmu", "delay": late})
+            system = _in_order(_by_own_clocks(self._system, self._clocks), order, self.step)
 
-            def load(path: Path, instance_name: str) -> Fmi2Instance:
+            def load(path: Path, instance_name: str) -> Instance:
                 if not start:
-                    return Fmi2Instance(path, instance_name)
-                return _GivenStart(path, instance_name, *start[instance_name])
+                    return open_instance(path, instance_name)
+                inputs = self.loop.ports[instance_name].inputs
+                return _GivenStart(path, instance_name, inputs, *start[instance_name])
 
-            with prepared(scenario, load=load) as flight:
+            with prepared(system, load=load) as flight:
                 flight.master.initialise()
                 flight.master.run()
                 result = flight.result()
             if result.divergence is not None:
                 raise QuadcosimError(f"in this project's master, {order}: {result.divergence}; nothing to compare")
-            self._own[key] = np.column_stack([result.signals[name] for name in ("time", *SIGNALS)])
+            self._own[key] = np.column_stack([result.signals[name] for name in ("time", *self.loop.signals)])
         return self._own[key]
+
+
+def _with_fmus(system: System, fmus: Mapping[str, Path]) -> System:
+    return changed(system, {f"components.{name}.fmu": str(path) for name, path in fmus.items()})
+
+
+def _by_own_clocks(system: System, clocks: Collection[str]) -> System:
+    """Sampled components that can keep a clock of their own, as they do in other masters."""
+    sampled = [name for name, component in system.components.items() if component.sampling is not None]
+    return changed(system, {f"components.{name}.sampling.clock": "fmu" for name in sampled if name in clocks})
+
+
+def _in_order(system: System, order: str, step: float = 0.0) -> System:
+    """Every connection in an order; in Jacobi's, what a component with its own clock sends is a step late.
+
+    (As it takes many steps in a period, and other masters exchange after each.)
+    """
+    changes: dict[str, Any] = {}
+    for x in system.connections:
+        sampling = system.components[x.sender].sampling
+        has_own = sampling is not None and sampling.clock == "fmu"
+        changes[f"connections.{x.name}.order"] = "gauss-seidel" if has_own else order
+        if has_own and order == "jacobi":
+            changes[f"connections.{x.name}.delay"] = step
+    return changed(system, changes)
 
 
 class _GivenStart(Fmi2Instance):
     """An FMU whose connected inputs are given ones until its first step is over, whatever the master sends."""
 
-    def __init__(self, path: Path, name: str, initial: Sequence[float], first: Sequence[float]) -> None:
+    def __init__(
+        self, path: Path, name: str, connected: Sequence[str], initial: Sequence[float], first: Sequence[float]
+    ) -> None:
         super().__init__(path, name)
-        names = PORTS[name][0]
+        self._connected = names = tuple(connected)
         self._put_initial = super().writer(names, np.array(initial))
         self._put_first = super().writer(names, np.array(first))
         self._held: list[Transfer] = []
@@ -117,7 +157,7 @@ class _GivenStart(Fmi2Instance):
     def writer(self, names: Sequence[str], source: Floats) -> Transfer:
         """As of the base; of connected inputs only once the first step is over."""
         usual = super().writer(names, source)
-        if not set(names) <= set(PORTS[self.name][0]):
+        if not set(names) <= set(self._connected):
             return usual
         self._held.append(usual)
         return lambda: usual() if self.stepped else None
@@ -137,16 +177,18 @@ class _GivenStart(Fmi2Instance):
                 write()
 
 
-def _expect_common_grid(scenario: Scenario) -> None:
-    """Other masters step both FMUs together; between two of their points nothing can be due."""
-    carried(scenario)
-    timing = scenario.timing
-    step = exact_nanoseconds(timing.plant_interval)
-    if step.denominator != 1:
-        raise UsageError(f"timing.plant_interval = {timing.plant_interval}: expected a whole number of nanoseconds")
-    times = {"timing.period": timing.period, "timing.offset": timing.offset, "stop_time": scenario.stop_time}
-    for name, value in times.items():
-        if exact_nanoseconds(value) % step != 0:
-            raise UsageError(
-                f"{name} = {value}: expected a multiple of the plant interval of {timing.plant_interval} s"
-            )
+def _expect_common_grid(system: System, step: float) -> None:
+    """Other masters step all FMUs together; between two of their points nothing can be due."""
+    exact = exact_nanoseconds(step)
+    continuous = [f"components.{name}.step" for name, component in system.components.items() if component.step]
+    if exact.denominator != 1:
+        place = next(iter(continuous), "step")
+        raise UsageError(f"{place} = {step}: expected a whole number of nanoseconds")
+    times = {"stop_time": system.stop_time}
+    for name, component in system.components.items():
+        if component.sampling is not None:
+            times[f"components.{name}.sampling.period"] = component.sampling.period
+            times[f"components.{name}.sampling.offset"] = component.sampling.offset
+    for place, value in times.items():
+        if exact_nanoseconds(value) % exact != 0:
+            raise UsageError(f"{place} = {value}: expected a multiple of the common step of {step} s")

@@ -5,7 +5,7 @@ A copy differs from its FMU in the entry script alone; the law and the dynamics 
 
 import json
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -15,10 +15,7 @@ import fmpy
 
 from fmu_kit.packaging import read_source_hash, write_archive
 from orchestration.errors import QuadcosimError, UsageError
-from orchestration.wiring import COMMAND, MEASUREMENT
-
-PORTS = {"controller": (MEASUREMENT, COMMAND), "plant": (COMMAND, MEASUREMENT)}
-"""By component: its connected inputs, and its outputs."""
+from orchestration.interop.job import Loop, Ports
 
 _LAYER = """
 
@@ -47,7 +44,7 @@ _Model = {model}.__mro__[1]
 """
 
 
-def traced_copy(fmu: Path, component: str, folder: Path) -> Path:
+def traced_copy(fmu: Path, component: str, ports: Ports, folder: Path) -> Path:
     """A copy of `fmu` in `folder` that writes its steps to `log_of(component, folder)`.
 
     Raises `UsageError` for an FMU that was not packed by this project.
@@ -58,11 +55,11 @@ def traced_copy(fmu: Path, component: str, folder: Path) -> Path:
         files = {name: archive.read(name) for name in archive.namelist()}
     description = fmpy.read_model_description(str(fmu))
     references = {variable.name: variable.valueReference for variable in description.modelVariables}
-    inputs, outputs = ([references[name] for name in names] for names in PORTS[component])
+    inputs, outputs = ([references[name] for name in names] for names in (ports.inputs, ports.outputs))
     entry = f"resources/{files['resources/slavemodule.txt'].decode().strip()}.py"
     log = str(log_of(component, folder))
     layer = _LAYER.format(log=log, inputs=inputs, outputs=outputs, model=description.modelName)
-    copy = folder / fmu.name
+    copy = folder / f"{component}.fmu"
     write_archive(copy, {**files, entry: files[entry] + layer.encode()}, first="modelDescription.xml")
     return copy
 
@@ -77,7 +74,8 @@ class Trace:
     """How a tool flew, as the FMUs saw it."""
 
     order: str
-    """gauss-seidel: a command is there in the step that begins at its sample; jacobi: in the next one"""
+    """gauss-seidel: one after the other, with the newest outputs of those before; jacobi: all with those of the step
+    before; alone: not all of the loop; other"""
     initial_inputs: dict[str, tuple[float, ...]]
     """by component: what was at its connected inputs when its initialisation ended"""
     first_inputs: dict[str, tuple[float, ...]]
@@ -91,7 +89,7 @@ class Trace:
     """where the last step ended [s]"""
 
 
-def read_trace(folder: Path, components: Mapping[str, Path], step: float) -> Trace:
+def read_trace(folder: Path, components: Mapping[str, Path], loop: Loop, step: float) -> Trace:
     """What the logs of `components`, FMUs by name, say; raises `QuadcosimError` if a component took no step."""
     starts, steps = {}, {}
     for component in components:
@@ -101,43 +99,66 @@ def read_trace(folder: Path, components: Mapping[str, Path], step: float) -> Tra
             raise QuadcosimError(f"{component}: expected steps, found none in {log}")
         starts[component], *steps[component] = map(json.loads, lines)
     exact = Fraction(repr(step))
-    last = steps["plant" if "plant" in steps else "controller"]
+    last = steps[next(name for name in reversed(list(loop.ports)) if name in steps)]
     return Trace(
-        order=_order(steps),
+        order=_order(steps, loop),
         initial_inputs={component: tuple(start["inputs"]) for component, start in starts.items()},
         first_inputs={component: tuple(found[0]["inputs"]) for component, found in steps.items()},
-        first_exchange={name: _first_exchange(name, components[name], starts, steps) for name in components},
+        first_exchange={
+            name: _first_exchange(name, components[name], loop, starts, steps)
+            for name in components
+            if loop.ports[name].inputs
+        },
         steps=len(last),
         drift=max(abs(line["t"] - float(k * exact)) for k, line in enumerate(last)),
         end=last[-1]["t"] + last[-1]["h"],
     )
 
 
-def _order(steps: Mapping[str, list[dict[str, Any]]]) -> str:
-    """From which step's command each step of the plant had; `other` if measurements came late too."""
-    if len(steps) < 2:
+def _order(steps: Mapping[str, list[dict[str, Any]]], loop: Loop) -> str:
+    """From which step's outputs each step had its inputs, the first apart."""
+    if set(steps) != set(loop.ports) or len(steps) < 2:
         return "alone"
-    controller, plant = steps["controller"], steps["plant"]
-    commands = [line["outputs"] for line in controller]
-    measured = all(line["inputs"] == before["outputs"] for line, before in zip(controller[1:], plant))
-    if measured and all(line["inputs"] == command for line, command in zip(plant[1:], commands[1:])):
-        return "gauss-seidel"
-    if measured and all(line["inputs"] == command for line, command in zip(plant[1:], commands)):
-        return "jacobi"
-    return "other"
+    places = {name: i for i, name in enumerate(loop.ports)}
+    old, new = True, True
+    for component in steps:
+        for sender, given, before, now in _exchanged(component, steps, loop):
+            old &= given == before
+            new &= given == (now if places[sender] < places[component] else before)
+    return "gauss-seidel" if new else "jacobi" if old else "other"
+
+
+def _exchanged(
+    component: str, steps: Mapping[str, list[dict[str, Any]]], loop: Loop
+) -> Iterator[tuple[str, list[float], list[float], list[float]]]:
+    """For each connected input: its sender, its values from the second step on, the outputs of the step before and of
+    the same step.
+    """
+    for i, (sender, output) in enumerate(loop.feeding(component).values()):
+        outputs = [line["outputs"][loop.ports[sender].outputs.index(output)] for line in steps[sender]]
+        given = [line["inputs"][i] for line in steps[component][1:]]
+        yield sender, given, outputs[: len(given)], outputs[1 : len(given) + 1]
 
 
 def _first_exchange(
-    component: str, fmu: Path, starts: Mapping[str, dict[str, Any]], steps: Mapping[str, list[dict[str, Any]]]
+    component: str,
+    fmu: Path,
+    loop: Loop,
+    starts: Mapping[str, dict[str, Any]],
+    steps: Mapping[str, list[dict[str, Any]]],
 ) -> str:
     """What the connected inputs of `component` were at its first step."""
     variables = {v.name: v for v in fmpy.read_model_description(str(fmu)).modelVariables}
     inputs = steps[component][0]["inputs"]
-    if inputs == [float(variables[name].start) for name in PORTS[component][0]]:
+    if inputs == [float(variables[name].start) for name in loop.ports[component].inputs]:
         return "start values"
     if not any(inputs):
         return "zeros"
-    other = "plant" if component == "controller" else "controller"
-    if other not in starts or inputs in (starts[other]["outputs"], steps[other][0]["outputs"]):
+    feeding = loop.feeding(component)
+    if not all(sender in starts for sender, _ in feeding.values()):
         return "exchanged"
-    return "other"
+    for value, (sender, output) in zip(inputs, feeding.values(), strict=True):
+        place = loop.ports[sender].outputs.index(output)
+        if value not in (starts[sender]["outputs"][place], steps[sender][0]["outputs"][place]):
+            return "other"
+    return "exchanged"

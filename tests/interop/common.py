@@ -5,11 +5,33 @@ from collections.abc import Sequence
 import numpy as np
 
 from orchestration import Scenario, run
-from orchestration.interop.catalogue import TOOLS
+from orchestration.interop.catalogue import TOOLS, Tool
 from orchestration.interop.compare import Agreement
-from orchestration.interop.job import SIGNALS
+from orchestration.interop.job import Loop, Ports
 from orchestration.interop.trace import Trace
 from orchestration.simulator import Floats
+from orchestration.wiring import COMMAND, MEASUREMENT
+
+PORTS = {
+    "controller": Ports(inputs=MEASUREMENT, outputs=COMMAND),
+    "plant": Ports(inputs=COMMAND, outputs=MEASUREMENT),
+}
+LOOP = Loop(
+    ports=PORTS,
+    connections=(
+        *((("plant", name), ("controller", name)) for name in MEASUREMENT),
+        *((("controller", name), ("plant", name)) for name in COMMAND),
+    ),
+    states=tuple(f"plant.{name}" for name in MEASUREMENT),
+    commands=tuple(f"controller.{name}" for name in COMMAND),
+)
+"""The quadrotor's."""
+
+
+def components_of(tool: Tool) -> tuple[str, ...]:
+    """What a tool flies of it."""
+    return tuple(PORTS) if tool.alone is None else (tool.alone,)
+
 
 OTHER = {
     "plant.mass": 1.2,
@@ -34,12 +56,12 @@ def with_other_parameters(scenario: Scenario) -> Scenario:
 def states_of_master(scenario: Scenario) -> Floats:
     """The states of the plant as this project's master flies them, shape (n, 13)."""
     signals = run(scenario.with_changes(timing={"clock": "fmu"})).signals
-    return np.column_stack([signals[name] for name in SIGNALS if name.startswith("plant.")])
+    return np.column_stack([signals[name] for name in LOOP.states])
 
 
 def farthest(agreement: Agreement, differences: dict[str, float]) -> float:
     """The largest difference of a state, of a command if no plant was flown."""
-    kind = "plant." if "plant" in agreement.tool.components else "controller."
+    kind = "plant." if "plant" in components_of(agreement.tool) else "controller."
     values = [value for name, value in differences.items() if name.startswith(kind)]
     assert len(values) == (13 if kind == "plant." else 4)
     return max(values)
@@ -53,8 +75,8 @@ def agreement(
 ) -> Agreement:
     """One that was never flown: every signal of the tool is so far from this project's."""
     chosen = TOOLS[tool]
-    names = [name for name in SIGNALS if name.partition(".")[0] in chosen.components]
-    inputs = dict.fromkeys(chosen.components, (0.0,))
+    names = [name for name in LOOP.signals if name.partition(".")[0] in components_of(chosen)]
+    inputs = dict.fromkeys(components_of(chosen), (0.0,))
     return Agreement(
         tool=chosen,
         versions=dict.fromkeys(chosen.packages, "1.0"),
@@ -62,11 +84,12 @@ def agreement(
             order="jacobi",
             initial_inputs=inputs,
             first_inputs=inputs,
-            first_exchange=dict(zip(chosen.components, first)),
+            first_exchange=dict(zip(components_of(chosen), first)),
             steps=3000,
             drift=2e-12,
             end=30.0,
         ),
         as_it_comes=dict.fromkeys(names, as_it_comes),
         same_start=dict.fromkeys(names, same_start),
+        states=frozenset(LOOP.states),
     )

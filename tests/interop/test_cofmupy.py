@@ -11,7 +11,8 @@ import pytest
 
 from orchestration.interop import tools
 from orchestration.interop.catalogue import TOOLS
-from orchestration.interop.job import CONNECTIONS, SIGNALS, Job
+from orchestration.interop.job import Job
+from tests.interop.common import LOOP
 
 COORDINATOR = """
 import json
@@ -36,8 +37,17 @@ RUN = "import runpy, sys; sys.path.insert(0, sys.argv.pop(1)); runpy.run_path(sy
 def flown(name: str, folder: Path) -> tuple[dict[str, Any], list[list[str]], Any]:
     """The configuration, the order of the FMUs, and the rows."""
     (folder / "cofmupy.py").write_text(COORDINATOR)
-    paths = {key: folder / key for key in ("controller", "plant", "ssp", "recorded", "folder")}
-    job = Job(**paths, step=0.01, stop=0.1, parameters={"controller": {"gain.eta": 9.0}, "plant": {}})
+    job = Job(
+        fmus={name: folder / name for name in LOOP.ports},
+        ssp=folder / "ssp",
+        recorded=folder / "recorded",
+        folder=folder / "folder",
+        connections=LOOP.connections,
+        signals=LOOP.signals,
+        step=0.01,
+        stop=0.1,
+        parameters={"controller": {"gain.eta": 9.0}, "plant": {}},
+    )
     (folder / "job.json").write_text(job.to_json())
     script, function = Path(str(tools.__path__[0])) / "cofmupy.py", TOOLS[name].call.partition(":")[2]
     given = [folder, script, function, folder / "job.json", folder / "rows.npy"]
@@ -62,11 +72,11 @@ def test_it_is_given_the_whole_loop_and_steps_the_controller_first(name: str, me
         for connection in configuration["connections"]
         for end in connection["target"]
     }
-    assert made == set(CONNECTIONS)
+    assert made == set(LOOP.connections)
 
 
 def test_its_rows_have_the_time_at_the_end_of_each_step(tmp_path: Path) -> None:
     _, _, rows = flown("cofmupy", tmp_path)
-    assert rows.shape == (10, 1 + len(SIGNALS))
+    assert rows.shape == (10, 1 + len(LOOP.signals))
     assert rows[:, 0] == pytest.approx(0.01 * np.arange(1, 11))
     assert (rows[:, 1:] == 7.0).all()

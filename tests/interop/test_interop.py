@@ -11,7 +11,7 @@ from orchestration.interop import table
 from orchestration.interop.catalogue import TOOLS, chosen
 from orchestration.interop.compare import Agreement, agreements
 from orchestration.interop.table import AIM, agrees
-from tests.interop.common import farthest
+from tests.interop.common import LOOP, components_of, farthest
 from tests.studies.common import one_line
 
 
@@ -51,7 +51,7 @@ def flown(request: pytest.FixtureRequest, paper: Scenario) -> tuple[Scenario, di
     step, stop = request.param
     scenario = paper.with_changes(timing={"plant_interval": step}, stop_time=stop)
     heard: list[float] = []
-    tools = chosen(None)
+    tools = chosen(None, LOOP.ports)
     found = agreements(scenario, tools, progress=heard.append)
     assert heard == [(i + 1) / (2 * len(tools)) for i in range(2 * len(tools))]  # each flies twice
     return scenario, {agreement.tool.name: agreement for agreement in found}
@@ -73,7 +73,7 @@ One = tuple[Scenario, Agreement, Fact]
 
 def test_the_table_has_every_tool_in_order(flown: Flown) -> None:
     assert list(TOOLS) == list(FACTS)
-    assert list(flown[1]) == [tool.name for tool in chosen(None)]
+    assert list(flown[1]) == [tool.name for tool in chosen(None, LOOP.ports)]
 
 
 def test_the_page_has_the_table_that_was_found(flown: Flown) -> None:
@@ -100,7 +100,7 @@ def test_the_order_of_each_tool_is_as_stated(one: One) -> None:
 def test_the_inputs_of_the_first_step_are_as_stated(one: One) -> None:
     _, agreement, fact = one
     stated = {"controller": fact.controller, "plant": fact.plant}
-    assert agreement.trace.first_exchange == {name: stated[name] for name in agreement.tool.components}
+    assert agreement.trace.first_exchange == {name: stated[name] for name in components_of(agreement.tool)}
 
 
 def test_the_steps_and_the_end_of_each_tool_are_as_stated(one: One) -> None:
@@ -146,9 +146,9 @@ def test_the_versions_of_what_flew_are_told(one: One) -> None:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"timing": {"period": 0.015}}, "timing.period = 0.015: expected a multiple of the plant interval of 0.01 s"),
-        ({"timing": {"offset": 0.005}}, "timing.offset = 0.005: expected a multiple of the plant interval of 0.01 s"),
-        ({"stop_time": 0.995}, "stop_time = 0.995: expected a multiple of the plant interval of 0.01 s"),
+        ({"timing": {"period": 0.015}}, "timing.period = 0.015: expected a multiple of the common step of 0.01 s"),
+        ({"timing": {"offset": 0.005}}, "timing.offset = 0.005: expected a multiple of the common step of 0.01 s"),
+        ({"stop_time": 0.995}, "stop_time = 0.995: expected a multiple of the common step of 0.01 s"),
         (
             {"timing": {"plant_interval": 1e-3 / 3.0}},
             f"timing.plant_interval = {1e-3 / 3.0}: expected a whole number of nanoseconds",
@@ -160,13 +160,13 @@ def test_times_that_other_masters_do_not_step_on_are_refused(
     changes: dict[str, object], said: str, short: Scenario
 ) -> None:
     with pytest.raises(UsageError) as refused:
-        agreements(short.with_changes(**changes), chosen(["libcosim"]))
+        agreements(short.with_changes(**changes), chosen(["libcosim"], LOOP.ports))
     assert one_line(refused.value).startswith(said)
 
 
 def test_a_flight_that_diverges_is_not_compared(short: Scenario) -> None:
     away = short.with_changes(parameters={"plant.initial.position.x": 200.0})
     with pytest.raises(QuadcosimError) as refused:
-        agreements(away, chosen(["libcosim"]))
+        agreements(away, chosen(["libcosim"], LOOP.ports))
     assert "position error" in one_line(refused.value)
     assert str(refused.value).endswith("nothing to compare")

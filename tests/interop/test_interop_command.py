@@ -11,11 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from orchestration import Scenario, fmus
+from orchestration import fmus
 from orchestration.interop.catalogue import COFMUPY, TOOLS, chosen
 from orchestration.ssp import writing
+from orchestration.system.model import System
+from orchestration.system.paths import changed
 from orchestration.wiring import MODELS
 from tests.commands import Main
+from tests.interop.common import LOOP
 from tests.studies.common import error_line, quadcosim
 
 SHORT = ("--plant-interval", "0.01", "--stop-time", "0.1")
@@ -82,8 +85,8 @@ def test_json_has_each_tool_once_and_the_chart_goes_to_out(tmp_path: Path, tempo
 def test_a_tool_that_flies_with_another_gain_is_noticed(main: Main, monkeypatch: pytest.MonkeyPatch) -> None:
     write = writing.write
 
-    def with_another_gain(scenario: Scenario, path: Path) -> Path:
-        return write(scenario.with_changes(parameters={"controller.gain.eta": 14.9999}), path)
+    def with_another_gain(system: System, path: Path) -> Path:
+        return write(changed(system, {"components.controller.parameters.gain.eta": 14.9999}), path)
 
     monkeypatch.setattr(writing, "write", with_another_gain)
     chosen = ("--tool", "libcosim", "--tool", "libcosim, SSP", "--tool", "fmpy, SSP")
@@ -105,10 +108,10 @@ def test_a_tool_that_there_is_none_of_is_wrong_usage_and_the_names_are_listed(ma
     [
         (("--delay", "0.01"), "timing.delay = 0.01: an SSP cannot say that"),
         (("--jitter", "0.001"), "timing.jitter = 0.001: an SSP cannot say that"),
-        (("--period", "0.0105"), "timing.period = 0.0105: expected a multiple of the plant interval of 0.001 s"),
-        (("--set", "plant.mass=true"), "plant.mass = True: expected a finite number"),
+        (("--period", "0.0105"), "timing.period = 0.0105: expected a multiple of the common step of 0.001 s"),
+        (("--set", "plant.mass=true"), "plant.mass = True: expected a number"),
         (("--set", "controller.use_reference_inputs=true"), "controller.use_reference_inputs: expected [reference]"),
-        (("nowhere.toml",), "nowhere.toml: expected a readable scenario file"),
+        (("nowhere.toml",), "nowhere.toml: expected a readable system or scenario file"),
     ],
 )
 def test_a_scenario_that_others_cannot_fly_is_wrong_usage(main: Main, arguments: tuple[str, ...], said: str) -> None:
@@ -152,9 +155,11 @@ def test_a_tool_with_an_environment_of_its_own_is_asked_for_by_its_variable(
 
 def test_a_tool_with_an_environment_of_its_own_is_left_out_where_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(COFMUPY, raising=False)
-    assert [tool.name for tool in chosen(None)] == [name for name in TOOLS if not name.startswith("cofmupy")]
+    assert [tool.name for tool in chosen(None, LOOP.ports)] == [
+        name for name in TOOLS if not name.startswith("cofmupy")
+    ]
     monkeypatch.setenv(COFMUPY, "/some/python")
-    assert [tool.name for tool in chosen(None)] == list(TOOLS)
+    assert [tool.name for tool in chosen(None, LOOP.ports)] == list(TOOLS)
 
 
 def test_a_tool_that_raises_is_named_with_its_last_words(main: Main, libcosim_that: Callable[[str], None]) -> None:

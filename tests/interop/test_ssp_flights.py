@@ -11,10 +11,11 @@ from orchestration.interop.catalogue import TOOLS, chosen
 from orchestration.interop.compare import Agreement, agreements
 from orchestration.interop.table import AIM, agrees
 from orchestration.ssp import writing
-from tests.interop.common import farthest, states_of_master, with_other_parameters
+from orchestration.system.model import System
+from tests.interop.common import LOOP, farthest, states_of_master, with_other_parameters
 
 FROM_SSP = ("libcosim, SSP", "ecos, SSP", "fmpy, SSP")
-IN_LOOP = tuple(name for name, tool in TOOLS.items() if len(tool.components) == 2)
+IN_LOOP = tuple(name for name, tool in TOOLS.items() if tool.alone is None)
 
 
 @pytest.fixture(scope="module")
@@ -25,11 +26,11 @@ def other(paper: Scenario) -> Scenario:
 
 @pytest.fixture(scope="module")
 def others(other: Scenario) -> list[Agreement]:
-    return agreements(other, chosen(None))
+    return agreements(other, chosen(None, LOOP.ports))
 
 
 def test_every_tool_flies_the_parameters_of_the_scenario(others: list[Agreement]) -> None:
-    assert [agreement.tool.name for agreement in others] == [tool.name for tool in chosen(None)]
+    assert [agreement.tool.name for agreement in others] == [tool.name for tool in chosen(None, LOOP.ports)]
     for agreement in others:
         assert farthest(agreement, agreement.same_start) <= AIM, agreement.tool.name
 
@@ -47,13 +48,13 @@ def test_each_tool_takes_the_parameters_from_the_ssp(
     """Given an SSP with the default parameters, they all fly those."""
     write = writing.write
 
-    def without_parameters(scenario: Scenario, path: Path) -> Path:
+    def without_parameters(system: System, path: Path) -> Path:
         defaults = paper.with_changes(timing={"plant_interval": 0.01}, stop_time=2.0)
-        fmus = {side: Path(getattr(scenario, side).fmu) for side in ("plant", "controller")}
+        fmus = {side: Path(system.components[side].fmu) for side in ("plant", "controller")}
         return write(defaults.with_fmus(**fmus), path)
 
     monkeypatch.setattr(writing, "write", without_parameters)
-    for agreement in agreements(other, chosen(FROM_SSP)):
+    for agreement in agreements(other, chosen(FROM_SSP, LOOP.ports)):
         assert farthest(agreement, agreement.same_start) > 1e-2, agreement.tool.name
         assert not agrees(agreement)
 
@@ -69,7 +70,7 @@ def test_fmus_of_any_name_in_any_folder_with_parameters_of_every_type(
     (folder / "flight.toml").write_text(FLIGHT, encoding="utf-8")
     monkeypatch.chdir(folder.parent)
     scenario = load_scenario(Path("später") / "flight.toml")
-    for agreement in agreements(scenario, chosen(IN_LOOP)):
+    for agreement in agreements(scenario, chosen(IN_LOOP, LOOP.ports)):
         assert farthest(agreement, agreement.same_start) <= AIM, agreement.tool.name
     empty = scenario.with_changes(parameters={"plant.cargo": 0})
     apart = np.abs(states_of_master(scenario) - states_of_master(empty)).max(axis=0)
@@ -99,5 +100,5 @@ def test_a_lag_and_a_late_first_sample_depend_on_the_inputs_of_initialisation(sh
     scenario = short.with_changes(
         parameters={"plant.actuator_time_constant": 0.05}, timing={"period": 0.02, "offset": 0.05}, stop_time=0.4
     )
-    for agreement in agreements(scenario, chosen(IN_LOOP)):
+    for agreement in agreements(scenario, chosen(IN_LOOP, LOOP.ports)):
         assert farthest(agreement, agreement.same_start) <= AIM, agreement.tool.name

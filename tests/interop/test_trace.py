@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from orchestration import QuadcosimError, Result, Scenario, UsageError, load_run, run
-from orchestration.interop.trace import PORTS, Trace, log_of, read_trace, traced_copy
+from orchestration.interop.trace import Trace, log_of, read_trace, traced_copy
 from orchestration.wiring import COMMAND, MEASUREMENT
+from tests.interop.common import LOOP
 from tests.studies.common import quadcosim
 
 Values = list[float]
@@ -33,7 +34,7 @@ class Logs:
         plant = plant or self.commands[1:]
         self.write("controller", controller, self.commands)
         self.write("plant", plant, self.measurements)
-        return read_trace(self.folder, self.fmus, STEP)
+        return read_trace(self.folder, self.fmus, LOOP, STEP)
 
     def write(self, component: str, inputs: list[Values], outputs: list[Values]) -> None:
         lines: list[dict[str, Any]] = [{"inputs": [7.0] * len(inputs[0]), "outputs": outputs[0]}]
@@ -78,7 +79,7 @@ def test_a_measurement_that_comes_late_is_another_order(logs: Logs) -> None:
 def test_a_component_without_the_other_is_alone(logs: Logs) -> None:
     for component in ("controller", "plant"):
         logs.read()
-        trace = read_trace(logs.folder, {component: logs.fmus[component]}, STEP)
+        trace = read_trace(logs.folder, {component: logs.fmus[component]}, LOOP, STEP)
         assert trace.order == "alone"
         assert trace.first_exchange == {component: "exchanged"}
         assert trace.first_inputs.keys() == trace.initial_inputs.keys() == {component}
@@ -143,7 +144,7 @@ def test_a_component_that_took_no_step_is_an_error(missing: str, logs: Logs) -> 
     else:
         log.write_text(log.read_text().splitlines()[0] + "\n")
     with pytest.raises(QuadcosimError, match=r"^plant: expected steps, found none in .*plant.jsonl$"):
-        read_trace(logs.folder, logs.fmus, STEP)
+        read_trace(logs.folder, logs.fmus, LOOP, STEP)
 
 
 # -- traced copies ----------------------------------------------------------------------------------------
@@ -153,7 +154,7 @@ def test_a_component_that_took_no_step_is_an_error(missing: str, logs: Logs) -> 
 def traced(short: Scenario, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Result]:
     """A folder with traced copies, and a flight of them in a process of its own, where nothing else has their names."""
     folder = tmp_path_factory.mktemp("it's {a} folder, ü")
-    paths = {side: traced_copy(Path(getattr(short, side).fmu), side, folder) for side in PORTS}
+    paths = {side: traced_copy(Path(getattr(short, side).fmu), side, LOOP.ports[side], folder) for side in LOOP.ports}
     scenario = short.with_fmus(**paths).with_changes(timing={"clock": "fmu"})
     (folder / "flight.toml").write_text(scenario.to_toml(), encoding="utf-8")
     quadcosim("run", "flight.toml", "--out", "flown", "--no-figures", cwd=folder)
@@ -183,4 +184,4 @@ def test_an_fmu_of_others_cannot_be_looked_into(tmp_path: Path) -> None:
     foreign = tmp_path / "Foreign.fmu"
     foreign.write_bytes(b"no archive of ours")
     with pytest.raises(UsageError, match=r"Foreign.fmu: expected an FMU packed by fmu_kit"):
-        traced_copy(foreign, "plant", tmp_path)
+        traced_copy(foreign, "plant", LOOP.ports["plant"], tmp_path)

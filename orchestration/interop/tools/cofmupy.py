@@ -12,8 +12,6 @@ import numpy as np
 from cofmupy import Coordinator
 
 Rows = list[list[float]]
-ORDER = [["controller", "plant"]]
-"""In which a loop's FMUs step; of itself it takes them in the order of a set of names, which each process has anew."""
 
 
 def fly_jacobi(job: dict[str, Any]) -> Rows:
@@ -22,7 +20,7 @@ def fly_jacobi(job: dict[str, Any]) -> Rows:
 
 
 def fly_gauss_seidel(job: dict[str, Any]) -> Rows:
-    """One FMU after the other, the controller first."""
+    """One FMU after the other, in the order of the job."""
     return _fly(job, "gauss_seidel")
 
 
@@ -31,7 +29,7 @@ def _fly(job: dict[str, Any], method: str) -> Rows:
     coordinator.start(
         {
             "fmus": [
-                {"id": name, "name": name, "path": job[name], "initialization": parameters}
+                {"id": name, "name": name, "path": job["fmus"][name], "initialization": parameters}
                 for name, parameters in job["parameters"].items()
             ],
             "connections": [
@@ -41,7 +39,8 @@ def _fly(job: dict[str, Any], method: str) -> Rows:
             "iterative": False,
         }
     )
-    coordinator.master.sequence_order = ORDER
+    # Of itself it takes the FMUs of a loop in the order of a set of names, which each process has anew.
+    coordinator.master.sequence_order = [list(job["fmus"])]
     coordinator.run_simulation(step_size=job["step"], end_time=job["stop"])
     found = coordinator.get_results()
     columns = [found[tuple(signal.split(".", 1))] for signal in job["signals"]]

@@ -1,4 +1,4 @@
-"""Both FMUs in one: a container of fmu-manipulation-toolbox, simulated by fmpy."""
+"""All FMUs in one: a container of fmu-manipulation-toolbox, simulated by fmpy."""
 
 import json
 import shutil
@@ -6,7 +6,7 @@ import shutil
 from fmpy import simulate_fmu
 from fmu_manipulation_toolbox.assembly import Assembly
 
-from orchestration.interop.job import CONNECTIONS, SIGNALS, Job, Rows
+from orchestration.interop.job import Job, Rows
 
 
 def fly_jacobi(job: Job) -> Rows:
@@ -15,7 +15,7 @@ def fly_jacobi(job: Job) -> Rows:
 
 
 def fly_sequential(job: Job) -> Rows:
-    """One FMU after the other, the controller first."""
+    """One FMU after the other, in the order of the job."""
     return _fly(job, sequential=True)
 
 
@@ -30,8 +30,8 @@ def _fly(job: Job, *, sequential: bool) -> Rows:
         "auto_link": False,
         "auto_input": False,
         "auto_output": False,
-        "link": [[files[start], output, files[end], target] for (start, output), (end, target) in CONNECTIONS],
-        "output": [[files[signal.partition(".")[0]], signal.partition(".")[2], signal] for signal in SIGNALS],
+        "link": [[files[start], output, files[end], target] for (start, output), (end, target) in job.connections],
+        "output": [[files[signal.partition(".")[0]], signal.partition(".")[2], signal] for signal in job.signals],
         "start": [[files[name], key, value] for name, set in job.parameters.items() for key, value in set.items()],
     }
     folder = job.folder / "container"
@@ -41,6 +41,6 @@ def _fly(job: Job, *, sequential: bool) -> Rows:
     (folder / "loop.json").write_text(json.dumps(description), encoding="utf-8")
     Assembly("loop.json", fmu_directory=folder).make_fmu()
     table = simulate_fmu(
-        str(folder / "loop.fmu"), stop_time=job.stop, step_size=job.step, output_interval=job.step, output=SIGNALS
+        str(folder / "loop.fmu"), stop_time=job.stop, step_size=job.step, output_interval=job.step, output=job.signals
     )
     return [list(row) for row in table][1:]

@@ -5,7 +5,7 @@ import sys
 from importlib.metadata import files
 from typing import Any
 
-from orchestration.interop.job import CONNECTIONS, SIGNALS, Job, Rows
+from orchestration.interop.job import Job, Rows
 from orchestration.ssp.writing import PARAMETER_SET
 
 
@@ -31,7 +31,7 @@ def fly(job: Job) -> Rows:
     structure = EcosSimulationStructure()
     for name, path in job.fmus.items():
         structure.add_model(name, path)
-    for (start, output), (end, target) in CONNECTIONS:
+    for (start, output), (end, target) in job.connections:
         structure.make_real_connection(f"{start}::{output}", f"{end}::{target}")
     structure.add_parameter_set(
         PARAMETER_SET, {f"{name}::{key}": value for name, set in job.parameters.items() for key, value in set.items()}
@@ -45,7 +45,7 @@ def fly_ssp(job: Job) -> Rows:
 
 
 def _record(simulation: EcosSimulation, job: Job) -> Rows:
-    recorder = _Recorder(simulation)
+    recorder = _Recorder(simulation, job)
     with simulation:
         simulation.add_listener("recorder", recorder)
         if not simulation.init(parameter_set=PARAMETER_SET):
@@ -58,10 +58,10 @@ def _record(simulation: EcosSimulation, job: Job) -> Rows:
 class _Recorder(SimulationListener):  # type: ignore[misc]
     """Reads the signals after each step."""
 
-    def __init__(self, simulation: EcosSimulation) -> None:
+    def __init__(self, simulation: EcosSimulation, job: Job) -> None:
         self.rows: Rows = []
         self._simulation = simulation
-        self._names = [signal.replace(".", "::", 1) for signal in SIGNALS]
+        self._names = [signal.replace(".", "::", 1) for signal in job.signals]
 
     def post(self, info: Any) -> None:
         """After a step."""

@@ -1,4 +1,4 @@
-"""fmpy: its SSP simulation, and `simulate_fmu` on each FMU alone, fed with what the other one sent."""
+"""fmpy: its SSP simulation, and `simulate_fmu` on each FMU alone, fed with what the others sent."""
 
 import math
 
@@ -7,7 +7,7 @@ from fmpy import simulate_fmu
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssv
 
-from orchestration.interop.job import SIGNALS, Job, Rows
+from orchestration.interop.job import Job, Rows
 from orchestration.ssp.writing import SYSTEM_PARAMETERS
 
 
@@ -17,30 +17,29 @@ def fly_ssp(job: Job) -> Rows:
         str(job.ssp), stop_time=job.stop, step_size=job.step, parameter_set=read_ssv(str(job.ssp), SYSTEM_PARAMETERS)
     )
     # fmpy puts the time at which a step began beside the values at its end.
-    return [[row["time"] + job.step, *(row[signal] for signal in SIGNALS)] for row in table]
+    return [[row["time"] + job.step, *(row[signal] for signal in job.signals)] for row in table]
 
 
 def fly_plant(job: Job) -> Rows:
     """The plant alone, fed with recorded commands."""
-    return _fly_alone(job, "plant", "controller")
+    return _fly_alone(job, "plant")
 
 
 def fly_controller(job: Job) -> Rows:
     """The controller alone, fed with recorded measurements."""
-    return _fly_alone(job, "controller", "plant")
+    return _fly_alone(job, "controller")
 
 
-def _fly_alone(job: Job, component: str, other: str) -> Rows:
+def _fly_alone(job: Job, component: str) -> Rows:
     recorded = np.load(job.recorded)
-    inputs = {name: i for i, name in enumerate(SIGNALS, start=1) if name.startswith(f"{other}.")}
-    signals = np.zeros(
-        len(recorded), dtype=[("time", np.float64), *((name.partition(".")[2], np.float64) for name in inputs)]
-    )
+    places = {signal: i for i, signal in enumerate(job.signals, start=1)}
+    inputs = {name: places[".".join(start)] for start, (owner, name) in job.connections if owner == component}
+    signals = np.zeros(len(recorded), dtype=[("time", np.float64), *((name, np.float64) for name in inputs)])
     # fmpy's own points: an input is interpolated where its rows lie a last bit beside them.
     signals["time"] = job.step * np.arange(len(recorded))
     for name, column in inputs.items():
-        signals[name.partition(".")[2]] = recorded[:, column]
-    outputs = [name.partition(".")[2] for name in SIGNALS if name not in inputs]
+        signals[name] = recorded[:, column]
+    own = [signal.partition(".")[2] if signal.partition(".")[0] == component else None for signal in job.signals]
     table = simulate_fmu(
         str(job.fmus[component]),
         stop_time=job.stop,
@@ -48,7 +47,6 @@ def _fly_alone(job: Job, component: str, other: str) -> Rows:
         output_interval=job.step,
         start_values=job.parameters[component],
         input=signals,
-        output=outputs,
+        output=[name for name in own if name is not None],
     )
-    names = ["time", *(None if name in inputs else name.partition(".")[2] for name in SIGNALS)]
-    return [[math.nan if name is None else row[name] for name in names] for row in table[1:]]
+    return [[math.nan if name is None else row[name] for name in ("time", *own)] for row in table[1:]]

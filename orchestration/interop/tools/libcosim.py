@@ -5,7 +5,7 @@ from libcosimpy.CosimExecution import CosimExecution
 from libcosimpy.CosimObserver import CosimObserver
 from libcosimpy.CosimSlave import CosimLocalSlave
 
-from orchestration.interop.job import CONNECTIONS, SIGNALS, Job, Rows
+from orchestration.interop.job import Job, Rows
 from orchestration.system.times import NANOSECONDS
 
 SPARE = 2
@@ -27,7 +27,7 @@ def fly(job: Job) -> Rows:
             }[variables.kind(name, parameter)]
             if not set_initial(*variables.at(name, parameter), value):
                 raise RuntimeError(f"{name}.{parameter} = {value}: libcosim did not take it")
-    for output, target in CONNECTIONS:
+    for output, target in job.connections:
         execution.connect_real_variables(*variables.at(*output), *variables.at(*target))
     return _record(execution, variables, job)
 
@@ -59,7 +59,7 @@ class _Variables:
 def _record(execution: CosimExecution, variables: _Variables, job: Job) -> Rows:
     observer = CosimObserver.create_time_series(buffer_size=job.steps + SPARE)
     execution.add_observer(observer)
-    places = [variables.at(*signal.split(".", 1)) for signal in SIGNALS]
+    places = [variables.at(*signal.split(".", 1)) for signal in job.signals]
     for place in places:
         observer.start_time_series(*place, CosimVariableType.REAL)
     if not execution.simulate_until(round(job.stop * NANOSECONDS)):
