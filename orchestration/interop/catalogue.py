@@ -24,6 +24,8 @@ class Tool:
     """module:function in `orchestration.interop.tools`"""
     alone: str | None = None
     """the component that it flies, if it is no master"""
+    converts: bool = False
+    """whether it passes on values between variables of different types"""
     python: str | None = None
     """environment variable that names a Python with its packages, where they do not go with those of this project"""
 
@@ -83,8 +85,13 @@ TOOLS = {
         Tool(name="ecos", packages=("ecospy", "tbb"), call="ecos:fly"),
         Tool(name="ecos, SSP", packages=("ecospy", "tbb"), call="ecos:fly_ssp"),
         Tool(name="fmpy, SSP", packages=("fmpy",), call="fmpy:fly_ssp"),
-        Tool(name="fmucontainer", packages=("fmu-manipulation-toolbox",), call="container:fly_jacobi"),
-        Tool(name="fmucontainer -sequential", packages=("fmu-manipulation-toolbox",), call="container:fly_sequential"),
+        Tool(name="fmucontainer", packages=("fmu-manipulation-toolbox",), call="container:fly_jacobi", converts=True),
+        Tool(
+            name="fmucontainer -sequential",
+            packages=("fmu-manipulation-toolbox",),
+            call="container:fly_sequential",
+            converts=True,
+        ),
         Tool(name="cofmupy", packages=("cofmupy",), call="cofmupy:fly_jacobi", python=COFMUPY),
         Tool(name="cofmupy gauss_seidel", packages=("cofmupy",), call="cofmupy:fly_gauss_seidel", python=COFMUPY),
         Tool(name="fmpy, plant alone", packages=("fmpy",), call="fmpy:fly_plant", alone="plant"),

@@ -3,7 +3,7 @@
 import math
 import os
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.errors import QuadcosimError
+from orchestration.errors import QuadcosimError, UsageError
 from orchestration.interop.catalogue import Tool
 from orchestration.interop.flights import Flights
 from orchestration.interop.trace import Trace
@@ -50,7 +50,7 @@ class Agreement:
 
 def agreements(
     asked: Scenario | System,
-    tools: Iterable[Tool],
+    tools: Sequence[Tool],
     *,
     announce: Callable[[str], None] | None = None,
     progress: Callable[[float], None] | None = None,
@@ -62,10 +62,10 @@ def agreements(
     system that an SSP cannot carry or whose times are no multiples of that step, `QuadcosimError` with a tool's last
     words if it fails.
     """
-    tools = list(tools)
-    versions = {tool.name: tool.versions() for tool in tools}
     with tempfile.TemporaryDirectory(prefix="quadcosim_") as folder:
+        versions = {tool.name: tool.versions() for tool in tools}
         flights = Flights(asked, Path(folder), announce)
+        tools = _able(tools, flights.loop.converted, announce)
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             seen = [pool.submit(flights.seen, tool) for tool in tools]
             flown = [pool.submit(flights.flown, tool) for tool in tools]
@@ -74,6 +74,18 @@ def agreements(
                 _agreement(flights, tool, versions[tool.name], trace.result(), rows.result())
                 for tool, trace, rows in zip(tools, seen, flown)
             ]
+
+
+def _able(tools: Sequence[Tool], converted: Sequence[str], announce: Callable[[str], None] | None) -> list[Tool]:
+    """The tools that can fly a system, the others told of; raises `UsageError` if there are none."""
+    able = [tool for tool in tools if tool.converts or not converted]
+    left_out = "; ".join(tool.name for tool in tools if tool not in able)
+    told = f"{left_out}: no conversion of types, as of {', '.join(converted)}"
+    if not able:
+        raise UsageError(f"--tool {told}; expected one that has it")
+    if left_out and announce is not None:
+        announce(f"left out {told}")
+    return able
 
 
 def _wait(tasks: Sequence[Future[Any]], progress: Callable[[float], None] | None) -> None:

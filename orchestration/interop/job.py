@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TypeAlias
 
 from orchestration.errors import UsageError
+from orchestration.fmi.model import Kind
 from orchestration.ssp.carried import Carried
-from orchestration.system.model import Parameter, component_of, variable_of
+from orchestration.system.model import Parameter, variable_of
 
 End: TypeAlias = tuple[str, str]
 """Component and variable"""
@@ -32,11 +33,20 @@ class Loop:
     ports: Mapping[str, Ports]
     """by component, in the order in which a tool that steps one after the other takes them"""
     connections: tuple[tuple[End, End], ...]
-    """output to input, all Real"""
+    """output to input"""
     states: tuple[str, ...]
     """connected outputs of components in continuous time, as COMPONENT.VARIABLE: of the end of a step"""
     commands: tuple[str, ...]
     """of sampled ones: a step gives what it computed at its start"""
+
+    kinds: Mapping[End, Kind]
+    """of every connected variable"""
+
+    @property
+    def converted(self) -> tuple[str, ...]:
+        """Outputs that are no Reals, or do not go to Reals."""
+        mixed = [start for start, end in self.connections if {self.kinds[start], self.kinds[end]} != {"Real"}]
+        return tuple(dict.fromkeys(".".join(start) for start in mixed))
 
     @property
     def signals(self) -> tuple[str, ...]:
@@ -50,17 +60,10 @@ class Loop:
 
 
 def loop_of(given: Carried) -> Loop:
-    """The loop of a system; raises `UsageError` for a connection that is not of Reals as they are."""
-    models = {part.name: part.model for part in given.parts}
+    """The loop of a system; raises `UsageError` for a connection that does not pass on values as they are."""
     for x in given.system.connections:
         if x.scale != 1.0 or x.offset != 0.0:
             raise UsageError(f"connections.{x.name}: has scale or offset; expected none to compare with other masters")
-        for end in (*x.start, *x.end):
-            kind = models[component_of(end)].variables[variable_of(end)].kind
-            if kind != "Real":
-                raise UsageError(
-                    f"connections.{x.name}: {end} is a {kind}; expected Reals to compare with other masters"
-                )
     sampled = {name for name, component in given.system.components.items() if component.sampling is not None}
     outputs = [(part.name, f"{part.name}.{name}") for part in given.parts for name in part.outputs]
     return Loop(
@@ -70,6 +73,9 @@ def loop_of(given: Carried) -> Loop:
             for x in given.system.connections
             for start, end in zip(x.start, x.end, strict=True)
         ),
+        kinds={
+            (part.name, name): part.variable(name).kind for part in given.parts for name in part.inputs + part.outputs
+        },
         states=tuple(signal for owner, signal in outputs if owner not in sampled),
         commands=tuple(signal for owner, signal in outputs if owner in sampled),
     )

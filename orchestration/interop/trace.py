@@ -11,10 +11,10 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import fmpy
-
 from fmu_kit.packaging import read_source_hash, write_archive
 from orchestration.errors import QuadcosimError, UsageError
+from orchestration.fmi.model import Variable, read_model
+from orchestration.fmi.values import number_of
 from orchestration.interop.job import Loop, Ports
 
 _LAYER = """
@@ -26,16 +26,20 @@ import json as _json
 _log = open({log!r}, "a", buffering=1, encoding="utf-8")
 
 
+def _values(self, variables):
+    return [float(getattr(self, get)([reference])[0]) for get, reference in variables]
+
+
 def _do_step(self, t, h):
-    inputs = self.get_real({inputs})
+    inputs = _values(self, {inputs})
     done = _Model.do_step(self, t, h)
-    _log.write(_json.dumps({{"t": t, "h": h, "inputs": inputs, "outputs": self.get_real({outputs})}}) + "\\n")
+    _log.write(_json.dumps({{"t": t, "h": h, "inputs": inputs, "outputs": _values(self, {outputs})}}) + "\\n")
     return done
 
 
 def _exit_initialization_mode(self):
     _Model.exit_initialization_mode(self)
-    _log.write(_json.dumps({{"inputs": self.get_real({inputs}), "outputs": self.get_real({outputs})}}) + "\\n")
+    _log.write(_json.dumps({{"inputs": _values(self, {inputs}), "outputs": _values(self, {outputs})}}) + "\\n")
 
 
 _Model = {model}.__mro__[1]
@@ -53,15 +57,19 @@ def traced_copy(fmu: Path, component: str, ports: Ports, folder: Path) -> Path:
         raise UsageError(f"{fmu}: expected an FMU packed by fmu_kit; what others are given cannot be seen")
     with zipfile.ZipFile(fmu) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}
-    description = fmpy.read_model_description(str(fmu))
-    references = {variable.name: variable.valueReference for variable in description.modelVariables}
-    inputs, outputs = ([references[name] for name in names] for names in (ports.inputs, ports.outputs))
+    model = read_model(fmu)
+    inputs, outputs = ([_getter(model.variables[name]) for name in names] for names in (ports.inputs, ports.outputs))
     entry = f"resources/{files['resources/slavemodule.txt'].decode().strip()}.py"
     log = str(log_of(component, folder))
-    layer = _LAYER.format(log=log, inputs=inputs, outputs=outputs, model=description.modelName)
+    layer = _LAYER.format(log=log, inputs=inputs, outputs=outputs, model=model.name)
     copy = folder / f"{component}.fmu"
     write_archive(copy, {**files, entry: files[entry] + layer.encode()}, first="modelDescription.xml")
     return copy
+
+
+def _getter(variable: Variable) -> tuple[str, int]:
+    """The method of the slave that reads a variable, and its reference."""
+    return f"get_{'integer' if variable.kind == 'Enumeration' else variable.kind.lower()}", variable.reference
 
 
 def log_of(component: str, folder: Path) -> Path:
@@ -148,9 +156,9 @@ def _first_exchange(
     steps: Mapping[str, list[dict[str, Any]]],
 ) -> str:
     """What the connected inputs of `component` were at its first step."""
-    variables = {v.name: v for v in fmpy.read_model_description(str(fmu)).modelVariables}
+    variables = read_model(fmu).variables
     inputs = steps[component][0]["inputs"]
-    if inputs == [float(variables[name].start) for name in loop.ports[component].inputs]:
+    if inputs == [number_of(variables[name], variables[name].start or 0.0) for name in loop.ports[component].inputs]:
         return "start values"
     if not any(inputs):
         return "zeros"

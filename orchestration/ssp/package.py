@@ -4,6 +4,7 @@ import hashlib
 import shutil
 import tempfile
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -72,7 +73,7 @@ def _unpack(path: Path, folder: Path) -> None:
             archive.extractall(partial)
         if not folder.is_dir():
             partial.rename(folder)
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError) as error:
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
         raise UsageError(f"{path}: expected an SSP archive: {error}") from error
     except OSError:
         if not folder.is_dir():  # else another process was first

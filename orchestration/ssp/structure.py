@@ -76,6 +76,8 @@ def structure_of(root: Read, package: Package) -> Structure:
 def _walk(system: Read, path: Path_, package: Package, into: Structure) -> None:
     _connectors(system, path, into)
     elements = {child.get("name"): child for child in all_of(system, "ssd:Elements/*")}
+    if len(elements) < len(all_of(system, "ssd:Elements/*")):
+        raise UsageError(f"{'.'.join(path) or 'the system'}: has two elements of one name; expected a name for each")
     for name, child in elements.items():
         kind = child.tag.rpartition("}")[2]
         if kind == "System":

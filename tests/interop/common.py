@@ -22,6 +22,7 @@ LOOP = Loop(
         *((("plant", name), ("controller", name)) for name in MEASUREMENT),
         *((("controller", name), ("plant", name)) for name in COMMAND),
     ),
+    kinds={(name, v): "Real" for name, ports in PORTS.items() for v in ports.inputs + ports.outputs},
     states=tuple(f"plant.{name}" for name in MEASUREMENT),
     commands=tuple(f"controller.{name}" for name in COMMAND),
 )

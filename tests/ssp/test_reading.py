@@ -323,6 +323,7 @@ LATE, ENDLESS = STEP.replace('startTime="0.0"', 'startTime="1.0"'), STEP.replace
         (loop(wire("plant.x", "law.x"), wire("plant.x", "law.x")), "connection to law.x: is connected already"),
         (loop(wire("law.u", "law.x")), "connection law.u -> law.x, from N to mm: these are units of different"),
         (loop(wire("plant.x", "law.v", BOOLEAN)), "a BooleanMappingTransformation: only linear"),
+        (laws("law", "law"), "the system: has two elements of one name"),
         (laws("law", "l w", "l_w"), "l w and l_w: would be named l_w"),
     ],
 )
