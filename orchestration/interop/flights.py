@@ -162,9 +162,13 @@ class _GivenStart(Fmi2Instance):
         self._held.append(usual)
         return lambda: usual() if self.stepped else None
 
-    def exit_initialization(self) -> None:
-        """As of the base, between the given inputs."""
+    def enter_initialization(self, start: float, stop: float) -> None:
+        """As of the base; what it sends first is what comes of the given inputs."""
+        super().enter_initialization(start, stop)
         self._put_initial()
+
+    def exit_initialization(self) -> None:
+        """As of the base; then the inputs of the first step."""
         super().exit_initialization()
         self._put_first()
 
