@@ -174,9 +174,7 @@ def test_two_fmus_of_one_file_name_are_refused(short: Scenario, built: dict[str,
 
 def test_fmus_that_do_not_fit_are_refused(short: Scenario, built: dict[str, Path], tmp_path: Path) -> None:
     swapped = short.with_fmus(plant=built["UnifiedController"], controller=built["QuadrotorPlant"])
-    assert refusal(swapped, tmp_path).startswith(
-        "plant.fmu: UnifiedController has no output position.x, "
-    )
+    assert refusal(swapped, tmp_path).startswith("plant.fmu: UnifiedController has no output position.x, ")
 
 
 def refusal(scenario: Scenario, folder: Path) -> str:
