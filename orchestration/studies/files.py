@@ -38,6 +38,14 @@ class Files:
         assert self.contents is not None
         return {name: read_model(path) for name, path in self.fmus.items()}
 
+    @cached_property
+    def starts(self) -> dict[str, dict[str, float]]:
+        """The start values of all Real variables, by FMU and name."""
+        return {
+            name: {v.name: float(v.start) for v in model.variables.values() if v.kind == "Real" and v.start is not None}
+            for name, model in self.models.items()
+        }
+
     def models_of(self, system: System) -> dict[str, Model]:
         """The models of its components."""
         return {name: self.models[component.fmu] for name, component in system.components.items()}

@@ -11,7 +11,6 @@ from collections.abc import Container, Mapping
 from pathlib import Path
 from typing import Any
 
-from orchestration.fmi.model import Model
 from orchestration.quadrotor import translation
 from orchestration.quadrotor.translation import in_words_of_a_scenario
 from orchestration.scenario import Scenario
@@ -96,7 +95,7 @@ def run_key(system: System, files: Files) -> str:
     content = {
         **{key: getattr(system, key) for key in ("stop_time", "seed", "objectives", "streams")},
         "components": [_component_of(name, component, files) for name, component in system.components.items()],
-        "connections": [dataclasses.asdict(x) for x in system.connections],
+        "connections": [_values_of(x) for x in system.connections],
         "sources": [[name, _source_of(source, files)] for name, source in system.sources.items()],
         "criterion": dataclasses.asdict(system.criterion),
         "versions": versions(),
@@ -105,10 +104,9 @@ def run_key(system: System, files: Files) -> str:
 
 
 def _component_of(name: str, component: Component, files: Files) -> dict[str, Any]:
-    starts = _starts(files.models[component.fmu])
-    content = {f.name: getattr(component, f.name) for f in dataclasses.fields(component)}
+    starts = files.starts[component.fmu]
     return {
-        **content,
+        **_values_of(component),
         "name": name,
         "fmu": files.hashes[component.fmu],
         "parameters": {key: v for key, v in component.parameters.items() if key not in starts or v != starts[key]},
@@ -116,13 +114,12 @@ def _component_of(name: str, component: Component, files: Files) -> dict[str, An
     }
 
 
-def _starts(model: Model) -> dict[str, float]:
-    return {v.name: float(v.start) for v in model.variables.values() if v.kind == "Real" and v.start is not None}
-
-
 def _source_of(source: Source, files: Files) -> dict[str, Any]:
-    content = dataclasses.asdict(source)
-    return {**content, "file": None if source.file is None else files.hashes[str(source.file)]}
+    return {**_values_of(source), "file": None if source.file is None else files.hashes[str(source.file)]}
+
+
+def _values_of(of: Any) -> dict[str, Any]:
+    return {field.name: getattr(of, field.name) for field in dataclasses.fields(of)}
 
 
 def study_parts(study: Study) -> dict[str, str]:
