@@ -34,6 +34,8 @@ def connect(
     proposal = propose(
         [(text, read_model(fmus.locate(text, say))) for text in fmu], Path.cwd() if out is None else out.parent
     )
+    for line in proposal.guessed:
+        say(f"guessed: {line}")
     for line in proposal.undecided:
         say(f"not decided: {line}")
     if out is None:

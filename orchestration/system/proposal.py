@@ -23,9 +23,11 @@ TAKEN = frozenset(("rows", "time", "stop_time", "sampled"))
 
 @dataclass(frozen=True, kw_only=True)
 class Proposal:
-    """A system file as text, and what it does not decide."""
+    """A system file as text, what it guesses, and what it does not decide."""
 
     text: str
+    guessed: tuple[str, ...]
+    """connections of variables with different names"""
     undecided: tuple[str, ...]
 
 
@@ -56,7 +58,11 @@ def propose(fmus: Sequence[tuple[str, Model]], folder: Path) -> Proposal:
     first = next((f"{n}.{v}" for n, model in named.items() for v in model.names("output", kinds=("Real",))), None)
     if first is not None:
         blocks.append(["# What a run comes to, for instance:", "# [objectives]", f'# peak = "max(abs({first}))"'])
-    return Proposal(text="\n\n".join("\n".join(block) for block in blocks) + "\n", undecided=matches.undecided)
+    return Proposal(
+        text="\n\n".join("\n".join(block) for block in blocks) + "\n",
+        guessed=_guesses(matches.found),
+        undecided=matches.undecided,
+    )
 
 
 def _names(models: Iterable[Model]) -> list[str]:
@@ -125,7 +131,11 @@ def _connection(name: str, members: Sequence[Match], converted: str) -> list[str
         conversion = members[0].conversion
         lines.append(f"scale = {conversion.scale!r}    # its units differ")
         lines += [f"offset = {conversion.offset!r}"] if conversion.offset else []
-    return [*(f"# {m.end} has {m.start} because {m.why}" for m in members if m.why is not None), *lines]
+    return [*(f"# {guess}" for guess in _guesses(members)), *lines]
+
+
+def _guesses(matches: Iterable[Match]) -> tuple[str, ...]:
+    return tuple(f"{m.end} has {m.start} because {m.why}" for m in matches if m.why is not None)
 
 
 def _list(key: str, ends: Sequence[str]) -> list[str]:

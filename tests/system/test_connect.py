@@ -66,6 +66,8 @@ def test_names_that_differ_are_told_from_words_then_from_units_and_the_file_says
     assert wires(system) == {f"A.{output} -> B.{entry}"}
     assert undecided == ()
     assert f"# B.{entry} has A.{output} because {why}\n" in text
+    said = propose([(str(path), read_model(path)) for path in paths], tmp_path).guessed
+    assert said == (f"B.{entry} has A.{output} because {why}",)
 
 
 def test_what_has_the_same_name_somewhere_feeds_nothing_by_likeness(tmp_path: Path) -> None:
