@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from orchestration.simulation import run
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.system_file import load_system
@@ -16,16 +15,3 @@ NAMES = sorted(path.parent.name for path in EXAMPLES.glob("*/system.toml"))
 def example(name: str, changes: Mapping[str, Any] | None = None) -> System:
     """The system of an example, changed by path; its FMUs are built when it is run."""
     return changed(load_system(EXAMPLES / name / "system.toml"), changes or {})
-
-
-def largest_good(system: System, path: str, low: float, high: float, tolerance: float) -> float:
-    """The middle of the last bracket of a bisection between a value that is good and one that is not."""
-    assert run(changed(system, {path: low})).metrics["good"]
-    assert not run(changed(system, {path: high})).metrics["good"]
-    while high - low > tolerance:
-        middle = 0.5 * (low + high)
-        if run(changed(system, {path: middle})).metrics["good"]:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)

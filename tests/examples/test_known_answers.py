@@ -6,34 +6,46 @@ import numpy as np
 import pytest
 
 from orchestration.simulation import run
-from tests.examples.common import example, largest_good
+from orchestration.studies import limit
+from orchestration.system.model import System
+from tests.examples.common import example
 
 PERIOD = "components.controller.sampling.period"
 COMMAND_DELAY = "connections.command.delay"
 
 
+def limits(system: System, of: str, near: float, **options: float) -> tuple[float, float]:
+    """What `quadcosim limit` says of a range around a value: the limit by runs, and the local one."""
+    found = limit.find(system, of, first=0.97 * near, last=1.03 * near, scan=0.03 * near, **options)
+    assert found.large_signal_limit is not None
+    assert found.local_limit is not None
+    return found.large_signal_limit, found.local_limit
+
+
 @pytest.mark.parametrize("k_d", [1.0, 1.4])
 def test_double_integrator_has_the_largest_period_of_theory(k_d: float) -> None:
-    """min(2/k_d, 2 k_d/k_p), within 0.5 %: the run of 240 s must show that the motion still dies out."""
+    """min(2/k_d, 2 k_d/k_p): by runs within 0.5 %, as 240 s must show it; the local limit within 0.05 %."""
     system = example("double_integrator", {"components.controller.parameters.k_d": k_d})
     expected = min(2.0 / k_d, 2.0 * k_d)
-    assert largest_good(system, PERIOD, 0.7 * expected, 1.2 * expected, 0.002) == pytest.approx(expected, rel=0.005)
+    large, local = limits(system, PERIOD, expected, tolerance=0.002)
+    assert large == pytest.approx(expected, rel=0.005)
+    assert local == pytest.approx(expected, rel=0.0005)
 
 
-@pytest.mark.parametrize("connection", ["command", "measurement"])
-def test_double_integrator_has_the_largest_delay_of_theory_wherever_it_lies(connection: str) -> None:
-    """0.68614 s at a period of 0.05 s, within 0.1 %; plant and samples are exact, so only the horizon is left."""
-    limit = largest_good(example("double_integrator"), f"connections.{connection}.delay", 0.5, 0.9, 2e-4)
-    assert limit == pytest.approx(0.68614, rel=1e-3)
+def test_double_integrator_has_the_largest_delay_of_theory() -> None:
+    """0.68614 s at a period of 0.05 s, within 0.2 %: the tolerance of 1 ms; plant and samples are exact."""
+    found = limits(example("double_integrator", {"stop_time": 120.0}), COMMAND_DELAY, 0.686, tolerance=1e-3)
+    assert found == pytest.approx((0.68614, 0.68614), rel=2e-3)
 
 
 WIRE = {f"connections.command.{key}": 0.0 for key in ("delay_jitter", "loss")}
 
 
 def test_servo_has_the_largest_delay_of_theory() -> None:
-    """13.497 ms, within 0.1 %, as above."""
-    limit = largest_good(example("dc_servo", WIRE), COMMAND_DELAY, 0.010, 0.018, 1e-5)
-    assert limit == pytest.approx(0.013497, rel=1e-3)
+    """13.497 ms: by runs within 0.2 %, the tolerance of 0.02 ms; the local limit within 0.02 %, its accuracy."""
+    large, local = limits(example("dc_servo", WIRE), COMMAND_DELAY, 0.0135, tolerance=2e-5)
+    assert large == pytest.approx(0.013497, rel=2e-3)
+    assert local == pytest.approx(0.013497, rel=2e-4)
 
 
 def test_servo_decays_with_the_spectral_radius_of_theory() -> None:
