@@ -28,8 +28,8 @@ from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 
 PULSE = 1e-6
 """of an input: of its value, or absolute where that is smaller than 1"""
-LARGE, SMALL = 1e-3, 1e-13
-"""sizes, likewise, between which a difference is followed: linear, and above what rounding leaves"""
+LARGE, SMALL = 1e3, 1e-7
+"""of what the pulse has made: sizes between which the difference is followed, linear and above what rounding leaves"""
 AT_REST = 1e-6
 """what may move in the first periods of the run that nothing strikes"""
 FEWEST, MOST = 100, 400
@@ -66,7 +66,8 @@ def growth_of(system: System, instances: Instances) -> Growth:
     if not size.any():
         raise UsageError("a pulse on the inputs moves nothing that is exchanged")
     begin = 2  # the pulse is over
-    ends = np.flatnonzero((size[begin:] > LARGE) | (size[begin:] < SMALL))
+    made = float(size[: begin + 1].max())
+    ends = np.flatnonzero((size[begin:] > LARGE * made) | (size[begin:] < SMALL * made))
     end = begin + int(ends[0]) if len(ends) else count
     seconds = float(interval) / NANOSECONDS
     window = difference[begin:end]
@@ -101,9 +102,9 @@ def _rate(window: Floats, delays: int, rounding: float) -> float | None:
 
 def _between(size: Floats, begin: int, end: int) -> float:
     """The mean growth of the logarithm from one instant to another, of what is soon too large or too small."""
-    if size[end] == 0.0 or end <= begin:
+    if size[begin] == 0.0 or size[end] == 0.0 or end <= begin:
         return -math.inf
-    return math.log(float(size[end] / max(size[begin], SMALL))) / (end - begin)
+    return math.log(float(size[end] / size[begin])) / (end - begin)
 
 
 def _at_rest(system: System) -> tuple[System, Fraction]:

@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 
 import orchestration
-from orchestration import UsageError
+from orchestration import Scenario, Timing, UsageError
 from orchestration.fmi.reuse import Instances
+from orchestration.quadrotor.translation import system_of
 from orchestration.request import load_request
 from orchestration.studies.axes import Axis
 from orchestration.studies.drawing import draw_study
 from orchestration.studies.limit import find
+from orchestration.studies.linear import HoverLoop
 from orchestration.studies.store import expect_columns, is_column, open_for_reading
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
@@ -199,6 +201,15 @@ def test_the_twins_part_as_the_eigenvalues_of_the_loop_say(
 ) -> None:
     varied = changed(system, {PERIOD: period, DELAY: delay})
     assert growth_of(varied, instances).rate == pytest.approx(theory(period, delay), abs=1e-8)
+
+
+@pytest.mark.parametrize("period", [0.079, 0.081])
+def test_the_twins_part_as_the_loop_that_is_linearised_through_saved_states(
+    instances: Instances, period: float
+) -> None:
+    scenario = Scenario(stop_time=8.0, timing=Timing(period=period, plant_interval=0.02))
+    expected = math.log(HoverLoop.of(scenario).spectral_radius(period, 0.0)) / period
+    assert growth_of(system_of(scenario), instances).rate == pytest.approx(expected, abs=1e-6)
 
 
 def test_noise_loss_and_jitter_do_not_change_the_growth(system: System, instances: Instances) -> None:
