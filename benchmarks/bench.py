@@ -14,18 +14,18 @@ from controller_fmu.vehicle import Measurement, Model
 from fmu_kit import packaging
 from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.trajectory import Trajectory
-from orchestration import wiring
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.model import read_model
+from orchestration.master.agenda import Agenda
+from orchestration.master.board import Board
+from orchestration.master.streams import Streams
+from orchestration.quadrotor import wiring
+from orchestration.quadrotor.scenario import FmuChoice, Scenario
+from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.translation import system_of
-from orchestration.scenario import FmuChoice, Scenario
 from orchestration.simulation import prepared
 from orchestration.simulator import Floats
-from orchestration.stepping.agenda import Agenda
-from orchestration.stepping.board import Board
-from orchestration.stepping.streams import Streams
 from orchestration.system.check import recorded
-from orchestration.timing import Timing
 from plant_fmu.dynamics import Body, RigidState, Wind, Wrench, derivative
 from plant_fmu.integrator import rk4_step
 

@@ -6,8 +6,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import system_of
-from orchestration.scenario import Scenario
 from orchestration.studies.axes import Axis
 from orchestration.studies.files import files_of, with_files
 from orchestration.studies.study import Study

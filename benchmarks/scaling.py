@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestration import plots
-from orchestration.recording import InMemory
+from orchestration.master.agenda import Agenda
+from orchestration.master.master import Master
+from orchestration.master.recording import InMemory
+from orchestration.master.streams import Streams
+from orchestration.results import plots
 from orchestration.simulator import Floats, Transfer
-from orchestration.stepping.agenda import Agenda
-from orchestration.stepping.master import Master
-from orchestration.stepping.streams import Streams
 from orchestration.system.model import Component, Connection, Sampling, System
 
 SIZES = (2, 4, 10, 20, 50, 100, 200)

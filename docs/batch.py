@@ -13,8 +13,8 @@ import numpy as np
 from controller_fmu.sliding_mode.law import Gains, Measurement, Model, evaluate
 from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.trajectory import Trajectory
+from orchestration.master.sources import NUMPY
 from orchestration.quadrotor.measures import SETTLED
-from orchestration.stepping.sources import NUMPY
 from plant_fmu.dynamics import Body, RigidState, Wind, Wrench, derivative
 from plant_fmu.integrator import rk4_step
 

@@ -6,12 +6,13 @@ import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration import plots, run
+from orchestration import run
+from orchestration.master.agenda import Agenda
+from orchestration.master.streams import Streams
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.translation import system_of
-from orchestration.scenario import Scenario
-from orchestration.stepping.agenda import Agenda
-from orchestration.stepping.streams import Streams
-from orchestration.timing import Timing
+from orchestration.results import plots
 
 FIGURES = Path(__file__).parent / "figures"
 MILLISECONDS = 1e-6

@@ -20,8 +20,8 @@ import numpy as np
 import pandas as pd
 
 from docs import batch, charts, experiments
+from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import system_of
-from orchestration.scenario import Scenario
 from orchestration.statistics import wilson
 from orchestration.studies import drawing, figures, limit
 from orchestration.studies.engine import Pool

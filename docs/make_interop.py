@@ -11,16 +11,17 @@ from pathlib import Path
 import matplotlib
 
 from docs.pages import fill
-from orchestration import fmus, plots
-from orchestration.interop import table
-from orchestration.interop.catalogue import chosen
-from orchestration.interop.compare import agreements
-from orchestration.interop.figure import agreement_chart
-from orchestration.scenario import Scenario
-from orchestration.timing import Timing
-from orchestration.validation import rules
-from orchestration.validation.finding import name_of
-from orchestration.wiring import MODELS
+from orchestration import fmus
+from orchestration.checks.validation import rules
+from orchestration.checks.validation.finding import name_of
+from orchestration.exchange.interop import table
+from orchestration.exchange.interop.catalogue import chosen
+from orchestration.exchange.interop.compare import agreements
+from orchestration.exchange.interop.figure import agreement_chart
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.timing import Timing
+from orchestration.quadrotor.wiring import MODELS
+from orchestration.results import plots
 from tests.fmus.mutants import MUTANTS
 from tests.fmus.verdicts import as_markdown, verdicts
 

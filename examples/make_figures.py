@@ -11,8 +11,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration.plots import BLUE, GREEN, GREY, ORANGE, RED, STYLE
-from orchestration.result import Result
+from orchestration.results.plots import BLUE, GREEN, GREY, ORANGE, RED, STYLE
+from orchestration.results.result import Result
 from orchestration.simulation import run
 from orchestration.system.paths import changed
 from orchestration.system.system_file import load_system

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from orchestration.errors import QuadcosimError, SimulatorError, UsageError
-    from orchestration.pause import fly_until, resume
-    from orchestration.result import Result
-    from orchestration.run_directory import load_run, save_run
-    from orchestration.scenario import FmuChoice, Record, ReferenceChoice, Scenario
-    from orchestration.scenario_file import load_scenario
+    from orchestration.quadrotor.scenario import FmuChoice, Record, ReferenceChoice, Scenario
+    from orchestration.quadrotor.scenario_file import load_scenario
+    from orchestration.quadrotor.timing import Timing
+    from orchestration.results.pause import fly_until, resume
+    from orchestration.results.result import Result
+    from orchestration.results.run_directory import load_run, save_run
     from orchestration.simulation import RunInterrupted, run
-    from orchestration.timing import Timing
 
 _HOMES = {
     "QuadcosimError": "errors",
@@ -26,17 +26,17 @@ _HOMES = {
     "UsageError": "errors",
     "RunInterrupted": "simulation",
     "run": "simulation",
-    "Result": "result",
-    "load_run": "run_directory",
-    "save_run": "run_directory",
-    "fly_until": "pause",
-    "resume": "pause",
-    "FmuChoice": "scenario",
-    "Record": "scenario",
-    "ReferenceChoice": "scenario",
-    "Scenario": "scenario",
-    "load_scenario": "scenario_file",
-    "Timing": "timing",
+    "Result": "results.result",
+    "load_run": "results.run_directory",
+    "save_run": "results.run_directory",
+    "fly_until": "results.pause",
+    "resume": "results.pause",
+    "FmuChoice": "quadrotor.scenario",
+    "Record": "quadrotor.scenario",
+    "ReferenceChoice": "quadrotor.scenario",
+    "Scenario": "quadrotor.scenario",
+    "load_scenario": "quadrotor.scenario_file",
+    "Timing": "quadrotor.timing",
 }
 
 __all__ = [

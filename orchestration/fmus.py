@@ -9,14 +9,14 @@ from typing import TypeVar
 from fmu_kit.bundle import PackagingError, Target
 from fmu_kit.discovery import slave_beside, slaves_in
 from fmu_kit.packaging import read_source_hash, source_hash
-from orchestration import child
+from orchestration import subprocesses
 from orchestration.errors import QuadcosimError, UsageError
-from orchestration.wiring import MODELS
+from orchestration.quadrotor.wiring import MODELS
 
 
 def default_folder() -> Path:
     """`fmus/` of the project, or the user's cache directory where that is not there to be written."""
-    root = Path(__file__).resolve().parent.parent
+    root = Path(__file__).resolve().parents[1]
     folder = root / "fmus"
     if (root / "pyproject.toml").is_file() and os.access(folder, os.W_OK):
         return folder
@@ -83,8 +83,8 @@ def build_slaves(targets: Sequence[Target], folder: Path, announce: Callable[[st
     named = [f"{target.module}:{target.model}" for target in targets]
     root = targets[0].root if targets else None
     done = subprocess.run(
-        child.command("fmu_kit.packaging", folder.resolve(), *(() if root is None else ("--root", root)), *named),
-        capture_output=True, text=True, env=child.environment(), check=False,
+        subprocesses.command("fmu_kit.packaging", folder.resolve(), *(() if root is None else ("--root", root)), *named),
+        capture_output=True, text=True, env=subprocesses.environment(), check=False,
     )  # fmt: skip
     if done.returncode != 0:
         lines = done.stderr.strip().splitlines() or ["no output"]

@@ -7,10 +7,10 @@ from typing import Any, TypeAlias
 
 from orchestration.documents import read_toml
 from orchestration.errors import UsageError
+from orchestration.exchange.ssp.reading import ENDINGS, tables_of
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.scenario_file import scenario_from_tables
 from orchestration.quadrotor.translation import system_of
-from orchestration.scenario import Scenario
-from orchestration.scenario_file import scenario_from_tables
-from orchestration.ssp.reading import ENDINGS, tables_of
 from orchestration.system.model import System
 from orchestration.system.system_file import is_system, system_from_tables, to_toml
 

@@ -20,21 +20,21 @@ from orchestration.fmi.instances import open_instance
 from orchestration.fmi.model import NUMERIC, Model, read_model
 from orchestration.fmi.values import number_of
 from orchestration.interrupt import Interrupt, Interrupted, interrupts_held_back
+from orchestration.master import initial
+from orchestration.master.agenda import Agenda, FixedStep
+from orchestration.master.channel import expand
+from orchestration.master.feeds import Feed
+from orchestration.master.master import Master
+from orchestration.master.recording import InMemory, Recorder
+from orchestration.master.sources import BuiltIn, Constant, Table, Values, WhiteNoise
+from orchestration.master.streams import VALUE, Streams
+from orchestration.master.table_file import read_table
+from orchestration.master.watch import watch
+from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import in_its_own_words, system_of, warnings
-from orchestration.recording import InMemory, Recorder
-from orchestration.result import Result
 from orchestration.results import objectives
-from orchestration.scenario import Scenario
+from orchestration.results.result import Result
 from orchestration.simulator import Floats
-from orchestration.stepping import initial
-from orchestration.stepping.agenda import Agenda, FixedStep
-from orchestration.stepping.channel import expand
-from orchestration.stepping.feeds import Feed
-from orchestration.stepping.master import Master
-from orchestration.stepping.sources import BuiltIn, Constant, Table, Values, WhiteNoise
-from orchestration.stepping.streams import VALUE, Streams
-from orchestration.stepping.table_file import read_table
-from orchestration.stepping.watch import watch
 from orchestration.system.check import check, recorded
 from orchestration.system.model import Component, System, component_of, variable_of
 from orchestration.system.times import NANOSECONDS, Grid, exact_nanoseconds

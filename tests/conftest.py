@@ -6,8 +6,9 @@ from pathlib import Path
 import hypothesis
 import pytest
 
-from orchestration import cli, fmus
-from orchestration.wiring import MODELS
+from orchestration import fmus
+from orchestration.command import cli
+from orchestration.quadrotor.wiring import MODELS
 from tests.commands import Done, Main
 
 hypothesis.settings.register_profile("ci", derandomize=True, deadline=None)

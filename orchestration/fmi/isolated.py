@@ -17,7 +17,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from orchestration import child
+from orchestration import subprocesses
 from orchestration.errors import SimulatorError
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.model import read_model
@@ -46,8 +46,8 @@ class IsolatedInstance(Instance):
         self._fresh = False  # whether these are the values of now
         self._writers = 0
         self._process = subprocess.Popen(
-            child.command("orchestration.fmi.isolated_process", path.absolute(), instance_name),
-            env=child.environment(), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            subprocesses.command("orchestration.fmi.isolated_process", path.absolute(), instance_name),
+            env=subprocesses.environment(), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             start_new_session=True,  # Ctrl-C is for the master, which ends the process when it is done
         )  # fmt: skip
         self._end = weakref.finalize(self, _ended, self._process)

@@ -13,7 +13,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from orchestration import child
+from orchestration import subprocesses
 from orchestration.fmi.instances import open_here
 from orchestration.fmi.isolated import Command, receive, send
 from orchestration.fmi.native import NativeInstance
@@ -63,7 +63,7 @@ class _Served:
 def main(path: Path, name: str) -> None:
     """Serve one instance."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it comes here nevertheless
-    child.end_with_parent()
+    subprocesses.end_with_parent()
     requests, answers = _streams()
     served = _Served(path, name)
     while True:

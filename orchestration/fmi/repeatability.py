@@ -15,8 +15,9 @@ import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from orchestration import child, confined
-from orchestration.confined import Limits
+from orchestration import subprocesses
+from orchestration.checks import confined
+from orchestration.checks.confined import Limits
 from orchestration.fmi.model import read_model
 
 _RULES = "1"
@@ -85,8 +86,8 @@ def _shown(content: str, path: Path) -> Repeatability:
     for manner in MANNERS:
         with tempfile.TemporaryDirectory(prefix="quadcosim-") as name:
             folder = Path(name)
-            command = child.command("orchestration.fmi.repeatability_process", path.absolute(), folder, manner)
-            ending = confined.run(command, {**child.environment(), "TMPDIR": name}, Limits())
+            command = subprocesses.command("orchestration.fmi.repeatability_process", path.absolute(), folder, manner)
+            ending = confined.run(command, {**subprocesses.environment(), "TMPDIR": name}, Limits())
             result = _result(folder / RESULT)
         if ending.reached is not None:
             return Repeatability()

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.confined import Limits, restrict
+from orchestration.checks.confined import Limits, restrict
 from orchestration.errors import QuadcosimError
 from orchestration.fmi.instances import open_here
 from orchestration.fmi.model import Variable

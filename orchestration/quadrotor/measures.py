@@ -5,8 +5,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from orchestration.quadrotor.wiring import POSITION, POSITION_REFERENCE
 from orchestration.simulator import Floats
-from orchestration.wiring import POSITION, POSITION_REFERENCE
 
 SETTLED = 0.05
 """[m] of position error in the last third of a flight, below which it counts as settled; as in system.toml"""

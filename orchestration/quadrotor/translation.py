@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.errors import UsageError
-from orchestration.nominal_model import mismatch
-from orchestration.scenario import Scenario
+from orchestration.quadrotor.nominal_model import mismatch
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.timing import TIMING_KEYS
+from orchestration.quadrotor.wiring import REFERENCE, RIGID_BODY, USE_REFERENCE_INPUTS
 from orchestration.system.model import System
 from orchestration.system.paths import TOP, changed
 from orchestration.system.system_file import load_system
-from orchestration.timing import TIMING_KEYS
-from orchestration.wiring import REFERENCE, RIGID_BODY, USE_REFERENCE_INPUTS
 
 
 @functools.cache

@@ -7,7 +7,7 @@ import numpy as np
 
 from orchestration.expressions.over_run import Marks, Recorded, Spans, evaluate, expect_names, vectors
 from orchestration.expressions.syntax import names, parse
-from orchestration.recording import Event, Recording
+from orchestration.master.recording import Event, Recording
 from orchestration.simulator import Floats
 from orchestration.system.model import System
 from orchestration.system.system_file import expressions

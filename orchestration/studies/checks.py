@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from orchestration.errors import UsageError
+from orchestration.master.table_file import read_table
 from orchestration.quadrotor.translation import in_its_own_words
 from orchestration.simulation import checked
-from orchestration.stepping.table_file import read_table
 from orchestration.studies.files import Files
 from orchestration.studies.store import expect_columns
 from orchestration.studies.study import Study

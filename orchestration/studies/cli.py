@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from orchestration.flags import FlightFlags, flies, request_from
-from orchestration.terminal import runs_bar, say
+from orchestration.command.flags import FlightFlags, flies, request_from
+from orchestration.command.terminal import runs_bar, say
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file.", metavar="STUDY.toml", show_default=False)]
 Out = Annotated[

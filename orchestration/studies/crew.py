@@ -15,7 +15,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from orchestration import child, scratch
+from orchestration import scratch, subprocesses
 from orchestration.errors import QuadcosimError
 from orchestration.studies.files import Files, with_files
 from orchestration.studies.identity import versions
@@ -75,8 +75,8 @@ class WorkerProcess:
         )
         # A session of its own: an interrupt from the terminal is the coordinator's to handle.
         self.process = subprocess.Popen(
-            child.command("orchestration.studies.serve", folder), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            env=child.environment(**dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder)), start_new_session=True,
+            subprocesses.command("orchestration.studies.serve", folder), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            env=subprocesses.environment(**dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder)), start_new_session=True,
         )  # fmt: skip
 
     def ask(self, task: Task) -> Any:

@@ -7,8 +7,8 @@ import numpy as np
 
 from orchestration.errors import UsageError
 from orchestration.expressions.syntax import Name, Number, Operation, names, parse
+from orchestration.quadrotor.scenario import Scenario
 from orchestration.request import Request
-from orchestration.scenario import Scenario
 from orchestration.simulator import Floats
 from orchestration.studies import figures, sensitivity
 from orchestration.studies.axes import Axis, unit_points

@@ -11,7 +11,7 @@ from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from orchestration.plots import BLUE, GREY, ORANGE, RED, STYLE
+from orchestration.results.plots import BLUE, GREY, ORANGE, RED, STYLE
 from orchestration.simulator import Floats
 from orchestration.statistics import wilson
 from orchestration.studies.axes import Axis

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.quadrotor import translation
+from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import in_words_of_a_scenario
-from orchestration.scenario import Scenario
 from orchestration.studies.files import Files, tables_of
 from orchestration.studies.study import Study
 from orchestration.system.model import Component, Source, System
@@ -22,7 +22,7 @@ ROOTS = ("orchestration.simulation", "orchestration.studies.worker")
 """Where the code that flies begins."""
 QUADROTOR = Path(translation.__file__).with_name("system.toml")
 """What every scenario is a change of"""
-_ASIDE = ("orchestration.fmus", "orchestration.tables", "orchestration.studies.store")
+_ASIDE = ("orchestration.fmus", "orchestration.results.tables", "orchestration.studies.store")
 """What finds FMUs and keeps results; it is imported there and changes no bit of them."""
 _PACKAGES = ("orchestration", "fmu_kit")
 _FEATURES = ("fma", "fma4", "avx2", "avx512f")

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 from orchestration.errors import UsageError
 from orchestration.quadrotor.measures import Outcome
+from orchestration.quadrotor.scenario import Record, Scenario
+from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.translation import in_its_own_words
 from orchestration.request import Request, system_meant
-from orchestration.scenario import Record, Scenario
 from orchestration.simulation import checked
 from orchestration.studies.engine import Pool
 from orchestration.studies.files import Files, files_of
@@ -17,7 +18,6 @@ from orchestration.studies.local import Local, local_limits
 from orchestration.studies.ranges import Range, Varied, range_asked_for
 from orchestration.studies.search import Bracket, bisected, first_failure
 from orchestration.studies.trials import RELIABILITY, Trials, Tried, is_random, said
-from orchestration.timing import Timing
 
 GAP = 0.1
 """of the local limit: a larger difference to the large-signal one is worth saying"""

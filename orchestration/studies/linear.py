@@ -16,12 +16,13 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from orchestration import fmus, wiring
+from orchestration import fmus
 from orchestration.errors import UsageError
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.reuse import Instances
+from orchestration.quadrotor import wiring
+from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import system_of
-from orchestration.scenario import Scenario
 from orchestration.simulation import prepared
 from orchestration.simulator import Floats
 from orchestration.studies.files import files_of

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from orchestration.errors import UsageError
 from orchestration.fmi.reuse import Instances
-from orchestration.scenario import Scenario
+from orchestration.quadrotor.scenario import Scenario
 from orchestration.studies.linear import HoverLoop, at_edge
 from orchestration.studies.ranges import Range, Varied, range_of
 from orchestration.studies.search import first_failure

@@ -7,9 +7,9 @@ from typing import Literal, get_args
 
 from orchestration.errors import UsageError
 from orchestration.fmi.model import Model
+from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import in_its_own_words
 from orchestration.request import Request, system_meant
-from orchestration.scenario import Scenario
 from orchestration.studies.study import paths_in, with_values
 from orchestration.system.model import System
 from orchestration.system.paths import value_at

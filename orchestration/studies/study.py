@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.errors import UsageError
+from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import in_its_own_words, paths_of
 from orchestration.request import Request, system_meant
-from orchestration.scenario import Scenario
 from orchestration.studies.axes import Axis, Method, Points, Value
 from orchestration.studies.files import Files, files_of
 from orchestration.studies.store import is_column

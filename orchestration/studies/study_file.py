@@ -9,8 +9,8 @@ import pydantic
 
 from orchestration.documents import read_toml
 from orchestration.errors import UsageError
+from orchestration.quadrotor.scenario_file import first_problem
 from orchestration.request import load_request, request_from_tables
-from orchestration.scenario_file import first_problem
 from orchestration.studies.axes import Axis, Method, Scale, Value, span
 from orchestration.studies.study import Study, names_fmu, names_table
 

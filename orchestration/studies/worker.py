@@ -12,7 +12,7 @@ from orchestration.errors import QuadcosimError, SimulatorError, UsageError
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.model import read_model
 from orchestration.fmi.reuse import Instances
-from orchestration.result import Result
+from orchestration.results.result import Result
 from orchestration.simulation import prepared
 from orchestration.studies.store import Row
 from orchestration.system.model import System
@@ -128,7 +128,7 @@ def row_of(
 
 
 def _parquet(result: Result) -> bytes:
-    from orchestration import tables  # pyarrow loads only where signals are kept
+    from orchestration.results import tables  # pyarrow loads only where signals are kept
 
     buffer = io.BytesIO()
     tables.write_signals(buffer, result.recording)

@@ -19,12 +19,12 @@ import numpy as np
 import pytest
 
 from orchestration import run
-from orchestration.doctor.machine import this_machine
-from orchestration.doctor.verdict import INSTALL_LIBPYTHON, satisfies
-from orchestration.scenario import Scenario
-from orchestration.ssp import writing
-from orchestration.timing import Timing
-from orchestration.wiring import COMMAND, MEASUREMENT
+from orchestration.checks.doctor.machine import this_machine
+from orchestration.checks.doctor.verdict import INSTALL_LIBPYTHON, satisfies
+from orchestration.exchange.ssp import writing
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.timing import Timing
+from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
 from tests.fmus.expected import law_command
 
 GUIDES = Path(__file__).parent.parent.parent / "docs" / "guides"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.cli import main
+from orchestration.command.cli import main
 
 ROOT = Path(__file__).parents[2]
 TEXTS = (

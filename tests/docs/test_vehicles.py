@@ -11,8 +11,8 @@ import pytest
 
 import orchestration
 from orchestration import Result, Scenario, Timing
-from orchestration.cli import main
-from orchestration.scenario_file import load_scenario
+from orchestration.command.cli import main
+from orchestration.quadrotor.scenario_file import load_scenario
 
 PAGE = (Path(__file__).parents[2] / "docs" / "vehicles.md").read_text(encoding="utf-8")
 SHORT = ["--stop-time", "10", "--plant-interval", "0.002", "--json"]

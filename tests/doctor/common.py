@@ -10,11 +10,11 @@ from typing import Any
 
 from elftools.elf.elffile import ELFFile
 
-from orchestration.doctor.archive import Fmu
-from orchestration.doctor.binaries import LINUX
-from orchestration.doctor.dependencies import needed
-from orchestration.doctor.machine import Library, Machine
-from orchestration.doctor.pythons import PythonLibrary
+from orchestration.checks.doctor.archive import Fmu
+from orchestration.checks.doctor.binaries import LINUX
+from orchestration.checks.doctor.dependencies import needed
+from orchestration.checks.doctor.machine import Library, Machine
+from orchestration.checks.doctor.pythons import PythonLibrary
 
 AARCH64 = 183
 """e_machine of ELF."""

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.doctor.archive import open_fmu
+from orchestration.checks.doctor.archive import open_fmu
 from orchestration.errors import UsageError
 from tests.doctor.common import (
     AARCH64,

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.doctor.binaries import LINUX, MACOS, WINDOWS, Binary, UnreadableError, newest, read
-from orchestration.doctor.machine import this_machine
+from orchestration.checks.doctor.binaries import LINUX, MACOS, WINDOWS, Binary, UnreadableError, newest, read
+from orchestration.checks.doctor.machine import this_machine
 from tests.doctor.common import AARCH64, LINUX64, WIN64, files_of, for_machine, with_run_path
 
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from orchestration.confined import Limits
-from orchestration.doctor import trial
+from orchestration.checks.confined import Limits
+from orchestration.checks.doctor import loading
 from tests.doctor.common import AARCH64, LINUX64, changed, described, files_of, for_machine, requiring
 from tests.fmus.foreign import lag, needs_compiler
 from tests.fmus.process import ROOT, run
@@ -23,7 +23,7 @@ def plant(built: dict[str, Path]) -> Path:
 
 def doctor(*arguments: str | Path, environment: dict[str, str] | None = None) -> CompletedProcess[str]:
     return run(
-        sys.executable, "-m", "orchestration.cli", "doctor", *map(str, arguments),
+        sys.executable, "-m", "orchestration.command.cli", "doctor", *map(str, arguments),
         environment={"PYTHONIOENCODING": "utf-8", **(environment or {})},
     )  # fmt: skip
 
@@ -143,7 +143,7 @@ def test_model_exchange_alone_is_not_tried(plant: Path, tmp_path: Path) -> None:
 
 
 def failure(path: Path, **limits: float) -> str | None:
-    return trial.attempt(path, Limits(**limits)).failure
+    return loading.attempt(path, Limits(**limits)).failure
 
 
 def test_an_fmu_that_takes_its_process_down_does_not_take_the_doctor_along(plant: Path, tmp_path: Path) -> None:
@@ -197,7 +197,7 @@ def test_a_foreign_pythonhome_or_pythonpath_is_what_the_doctor_finds(tmp_path: P
     for module in ("typer", "pydantic"):
         (tmp_path / f"{module}.py").write_text("raise ImportError('of another Python')")
     environment = {"PYTHONPATH": f"{tmp_path}:{ROOT}"}
-    start = (sys.executable, "-m", "orchestration.start")
+    start = (sys.executable, "-m", "orchestration.command.start")
     done = run(*start, "doctor", str(path), environment=environment)
     assert done.returncode == 1, done.stderr
     said = done.stdout.splitlines()[-1]

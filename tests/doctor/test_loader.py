@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.doctor.binaries import LINUX, MACOS, WINDOWS, read
-from orchestration.doctor.loader import Loader, loader_of_programs, loader_of_this_python
-from orchestration.doctor.machine import this_machine
-from orchestration.doctor.pythons import ON_PATH, PRELOADED, THIS_PYTHON, PythonLibrary, python_libraries
+from orchestration.checks.doctor.binaries import LINUX, MACOS, WINDOWS, read
+from orchestration.checks.doctor.loader import Loader, loader_of_programs, loader_of_this_python
+from orchestration.checks.doctor.machine import this_machine
+from orchestration.checks.doctor.pythons import ON_PATH, PRELOADED, THIS_PYTHON, PythonLibrary, python_libraries
 from tests.doctor.common import AARCH64, LINUX64, WIN64, files_of, for_machine, with_run_path
 
 RPATH = 15

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.doctor.archive import open_fmu
-from orchestration.doctor.binaries import LINUX, MACOS, WINDOWS
-from orchestration.doctor.machine import this_machine
-from orchestration.doctor.report import Report, as_tables
-from orchestration.doctor.text import as_text
-from orchestration.doctor.verdict import judge
+from orchestration.checks.doctor.archive import open_fmu
+from orchestration.checks.doctor.as_lines import as_text
+from orchestration.checks.doctor.binaries import LINUX, MACOS, WINDOWS
+from orchestration.checks.doctor.machine import this_machine
+from orchestration.checks.doctor.report import Report, as_tables
+from orchestration.checks.doctor.verdict import judge
 
 
 @pytest.mark.parametrize(

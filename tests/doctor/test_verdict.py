@@ -6,14 +6,14 @@ from typing import Any
 
 import pytest
 
-from orchestration.doctor.archive import Fmu, open_fmu
-from orchestration.doctor.binaries import MACOS, WINDOWS, Dependency
-from orchestration.doctor.dependencies import missing_versions
-from orchestration.doctor.machine import Library, Machine
-from orchestration.doctor.pythons import ON_PATH, PRELOADED, THIS_PYTHON, PythonLibrary
-from orchestration.doctor.report import Report, as_tables
-from orchestration.doctor.text import as_text
-from orchestration.doctor.verdict import Verdict, judge
+from orchestration.checks.doctor.archive import Fmu, open_fmu
+from orchestration.checks.doctor.as_lines import as_text
+from orchestration.checks.doctor.binaries import MACOS, WINDOWS, Dependency
+from orchestration.checks.doctor.dependencies import missing_versions
+from orchestration.checks.doctor.machine import Library, Machine
+from orchestration.checks.doctor.pythons import ON_PATH, PRELOADED, THIS_PYTHON, PythonLibrary
+from orchestration.checks.doctor.report import Report, as_tables
+from orchestration.checks.doctor.verdict import Verdict, judge
 from tests.doctor.common import (
     AARCH64,
     LINUX64,

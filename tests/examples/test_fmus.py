@@ -3,7 +3,7 @@
 import pytest
 
 from orchestration import fmus
-from orchestration.validation import validate
+from orchestration.checks.validation import validate
 from tests.examples.common import EXAMPLES
 
 

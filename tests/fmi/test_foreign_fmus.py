@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestration import child
+from orchestration import subprocesses
 from orchestration.errors import SimulatorError, UsageError
 from orchestration.fmi import instances
 from orchestration.fmi.isolated import IsolatedInstance
 from orchestration.fmi.native import NativeInstance
-from orchestration.result import Result
+from orchestration.results.result import Result
 from orchestration.simulation import prepared
 from orchestration.system.model import Component, Connection, Sampling, Source, System
 from tests.fmi.small import BINARY, CLOCK, SIZE, needs_compiler, small
@@ -301,7 +301,11 @@ def test_the_process_of_an_isolated_fmu_ends_with_its_parent(tmp_path: Path) -> 
         os.kill(os.getpid(), 9)
     """)
     done = subprocess.run(
-        [sys.executable, "-c", script, str(path)], capture_output=True, text=True, env=child.environment(), check=False
+        [sys.executable, "-c", script, str(path)],
+        capture_output=True,
+        text=True,
+        env=subprocesses.environment(),
+        check=False,
     )
     pid = int(done.stdout)
     for _ in range(100):
@@ -338,7 +342,7 @@ def test_what_an_fmu_prints_is_not_among_what_the_command_prints(load: str, tmp_
     """)
     done = subprocess.run(
         [sys.executable, "-c", script, str(path)],
-        capture_output=True, text=True, env=child.environment(PYTHONUNBUFFERED=""), check=True,
+        capture_output=True, text=True, env=subprocesses.environment(PYTHONUNBUFFERED=""), check=True,
     )  # fmt: skip
     assert done.stdout.split() == ["before", "inside", "after"]
     assert done.stderr.count("SMALL FMU, version 1") == 1
@@ -351,8 +355,8 @@ def test_a_banner_does_not_spoil_the_json_of_a_command(tmp_path: Path) -> None:
         f'stop_time = 0.1\n[components.it]\nfmu = "{path.name}"\nstep = 0.01\n[objectives]\npeak = "max(it.y)"\n'
     )
     done = subprocess.run(
-        child.command("orchestration.cli", "run", "system.toml", "--json"),
-        cwd=tmp_path, capture_output=True, text=True, env=child.environment(), check=True,
+        subprocesses.command("orchestration.command.cli", "run", "system.toml", "--json"),
+        cwd=tmp_path, capture_output=True, text=True, env=subprocesses.environment(), check=True,
     )  # fmt: skip
     assert json.loads(done.stdout)["peak"] == 0.0
     assert "SMALL FMU, version 1" in done.stderr

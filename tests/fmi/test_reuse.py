@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.confined import Ending
+from orchestration.checks.confined import Ending
 from orchestration.fmi import repeatability
 from orchestration.fmi.isolated import IsolatedInstance
 from orchestration.fmi.native import NativeInstance

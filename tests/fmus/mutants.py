@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element
 import fmpy
 
 from orchestration import fmus
-from orchestration.wiring import MODELS
+from orchestration.quadrotor.wiring import MODELS
 from tests.fmus.damage import (
     DESCRIPTION,
     Damage,

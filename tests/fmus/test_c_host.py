@@ -9,11 +9,11 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from orchestration.doctor.archive import open_fmu
-from orchestration.doctor.dependencies import needed
-from orchestration.doctor.machine import this_machine
-from orchestration.doctor.pythons import BY_LOADER, THIS_PYTHON, PythonLibrary
-from orchestration.doctor.verdict import INSTALL_LIBPYTHON, other_host, satisfies
+from orchestration.checks.doctor.archive import open_fmu
+from orchestration.checks.doctor.dependencies import needed
+from orchestration.checks.doctor.machine import this_machine
+from orchestration.checks.doctor.pythons import BY_LOADER, THIS_PYTHON, PythonLibrary
+from orchestration.checks.doctor.verdict import INSTALL_LIBPYTHON, other_host, satisfies
 from tests.fmus.archive import without_loader
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
 from tests.fmus.instance import Instance

@@ -18,7 +18,7 @@ import pytest
 from fmpy.validation import validate_fmu
 
 from fmu_kit.trajectory import Trajectory
-from orchestration.wiring import COMMAND, MEASUREMENT, MODELS
+from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT, MODELS
 from tests.fmus.archive import files_of
 from tests.fmus.instance import Instance
 from tests.fmus.process import ROOT, run

@@ -14,7 +14,7 @@ from fmpy.fmi1 import FMICallException
 
 from orchestration.errors import SimulatorError, UsageError
 from orchestration.fmi.fmi2 import Fmi2Instance
-from orchestration.wiring import MODELS
+from orchestration.quadrotor.wiring import MODELS
 from tests.fmus.archive import without_loader
 from tests.fmus.instance import Instance
 from tests.fmus.process import run, run_script

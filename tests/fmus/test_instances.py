@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.wiring import MODELS
+from orchestration.quadrotor.wiring import MODELS
 from tests.fmus.expected import law_command
 from tests.fmus.instance import Instance
 from tests.fmus.process import run_script

@@ -11,7 +11,7 @@ from fmpy.model_description import ModelDescription
 
 from fmu_kit.model_description import PYTHON_REQUIRED
 from orchestration.documents import tomllib
-from orchestration.wiring import MODELS
+from orchestration.quadrotor.wiring import MODELS
 from tests.fmus.archive import files_of
 from tests.fmus.expected import MEASUREMENT
 from tests.fmus.instance import Instance

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from orchestration import cli
-from orchestration.confined import Limits
-from orchestration.validation import Finding, rules, validate
-from orchestration.validation.child import PLATFORM, READABLE
-from orchestration.validation.finding import name_of
-from orchestration.validation.validator import PROCESS
-from orchestration.wiring import MODELS
+from orchestration.checks.confined import Limits
+from orchestration.checks.validation import Finding, rules, validate
+from orchestration.checks.validation.confined_process import PLATFORM, READABLE
+from orchestration.checks.validation.finding import name_of
+from orchestration.checks.validation.validator import PROCESS
+from orchestration.command import cli
+from orchestration.quadrotor.wiring import MODELS
 from tests.fmus.damage import Mutant
 from tests.fmus.mutants import MUTANTS
 from tests.fmus.verdicts import as_markdown, fmpy_finds, fmutool_finds, verdicts

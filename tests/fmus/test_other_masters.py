@@ -8,7 +8,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import fmi2False
 
-from orchestration.wiring import MODELS
+from orchestration.quadrotor.wiring import MODELS
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
 from tests.fmus.flights import STEPS, Flight
 from tests.fmus.instance import Instance

@@ -14,10 +14,10 @@ import pytest
 from fmu_kit import bundle, packaging
 from fmu_kit.loader import BESIDE, GUID_FILE
 from orchestration import fmus
-from orchestration.doctor import binaries
+from orchestration.checks.doctor import binaries
 from orchestration.documents import tomllib
 from orchestration.errors import QuadcosimError
-from orchestration.wiring import MODELS
+from orchestration.quadrotor.wiring import MODELS
 from tests.fmus.archive import files_of
 from tests.fmus.instance import Instance
 from tests.fmus.process import ROOT, run
@@ -233,7 +233,7 @@ def test_a_python_that_is_too_old_is_refused_in_a_sentence(model: str, built: di
         ("import math, numpy.linalg as la", "numpy.linalg"),
         ("from numpy import array", "numpy"),
         ("def late():\n    import numpy", "numpy"),
-        ("from orchestration.wiring import MODELS", "orchestration.wiring"),
+        ("from orchestration.quadrotor.wiring import MODELS", "orchestration.quadrotor.wiring"),
     ],
 )
 def test_a_slave_that_needs_more_than_the_standard_library_is_refused(

@@ -8,20 +8,21 @@ from xml.etree.ElementTree import Element, SubElement, fromstring
 
 import pytest
 
-from orchestration import cli, confined
-from orchestration.confined import Ending, Limits
+from orchestration.checks import confined
+from orchestration.checks.confined import Ending, Limits
+from orchestration.checks.validation import Finding, confined_process, run_rules, validate
+from orchestration.checks.validation.archive import Archive
+from orchestration.checks.validation.exercise import Bench
+from orchestration.checks.validation.finding import check
+from orchestration.checks.validation.fmu import Fmu, read_fmu, read_root
+from orchestration.checks.validation.own_description import differences, elements
+from orchestration.checks.validation.progress import REPORT, Told
+from orchestration.checks.validation.structure import initial_unknowns, known_dependencies, outputs
+from orchestration.checks.validation.units import dimensions, unit_meaning
+from orchestration.checks.validation.variables import aliases
+from orchestration.command import cli
 from orchestration.errors import QuadcosimError
-from orchestration.validation import Finding, child, runs, validate
-from orchestration.validation.archive import Archive
-from orchestration.validation.bench import Bench
-from orchestration.validation.finding import check
-from orchestration.validation.fmu import Fmu, read_fmu, read_root
-from orchestration.validation.own_description import differences, elements
-from orchestration.validation.progress import REPORT, Told
-from orchestration.validation.structure import initial_unknowns, known_dependencies, outputs
-from orchestration.validation.units import dimensions, unit_meaning
-from orchestration.validation.variables import aliases
-from orchestration.wiring import MODELS
+from orchestration.quadrotor.wiring import MODELS
 from tests.fmus.archive import files_of
 from tests.fmus.damage import DESCRIPTION, Damage, description, root, source, without, write_fmu
 from tests.fmus.foreign import lag, needs_compiler
@@ -240,10 +241,10 @@ def test_the_child_reports_an_error_in_a_rule(low_pass: Path, monkeypatch: pytes
     def odd(bench: Bench) -> list[str]:
         raise KeyError(3)
 
-    monkeypatch.setattr(runs, "FIRST", (odd,))
-    monkeypatch.setattr(child, "restrict", lambda size: None)  # which would hold for the process of the test
+    monkeypatch.setattr(run_rules, "FIRST", (odd,))
+    monkeypatch.setattr(confined_process, "restrict", lambda size: None)  # which would hold for the process of the test
     with pytest.raises(KeyError):
-        child.main(low_pass, tmp_path, Limits())
+        confined_process.main(low_pass, tmp_path, Limits())
     told = Told(tmp_path / REPORT)
     assert (told.rule, told.error, told.ended) == ("odd", "KeyError: 3", False)
 

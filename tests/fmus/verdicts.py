@@ -8,8 +8,8 @@ from pathlib import Path
 
 from fmpy.validation import validate_fmu
 
-from orchestration.confined import Limits
-from orchestration.validation import Finding, validate
+from orchestration.checks.confined import Limits
+from orchestration.checks.validation import Finding, validate
 from tests.fmus.damage import Mutant
 
 

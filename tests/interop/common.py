@@ -5,12 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from orchestration import Scenario, run
-from orchestration.interop.catalogue import TOOLS, Tool
-from orchestration.interop.compare import Agreement
-from orchestration.interop.job import Loop, Ports
-from orchestration.interop.trace import Trace
+from orchestration.exchange.interop.assignment import Loop, Ports
+from orchestration.exchange.interop.catalogue import TOOLS, Tool
+from orchestration.exchange.interop.compare import Agreement
+from orchestration.exchange.interop.trace import Trace
+from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
 from orchestration.simulator import Floats
-from orchestration.wiring import COMMAND, MEASUREMENT
 
 PORTS = {
     "controller": Ports(inputs=MEASUREMENT, outputs=COMMAND),

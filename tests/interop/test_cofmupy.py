@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestration.interop import tools
-from orchestration.interop.catalogue import TOOLS
-from orchestration.interop.job import Job
+from orchestration.exchange.interop import tools
+from orchestration.exchange.interop.assignment import Job
+from orchestration.exchange.interop.catalogue import TOOLS
 from tests.interop.common import LOOP
 
 COORDINATOR = """

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from orchestration import QuadcosimError, Scenario, UsageError
-from orchestration.interop import table
-from orchestration.interop.catalogue import TOOLS, chosen
-from orchestration.interop.compare import Agreement, agreements
-from orchestration.interop.table import AIM, agrees
+from orchestration.exchange.interop import table
+from orchestration.exchange.interop.catalogue import TOOLS, chosen
+from orchestration.exchange.interop.compare import Agreement, agreements
+from orchestration.exchange.interop.table import AIM, agrees
 from tests.interop.common import LOOP, components_of, farthest
 from tests.studies.common import one_line
 

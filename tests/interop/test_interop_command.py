@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 
 from orchestration import fmus
-from orchestration.interop.catalogue import COFMUPY, TOOLS, chosen
-from orchestration.ssp import writing
+from orchestration.exchange.interop.catalogue import COFMUPY, TOOLS, chosen
+from orchestration.exchange.ssp import writing
+from orchestration.quadrotor.wiring import MODELS
 from orchestration.system.model import System
 from orchestration.system.paths import changed
-from orchestration.wiring import MODELS
 from tests.commands import Main
 from tests.interop.common import LOOP
 from tests.studies.common import error_line, quadcosim

@@ -14,8 +14,8 @@ from fmpy.ssp.ssd import read_ssd, read_ssv
 
 from fmu_kit.packaging import write_archive
 from orchestration import FmuChoice, Scenario, Timing, UsageError
+from orchestration.exchange.ssp import writing
 from orchestration.quadrotor.translation import system_of
-from orchestration.ssp import writing
 from orchestration.system.paths import changed
 from tests.fmus.interface_table import TABLES
 from tests.interop.common import with_other_parameters

@@ -9,7 +9,7 @@ import pytest
 from fmpy.ssp.ssd import read_ssd
 
 from orchestration import ReferenceChoice, Scenario, Timing, UsageError, fmus
-from orchestration.ssp import writing
+from orchestration.exchange.ssp import writing
 from tests.commands import Main
 from tests.interop.common import OTHER
 from tests.studies.common import error_line, one_line, quadcosim

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from orchestration import Scenario, load_scenario
-from orchestration.interop.catalogue import Tool, chosen
-from orchestration.interop.compare import Agreement, agreements
-from orchestration.interop.table import AIM, agrees
-from orchestration.ssp import writing
+from orchestration.exchange.interop.catalogue import Tool, chosen
+from orchestration.exchange.interop.compare import Agreement, agreements
+from orchestration.exchange.interop.table import AIM, agrees
+from orchestration.exchange.ssp import writing
 from orchestration.system.model import System
 from tests.interop.common import LOOP, farthest, states_of_master, with_other_parameters
 

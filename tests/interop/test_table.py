@@ -9,9 +9,9 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from orchestration.interop import figure, table
-from orchestration.interop.catalogue import TOOLS
-from orchestration.interop.compare import Agreement
+from orchestration.exchange.interop import figure, table
+from orchestration.exchange.interop.catalogue import TOOLS
+from orchestration.exchange.interop.compare import Agreement
 from tests.interop.common import agreement
 
 SEVERAL = [

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from orchestration import QuadcosimError, Result, Scenario, UsageError, load_run, run
-from orchestration.interop.trace import Trace, log_of, read_trace, traced_copy
-from orchestration.wiring import COMMAND, MEASUREMENT
+from orchestration.exchange.interop.trace import Trace, log_of, read_trace, traced_copy
+from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
 from tests.interop.common import LOOP
 from tests.studies.common import quadcosim
 

@@ -16,7 +16,7 @@ import numpy as np
 
 import orchestration
 from orchestration import Result
-from orchestration.scenario_file import scenario_from_tables
+from orchestration.quadrotor.scenario_file import scenario_from_tables
 
 TABLE = Path(__file__).parent.parent / "data" / "quadrotor_signals.json"
 FUNCTIONS: tuple[Callable[[float], float], ...] = (

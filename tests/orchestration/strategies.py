@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from hypothesis import strategies as st
 
-from orchestration.timing import Timing
+from orchestration.quadrotor.timing import Timing
 
 
 class Case(NamedTuple):

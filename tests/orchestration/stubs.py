@@ -9,17 +9,17 @@ import numpy as np
 import numpy.typing as npt
 
 from orchestration.errors import SimulatorError
+from orchestration.master.agenda import Agenda
+from orchestration.master.master import Master
+from orchestration.master.recording import Chunk, Event, InMemory
+from orchestration.master.sources import Constant, Values
+from orchestration.master.streams import Streams
+from orchestration.master.watch import watch
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.translation import system_of
-from orchestration.recording import Chunk, Event, InMemory
-from orchestration.scenario import Scenario
+from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE
 from orchestration.simulator import Floats, Simulator, Transfer
-from orchestration.stepping.agenda import Agenda
-from orchestration.stepping.master import Master
-from orchestration.stepping.sources import Constant, Values
-from orchestration.stepping.streams import Streams
-from orchestration.stepping.watch import watch
-from orchestration.timing import Timing
-from orchestration.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE
 
 Call = tuple[Any, ...]
 

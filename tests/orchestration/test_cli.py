@@ -110,7 +110,7 @@ HEAVY = ("numpy", "matplotlib", "pandas", "pyarrow", "fmpy")
 @pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"]])
 def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
     code = (
-        "import json, sys\nfrom orchestration.cli import main\n"
+        "import json, sys\nfrom orchestration.command.cli import main\n"
         f"try:\n    main({arguments!r})\nexcept SystemExit as end:\n    assert not end.code\n"
         f"print(json.dumps([name for name in {HEAVY!r} if name in sys.modules]))"
     )
@@ -228,7 +228,7 @@ def test_plot_zooms_on_a_window(main: Main, here: Path) -> None:
 def test_ctrl_c_ends_a_flight_with_one_line_and_130(here: Path, out: list[str]) -> None:
     code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n" + (
         "from orchestration import terminal; terminal.SPARSE = 0.0\n"  # says when it flies
-        "from orchestration.cli import main; main()"
+        "from orchestration.command.cli import main; main()"
     )
     with subprocess.Popen(
         [sys.executable, "-c", code, "run", "--stop-time", "1000", *out], stderr=subprocess.PIPE, text=True
@@ -457,7 +457,7 @@ def project(here: Path) -> Path:
 def test_fmus_are_built_into_the_project_when_they_are_missing_or_old(project: Path) -> None:
     def run() -> str:
         done = subprocess.run(
-            [sys.executable, "-m", "orchestration.cli", "run", "--stop-time", "0.05", "--json"],
+            [sys.executable, "-m", "orchestration.command.cli", "run", "--stop-time", "0.05", "--json"],
             cwd=project, env={**os.environ, "PYTHONPATH": str(project)}, capture_output=True, text=True, check=True,
         )  # fmt: skip
         assert json.loads(done.stdout)["steps"] == 50

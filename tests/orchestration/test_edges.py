@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 
 from orchestration.errors import UsageError
-from orchestration.run_directory import run_folder
-from orchestration.scenario import Scenario
-from orchestration.scenario_file import load_scenario
-from orchestration.timing import Timing
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.scenario_file import load_scenario
+from orchestration.quadrotor.timing import Timing
+from orchestration.results.run_directory import run_folder
 
 from .stubs import Counting, Flown, Plant, Straying, agenda_of
 

@@ -20,8 +20,8 @@ from fmu_kit.trajectory import Trajectory
 from orchestration import Result, RunInterrupted, Scenario, SimulatorError, Timing, UsageError
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.quadrotor.measures import desired
-from orchestration.scenario import FmuChoice, Record, ReferenceChoice
-from orchestration.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE, REFERENCE
+from orchestration.quadrotor.scenario import FmuChoice, Record, ReferenceChoice
+from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE, REFERENCE
 
 EVERYTHING: dict[str, Any] = {
     "delay": 0.003,

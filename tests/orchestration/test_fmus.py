@@ -9,7 +9,7 @@ import pytest
 
 from orchestration import QuadcosimError, UsageError, fmus
 from orchestration.fmi.fmi2 import Fmi2Instance
-from orchestration.wiring import MODELS
+from orchestration.quadrotor.wiring import MODELS
 
 
 @pytest.fixture

@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestration.errors import SimulatorError
-from orchestration.stepping.sources import Constant
+from orchestration.master.sources import Constant
+from orchestration.quadrotor.timing import Timing
+from orchestration.quadrotor.wiring import MEASUREMENT
 from orchestration.system.times import nanoseconds
-from orchestration.timing import Timing
-from orchestration.wiring import MEASUREMENT
 from tests.orchestration.strategies import timings
 from tests.orchestration.stubs import Call, Counting, Feedback, Flown, Plant, Still, Straying
 

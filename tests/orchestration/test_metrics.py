@@ -12,14 +12,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from orchestration import wiring
+from orchestration.master.recording import Chunk, Event, InMemory
+from orchestration.quadrotor import wiring
 from orchestration.quadrotor.translation import quadrotor
-from orchestration.recording import Chunk, Event, InMemory
+from orchestration.quadrotor.wiring import COMMAND, POSITION
 from orchestration.results import objectives
 from orchestration.results.objectives import Metrics
 from orchestration.system.model import Hold
 from orchestration.system.paths import changed
-from orchestration.wiring import COMMAND, POSITION
 
 Array = npt.NDArray[np.float64]
 

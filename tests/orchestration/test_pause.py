@@ -12,9 +12,9 @@ import pytest
 
 import orchestration
 from orchestration import ReferenceChoice, Scenario, Timing, UsageError
-from orchestration.pause import fly_until, resume
-from orchestration.result import Result
-from orchestration.wiring import REFERENCE
+from orchestration.quadrotor.wiring import REFERENCE
+from orchestration.results.pause import fly_until, resume
+from orchestration.results.result import Result
 
 EVERYTHING = Timing(
     period=0.01,

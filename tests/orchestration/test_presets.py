@@ -4,7 +4,7 @@ import pytest
 
 import orchestration
 from orchestration import Scenario, Timing, UsageError
-from orchestration.presets import PRESETS, preset_timing
+from orchestration.quadrotor.presets import PRESETS, preset_timing
 
 
 @pytest.mark.parametrize("name", PRESETS)

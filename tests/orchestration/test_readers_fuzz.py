@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 import orchestration
 from orchestration import Scenario, UsageError, fly_until, load_run, load_scenario, save_run
-from orchestration.pause import read_state
-from orchestration.presets import preset_timing
-from orchestration.stepping.table_file import read_table
+from orchestration.master.table_file import read_table
+from orchestration.quadrotor.presets import preset_timing
+from orchestration.quadrotor.wiring import REFERENCE
+from orchestration.results.pause import read_state
 from orchestration.studies.study_file import load_study
-from orchestration.wiring import REFERENCE
 
 resource = pytest.importorskip("resource")  # and signals with a time, neither of which Windows has
 

@@ -7,10 +7,11 @@ import pyarrow.parquet as pq
 import pytest
 
 import orchestration
-from orchestration import Result, Scenario, Timing, load_run, plots
-from orchestration.pause import fly_until, resume
-from orchestration.recording import InMemory, thinned
-from orchestration.run_directory import keep_flight
+from orchestration import Result, Scenario, Timing, load_run
+from orchestration.master.recording import InMemory, thinned
+from orchestration.results import plots
+from orchestration.results.pause import fly_until, resume
+from orchestration.results.run_directory import keep_flight
 
 JACOBI = Timing(order="jacobi", delay=0.003, jitter=0.004, command_loss=0.3, hold="first")
 SCENARIO = Scenario(stop_time=0.5, timing=JACOBI, seed=5)
@@ -24,7 +25,7 @@ def whole() -> Result:
 @pytest.fixture(autouse=True)
 def _few_rows(whole: Result, monkeypatch: pytest.MonkeyPatch) -> None:
     """In each chunk, once the flight to compare with is over."""
-    monkeypatch.setattr("orchestration.stepping.master.ROWS", 64)
+    monkeypatch.setattr("orchestration.master.master.ROWS", 64)
 
 
 def expect_equal(found: Result, whole: Result) -> None:
@@ -70,7 +71,7 @@ def test_a_pause_between_chunks_changes_nothing(at: float, whole: Result, tmp_pa
 def test_a_diverged_run_is_the_same_in_chunks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scenario = Scenario(stop_time=3.0, timing=Timing(period=0.3, order="jacobi"))
     chunks = orchestration.run(scenario)
-    monkeypatch.setattr("orchestration.stepping.master.ROWS", 10**6)
+    monkeypatch.setattr("orchestration.master.master.ROWS", 10**6)
     expect_equal(chunks, orchestration.run(scenario))
 
 

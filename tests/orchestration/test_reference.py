@@ -7,9 +7,9 @@ import pytest
 
 from fmu_kit.trajectory import Trajectory
 from orchestration import UsageError
-from orchestration.stepping.sources import BuiltIn, Table
-from orchestration.stepping.table_file import read_table
-from orchestration.wiring import REFERENCE
+from orchestration.master.sources import BuiltIn, Table
+from orchestration.master.table_file import read_table
+from orchestration.quadrotor.wiring import REFERENCE
 
 HEADER = ",".join(("time", *REFERENCE))
 STOP = 2.0

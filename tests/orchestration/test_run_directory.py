@@ -28,8 +28,8 @@ from orchestration import (
     plots,
     save_run,
 )  # fmt: skip
-from orchestration.recording import Chunk, InMemory, Recorder
-from orchestration.run_directory import keep_flight
+from orchestration.master.recording import Chunk, InMemory, Recorder
+from orchestration.results.run_directory import keep_flight
 
 FILES = {"signals.parquet", "events.parquet", "metrics.json", "scenario.toml"}
 FIGURES = {"path.png", "errors.png", "commands.png", "energy.png"}
@@ -237,7 +237,7 @@ def test_a_failure_while_writing_leaves_the_earlier_run(
 WRITER = """
 import sys, time
 import orchestration
-from orchestration import plots
+from orchestration.results import plots
 
 def wait(*_):
     print("writing", flush=True)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import orchestration
 from orchestration import FmuChoice, Record, ReferenceChoice, Scenario, Timing, UsageError, load_scenario
 from orchestration.documents import tomllib
-from orchestration.timing import TIMING_KEYS
+from orchestration.quadrotor.timing import TIMING_KEYS
 from tests.orchestration.strategies import timings
 
 

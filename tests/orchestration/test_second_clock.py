@@ -12,10 +12,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from orchestration.master.streams import Streams
+from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.translation import quadrotor
-from orchestration.stepping.streams import Streams
-from orchestration.timing import Timing
-from orchestration.wiring import COMMAND, MEASUREMENT
+from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
 from tests.orchestration import second_clock
 from tests.orchestration.strategies import Case, cases
 from tests.orchestration.stubs import Counting, Flown, Plant

@@ -12,14 +12,15 @@ import typer.main
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestration import Scenario, cli
+from orchestration import Scenario
+from orchestration.command import cli
+from orchestration.command.flags import FlightFlags
 from orchestration.errors import UsageError
-from orchestration.flags import FlightFlags
+from orchestration.master.agenda import Agenda
+from orchestration.master.streams import Streams
+from orchestration.quadrotor.timing import TIMING_KEYS, Timing
 from orchestration.quadrotor.translation import quadrotor
-from orchestration.stepping.agenda import Agenda
-from orchestration.stepping.streams import Streams
 from orchestration.system.times import Grid, nanoseconds
-from orchestration.timing import TIMING_KEYS, Timing
 from tests.orchestration import stubs
 from tests.orchestration.strategies import Case, cases
 from tests.orchestration.stubs import Instant, Sample

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fmu_kit.algebra import ZERO, Inertia, Quaternion, Vec3
-from orchestration.stepping.sources import NUMPY
+from orchestration.master.sources import NUMPY
 from plant_fmu.dynamics import Actuators, Body, RigidState, Wind, Wrench, acceleration, derivative, tilt
 from plant_fmu.integrator import rk4_step
 

@@ -8,9 +8,9 @@ import pytest
 
 from fmu_kit.packaging import write_archive
 from orchestration import Scenario, UsageError
+from orchestration.exchange.ssp import package, writing
 from orchestration.quadrotor.translation import system_of
 from orchestration.request import load_request
-from orchestration.ssp import package, writing
 from orchestration.system.model import Sampling, System
 from tests.commands import Main
 from tests.studies.common import one_line

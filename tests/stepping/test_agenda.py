@@ -3,8 +3,8 @@
 import pytest
 
 from orchestration.errors import UsageError
-from orchestration.stepping.agenda import Agenda, FixedStep
-from orchestration.stepping.streams import Streams
+from orchestration.master.agenda import Agenda, FixedStep
+from orchestration.master.streams import Streams
 from orchestration.system.times import Grid, exact_nanoseconds
 from tests.stepping.stubs import continuous, sampled, system, wire
 

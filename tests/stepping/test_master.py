@@ -5,10 +5,10 @@ import math
 import pytest
 
 from orchestration.errors import SimulatorError
-from orchestration.recording import InMemory
-from orchestration.stepping.agenda import Agenda
-from orchestration.stepping.master import Master
-from orchestration.stepping.streams import Streams
+from orchestration.master.agenda import Agenda
+from orchestration.master.master import Master
+from orchestration.master.recording import InMemory
+from orchestration.master.streams import Streams
 from tests.stepping.stubs import Stub, clock, column, continuous, events, near, sampled, system, wire
 
 

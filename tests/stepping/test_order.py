@@ -1,7 +1,7 @@
 """Who comes first at one instant, and before a run."""
 
-from orchestration.stepping.initial import groups, is_loop
-from orchestration.stepping.order import ranked
+from orchestration.master.initial import groups, is_loop
+from orchestration.master.order import ranked
 from tests.stepping.stubs import wire
 
 

@@ -4,8 +4,8 @@ import hashlib
 
 import numpy as np
 
-from orchestration.stepping.agenda import Agenda
-from orchestration.stepping.streams import Streams
+from orchestration.master.agenda import Agenda
+from orchestration.master.streams import Streams
 from tests.stepping.stubs import continuous, sampled, system, wire
 
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from orchestration import fmus
-from orchestration.wiring import DEFAULT_PLANT
+from orchestration.quadrotor.wiring import DEFAULT_PLANT
 from tests.fmus.archive import files_of
 from tests.fmus.damage import with_its_guid, write_fmu
 

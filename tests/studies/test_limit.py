@@ -17,8 +17,9 @@ from hypothesis import strategies as st
 import orchestration
 from orchestration import Result, Scenario, Timing, UsageError
 from orchestration.fmi.reuse import Instances
+from orchestration.quadrotor.scenario import FmuChoice, Record
 from orchestration.quadrotor.translation import system_of
-from orchestration.scenario import FmuChoice, Record
+from orchestration.quadrotor.wiring import COMMAND
 from orchestration.simulation import prepared
 from orchestration.simulator import Floats
 from orchestration.statistics import wilson
@@ -31,7 +32,6 @@ from orchestration.studies.search import first_failure
 from orchestration.studies.trials import is_good
 from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS
-from orchestration.wiring import COMMAND
 from tests.fmus import source_tree
 from tests.studies.common import at, one_line, short
 

@@ -19,13 +19,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestration import QuadcosimError, Scenario, UsageError, fmus
+from orchestration.quadrotor.scenario import FmuChoice, ReferenceChoice
 from orchestration.quadrotor.translation import system_of
-from orchestration.scenario import FmuChoice, ReferenceChoice
+from orchestration.quadrotor.wiring import DEFAULT_PLANT
 from orchestration.studies import store as stores
 from orchestration.studies.files import Files
 from orchestration.studies.identity import flight_sources, run_key, sources_hash, versions
 from orchestration.studies.store import TEXTS, Place, Row, open_for_reading, open_for_writing
-from orchestration.wiring import DEFAULT_PLANT
 from tests.studies.common import METRICS, OBJECTIVES, files_in, one_line, row
 
 NUMBERS = [name for name in METRICS if name not in TEXTS]
@@ -442,9 +442,9 @@ def test_a_parameter_given_as_its_fmu_has_it_is_the_same_run() -> None:
 
 
 @pytest.mark.parametrize(
-    "module", ["orchestration.stepping.master", "orchestration.stepping.agenda", "orchestration.results.objectives",
+    "module", ["orchestration.master.master", "orchestration.master.agenda", "orchestration.results.objectives",
                "fmu_kit.trajectory", "orchestration.fmi.native", "orchestration.studies.worker",
-               "orchestration.wiring"],
+               "orchestration.quadrotor.wiring"],
 )  # fmt: skip
 def test_an_edited_source_on_the_path_of_the_flight_is_other_software(module: str, tmp_path: Path) -> None:
     sources = flight_sources()
@@ -454,7 +454,12 @@ def test_an_edited_source_on_the_path_of_the_flight_is_other_software(module: st
 
 
 def test_sources_that_only_show_or_keep_results_are_not_on_the_path_of_the_flight() -> None:
-    aside = ("orchestration.plots", "orchestration.cli", "orchestration.studies.sweep", "orchestration.studies.store")
+    aside = (
+        "orchestration.results.plots",
+        "orchestration.command.cli",
+        "orchestration.studies.sweep",
+        "orchestration.studies.store",
+    )
     assert not {*aside} & {*flight_sources()}
 
 

@@ -17,8 +17,9 @@ import pytest
 import orchestration
 from orchestration import QuadcosimError, UsageError, fmus
 from orchestration.fmi.fmi2 import Fmi2Instance
+from orchestration.quadrotor.scenario import FmuChoice, Record, Scenario
 from orchestration.quadrotor.translation import system_of
-from orchestration.scenario import FmuChoice, Record, Scenario
+from orchestration.quadrotor.wiring import DEFAULT_PLANT
 from orchestration.studies import engine
 from orchestration.studies.axes import Axis
 from orchestration.studies.crew import Crew
@@ -29,7 +30,6 @@ from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
 from orchestration.studies.sweep import store_path, sweep
 from orchestration.studies.worker import BrokenPlaceError, Hangar, Outcome, Task
-from orchestration.wiring import DEFAULT_PLANT
 from tests.studies.common import (
     GRID,
     NOISY,

@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 
 from orchestration.errors import UsageError
+from orchestration.master.agenda import Agenda
+from orchestration.master.streams import Streams
 from orchestration.quadrotor import translation
 from orchestration.quadrotor.translation import quadrotor
 from orchestration.request import load_request
-from orchestration.stepping.agenda import Agenda
-from orchestration.stepping.streams import Streams
 from orchestration.system.system_file import load_system, schema, to_toml
 
 SHIPPED = Path(translation.__file__).with_name("system.toml")

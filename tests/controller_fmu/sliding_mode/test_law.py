@@ -27,7 +27,7 @@ from fmu_kit.algebra import ZERO, Inertia, Quaternion, Vec3
 from fmu_kit.errors import DivergenceError
 from fmu_kit.scalar import FLOAT, ScalarOps
 from fmu_kit.trajectory import Reference, Trajectory
-from orchestration.stepping.sources import NUMPY
+from orchestration.master.sources import NUMPY
 from plant_fmu.dynamics import Body, RigidState, Wrench, derivative
 from plant_fmu.integrator import rk4_step
 from tests.reference.tables import LAWS, law_at

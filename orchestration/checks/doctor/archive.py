@@ -1,0 +1,158 @@
+"""What an .fmu file says of what it needs: its description, its binaries, the Python sources in it."""
+
+import io
+import math
+import posixpath
+import zipfile
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+from fmu_kit import loader
+from orchestration.checks.doctor import sources
+from orchestration.checks.doctor.binaries import LINUX, MACOS, WINDOWS, Binary, UnreadableError, joined, origin_in, read
+from orchestration.errors import UsageError
+
+DESCRIPTION = "modelDescription.xml"
+CO_SIMULATION, MODEL_EXCHANGE = "CoSimulation", "ModelExchange"
+
+PLATFORMS = {
+    "linux32": (LINUX, ("x86",)),
+    "linux64": (LINUX, ("x86-64",)),
+    "win32": (WINDOWS, ("x86",)),
+    "win64": (WINDOWS, ("x86-64",)),
+    "darwin32": (MACOS, ("x86",)),
+    "darwin64": (MACOS, ("x86-64", "aarch64")),
+}
+"""The folders that FMI 2.0 names, and the machines they stand for."""
+
+_SUFFIXES = {"linux": ".so", "win": ".dll", "darwin": ".dylib"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlatformBinary:
+    """The FMU's library for one platform."""
+
+    platform: str
+    """The folder in `binaries/`."""
+    binary: Binary | None = None
+    """None if there is none to be read; `problem` says why."""
+    finds_python: bool = False
+    """Whether it is a loader of this project, which opens a libpython and then pythonfmu's library beside it."""
+    bundled: frozenset[str] = frozenset()
+    """Dependencies that the FMU brings along, where the loader looks."""
+    problem: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fmu:
+    """What an FMI 2.0 FMU needs."""
+
+    path: Path
+    kinds: tuple[str, ...]
+    model_identifier: str
+    guid: str
+    start_time: float
+    """[s]; of the default experiment, 0 if it has none"""
+    needs_tool: str | None
+    """The tool that must be installed because the FMU says so (needsExecutionTool)."""
+    platforms: tuple[PlatformBinary, ...]
+    requires_python: str | None
+    """The version specifier that the description declares, if any."""
+    python: sources.PythonSources | None
+    """None if it is not made by pythonfmu."""
+
+
+def open_fmu(path: Path, size_limit: float = math.inf) -> Fmu:
+    """Read an .fmu file; raises `UsageError` if it is not an FMI 2.0 FMU, or unpacks to more than `size_limit` MB."""
+    if not path.is_file():
+        raise UsageError(f"{path}: expected an .fmu file")
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(entry.file_size for entry in archive.infolist()) / 1e6
+            if size > size_limit:
+                raise UsageError(f"{path}: unpacks to {size:.0f} MB: expected at most {size_limit:g} MB (--size-limit)")
+            if DESCRIPTION not in archive.namelist():
+                raise UsageError(f"{path}: expected an FMU; it has no {DESCRIPTION}")
+            description = ElementTree.fromstring(archive.read(DESCRIPTION))
+            return _read(path, archive, description)
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
+        raise UsageError(f"{path}: expected an FMU, which is a zip file: {error}") from error
+    except ElementTree.ParseError as error:
+        raise UsageError(f"{path}: expected XML in {DESCRIPTION}: {error}") from error
+
+
+def _read(path: Path, archive: zipfile.ZipFile, description: ElementTree.Element) -> Fmu:
+    version = description.get("fmiVersion")
+    if version != "2.0":
+        raise UsageError(f"{path}: an FMU of FMI {version}: expected one of FMI 2.0")
+    kinds = tuple(kind for kind in (CO_SIMULATION, MODEL_EXCHANGE) if description.find(kind) is not None)
+    chosen = description.find(kinds[0]) if kinds else None
+    if chosen is None:
+        raise UsageError(f"{path}: expected {CO_SIMULATION} or {MODEL_EXCHANGE} in {DESCRIPTION}")
+    declared = description.find("VendorAnnotations/Tool[@name='quadcosim']/Python")
+    tool = description.get("generationTool", "the tool that made it")
+    return Fmu(
+        path=path,
+        kinds=kinds,
+        model_identifier=chosen.get("modelIdentifier", ""),
+        guid=description.get("guid", ""),
+        start_time=_start_time(description),
+        needs_tool=tool if chosen.get("needsExecutionTool") in ("true", "1") else None,
+        platforms=_platforms(archive, chosen.get("modelIdentifier", "")),
+        requires_python=None if declared is None else declared.get("requires"),
+        python=sources.read(archive),
+    )
+
+
+def _start_time(description: ElementTree.Element) -> float:
+    experiment = description.find("DefaultExperiment")
+    try:
+        return float("0" if experiment is None else experiment.get("startTime", "0"))
+    except ValueError:  # which is for `validate` to say
+        return 0.0
+
+
+def _platforms(archive: zipfile.ZipFile, identifier: str) -> tuple[PlatformBinary, ...]:
+    parts = [name.split("/") for name in archive.namelist()]
+    folders = sorted({part[1] for part in parts if part[0] == "binaries" and len(part) > 2 and part[2]})
+    return tuple(_platform(archive, folder, identifier) for folder in folders)
+
+
+def _platform(archive: zipfile.ZipFile, folder: str, identifier: str) -> PlatformBinary:
+    names = archive.namelist()
+    suffixes = [suffix for system, suffix in _SUFFIXES.items() if folder.startswith(system)] or _SUFFIXES.values()
+    expected = [f"binaries/{folder}/{identifier}{suffix}" for suffix in suffixes]
+    found = next((name for name in expected if name in names), None)
+    if found is None:
+        return PlatformBinary(platform=folder, problem=f"expected {' or '.join(expected)}")
+    try:
+        binary = read(io.BytesIO(archive.read(found)))
+        finds_python = folder == posixpath.basename(loader.PLATFORM) and loader.BESIDE in names
+        if finds_python:
+            binary = joined(binary, read(io.BytesIO(archive.read(loader.BESIDE))))
+    except UnreadableError as error:
+        return PlatformBinary(platform=folder, problem=f"{found}: {error}")
+    looked_at = {f"binaries/{folder}"} if binary.system == WINDOWS else set(_inside(binary, folder))
+    bundled = {name for name in binary.dependency_names for place in looked_at if f"{place}/{name}" in names}
+    problem = _mismatch(folder, binary)
+    return PlatformBinary(
+        platform=folder, binary=binary, finds_python=finds_python, bundled=frozenset(bundled), problem=problem
+    )
+
+
+def _inside(binary: Binary, folder: str) -> list[str]:
+    """Folders of the archive in which an ELF library asks the loader to look."""
+    own = f"binaries/{folder}"
+    return [posixpath.normpath(origin_in(entry, own)) for entry in binary.run_path]
+
+
+def _mismatch(folder: str, binary: Binary) -> str | None:
+    """What is wrong if the header of a binary speaks of another machine than its folder."""
+    if folder not in PLATFORMS:
+        return None
+    system, architectures = PLATFORMS[folder]
+    if binary.system == system and set(binary.architectures) <= set(architectures):
+        return None
+    return f"a binary for {binary.target}, expected {system}, {' or '.join(architectures)} in this folder"

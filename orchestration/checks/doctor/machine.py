@@ -1,0 +1,134 @@
+"""What this machine has of what FMUs need, as plain facts; nothing is judged here."""
+
+import importlib.util
+import os
+import platform
+import struct
+import sys
+import sysconfig
+import tempfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from orchestration.checks.doctor import loader
+from orchestration.checks.doctor.archive import Fmu
+from orchestration.checks.doctor.binaries import LINUX, MACOS, WINDOWS
+from orchestration.checks.doctor.loader import Loader
+from orchestration.checks.doctor.pythons import PythonLibrary, python_libraries
+
+_SYSTEMS = {"Linux": LINUX, "Windows": WINDOWS, "Darwin": MACOS}
+_FOLDERS = {LINUX: "linux", WINDOWS: "win", MACOS: "darwin"}
+_X86, _ARM = ("i386", "i686", "x86", "amd64", "x86_64"), ("arm64", "aarch64")
+_ON_64_BITS = {"x86-64", "aarch64"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Library:
+    """A shared library that a loader finds."""
+
+    path: Path
+    versions: tuple[str, ...] = ()
+    """Versions of symbols that it defines."""
+
+
+Libraries = Mapping[str, Library | None]
+"""By the name that a binary gives; None: not found."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Machine:
+    """A machine, the Python that looks at it, and what was found of the libraries and modules asked for."""
+
+    system: str
+    architecture: str
+    glibc: str | None = None
+    python: str
+    """Major, minor and micro."""
+    executable: str
+    shared: bool | None = None
+    """Whether this Python is linked to a shared libpython; None: unknown."""
+    temp_folder: Path
+    """Where FMUs are unpacked."""
+    python_libraries: tuple[PythonLibrary, ...] = ()
+    """What a host that is not Python could load, best first."""
+    found: Libraries = field(default_factory=dict)
+    """What the loader of a program that is not Python finds."""
+    found_by_python: Libraries = field(default_factory=dict)
+    """What the loader of this Python finds."""
+    modules: Mapping[str, bool] = field(default_factory=dict)
+    """Whether this Python can import a module."""
+
+    @property
+    def platform(self) -> str:
+        """The folder in `binaries/` that FMI 2.0 tools look into here."""
+        return _FOLDERS.get(self.system, self.system) + ("64" if self.architecture in _ON_64_BITS else "32")
+
+
+def this_machine(fmus: Iterable[Fmu]) -> Machine:
+    """This machine, looked at for what `fmus` ask for."""
+    fmus = tuple(fmus)
+    system, architecture = _SYSTEMS.get(platform.system(), platform.system()), _architecture()
+    programs = loader.loader_of_programs(system, architecture)
+    own = loader.loader_of_this_python(programs)
+    wanted = {
+        name: part.binary.run_path
+        for fmu in fmus
+        for part in fmu.platforms
+        if part.binary is not None and part.binary.fits(system, architecture)
+        for name in part.binary.dependency_names
+    }
+    return Machine(
+        system=system,
+        architecture=architecture,
+        glibc=_glibc(),
+        python=".".join(map(str, sys.version_info[:3])),
+        executable=sys.executable,
+        shared=_shared(system),
+        temp_folder=Path(tempfile.gettempdir()),
+        python_libraries=python_libraries(programs),
+        found={name: _library(programs, name, run_path) for name, run_path in wanted.items()},
+        found_by_python={name: _library(own, name, run_path) for name, run_path in wanted.items()},
+        modules={name: _importable(name) for fmu in fmus if fmu.python is not None for name in fmu.python.imports},
+    )
+
+
+def _architecture() -> str:
+    """That of this process, which may be of 32 bits on a machine of 64."""
+    name = sysconfig.get_platform().rpartition("-")[2] if os.name == "nt" else platform.machine()
+    wide = struct.calcsize("P") == 8
+    if name.lower() in (*_X86, "win32"):
+        return "x86-64" if wide else "x86"
+    if name.lower() in _ARM:
+        return "aarch64" if wide else "arm"
+    return name
+
+
+def _glibc() -> str | None:
+    try:
+        return os.confstr("CS_GNU_LIBC_VERSION")
+    except (AttributeError, ValueError, OSError):  # not on Windows, not with another C library
+        return None
+
+
+def _shared(system: str) -> bool | None:
+    """Whether the executable needs a libpython; on Windows every Python has its DLL."""
+    if system == WINDOWS:
+        return True
+    binary = loader.read_file(Path(sys.executable))
+    if binary is None or binary.dependencies is None:
+        return None
+    return any(name.startswith("libpython") for name in binary.dependency_names)
+
+
+def _library(where: Loader, name: str, run_path: Iterable[str]) -> Library | None:
+    path = where.find(name, run_path)
+    binary = None if path is None else loader.read_file(path)
+    return None if path is None or binary is None else Library(path=path, versions=binary.defined_versions)
+
+
+def _importable(module: str) -> bool:
+    try:
+        return importlib.util.find_spec(module) is not None
+    except (ImportError, ValueError):
+        return False

@@ -1,0 +1,73 @@
+"""Looking at FMUs and this machine, and what came of it."""
+
+import dataclasses
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from orchestration.checks.confined import Limits
+from orchestration.checks.doctor.binaries import newest
+from orchestration.checks.doctor.dependencies import part_for
+from orchestration.checks.doctor.loading import attempt
+from orchestration.checks.doctor.machine import Library, Machine, this_machine
+from orchestration.checks.doctor.verdict import Verdict, judge
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """A machine, and what came of each FMU on it."""
+
+    machine: Machine
+    verdicts: tuple[Verdict, ...]
+
+    @property
+    def good(self) -> bool:
+        """Whether every FMU loads and nothing is missing."""
+        return all(verdict.good for verdict in self.verdicts)
+
+
+def examine(paths: Iterable[Path], limits: Limits) -> Report:
+    """Read the FMUs and try them within `limits`, look at this machine; `UsageError` for what is no FMI 2.0 FMU."""
+    trials = [attempt(path, limits) for path in paths]
+    machine = this_machine([trial.fmu for trial in trials])
+    return Report(machine=machine, verdicts=tuple(judge(trial.fmu, machine, trial.failure) for trial in trials))
+
+
+def as_tables(report: Report) -> dict[str, Any]:
+    """All facts, for `json.dumps`."""
+    return {
+        "machine": _plain(report.machine),
+        "fmus": [_verdict_table(verdict, report.machine) for verdict in report.verdicts],
+        "good": report.good,
+    }
+
+
+def _verdict_table(verdict: Verdict, machine: Machine) -> dict[str, Any]:
+    part = part_for(verdict.fmu, machine)
+    hosts = {"python": verdict.python_host, "other": verdict.other_host}
+    return {
+        **_plain(verdict.fmu),
+        "platform_here": None if part is None else part.platform,
+        "hosts": {name: {"ready": host.ready, **_plain(host)} for name, host in hosts.items()},
+        "loads": verdict.failure is None,
+        "failure": verdict.failure,
+        "problems": list(verdict.problems),
+        "elsewhere": list(verdict.elsewhere),
+        "good": verdict.good,
+    }
+
+
+def _plain(value: Any) -> Any:
+    """Dataclasses as tables, paths as text, sets as sorted lists; of a library's versions the newest."""
+    if isinstance(value, Library):
+        return {"path": str(value.path), "versions": list(newest(value.versions))}
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if isinstance(value, dict):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, (set, frozenset)):
+        return sorted(value)
+    if isinstance(value, (tuple, list)):
+        return [_plain(entry) for entry in value]
+    return str(value) if isinstance(value, Path) else value

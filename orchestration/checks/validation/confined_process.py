@@ -1,0 +1,80 @@
+"""The confined process that does all that touches the FMU.
+
+`python -m orchestration.checks.validation.confined_process FMU FOLDER SECONDS MB` unpacks the FMU in the folder, an
+empty one, and writes what is found to it (see `progress`).
+"""
+
+import sys
+from pathlib import Path
+
+import fmpy
+
+from orchestration.checks.confined import Limits, restrict
+from orchestration.checks.validation import rules, run_rules
+from orchestration.checks.validation.archive import UnreadableError, can_be_unpacked, read_archive
+from orchestration.checks.validation.description import standard
+from orchestration.checks.validation.exercise import Bench
+from orchestration.checks.validation.fmu import read_fmu, read_root
+from orchestration.checks.validation.instance import RefusedError
+from orchestration.checks.validation.own_description import own_description
+from orchestration.checks.validation.progress import PULSE, REPORT, Pulse, Report
+from orchestration.fmi.pythonfmu import expect_readable_place
+
+READABLE, PLATFORM = "readable", "platform"
+"""Rules that are kept here: there is an FMI 2.0 FMU to look at, and this machine can run it"""
+
+
+def main(path: Path, folder: Path, limits: Limits) -> None:
+    """Try every rule that is meant for the FMU."""
+    restrict(limits.size)
+    report = Report(folder / REPORT)
+    try:
+        report.rule(READABLE)
+        _look(path, folder, limits, report)
+        report.end()
+    except UnreadableError as error:
+        report.rule(READABLE)
+        report.found(str(error))
+        report.end()
+    except Exception as error:
+        report.failed(error)
+        raise
+
+
+def _look(path: Path, folder: Path, limits: Limits, report: Report) -> None:
+    archive = read_archive(path, limits.size)
+    report.tried(rules.OF_ARCHIVES, archive, RefusedError)
+    root = read_root(archive)
+    report.tried((standard,), archive, RefusedError)
+    fmu = read_fmu(archive, root)
+    report.tried((*rules.OF_DESCRIPTIONS, *(rules.OUR_DESCRIPTIONS if fmu.is_ours else ())), fmu, RefusedError)
+    if can_be_unpacked(archive):
+        place = folder / "fmu"
+        fmpy.extract(str(path), str(place))
+        expect_readable_place(place)
+        pulse = Pulse(folder / PULSE)
+        _run(Bench(fmu, place, limits.time, pulse.beat), report)
+
+
+def _run(bench: Bench, report: Report) -> None:
+    fmu = bench.fmu
+    if fmu.is_ours:
+        report.tried((own_description,), bench, RefusedError)
+    platforms = fmpy.supported_platforms(str(fmu.archive.path))
+    if fmpy.platform not in platforms:
+        report.rule(PLATFORM)
+        missing = f"expected a binary for {fmpy.platform}, found {', '.join(platforms) or 'none'}"
+        report.found(f"what the FMU does was not checked: {missing}")
+        return
+    if any(report.tried([rule], bench, RefusedError) for rule in run_rules.FIRST):
+        return
+    report.tried(rules.OF_RUNS, bench, RefusedError)
+    if bench.repeats is None:
+        report.tried(rules.OF_EQUAL_RUNS, bench, RefusedError)
+    if fmu.is_ours:
+        report.tried(rules.OUR_RUNS, bench, RefusedError)
+
+
+if __name__ == "__main__":
+    _path, _folder, _time, _size = sys.argv[1:]
+    main(Path(_path), Path(_folder), Limits(time=float(_time), size=float(_size)))

@@ -1,0 +1,145 @@
+"""Rules on what is declared of outputs and inputs: each input is moved, and what moves with it is looked at."""
+
+import contextlib
+from collections import defaultdict, deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+from orchestration.checks.validation.exercise import Bench, Plan
+from orchestration.checks.validation.fmu import Fmu, Unknown, Variable
+from orchestration.checks.validation.instance import Instance, RefusedError, Row, Value, Values, same
+
+MOST_SWITCHES = 16
+"""Boolean parameters that are tried the other way round, each with all inputs"""
+_POINTS = (0, 3)
+"""Communication points, in steps, at which the inputs are moved"""
+
+_FAR = tuple(sign * 10.0**k for k in range(5) for sign in (1.0, -1.0))
+"""By how much an input is moved that moves nothing when it is moved a little"""
+
+Moved = dict[str, set[str]]
+"""Outputs that move, by the input that they move with"""
+
+
+@dataclass(frozen=True)
+class Mode:
+    """What is declared of the outputs in a mode, and what was seen."""
+
+    where: str
+    declared: dict[str, set[str] | None]
+    """Inputs by output; None: all"""
+    moved: Moved = field(default_factory=lambda: defaultdict(set))
+
+
+def undeclared_dependency(bench: Bench) -> Iterator[str]:
+    """No output moves with an input that it is declared not to depend on."""
+    for mode in _modes(bench):
+        for name, outputs in mode.moved.items():
+            for output in sorted(outputs):
+                declared = mode.declared.get(output)
+                if declared is not None and name not in declared:
+                    yield f"{output} moves with {name} {mode.where}: expected {name} among its dependencies"
+
+
+def idle_dependency(bench: Bench) -> Iterator[str]:
+    """Rule of this project: an input that outputs are declared to depend on moves one of them in some way or other."""
+    if not bench.fmu.is_ours:
+        return
+    for mode in _modes(bench):
+        for v in bench.inputs:
+            declaring = {output for output, inputs in mode.declared.items() if inputs is not None and v.name in inputs}
+            if declaring and not declaring & (mode.moved[v.name] or _moving_far(bench, v)):
+                names = ", ".join(sorted(declaring))
+                yield f"{v.name} moves none of {names} {mode.where}: expected it not to be among their dependencies"
+
+
+def _modes(bench: Bench) -> Iterator[Mode]:
+    """What is seen in initialisation mode and, of our FMUs, at communication points, in every configuration.
+
+    At a communication point FMI allows no value to be asked for between setting an input and the next step;
+    the FMUs of this project answer nevertheless, with what they declare.
+    """
+    initial = Mode("in initialisation mode", _declared(bench.fmu, bench.fmu.initial_unknowns))
+    later = Mode("at a communication point", _declared(bench.fmu, bench.fmu.outputs))
+    for values in _configurations(bench):
+        with contextlib.suppress(RefusedError):  # a configuration that is refused shows nothing
+            _move(bench, values, None, initial.moved)
+            for steps in _POINTS if bench.fmu.is_ours else ():
+                _move(bench, values, steps, later.moved)
+    yield initial
+    if bench.fmu.is_ours:
+        yield later
+
+
+def _configurations(bench: Bench) -> Iterator[dict[str, Value]]:
+    """Inputs a little away from their starts; and with them each Boolean parameter the other way round."""
+    inputs = bench.inputs_at(0)
+    yield inputs
+    switches = [v for v in bench.fmu.of_causality("parameter") if v.type == "Boolean"]
+    for v in switches[:MOST_SWITCHES]:
+        yield {**inputs, v.name: not v.start_value}
+
+
+def _move(bench: Bench, values: Values, steps: int | None, moved: Moved) -> None:
+    """Move each input a little, one after another, and note what moves with it.
+
+    After `steps` steps; None: in initialisation mode. A value that is refused shows nothing, and ends its instance.
+    """
+    waiting = deque(bench.inputs)
+    while waiting:
+        with bench.instance() as instance:
+            _prepare(bench, instance, values, steps)
+            before = instance.get(bench.outputs)
+            with contextlib.suppress(RefusedError):
+                while waiting:
+                    v = waiting.popleft()
+                    moved[v.name] |= _moving(bench, instance, v, before)
+
+
+def _moving(bench: Bench, instance: Instance, v: Variable, before: Row) -> set[str]:
+    """The outputs that move with an input, which is put back."""
+    value, *near = bench.around(v)
+    outputs = set()
+    for other in near:
+        instance.set({v.name: other})
+        after = instance.get(bench.outputs)
+        outputs |= {output for output, old in before.items() if not same(old, after[output])}
+    instance.set({v.name: value})
+    return outputs
+
+
+def _moving_far(bench: Bench, v: Variable) -> set[str]:
+    """The outputs that move in initialisation mode with a Real input that is moved far: a switch has a threshold."""
+    outputs: set[str] = set()
+    for move in _FAR if v.type == "Real" else ():
+        with bench.instance() as instance, contextlib.suppress(RefusedError):
+            values = bench.inputs_at(0)
+            instance.begin(values, bench.start)
+            before = instance.get(bench.outputs)
+            instance.set({v.name: float(values[v.name]) + move})
+            after = instance.get(bench.outputs)
+            outputs |= {output for output, old in before.items() if not same(old, after[output])}
+    return outputs
+
+
+def _prepare(bench: Bench, instance: Instance, values: Values, steps: int | None) -> None:
+    if steps is None:
+        instance.begin(values, bench.start)
+        return
+    instance.initialise(values, bench.start)
+    for t, h in bench.points(Plan(steps=steps))[:steps]:
+        instance.step(t, h)
+
+
+def _declared(fmu: Fmu, unknowns: Iterable[Unknown]) -> dict[str, set[str] | None]:
+    declared: dict[str, set[str] | None] = {}
+    for unknown in unknowns:
+        output = fmu.variable(unknown.index)
+        if output is not None and output.causality == "output":
+            listed = unknown.dependencies
+            known = None if listed is None else {v.name for v in map(fmu.variable, listed) if v is not None}
+            declared[output.name] = known
+    return declared
+
+
+RULES = (undeclared_dependency, idle_dependency)

@@ -1,0 +1,81 @@
+"""Rules on the model description as a whole."""
+
+import math
+import re
+from collections.abc import Iterator
+
+from orchestration.checks.validation.archive import Archive
+from orchestration.checks.validation.fmu import Fmu
+
+_PLATFORM_SUFFIXES = (".so", ".dll", ".dylib")
+SLAVE_MODULE = "resources/slavemodule.txt"
+"""Where pythonfmu looks for the name of the script that it runs."""
+
+
+def standard(archive: Archive) -> list[str]:
+    """All that fmpy finds: the schema, names, required starts, combinations of attributes, units, structure."""
+    from fmpy.validation import validate_fmu
+
+    try:
+        problems = validate_fmu(str(archive.path))
+    except Exception as error:  # it reads attributes strictly, and trips over damage in its own ways
+        problems = [f"fmpy does not read it: {type(error).__name__}: {error}"]
+    return [" ".join(str(problem).split()) for problem in problems]
+
+
+def guid(fmu: Fmu) -> Iterator[str]:
+    """An empty one passes the schema, but no library could tell by it whose description it was given."""
+    if not fmu.guid.strip():
+        yield f"guid = {fmu.guid!r}: expected a text that is not empty"
+
+
+def model_identifier(fmu: Fmu) -> Iterator[str]:
+    """It is the prefix of C functions and the name of a file (FMI 2.0.4, section 2.1.1)."""
+    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", fmu.model_identifier):
+        yield f"modelIdentifier = {fmu.model_identifier!r}: expected a name by C syntax"
+
+
+def capabilities(fmu: Fmu) -> Iterator[str]:
+    """What cannot be saved cannot be serialised."""
+    if fmu.can("canSerializeFMUstate") and not fmu.can("canGetAndSetFMUstate"):
+        yield "canGetAndSetFMUstate = false: expected true, since canSerializeFMUstate is"
+
+
+def default_experiment(fmu: Fmu) -> Iterator[str]:
+    """It can be run as it is written."""
+    experiment = fmu.experiment
+    for key, value in experiment.items():
+        if not math.isfinite(value):
+            yield f"{key} = {value}: expected a finite number"
+    start, stop = experiment.get("startTime", 0.0), experiment.get("stopTime")
+    if stop is not None and not stop > start:
+        yield f"stopTime = {stop}: expected a time after startTime = {start}"
+    for key in ("stepSize", "tolerance"):
+        if not experiment.get(key, 1.0) > 0.0:
+            yield f"{key} = {experiment[key]}: expected a positive number"
+
+
+def binaries(fmu: Fmu) -> Iterator[str]:
+    """A library for at least one platform goes by the model identifier, or the FMU comes as sources."""
+    files = fmu.archive.files
+    libraries = [name for name in files if name.startswith("binaries/") and name.endswith(_PLATFORM_SUFFIXES)]
+    if any(name.rpartition("/")[2].rpartition(".")[0] == fmu.model_identifier for name in libraries):
+        return
+    if not any(name.startswith("sources/") for name in files):
+        found = ", ".join(libraries) or "none"
+        yield f"expected a library of the name {fmu.model_identifier} under binaries/, found {found}"
+
+
+def slave_module(fmu: Fmu) -> Iterator[str]:
+    """The script that pythonfmu is told to run is there."""
+    files = fmu.archive.files
+    if SLAVE_MODULE not in files:
+        if fmu.is_ours:
+            yield f"{SLAVE_MODULE}: expected this file, with the name of the script in resources/"
+        return
+    name = files[SLAVE_MODULE].decode("utf-8", "replace").strip()
+    if f"resources/{name}.py" not in files:
+        yield f"{SLAVE_MODULE}: it names {name}, expected a script in resources/; there is no resources/{name}.py"
+
+
+RULES = (guid, model_identifier, capabilities, default_experiment, binaries, slave_module)

@@ -1,0 +1,114 @@
+"""Rules of this project: what an FMU that quadcosim built must be beyond the standard."""
+
+import datetime
+from collections.abc import Iterator
+
+from fmu_kit.loader import GUID_FILE
+from fmu_kit.packaging import ICON, content_guid
+from orchestration.checks.validation.fmu import Fmu, Variable
+from orchestration.checks.validation.units import base_units, dimensions
+from orchestration.quadrotor import wiring
+
+PAGE = "documentation/index.html"
+_PNG = b"\x89PNG\r\n\x1a\n"
+_DATE = "%Y-%m-%dT%H:%M:%SZ"
+
+
+def guid_of_content(fmu: Fmu) -> Iterator[str]:
+    """The GUID says which files, to the byte, the FMU was built with."""
+    expected = content_guid(dict(fmu.archive.files))
+    if fmu.guid != expected:
+        yield f"guid = {fmu.guid}: expected {expected}, that of the content"
+    known = fmu.archive.files.get(GUID_FILE, b"").decode(errors="replace")
+    if known != fmu.guid:
+        yield f"{GUID_FILE} = {known}: expected {fmu.guid}, the guid"
+
+
+def date(fmu: Fmu) -> Iterator[str]:
+    """FMI asks for Zulu time in words, the schema for any time."""
+    text = fmu.root.get("generationDateAndTime", "none")
+    try:
+        sound = datetime.datetime.strptime(text, _DATE).strftime(_DATE) == text
+    except ValueError:
+        sound = False
+    if not sound:
+        yield f"generationDateAndTime = {text}: expected the form 2009-12-08T14:33:22Z"
+
+
+def execution_tool(fmu: Fmu) -> Iterator[str]:
+    """Some masters refuse an FMU that says it needs a tool."""
+    if fmu.can("needsExecutionTool"):
+        yield "needsExecutionTool = true: expected false"
+
+
+def value_references(fmu: Fmu) -> Iterator[str]:
+    """A value reference is the place in the list: none twice, and the same for every build of the same sources."""
+    for v in fmu.variables:
+        if v.reference != v.index - 1:
+            yield f"{v.name}: valueReference = {v.reference}, expected {v.index - 1}, its place in the list"
+
+
+def start_text(fmu: Fmu) -> Iterator[str]:
+    """A start is the shortest text that gives its bits, so that two builds cannot differ in it."""
+    for v in fmu.variables:
+        if v.type == "Real" and v.start is not None and v.start != repr(float(v.start)):
+            yield f"{v.name}: start = {v.start}, expected {float(v.start)!r}, the shortest text for the same bits"
+
+
+def units(fmu: Fmu) -> Iterator[str]:
+    """Every Real has a unit, and every unit a definition by SI base units under a name that says the same."""
+    used = {v.unit for v in fmu.variables if v.unit is not None}
+    for v in fmu.variables:
+        if v.type == "Real" and v.unit is None:
+            yield f"{v.name}: expected a unit, found none"
+    for name, base in base_units(fmu).items():
+        if base is None:
+            yield f"unit {name}: expected its base units, found none"
+        if dimensions(name) is None:
+            yield f"unit {name}: expected a name made of SI symbols, as N.m.s or m/s3"
+        if name not in used:
+            yield f"unit {name}: expected a variable that has it, found none"
+
+
+def documentation(fmu: Fmu) -> Iterator[str]:
+    """The FMU explains itself to whoever has nothing else, and the models of this project have their icon."""
+    files = fmu.archive.files
+    if not files.get(PAGE, b"").strip():
+        yield f"{PAGE}: expected a page, found {'an empty file' if PAGE in files else 'none'}"
+    if fmu.root.get("modelName") in wiring.MODELS and not files.get(ICON, b"").startswith(_PNG):
+        yield f"{ICON}: expected an icon in PNG, found {'another file' if ICON in files else 'none'}"
+
+
+def ports(fmu: Fmu) -> Iterator[str]:
+    """A controller, and a plant, has all that is wired to it, under the names and with the units of the wiring."""
+    outputs = {v.name for v in fmu.of_causality("output")}
+    if outputs.intersection(wiring.COMMAND):
+        yield from _missing(fmu, "output", wiring.COMMAND)
+        yield from _missing(fmu, "input", (*wiring.MEASUREMENT, *wiring.REFERENCE))
+        yield from _missing(fmu, "parameter", (wiring.SAMPLE_PERIOD, wiring.SAMPLE_OFFSET, *wiring.TRAJECTORY))
+        yield from _missing(fmu, "parameter", (wiring.USE_REFERENCE_INPUTS,), "Boolean")
+    elif outputs.intersection(wiring.MEASUREMENT):
+        yield from _missing(fmu, "output", wiring.MEASUREMENT)
+        yield from _missing(fmu, "input", (*wiring.COMMAND, *wiring.EXTERNAL_FORCE))
+
+
+def _missing(fmu: Fmu, causality: str, names: tuple[str, ...], kind: str = "Real") -> Iterator[str]:
+    by_name = {v.name: v for v in fmu.variables}
+    for name in names:
+        unit = wiring.UNITS.get(name)
+        expected = _described(kind, causality, unit)
+        if name not in by_name:
+            yield f"{name}: expected {expected}, found none"
+        elif (found := _as_port(by_name[name])) != expected:
+            yield f"{name}: expected {expected}, found {found}"
+
+
+def _as_port(v: Variable) -> str:
+    return _described(v.type, v.causality, v.unit)
+
+
+def _described(kind: str, causality: str, unit: str | None) -> str:
+    return f"{kind} {causality}" + (f" in {unit}" if unit is not None else "")
+
+
+RULES = (guid_of_content, date, execution_tool, value_references, start_text, units, documentation, ports)

@@ -1,0 +1,85 @@
+"""Rules of this project on calls: those that must be refused, and a run that must not be."""
+
+import math
+from collections.abc import Iterator
+
+from orchestration.checks.validation.exercise import PLAIN, Bench
+from orchestration.checks.validation.fmu import Variable
+from orchestration.checks.validation.instance import RefusedError, Value
+from orchestration.checks.validation.variables import limits
+
+
+def general_run(bench: Bench) -> Iterator[str]:
+    """Parameters near their starts, moving inputs and uneven steps are taken; the other runs rely on it."""
+    try:
+        bench.flown(bench.everything)
+    except RefusedError as error:
+        yield f"with parameters near their starts, moving inputs and uneven steps: {error}"
+
+
+def fixed_parameters(bench: Bench) -> Iterator[str]:
+    """A fixed parameter cannot be set after initialisation, not even to what it is."""
+    for v in bench.fmu.of_causality("parameter"):
+        if v.variability == "fixed" and _accepts(bench, v, v.start_value, initialised=True):
+            yield f"{v.name}: set after initialisation, expected a fixed parameter to be refused"
+
+
+def bounds_enforced(bench: Bench) -> Iterator[str]:
+    """A parameter outside its bounds does not get past initialisation, a tunable one not past the next step."""
+    for v in bench.fmu.of_causality("parameter"):
+        for bound, sign in zip(limits(v), (-1.0, 1.0)):
+            if math.isinf(bound):
+                continue
+            outside = bound + sign * max(1.0, abs(bound))
+            value = outside if v.type == "Real" else int(outside)
+            moments = (False, True) if v.variability == "tunable" else (False,)
+            for initialised in moments:
+                if _accepts(bench, v, value, initialised=initialised):
+                    when = "after" if initialised else "before"
+                    yield f"{v.name} = {value:g} set {when} initialisation: expected it refused, its bound is {bound:g}"
+
+
+def not_finite_refused(bench: Bench) -> Iterator[str]:
+    """A value that is not finite is refused where it is set, so that the message can name the variable."""
+    for v in bench.fmu.of_causality("input", "parameter"):
+        if v.type != "Real":
+            continue
+        cases = [(math.nan, False)]
+        if v.causality == "input" or v.variability == "tunable":
+            cases += [(math.nan, True), (math.inf, True)]
+        for value, initialised in cases:
+            if _takes(bench, v, value, initialised=initialised):
+                when = "after" if initialised else "before"
+                yield f"{v.name} = {value} set {when} initialisation: expected the call to be refused"
+                break
+
+
+def _accepts(bench: Bench, v: Variable, value: Value, *, initialised: bool) -> bool:
+    """Whether the FMU goes on with a value: through initialisation, or through a step."""
+    try:
+        with bench.instance() as instance:
+            if initialised:
+                bench.begin(instance, PLAIN)
+                instance.set({v.name: value})
+                instance.step(bench.start, bench.step)
+            else:
+                instance.set({v.name: value})
+                bench.begin(instance, PLAIN)
+    except RefusedError:
+        return False
+    return True
+
+
+def _takes(bench: Bench, v: Variable, value: Value, *, initialised: bool) -> bool:
+    """Whether the call that sets the value succeeds."""
+    with bench.instance() as instance:
+        if initialised:
+            bench.begin(instance, PLAIN)
+        try:
+            instance.set({v.name: value})
+        except RefusedError:
+            return False
+    return True
+
+
+RULES = (general_run, fixed_parameters, bounds_enforced, not_finite_refused)

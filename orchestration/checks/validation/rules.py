@@ -1,0 +1,29 @@
+"""Every rule, by what it looks at and whose FMUs it is for."""
+
+from orchestration.checks.validation import (
+    archive,
+    dependencies,
+    description,
+    own_rules,
+    refusals,
+    run_rules,
+    structure,
+    units,
+    variables,
+)
+from orchestration.checks.validation.own_description import own_description
+
+OF_ARCHIVES = archive.RULES
+OF_DESCRIPTIONS = (*description.RULES, *variables.RULES, *units.RULES, *structure.RULES)
+OF_RUNS = run_rules.RULES
+"""After `run_rules.FIRST`, without which they cannot be tried."""
+OF_EQUAL_RUNS = (*run_rules.COMPARED, *dependencies.RULES)
+"""For FMUs whose runs can be repeated."""
+
+OUR_DESCRIPTIONS = own_rules.RULES
+OUR_RUNS = refusals.RULES
+
+STANDARD = (*OF_ARCHIVES, description.standard, *OF_DESCRIPTIONS, *run_rules.FIRST, *OF_RUNS, *OF_EQUAL_RUNS)
+"""For every FMU."""
+OURS = (*OUR_DESCRIPTIONS, own_description, *OUR_RUNS)
+"""For those that quadcosim built."""

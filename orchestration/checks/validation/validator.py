@@ -1,0 +1,53 @@
+"""All rules, tried in a confined process: a crash is a finding, and so is no answer in time."""
+
+import tempfile
+from pathlib import Path
+
+from orchestration import subprocesses
+from orchestration.checks import confined
+from orchestration.checks.confined import Ending, Limits
+from orchestration.checks.validation.finding import Finding
+from orchestration.checks.validation.progress import PULSE, REPORT, Told, since_last_beat
+from orchestration.errors import QuadcosimError
+
+PROCESS = "process"
+"""Rule that is kept here: the process of the FMU lives to its end"""
+_HANGS = 0.5
+"""Share of the time limit that one call may take before it is taken for one that does not return"""
+
+
+def validate(path: str | Path, *, limits: Limits | None = None) -> list[Finding]:
+    """What is wrong with the FMU for co-simulation (FMI 2.0) at `path`; nothing for one that is as it should be.
+
+    All that touches the file is done, and the FMU is run, in a process of its own within `limits`. Rules that are
+    this project's and not the standard's are for FMUs that quadcosim built. Raises `QuadcosimError` if the
+    validation fails itself.
+    """
+    path, limits = Path(path), limits or Limits()
+    with tempfile.TemporaryDirectory(prefix="quadcosim-", ignore_cleanup_errors=True) as place:
+        folder = Path(place)
+        (folder / REPORT).touch()
+        command = subprocesses.command(
+            "orchestration.checks.validation.confined_process", path.resolve(), folder, limits.time, limits.size
+        )
+        ending = confined.run(command, subprocesses.environment(), limits)
+        silent = since_last_beat(folder / PULSE)
+        told = Told(folder / REPORT)
+    if told.error is not None or (told.rule is None and ending.code is not None):
+        raise QuadcosimError(f"{path}: it is the validation that failed: {told.error or ending.said}")
+    return [*told.findings, *_of_ending(told, ending, silent, limits)]
+
+
+def _of_ending(told: Told, ending: Ending, silent: float | None, limits: Limits) -> list[Finding]:
+    """What the end of the process says of the FMU; `silent`: seconds since a call of it began or returned."""
+    moment = "after the last rule" if told.ended else f"in {told.rule or 'reading'}"
+    if ending.code is None:
+        hangs = silent is not None and silent > _HANGS * limits.time
+        why = ""
+        if ending.out_of_time and silent is not None:
+            why = "a call does not return" if hangs else "its calls return, it is slow"
+        text = "; ".join(filter(None, (f"stopped {moment}: {ending.reached}", why, "the rest was not checked")))
+        return [Finding(PROCESS, text)]
+    if ending.code == 0 and told.ended:
+        return []
+    return [Finding(PROCESS, f"the process of the FMU {ending.described} {moment}")]

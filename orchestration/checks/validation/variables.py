@@ -1,0 +1,60 @@
+"""Rules on variables: their bounds, and those that share a value reference."""
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator
+
+from orchestration.checks.validation.fmu import NUMBERS, Fmu, Variable
+
+
+def bounds(fmu: Fmu) -> Iterator[str]:
+    """min, start and max are in this order."""
+    for v in fmu.variables:
+        if v.type not in NUMBERS:
+            continue
+        if v.type == "Real" and v.start is not None and not math.isfinite(float(v.start)):
+            yield f"{v.name}: start = {v.start}, expected a finite value"
+        low, high = limits(v)
+        if not low <= high:
+            yield f"{v.name}: min = {v.minimum} is above max = {v.maximum}"
+        if v.start is not None and float(v.start) < low:
+            yield f"{v.name}: start = {v.start}, expected at least min = {v.minimum}"
+        if v.start is not None and float(v.start) > high:
+            yield f"{v.name}: start = {v.start}, expected at most max = {v.maximum}"
+
+
+def limits(variable: Variable) -> tuple[float, float]:
+    """The smallest and the largest value that a variable is declared to take."""
+    low = -math.inf if variable.minimum is None else float(variable.minimum)
+    return low, math.inf if variable.maximum is None else float(variable.maximum)
+
+
+def aliases(fmu: Fmu) -> Iterator[str]:
+    """Variables with one value reference are one value under several names (FMI 2.0.4, section 2.2.7)."""
+    sets: dict[tuple[str, int], list[Variable]] = defaultdict(list)
+    for v in fmu.variables:
+        sets["Integer" if v.type == "Enumeration" else v.type, v.reference].append(v)
+    for (_, reference), members in sets.items():
+        if len(members) > 1:
+            names = ", ".join(v.name for v in members)
+            for problem in _wrong_with_aliases(members):
+                yield f"{names}: value reference {reference} for all of them, but {problem}"
+
+
+def _wrong_with_aliases(members: list[Variable]) -> Iterator[str]:
+    constants = [v for v in members if v.variability == "constant"]
+    if constants:
+        if len(constants) < len(members):
+            yield "only some are constants"
+        elif len({v.start for v in members}) > 1:
+            yield "the constants have different starts"
+        return
+    if sum(v.causality in ("input", "parameter", "independent") for v in members) > 1:
+        yield "more than one of them is set from outside"
+    elif sum(v.start is not None for v in members) > 1:
+        yield "more than one of them has a start"
+    if len({v.unit for v in members}) > 1:
+        yield f"their units are {', '.join(str(v.unit) for v in members)}"
+
+
+RULES = (bounds, aliases)

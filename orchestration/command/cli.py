@@ -1,0 +1,314 @@
+"""The command `quadcosim`."""
+
+import json
+import math
+import sys
+import traceback
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+import typer.core
+
+from orchestration.command import systems as system_commands
+from orchestration.command.flags import FlightFlags, Timing, flies, request_from
+from orchestration.command.limit_flags import MemoryLimit, OutputLimit, SizeLimit, TimeLimit, limits_from
+from orchestration.command.terminal import progress_bar, say
+from orchestration.errors import QuadcosimError, SimulatorError, UsageError, shown
+from orchestration.exchange.interop import cli as interop
+from orchestration.fmi.banners import banners_to_stderr
+from orchestration.studies import cli as studies
+from orchestration.subprocesses import misleading_variables
+
+if TYPE_CHECKING:
+    from orchestration.results.result import Result
+
+EXTRAS = {
+    "studies": ("dask", "distributed", "filelock", "pandas", "SALib", "scipy", "xarray"),
+    "interop": ("libcosimpy", "ecospy", "tbb", "fmu-manipulation-toolbox"),
+}
+"""Packages that the base install does without, by the extra that brings them."""
+
+
+class _Stopped(Exception):
+    """Ctrl-C; the text says how far the work was."""
+
+
+class _Commands(typer.core.TyperGroup):
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except (KeyboardInterrupt, typer.Abort) as stop:  # of which the parser would keep an exit code only
+            raise _Stopped(str(stop)) from stop
+
+
+app = typer.Typer(
+    name="quadcosim",
+    cls=_Commands,
+    help="Fly a quadrotor controller FMU under a realistic digital clock.",
+    epilog="A first flight: quadcosim run --out results/paper. Add --debug to any command for a traceback.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+@app.command()
+def build(
+    folder: Annotated[
+        Path | None,
+        typer.Argument(
+            help="Folder of modules that define slaves; without one, this project's FMUs.", show_default=False
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="Folder for the FMUs; FOLDER, or fmus/ for this project's, unless told."),
+    ] = None,
+) -> None:
+    """Build every slave that the modules of FOLDER define, each as an .fmu. Same sources give the same bytes."""
+    from orchestration import fmus
+    from orchestration.quadrotor.wiring import MODELS
+
+    if folder is None:
+        built = fmus.build(MODELS, out or fmus.default_folder(), say)
+    else:
+        built = fmus.build_slaves(fmus.slaves_of(folder), out or folder, say)
+    for path in built:
+        print(path)
+
+
+@app.command()
+@flies
+def run(
+    scenario: Annotated[
+        Path | None,
+        typer.Argument(help="System or scenario file, or SSP; without one, the paper's flight.", show_default=False),
+    ] = None,
+    timing: Timing = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Directory for signals, events, metrics and figures.", metavar="DIR")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the metrics as JSON.")] = False,
+    figures: Annotated[bool, typer.Option(help="Draw the figures into the directory.")] = True,
+    pause_at: Annotated[
+        float | None, typer.Option("--pause-at", help="Stop here, the state in --out DIR.", metavar="SECONDS")
+    ] = None,
+    resume: Annotated[
+        Path | None, typer.Option("--resume", help="Go on with the run paused in DIR, to the same bits.", metavar="DIR")
+    ] = None,
+    *,
+    flags: FlightFlags,
+) -> None:
+    """Fly a scenario and print its metrics. FMUs that are missing or out of date are built first."""
+    from orchestration.results import pause
+    from orchestration.results.run_directory import keep_flight
+    from orchestration.simulation import run as fly
+
+    if resume is not None and (scenario is not None or pause_at is not None or flags != FlightFlags()):
+        raise UsageError("--resume: expected no scenario and no flags of the flight; the paused run has its own")
+    if pause_at is not None and out is None:
+        raise UsageError("--pause-at: expected --out DIR for the state")
+    with progress_bar("flying") as progress:
+        if resume is not None:
+            result: Result | None = pause.resume(resume, out, figures=figures, progress=progress, announce=say)
+        elif pause_at is not None and out is not None:
+            chosen = request_from(scenario, flags, timing)
+            result = pause.fly_until(chosen, pause_at, out, figures=figures, progress=progress, announce=say)
+        elif out is not None:
+            chosen = request_from(scenario, flags, timing)
+            result = keep_flight(
+                out, lambda to: fly(chosen, recorder=to, progress=progress, announce=say), figures=figures
+            )
+        else:
+            result = fly(request_from(scenario, flags, timing), progress=progress, announce=say)
+    if result is None:
+        say(f"paused in {out}; go on with: quadcosim run --resume {out}")
+        return
+    _report(result, as_json)
+    if out is not None:
+        say(f"results in {out}")
+    elif not as_json:
+        say("add --out DIR to keep the signals and the figures")
+
+
+@app.command()
+def plot(
+    directory: Annotated[Path, typer.Argument(help="Directory of a run.", metavar="DIR")],
+    start: Annotated[
+        float | None, typer.Option("--from", help="Start of the zoom on the commands, in seconds.")
+    ] = None,
+    end: Annotated[float | None, typer.Option("--to", help="End of the zoom on the commands, in seconds.")] = None,
+) -> None:
+    """Draw the figures of a run again, the commands zoomed on a window of time."""
+    from orchestration.results import plots
+    from orchestration.results.run_directory import load_run
+
+    result = load_run(directory)
+    last = result.end
+    window = None
+    if start is not None or end is not None:
+        window = (0.0 if start is None else start, last if end is None else end)
+        if not 0.0 <= window[0] < window[1] < math.inf or window[0] >= last:
+            raise UsageError(
+                f"--from {shown(window[0])} --to {shown(window[1])}: expected 0 <= from < to, and from before the "
+                f"run's end at {shown(last)} s"
+            )
+    for path in plots.draw(result, directory, window):
+        print(path)
+
+
+@app.command()
+def validate(
+    fmu: Annotated[list[Path] | None, typer.Argument(help="FMUs; without any, those of this project.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
+    time_limit: TimeLimit = 60.0,
+    memory_limit: MemoryLimit = 2000.0,
+    size_limit: SizeLimit = 1000.0,
+    output_limit: OutputLimit = 10.0,
+) -> None:
+    """Check FMUs: archive, description, and what they do when they run; exit code 1 if there is any problem.
+
+    Any FMI 2.0 co-simulation FMU will do; those that quadcosim built must keep the rules of this project too.
+    All of it is done in a process of its own within limits.
+    """
+    from orchestration import fmus
+    from orchestration.checks.validation import validate as findings_of
+    from orchestration.quadrotor.wiring import MODELS
+
+    limits = limits_from(time_limit, memory_limit, size_limit, output_limit)
+    paths = fmu or [fmus.locate(name, say) for name in MODELS]
+    for path in paths:
+        if not path.is_file():
+            raise UsageError(f"{path}: expected an .fmu file")
+    results, problems = [], 0
+    for path in paths:
+        findings = findings_of(path, limits=limits)
+        results.append({"fmu": str(path), "findings": [asdict(finding) for finding in findings]})
+        count = sum(not finding.note for finding in findings)
+        problems += count
+        if not as_json:
+            print(f"{path}: {count or 'no'} problem{'' if count == 1 else 's'}{'' if count else ' found'}")
+            for finding in findings:
+                print(f"  {finding}")
+    if as_json:
+        print(json.dumps(results, indent=2))
+    if problems:
+        raise typer.Exit(1)
+
+
+@app.command()
+def doctor(
+    fmu: Annotated[list[Path] | None, typer.Argument(help="FMUs; without any, those of this project.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the same facts as JSON.")] = False,
+    time_limit: TimeLimit = 60.0,
+    memory_limit: MemoryLimit = 2000.0,
+    size_limit: SizeLimit = 1000.0,
+    output_limit: OutputLimit = 10.0,
+) -> None:
+    """Say what FMUs need to load, what of it this machine has, and try; exit code 1 if anything is missing."""
+    from orchestration import fmus
+    from orchestration.checks.doctor.as_lines import as_text
+    from orchestration.checks.doctor.report import as_tables, examine
+    from orchestration.quadrotor.wiring import MODELS
+
+    limits = limits_from(time_limit, memory_limit, size_limit, output_limit)
+    report = examine(fmu or [fmus.locate(name, say) for name in MODELS], limits)
+    print(json.dumps(as_tables(report), indent=2) if as_json else as_text(report))
+    if not report.good:
+        raise typer.Exit(1)
+
+
+@app.command()
+@flies
+def ssp(
+    scenario: Annotated[
+        Path | None,
+        typer.Argument(help="System or scenario file; without one, the paper's flight.", show_default=False),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", help="The file; QuadrotorLoop.ssp in fmus/, or NAME.ssp here, unless told.", metavar="FILE"
+        ),
+    ] = None,
+    *,
+    flags: FlightFlags,
+) -> None:
+    """Write FMUs, their connections and their parameters as one SSP 1.0 file for other tools."""
+    from orchestration import fmus
+    from orchestration.exchange.ssp import writing
+    from orchestration.quadrotor.scenario import Scenario
+
+    asked = request_from(scenario, flags)
+    if isinstance(asked, Scenario) or scenario is None:
+        usual = fmus.default_folder() / f"{writing.NAME}.ssp"
+    else:
+        usual = Path(f"{scenario.stem}.ssp")
+    print(writing.write(asked, out or usual, say))
+
+
+system_commands.register(app)
+studies.register(app)
+interop.register(app)
+
+
+def _report(result: "Result", as_json: bool) -> None:
+    for warning in result.warnings:
+        say(f"warning: {warning}")
+    printed = {**result.metrics, "wall_time": result.provenance["wall_time"]}
+    if as_json:
+        print(json.dumps(printed, indent=2))
+        return
+    width = max(map(len, printed))
+    for name, value in printed.items():
+        shown = f"{value:.6g}" if isinstance(value, float) else "-" if value is None else str(value)
+        print(f"{name:<{width}}  {shown}")
+    if result.divergence is not None:
+        print(f"diverged: {result.divergence}")
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line: 0 done, 1 failure, 2 wrong usage; one line for an error, more with --debug."""
+    given = sys.argv[1:] if arguments is None else arguments
+    debug = "--debug" in given
+    try:
+        arguments = [argument for argument in given if argument != "--debug"]
+        with banners_to_stderr():
+            code = app(arguments or ["--help"], standalone_mode=False)
+        sys.exit(code if arguments else 2)
+    except (KeyboardInterrupt, _Stopped) as stop:
+        say(f"quadcosim: interrupted {stop}".rstrip())
+        sys.exit(130)
+    except Exception as error:
+        _fail(error, debug)
+
+
+def _fail(error: Exception, debug: bool) -> None:
+    if debug:
+        traceback.print_exc()
+        if isinstance(error, SimulatorError) and error.details:
+            say(f"in the FMU:\n{error.details}")
+    describe = getattr(error, "format_message", None)  # of a usage error that the parser finds
+    if isinstance(error, (QuadcosimError, OSError)):
+        say(f"quadcosim: {error}")
+    elif describe is not None:
+        say(f"quadcosim: {describe()} (--help lists what there is)")
+        sys.exit(2)
+    elif isinstance(error, ModuleNotFoundError) and (extra := _extra_of(error.name)) is not None:
+        say(f"quadcosim: {error.name} is not installed; this command needs: pip install 'quadcosim[{extra}]'")
+    elif isinstance(error, ImportError) and (given := misleading_variables()):
+        say(f"quadcosim: {error}; try without {' '.join(given)}, which may have Python take modules of another one")
+    else:
+        say(f"quadcosim: {type(error).__name__}: {error} (an error of quadcosim itself; --debug shows where)")
+    sys.exit(2 if isinstance(error, UsageError) else 1)
+
+
+def _extra_of(package: str | None) -> str | None:
+    return next((extra for extra, packages in EXTRAS.items() if package in packages), None)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,243 @@
+"""The flags of every command that flies, declared once."""
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from orchestration.errors import UsageError
+from orchestration.quadrotor.timing import TIMING_KEYS
+
+if TYPE_CHECKING:
+    from orchestration.quadrotor.scenario import Parameter, Scenario
+    from orchestration.request import Request
+    from orchestration.system.model import System
+
+TIMING, EFFECTS, MODEL = "Timing", "What goes wrong", "What flies"
+
+
+def _option(*names: str, panel: str, text: str, metavar: str = "SECONDS", **options: Any) -> Any:
+    return typer.Option(*names, help=text, metavar=metavar, rich_help_panel=panel, show_default=False, **options)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlightFlags:
+    """What was given on the command line; None: not given, the scenario decides."""
+
+    period: Annotated[float | None, _option("--period", panel=TIMING, text="Controller period; 0.01 unless told.")] = (
+        None
+    )
+    offset: Annotated[float | None, _option("--offset", panel=TIMING, text="Time of the first sample.")] = None
+    plant_interval: Annotated[
+        float | None,
+        _option("--plant-interval", panel=TIMING, text="Plant's communication interval; 0.001 unless told."),
+    ] = None
+    preset: Annotated[
+        str | None,
+        _option(
+            "--preset",
+            panel=TIMING,
+            metavar="px4|crazyflie|betaflight",
+            text="Rate and latency of a real stack; other flags go before it.",
+        ),
+    ] = None
+    order: Annotated[
+        str | None,
+        _option(
+            "--order",
+            panel=TIMING,
+            metavar="gauss-seidel|jacobi",
+            text="Whether a command is there at its sample, or at the next one.",
+        ),
+    ] = None
+    hold: Annotated[
+        str | None, _option("--hold", panel=TIMING, metavar="zero|first", text="Hold of the command between arrivals.")
+    ] = None
+    clock: Annotated[
+        str | None,
+        _option("--clock", panel=TIMING, metavar="master|fmu", text="Who decides when the controller samples."),
+    ] = None
+    delay: Annotated[
+        float | None,
+        _option("--delay", panel=EFFECTS, text="From sample to application of its command; may exceed the period."),
+    ] = None
+    delay_jitter: Annotated[
+        float | None, _option("--delay-jitter", panel=EFFECTS, text="Largest random addition to the delay.")
+    ] = None
+    jitter: Annotated[
+        float | None, _option("--jitter", panel=EFFECTS, text="Largest lateness of a sampling instant.")
+    ] = None
+    jitter_distribution: Annotated[
+        str | None, _option("--jitter-distribution", panel=EFFECTS, metavar="uniform|normal", text="Of both jitters.")
+    ] = None
+    measurement_loss: Annotated[
+        float | None,
+        _option("--measurement-loss", panel=EFFECTS, metavar="P", text="Probability that a measurement is lost."),
+    ] = None
+    command_loss: Annotated[
+        float | None, _option("--command-loss", panel=EFFECTS, metavar="P", text="Probability that a command is lost.")
+    ] = None
+    loss: Annotated[float | None, _option("--loss", panel=EFFECTS, metavar="P", text="Both losses at once.")] = None
+    burst_length: Annotated[
+        float | None,
+        _option(
+            "--burst-length",
+            panel=EFFECTS,
+            metavar="N",
+            text="Mean number of losses in a row; independent unless given.",
+        ),
+    ] = None
+    clock_ratio: Annotated[
+        float | None,
+        _option(
+            "--clock-ratio",
+            panel=EFFECTS,
+            metavar="R",
+            text="Seconds that the controller believes pass per true second.",
+        ),
+    ] = None
+    noise: Annotated[
+        list[str] | None,
+        _option(
+            "--noise", panel=EFFECTS, metavar="NAME=SIGMA", text="Gaussian noise on a measurement; may be repeated."
+        ),
+    ] = None
+    quantisation: Annotated[
+        list[str] | None,
+        _option("--quantisation", panel=EFFECTS, metavar="NAME=Q", text="Rounding of a measurement; may be repeated."),
+    ] = None
+    seed: Annotated[int | None, _option("--seed", panel=EFFECTS, metavar="N", text="Of all random numbers.")] = None
+    stop_time: Annotated[float | None, _option("--stop-time", panel=MODEL, text="End of the run; 30 unless told.")] = (
+        None
+    )
+    model_mismatch: Annotated[
+        bool | None,
+        _option(
+            "--model-mismatch",
+            panel=MODEL,
+            metavar="",
+            text="The controller's nominal mass or inertia is not the plant's on purpose: no warning.",
+        ),
+    ] = None
+    set: Annotated[
+        list[str] | None,
+        _option(
+            "--set",
+            panel=MODEL,
+            metavar="SIDE.NAME=V",
+            text="A parameter, as controller.NAME=V, or of a system file any value by its path; may be repeated.",
+        ),
+    ] = None
+
+    def applied_to(self, scenario: "Scenario") -> "Scenario":
+        """`scenario` with what was given; raises `UsageError` for what cannot be."""
+        from orchestration.quadrotor.presets import preset_timing
+
+        timing: dict[str, Any] = {} if self.preset is None else preset_timing(self.preset)
+        timing |= {name: getattr(self, name) for name in _TIMING_FLAGS if getattr(self, name) is not None}
+        if self.loss is not None:
+            timing.setdefault("measurement_loss", self.loss)
+            timing.setdefault("command_loss", self.loss)
+        for name in _BY_MEASUREMENT:
+            given = getattr(self, name)
+            if given:
+                old: Mapping[str, float] = getattr(scenario.timing, name)
+                timing[name] = {**old, **{key: _number(f"--{name} {key} =", text) for key, text in _pairs(name, given)}}
+        top = {
+            name: value
+            for name in ("seed", "stop_time", "model_mismatch")
+            if (value := getattr(self, name)) is not None
+        }
+        parameters = {key: _value(key, text) for key, text in _pairs("set", self.set or [])}
+        return scenario.with_changes(timing=timing, parameters=parameters, **top)
+
+    def applied_to_system(self, system: "System") -> "System":
+        """`system` with what was given; raises `UsageError` for flags that are for the quadrotor only."""
+        from orchestration.system.paths import changed
+
+        top = {name: value for name in ("seed", "stop_time") if (value := getattr(self, name)) is not None}
+        foreign = [f.name for f in fields(self) if f.name not in ("seed", "stop_time", "set") and getattr(self, f.name)]
+        if foreign:
+            flags = ", ".join(f"--{name.replace('_', '-')}" for name in foreign)
+            raise UsageError(
+                f"{flags}: for the quadrotor only; expected --set PATH=V for a system, as connections.NAME.delay"
+            )
+        return changed(system, {**top, **{key: _value(key, text) for key, text in _pairs("set", self.set or [])}})
+
+
+Timing = Annotated[
+    Path | None,
+    typer.Argument(help="Of an SSP: the file with the timing that SSP has no words for.", show_default=False),
+]
+
+_BY_MEASUREMENT = ("noise", "quantisation")
+_TIMING_FLAGS = tuple(key for key in TIMING_KEYS if key not in _BY_MEASUREMENT)
+
+
+def flies(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command all flight flags; it receives them as its argument `flags`."""
+    own = [p for p in inspect.signature(command).parameters.values() if p.name != "flags"]
+    shared = [
+        inspect.Parameter(f.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=f.type)
+        for f in fields(FlightFlags)
+    ]
+
+    @wraps(command)
+    def call(**given: Any) -> None:
+        flags = FlightFlags(**{f.name: given.pop(f.name) for f in fields(FlightFlags)})
+        command(flags=flags, **given)
+
+    call.__signature__ = inspect.Signature(own + shared)  # type: ignore[attr-defined]
+    call.__annotations__ = {p.name: p.annotation for p in own + shared}
+    return call
+
+
+def scenario_from(path: Path | None, flags: FlightFlags) -> "Scenario":
+    """The scenario of a file, or the paper's, with the flags applied; raises `UsageError` for a system file."""
+    from orchestration.quadrotor.scenario import Scenario
+
+    request = request_from(path, flags)
+    if not isinstance(request, Scenario):
+        raise UsageError(f"{path}: is a system file; this command is for scenarios of the quadrotor")
+    return request
+
+
+def request_from(path: Path | None, flags: FlightFlags, timing: Path | None = None) -> "Request":
+    """The system or the scenario of a file, an SSP's with its timing, or the paper's, with the flags applied."""
+    from orchestration.quadrotor.scenario import Scenario
+    from orchestration.request import load_request
+
+    request = Scenario() if path is None else load_request(path, timing)
+    return flags.applied_to(request) if isinstance(request, Scenario) else flags.applied_to_system(request)
+
+
+def _pairs(flag: str, given: list[str]) -> list[tuple[str, str]]:
+    pairs = []
+    for text in given:
+        key, equals, value = text.partition("=")
+        if key.strip() in ("controller.fmu", "plant.fmu"):
+            side = key.strip().removesuffix(".fmu")
+            raise UsageError(
+                f'--{flag} {text}: expected a parameter; a scenario file names the FMU: [{side}] fmu = "…"'
+            )
+        if not (key and equals and value):
+            raise UsageError(f"--{flag} {text}: expected NAME=VALUE")
+        pairs.append((key.strip(), value.strip()))
+    return pairs
+
+
+def _number(place: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise UsageError(f"{place} {text}: expected a number") from None
+
+
+def _value(name: str, text: str) -> "Parameter":
+    if text.lower() in ("true", "false"):
+        return text.lower() == "true"
+    return _number(f"--set {name} =", text)

@@ -1,0 +1,77 @@
+"""The commands that are about a system as a file: its schema, a proposal for one, a picture of one."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from orchestration.command.flags import FlightFlags, Timing, flies, request_from
+from orchestration.command.terminal import say
+
+
+def schema() -> None:
+    """Print the JSON schema of a system file, from which editors complete and check it."""
+    from orchestration.system import system_file
+
+    print(json.dumps(system_file.schema(), indent=2))
+
+
+def connect(
+    fmu: Annotated[list[str], typer.Argument(help="FMUs: paths, or names of this project's.", show_default=False)],
+    out: Annotated[
+        Path | None, typer.Option("--out", help="The system file; printed unless told.", metavar="SYSTEM.toml")
+    ] = None,
+) -> None:
+    """Propose a system file for FMUs: outputs to inputs by name, type and unit; what is open is said in it."""
+    from orchestration import fmus
+    from orchestration.errors import UsageError
+    from orchestration.fmi.model import read_model
+    from orchestration.system.proposal import propose
+
+    if out is not None and out.exists():
+        raise UsageError(f"--out {out}: is there already; expected a file that can be made")
+    proposal = propose(
+        [(text, read_model(fmus.locate(text, say))) for text in fmu], Path.cwd() if out is None else out.parent
+    )
+    for line in proposal.guessed:
+        say(f"guessed: {line}")
+    for line in proposal.undecided:
+        say(f"not decided: {line}")
+    if out is None:
+        print(proposal.text, end="")
+        return
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text(proposal.text, encoding="utf-8")
+    print(out)
+
+
+@flies
+def show(
+    system: Annotated[
+        Path | None,
+        typer.Argument(help="System or scenario file, or SSP; without one, the paper's flight.", show_default=False),
+    ] = None,
+    timing: Timing = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Draw it, in the format of the ending.", metavar="FIGURE.png")
+    ] = None,
+    *,
+    flags: FlightFlags,
+) -> None:
+    """Show a system: components with their rates, connections with their delay, jitter, loss and hold."""
+    from orchestration.request import system_meant
+    from orchestration.system.description import as_text
+
+    meant = system_meant(request_from(system, flags, timing))
+    print(as_text(meant))
+    if out is not None:
+        from orchestration.system import diagram
+
+        say(str(diagram.write(meant, out)))
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the command line."""
+    for command in (schema, connect, show):
+        app.command()(command)

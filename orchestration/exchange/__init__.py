@@ -1,0 +1,1 @@
+"""Other tools: files that they read, and their masters."""

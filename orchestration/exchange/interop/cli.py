@@ -1,0 +1,56 @@
+"""The command that compares this project's master with other people's."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from orchestration.command.flags import FlightFlags, Timing, flies, request_from
+from orchestration.command.terminal import progress_bar, say
+
+
+@flies
+def interop(
+    scenario: Annotated[
+        Path | None,
+        typer.Argument(help="System or scenario file, or SSP; without one, the paper's flight.", show_default=False),
+    ] = None,
+    timing: Timing = None,
+    tool: Annotated[
+        list[str] | None, typer.Option("--tool", help="Only this tool; may be repeated.", metavar="NAME")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Draw the agreement, signal by signal, here.", metavar="DIR")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the table as JSON.")] = False,
+    *,
+    flags: FlightFlags,
+) -> None:
+    """Fly a system in other people's masters and compare every signal with this one's.
+
+    Exit code 1 if a tool is farther than 1e-9 in a state, its own first inputs given to this master too.
+    """
+    from orchestration.exchange.interop import table
+    from orchestration.exchange.interop.catalogue import chosen
+    from orchestration.exchange.interop.compare import agreements
+    from orchestration.request import system_meant
+
+    asked = request_from(scenario, flags, timing)
+    tools = chosen(tool, system_meant(asked).components)
+    with progress_bar("flying in other masters") as progress:
+        found = agreements(asked, tools, announce=say, progress=progress)
+    if out is not None:
+        from orchestration.exchange.interop.figure import draw
+
+        say(str(draw(found, out)))
+    print(json.dumps([table.as_dict(agreement) for agreement in found], indent=2) if as_json else table.text(found))
+    far = [agreement.tool.name for agreement in found if not table.agrees(agreement)]
+    if far:
+        say(f"farther than {table.AIM:g} from this project's master: {'; '.join(far)}")
+        raise typer.Exit(1)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the command line."""
+    app.command()(interop)

@@ -1,0 +1,172 @@
+"""What a tool does with the FMUs, step by step: flown with copies of them that write down what they are given.
+
+A copy differs from its FMU in the entry script alone; the law and the dynamics are the same files.
+"""
+
+import json
+import zipfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from fmu_kit.packaging import read_source_hash, write_archive
+from orchestration.errors import QuadcosimError, UsageError
+from orchestration.exchange.interop.assignment import Loop, Ports
+from orchestration.fmi.model import Variable, read_model
+from orchestration.fmi.values import number_of
+
+_LAYER = """
+
+# -- a copy that writes down what it is given ------------------------------------------------------------
+
+import json as _json
+
+_log = open({log!r}, "a", buffering=1, encoding="utf-8")
+
+
+def _values(self, variables):
+    return [float(getattr(self, get)([reference])[0]) for get, reference in variables]
+
+
+def _do_step(self, t, h):
+    inputs = _values(self, {inputs})
+    done = _Model.do_step(self, t, h)
+    _log.write(_json.dumps({{"t": t, "h": h, "inputs": inputs, "outputs": _values(self, {outputs})}}) + "\\n")
+    return done
+
+
+def _exit_initialization_mode(self):
+    _Model.exit_initialization_mode(self)
+    _log.write(_json.dumps({{"inputs": _values(self, {inputs}), "outputs": _values(self, {outputs})}}) + "\\n")
+
+
+_Model = {model}.__mro__[1]
+{model}.do_step = _do_step
+{model}.exit_initialization_mode = _exit_initialization_mode
+"""
+
+
+def traced_copy(fmu: Path, component: str, ports: Ports, folder: Path) -> Path:
+    """A copy of `fmu` in `folder` that writes its steps to `log_of(component, folder)`.
+
+    Raises `UsageError` for an FMU that was not packed by this project.
+    """
+    if read_source_hash(fmu) is None:
+        raise UsageError(f"{fmu}: expected an FMU packed by fmu_kit; what others are given cannot be seen")
+    with zipfile.ZipFile(fmu) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    model = read_model(fmu)
+    inputs, outputs = ([_getter(model.variables[name]) for name in names] for names in (ports.inputs, ports.outputs))
+    entry = f"resources/{files['resources/slavemodule.txt'].decode().strip()}.py"
+    log = str(log_of(component, folder))
+    layer = _LAYER.format(log=log, inputs=inputs, outputs=outputs, model=model.name)
+    copy = folder / f"{component}.fmu"
+    write_archive(copy, {**files, entry: files[entry] + layer.encode()}, first="modelDescription.xml")
+    return copy
+
+
+def _getter(variable: Variable) -> tuple[str, int]:
+    """The method of the slave that reads a variable, and its reference."""
+    return f"get_{'integer' if variable.kind == 'Enumeration' else variable.kind.lower()}", variable.reference
+
+
+def log_of(component: str, folder: Path) -> Path:
+    """Where a traced copy writes: one JSON object for the end of initialisation, one for each step."""
+    return folder / f"{component}.jsonl"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trace:
+    """How a tool flew, as the FMUs saw it."""
+
+    order: str
+    """gauss-seidel: one after the other, with the newest outputs of those before; jacobi: all with those of the step
+    before; alone: not all of the loop; other"""
+    initial_inputs: dict[str, tuple[float, ...]]
+    """by component: what was at its connected inputs when its initialisation ended"""
+    first_inputs: dict[str, tuple[float, ...]]
+    """by component: what its first step found at its connected inputs"""
+    first_exchange: dict[str, str]
+    """by component, what that was: exchanged, start values or zeros"""
+    steps: int
+    drift: float
+    """largest distance of a communication point from a multiple of the step [s]"""
+    end: float
+    """where the last step ended [s]"""
+
+
+def read_trace(folder: Path, components: Mapping[str, Path], loop: Loop, step: float) -> Trace:
+    """What the logs of `components`, FMUs by name, say; raises `QuadcosimError` if a component took no step."""
+    starts, steps = {}, {}
+    for component in components:
+        log = log_of(component, folder)
+        lines = log.read_text(encoding="utf-8").splitlines() if log.is_file() else []
+        if len(lines) < 2:
+            raise QuadcosimError(f"{component}: expected steps, found none in {log}")
+        starts[component], *steps[component] = map(json.loads, lines)
+    exact = Fraction(repr(step))
+    last = steps[next(name for name in reversed(list(loop.ports)) if name in steps)]
+    return Trace(
+        order=_order(steps, loop),
+        initial_inputs={component: tuple(start["inputs"]) for component, start in starts.items()},
+        first_inputs={component: tuple(found[0]["inputs"]) for component, found in steps.items()},
+        first_exchange={
+            name: _first_exchange(name, components[name], loop, starts, steps)
+            for name in components
+            if loop.ports[name].inputs
+        },
+        steps=len(last),
+        drift=max(abs(line["t"] - float(k * exact)) for k, line in enumerate(last)),
+        end=last[-1]["t"] + last[-1]["h"],
+    )
+
+
+def _order(steps: Mapping[str, list[dict[str, Any]]], loop: Loop) -> str:
+    """From which step's outputs each step had its inputs, the first apart."""
+    if set(steps) != set(loop.ports) or len(steps) < 2:
+        return "alone"
+    places = {name: i for i, name in enumerate(loop.ports)}
+    old, new = True, True
+    for component in steps:
+        for sender, given, before, now in _exchanged(component, steps, loop):
+            old &= given == before
+            new &= given == (now if places[sender] < places[component] else before)
+    return "gauss-seidel" if new else "jacobi" if old else "other"
+
+
+def _exchanged(
+    component: str, steps: Mapping[str, list[dict[str, Any]]], loop: Loop
+) -> Iterator[tuple[str, list[float], list[float], list[float]]]:
+    """For each connected input: its sender, its values from the second step on, the outputs of the step before and of
+    the same step.
+    """
+    for i, (sender, output) in enumerate(loop.feeding(component).values()):
+        outputs = [line["outputs"][loop.ports[sender].outputs.index(output)] for line in steps[sender]]
+        given = [line["inputs"][i] for line in steps[component][1:]]
+        yield sender, given, outputs[: len(given)], outputs[1 : len(given) + 1]
+
+
+def _first_exchange(
+    component: str,
+    fmu: Path,
+    loop: Loop,
+    starts: Mapping[str, dict[str, Any]],
+    steps: Mapping[str, list[dict[str, Any]]],
+) -> str:
+    """What the connected inputs of `component` were at its first step."""
+    variables = read_model(fmu).variables
+    inputs = steps[component][0]["inputs"]
+    if inputs == [number_of(variables[name], variables[name].start or 0.0) for name in loop.ports[component].inputs]:
+        return "start values"
+    if not any(inputs):
+        return "zeros"
+    feeding = loop.feeding(component)
+    if not all(sender in starts for sender, _ in feeding.values()):
+        return "exchanged"
+    for value, (sender, output) in zip(inputs, feeding.values(), strict=True):
+        place = loop.ports[sender].outputs.index(output)
+        if value not in (starts[sender]["outputs"][place], steps[sender][0]["outputs"][place]):
+            return "other"
+    return "exchanged"

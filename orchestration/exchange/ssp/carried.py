@@ -1,0 +1,168 @@
+"""What of a system other masters can be given: FMUs with their parameters, wires, and one step for all."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from orchestration import fmus
+from orchestration.errors import UsageError
+from orchestration.fmi.model import Model, Variable, read_model
+from orchestration.master.plan import Plan
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.translation import in_its_own_words, system_of
+from orchestration.quadrotor.wiring import SAMPLE_OFFSET, SAMPLE_PERIOD
+from orchestration.system.check import check
+from orchestration.system.model import Component, Connection, Parameter, Sampling, System, component_of, variable_of
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """One FMU of the system."""
+
+    name: str
+    fmu: Path
+    model: Model
+    parameters: dict[str, Parameter]
+    """all that have a start value, and inputs that are given one"""
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    """what is connected"""
+
+    def variable(self, name: str) -> Variable:
+        """The declaration of a variable."""
+        return self.model.variables[name]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Carried:
+    """A system for other masters."""
+
+    system: System
+    parts: tuple[Part, ...]
+    """sampled ones first, each kind as this project's master has them at one instant: so a tool that steps one
+    after the other exchanges what this master does"""
+    step: float
+    """communication step of all [s]"""
+
+
+def carried(asked: Scenario | System, announce: Callable[[str], None] | None = None) -> Carried:
+    """What other masters are given; raises `UsageError` for what they cannot say.
+
+    That is: anything late, lost or noisy, a source that is no constant, and components at steps of their own. A
+    sampled component needs the common step for its period, or an FMU with a clock of its own by `sample_period`.
+    """
+    with in_its_own_words(asked):
+        system = system_of(asked) if isinstance(asked, Scenario) else asked
+        for name, component in system.components.items():
+            if component.sampling is not None:
+                _expect_plain(f"components.{name}.sampling", component.sampling, ("jitter", "clock_ratio"))
+        for x in system.connections:
+            _expect_plain(f"connections.{x.name}", x, FAULTS)
+        for name, source in system.sources.items():
+            if source.to and source.constant is None:
+                kind = "file" if source.file is not None else "noise" if source.noise is not None else "trajectory"
+                raise UsageError(f"sources.{name}.{kind}: an SSP cannot feed one; expected a constant")
+        located = {name: fmus.locate(component.fmu, announce) for name, component in system.components.items()}
+        models = {name: read_model(path) for name, path in located.items()}
+        check(system, models)
+        plan = Plan(system)
+        return Carried(
+            system=system,
+            parts=tuple(_part(system, name, located[name], models[name]) for name in plan.sampled + plan.continuous),
+            step=_common_step(system, models),
+        )
+
+
+FAULTS = ("delay", "delay_jitter", "loss", "hold", "noise", "quantisation")
+"""Of a connection, what no other master can say"""
+
+
+def _expect_plain(place: str, of: Sampling | Connection, keys: tuple[str, ...]) -> None:
+    defaults = {f.name: f.default for f in fields(of)}
+    for key in keys:
+        value = getattr(of, key)
+        if isinstance(value, Mapping):
+            if any(value.values()):
+                raise UsageError(f"{place}.{key}: an SSP cannot say that; expected none")
+        elif value != defaults[key]:
+            raise UsageError(f"{place}.{key} = {value}: an SSP cannot say that; expected {defaults[key]}")
+
+
+def has_clock(model: Model) -> bool:
+    """Whether an FMU can sample by itself when its parameters say so."""
+    return SAMPLE_PERIOD in model.variables
+
+
+def _common_step(system: System, models: Mapping[str, Model]) -> float:
+    """The step of all components in continuous time, or the period of all others where there are none."""
+    steps = {f"components.{name}.step": c.step for name, c in system.components.items() if c.step is not None}
+    by_master = {
+        name: c.sampling
+        for name, c in system.components.items()
+        if c.sampling is not None and not has_clock(models[name])
+    }
+    periods = {f"components.{name}.sampling.period": sampling.period for name, sampling in by_master.items()}
+    own = [c.sampling.period for c in system.components.values() if c.sampling is not None]
+    first = next(iter((*steps.values(), *periods.values(), *own)))
+    for place, step in (steps | periods).items():
+        if step != first:
+            raise UsageError(f"{place} = {step}: expected the one step of all, {first} s; an SSP has no more than one")
+    for name, sampling in by_master.items():
+        if sampling.offset != 0.0:
+            raise UsageError(
+                f"components.{name}.sampling.offset = {sampling.offset}: an SSP cannot say that; expected 0"
+            )
+    return first
+
+
+def _part(system: System, name: str, path: Path, model: Model) -> Part:
+    component = system.components[name]
+    return Part(
+        name=name,
+        fmu=path,
+        model=model,
+        parameters=_values(component, model, _constants(system, name)),
+        inputs=tuple(variable_of(end) for x in system.connections for end in x.end if x.receiver == name),
+        outputs=_outputs(system, name, model),
+    )
+
+
+def _outputs(system: System, name: str, model: Model) -> tuple[str, ...]:
+    found = tuple(dict.fromkeys(variable_of(s) for x in system.connections for s in x.start if x.sender == name))
+    for output in found:
+        if model.variables[output].causality != "output":
+            raise UsageError(f"{name}.{output}: is a local of its FMU; an SSP connects outputs only")
+    return found
+
+
+def _constants(system: System, name: str) -> dict[str, Parameter]:
+    """Inputs that a source holds."""
+    return {
+        variable_of(end): source.constant
+        for source in system.sources.values()
+        for end in source.to
+        if component_of(end) == name and source.constant is not None
+    }
+
+
+def _values(component: Component, model: Model, constants: Mapping[str, Parameter]) -> dict[str, Parameter]:
+    """In the order of the FMU: every parameter that is a number, and what else is given."""
+    given = {**component.parameters, **constants}
+    if component.sampling is not None and has_clock(model):
+        given |= {SAMPLE_PERIOD: component.sampling.period, SAMPLE_OFFSET: component.sampling.offset}
+    found: dict[str, Parameter] = {}
+    for variable in model.variables.values():
+        if variable.name in given:
+            value = _typed(given[variable.name], variable)
+            # A Boolean only if it is not what it is anyway: fmpy takes the text false for true.
+            if variable.kind != "Boolean" or str(value).lower() != variable.start:
+                found[variable.name] = value
+        elif variable.causality == "parameter" and variable.kind in ("Real", "Integer") and variable.start is not None:
+            found[variable.name] = int(variable.start) if variable.kind == "Integer" else float(variable.start)
+    return found
+
+
+def _typed(value: Parameter, variable: Variable) -> Parameter:
+    if variable.kind == "Real":
+        return float(value)
+    return bool(value) if variable.kind == "Boolean" and not isinstance(value, str) else value

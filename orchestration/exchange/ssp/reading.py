@@ -1,0 +1,230 @@
+"""From an SSP, and a file with the timing that SSP has no words for, to the tables of a system file."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from orchestration.errors import UsageError
+from orchestration.exchange.ssp.document import read
+from orchestration.exchange.ssp.package import opened
+from orchestration.exchange.ssp.parameters import Value
+from orchestration.exchange.ssp.structure import Node, Path_, Structure, Wire, said, structure_of
+from orchestration.fmi.model import Model, read_model
+from orchestration.quadrotor.wiring import SAMPLE_OFFSET, SAMPLE_PERIOD
+from orchestration.system.conversion import BaseUnits, Conversion, OtherQuantity, between, unit_of
+from orchestration.system.model import Parameter, component_of
+
+ENDINGS = (".ssp", ".ssd")
+TAKEN = frozenset(("rows", "time", "stop_time", "sampled"))
+"""Names that no component can have"""
+CLOCK = (SAMPLE_PERIOD, SAMPLE_OFFSET)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Signal:
+    """A connection of two components."""
+
+    start: str
+    end: str
+    """COMPONENT.VARIABLE"""
+    conversion: Conversion
+
+
+def tables_of(path: Path, timing: Mapping[str, Any]) -> dict[str, Any]:
+    """The tables of the system file that an SSP and the `timing` on top of it mean.
+
+    A component is stepped as `timing` says, else in continuous time with the step that the SSP's annotations name.
+    Raises `UsageError` for what is not read, what does not exist, and a step or end that nobody says.
+    """
+    package = opened(path)
+    structure = structure_of(read(package.structure, "ssd"), package)
+    names = _names(structure.components)
+    models = {place: read_model(fmu) for place, fmu in structure.components.items()}
+    tables: dict[str, Any] = {**timing}
+    tables["components"] = _components(structure, names, models, timing.get("components", {}))
+    tables["connections"] = _connections(_signals(structure, names, models), timing.get("connections", []))
+    if "stop_time" not in tables:
+        if structure.stop is None:
+            raise UsageError("stop_time: the SSP has no DefaultExperiment with one; expected it in a file with timing")
+        tables["stop_time"] = structure.stop
+    return tables
+
+
+def _names(paths: Sequence[Path_] | Mapping[Path_, Any]) -> dict[Path_, str]:
+    """Components by their path, with _ between and for what no name can have."""
+    names = {path: re.sub(r"\W", "_", "_".join(path), flags=re.ASCII) for path in paths}
+    for path, name in names.items():
+        same = [".".join(other) for other, its in names.items() if its == name]
+        if len(same) > 1 or name in TAKEN:
+            raise UsageError(f"{' and '.join(same)}: would be named {name}; expected names that stay apart")
+        names[path] = f"_{name}" if name[0].isdigit() else name
+    return names
+
+
+def _components(
+    structure: Structure, names: Mapping[Path_, str], models: Mapping[Path_, Model], timing: Mapping[str, Any]
+) -> dict[str, Any]:
+    for name in timing:
+        if name not in names.values():
+            raise UsageError(
+                f"components.{name}: the SSP has no such component; expected one of {_list(names.values())}"
+            )
+    found = {}
+    for place, name in names.items():
+        given = dict(timing.get(name, {}))
+        parameters = _parameters(structure, place, models[place])
+        if "sampling" in given:  # which goes before the clock that the SSP gave the component
+            parameters = {key: value for key, value in parameters.items() if key not in CLOCK}
+        parameters |= dict(given.pop("parameters", {}))
+        table = {"fmu": str(structure.components[place]), "parameters": parameters, **given}
+        if "step" not in table and "sampling" not in table:
+            if structure.step is None:
+                raise UsageError(
+                    f"components.{name}: the SSP does not say how it is stepped; expected step or sampling of it in a "
+                    "file with timing"
+                )
+            table["step"] = structure.step
+        found[name] = table
+    return found
+
+
+def _parameters(structure: Structure, place: Path_, model: Model) -> dict[str, Parameter]:
+    """Values for a component, in the units of its FMU; those for what is connected to a component are left out."""
+    found = {}
+    for node, value in structure.values.items():
+        if node[0] == place and _giver(structure, node) is None:
+            found[node[1]] = _in_own_unit(structure, node, value, model)
+    for node in [node for node in structure.wires if node[0] == place]:
+        wires = list(structure.way_to(node))
+        for wire in reversed(wires):  # the value that is set furthest out
+            if wire.start in structure.values and wire.start[0] not in structure.components:
+                outer = _in_own_unit(structure, wire.start, structure.values[wire.start], None)
+                found[node[1]] = _passed(outer, wires[: wires.index(wire) + 1], structure, model)
+                break
+    return found
+
+
+def _giver(structure: Structure, node: Node) -> Node | None:
+    """The component's output at the other end of what is connected to a connector."""
+    wires = list(structure.way_to(node))
+    return wires[-1].start if wires and wires[-1].start[0] in structure.components else None
+
+
+def _passed(value: Parameter, wires: Sequence[Wire], structure: Structure, model: Model) -> Parameter:
+    conversion = _along(wires, structure, {wires[0].end[0]: model})
+    if conversion.is_none:
+        return value
+    if isinstance(value, (bool, str)):
+        raise UsageError(f"connection {wires[0].said}: is converted; expected a number, not {value!r}")
+    return conversion(value)
+
+
+def _in_own_unit(structure: Structure, node: Node, value: Value, model: Model | None) -> Parameter:
+    variable = None if model is None else model.variables.get(node[1])
+    own = structure.units.get(node) or (variable.unit if variable is not None else None)
+    number = value.value
+    if not own or not value.unit or own == value.unit or isinstance(number, (bool, str)):
+        return number
+    one = value.definition or structure.definitions.get(value.unit)
+    other = structure.definitions.get(own) or (unit_of(model, own) if model is not None else None)
+    return _conversion(one, other, f"{said(node)} in {value.unit}, expected {own}")(number)
+
+
+def _signals(structure: Structure, names: Mapping[Path_, str], models: Mapping[Path_, Model]) -> list[Signal]:
+    """What goes from component to component, in the order of the document's components and their connectors."""
+    found = []
+    for node in structure.kinds:
+        giver = _giver(structure, node) if node[0] in names else None
+        if giver is not None:
+            conversion = _along(list(structure.way_to(node)), structure, models)
+            start, end = (f"{names[place]}.{variable}" for place, variable in (giver, node))
+            found.append(Signal(start=start, end=end, conversion=conversion))
+    return found
+
+
+def _along(wires: Sequence[Wire], structure: Structure, models: Mapping[Path_, Model]) -> Conversion:
+    """What becomes of a value on its way, the last wire first: transformations, each followed by that of units."""
+    result = Conversion()
+    for wire in reversed(wires):
+        result = result.then(wire.transformation)
+        if wire.converts_units:
+            result = result.then(_of_units(wire, structure, models))
+    return result
+
+
+def _of_units(wire: Wire, structure: Structure, models: Mapping[Path_, Model]) -> Conversion:
+    named, defined = [], []
+    for node in (wire.start, wire.end):
+        model = models.get(node[0])
+        variable = model.variables.get(node[1]) if model is not None else None
+        name = structure.units.get(node) or (variable.unit if variable is not None else None)
+        named.append(name)
+        own = structure.definitions.get(name) if name else None
+        defined.append(own or (unit_of(model, name) if model is not None else None))
+    if not all(named) or named[0] == named[1]:
+        return Conversion()
+    return _conversion(defined[0], defined[1], f"connection {wire.said}, from {named[0]} to {named[1]}")
+
+
+def _conversion(one: BaseUnits | None, other: BaseUnits | None, place: str) -> Conversion:
+    if one is None or other is None:
+        raise UsageError(f"{place}: a unit is not defined; expected it in ssd:Units")
+    try:
+        return between(one, other)
+    except OtherQuantity:
+        raise UsageError(f"{place}: these are units of different quantities") from None
+
+
+def _connections(signals: Sequence[Signal], timing: object) -> list[dict[str, Any]]:
+    """Those that the timing names by their ends, in its order, then the others: a message for each pair."""
+    left = list(signals)
+    tables = []
+    for index, table in enumerate(timing if isinstance(timing, list) else []):
+        place = f"connections.{table.get('name', index)}"
+        if "scale" in table or "offset" in table:
+            raise UsageError(f"{place}: has scale or offset, which the SSP decides")
+        members = _named(place, table, left)
+        left = [signal for signal in left if signal not in members]
+        if len({signal.conversion for signal in members}) > 1:
+            raise UsageError(f"{place}: its signals are converted differently; expected a connection for each")
+        tables.append(_table(members) | {key: value for key, value in table.items() if key not in ("from", "to")})
+    groups: dict[tuple[str, str, Conversion], list[Signal]] = {}
+    for signal in left:
+        pair = component_of(signal.start), component_of(signal.end)
+        groups.setdefault((*pair, signal.conversion), []).append(signal)
+    taken = {table["name"] for table in tables if "name" in table}
+    for (sender, receiver, _), members in groups.items():
+        base = f"{sender}_to_{receiver}"
+        name = next(n for k in range(1, 2 + len(taken)) if (n := base if k == 1 else f"{base}_{k}") not in taken)
+        taken.add(name)
+        tables.append({"name": name, **_table(members)})
+    return tables
+
+
+def _table(members: Sequence[Signal]) -> dict[str, Any]:
+    conversion = members[0].conversion
+    changed = {} if conversion.is_none else {"scale": conversion.scale, "offset": conversion.offset}
+    return {"from": [signal.start for signal in members], "to": [signal.end for signal in members], **changed}
+
+
+def _named(place: str, table: Mapping[str, Any], signals: Sequence[Signal]) -> list[Signal]:
+    """The signals that a table of the timing means by its ends: each by name, or all between two components."""
+    starts, ends = ([end] if isinstance(end, str) else end for end in (table.get("from"), table.get("to")))
+    if not (isinstance(starts, list) and isinstance(ends, list) and len(starts) == len(ends) > 0):
+        raise UsageError(f"{place}: expected from and to: as many ends, or a component each")
+    found: list[Signal] = []
+    for start, end in zip(starts, ends, strict=True):
+        whole = [s for s in signals if (component_of(s.start), component_of(s.end)) == (start, end)]
+        matching = whole or [s for s in signals if (s.start, s.end) == (start, end)]
+        if not matching:
+            known = _list(f"{s.start} -> {s.end}" for s in signals)
+            raise UsageError(f"{place}: {start} -> {end} is not in the SSP, or named before; expected of {known}")
+        found += matching
+    return found
+
+
+def _list(names: Any, most: int = 12) -> str:
+    listed = list(names)
+    return ", ".join(listed[:most]) + (f" and {len(listed) - most} more" if len(listed) > most else "")

@@ -1,0 +1,176 @@
+"""What an SSD says, with nested systems taken apart: components by their path, and what feeds what through them."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from orchestration.errors import UsageError
+from orchestration.exchange.ssp.document import Read, all_of
+from orchestration.exchange.ssp.package import Package
+from orchestration.exchange.ssp.parameters import Value, definitions_in, transformation, values_of
+from orchestration.system.conversion import BaseUnits, Conversion
+
+Path_ = tuple[str, ...]
+"""Names from the system at the top, which is (), to an element"""
+Node = tuple[Path_, str]
+"""A connector, of the element at a path"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wire:
+    """One connection of the document, as its values flow."""
+
+    start: Node
+    end: Node
+    transformation: Conversion
+    converts_units: bool
+
+    @property
+    def said(self) -> str:
+        """For messages."""
+        return f"{said(self.start)} -> {said(self.end)}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Structure:
+    """A document, taken apart."""
+
+    components: dict[Path_, Path] = field(default_factory=dict)
+    """their FMUs"""
+    kinds: dict[Node, str] = field(default_factory=dict)
+    units: dict[Node, str] = field(default_factory=dict)
+    """where connectors name one"""
+    wires: dict[Node, Wire] = field(default_factory=dict)
+    """by their end"""
+    values: dict[Node, Value] = field(default_factory=dict)
+    """of parameters and inputs"""
+    definitions: dict[str, BaseUnits] = field(default_factory=dict)
+    """of units"""
+    stop: float | None = None
+    step: float | None = None
+    """[s], if they are in it"""
+
+    def way_to(self, node: Node) -> Iterator[Wire]:
+        """The wires that lead to a connector, the last first, through the connectors of systems."""
+        seen = set()
+        while (wire := self.wires.get(node)) is not None and node not in seen:
+            seen.add(node)
+            yield wire
+            node = wire.start
+
+
+def said(node: Node) -> str:
+    """A connector by its path."""
+    return ".".join((*node[0], node[1]))
+
+
+def structure_of(root: Read, package: Package) -> Structure:
+    """Take a document apart; raises `UsageError` for what is not read."""
+    (system,) = all_of(root, "ssd:System")
+    result = Structure(stop=_stop(root), step=_step(root))
+    result.definitions.update(definitions_in(root, "ssd:Units/ssc:Unit"))
+    _walk(system, (), package, result)
+    return result
+
+
+def _walk(system: Read, path: Path_, package: Package, into: Structure) -> None:
+    _connectors(system, path, into)
+    elements = {child.get("name"): child for child in all_of(system, "ssd:Elements/*")}
+    if len(elements) < len(all_of(system, "ssd:Elements/*")):
+        raise UsageError(f"{'.'.join(path) or 'the system'}: has two elements of one name; expected a name for each")
+    for name, child in elements.items():
+        kind = child.tag.rpartition("}")[2]
+        if kind == "System":
+            _walk(child, (*path, name), package, into)
+        elif kind == "Component":
+            _component(child, (*path, name), package, into)
+        else:
+            raise UsageError(f"{said((path, name))}: is a {kind}; only components and systems are read")
+    for connection in all_of(system, "ssd:Connections/ssd:Connection"):
+        _wire(connection, path, into)
+    # After those of its elements: what is bound further out is taken.
+    for name, value in values_of(system, package, package.structure):
+        into.values[_meant(name, path, elements)] = value
+
+
+def _component(component: Read, path: Path_, package: Package, into: Structure) -> None:
+    place = ".".join(path)
+    kind = component.get("type") or "application/x-fmu-sharedlibrary"
+    if kind != "application/x-fmu-sharedlibrary":
+        raise UsageError(f"{place}: is of type {kind}; only FMUs are read")
+    if component.get("implementation") == "ModelExchange":
+        raise UsageError(f"{place}: is for model exchange; only co-simulation is read")
+    into.components[path] = fmu = package.file(component.get("source"))
+    _connectors(component, path, into)
+    for name, value in values_of(component, package, fmu):
+        into.values[path, name] = value
+
+
+def _connectors(element: Read, path: Path_, into: Structure) -> None:
+    for connector in all_of(element, "ssd:Connectors/ssd:Connector"):
+        node = path, connector.get("name")
+        into.kinds[node] = connector.get("kind")
+        for unit in (real.get("unit") for real in all_of(connector, "ssc:Real")):
+            if unit is not None:
+                into.units[node] = unit
+
+
+def _wire(connection: Read, path: Path_, into: Structure) -> None:
+    """Which end gives is a matter of the connectors' kinds, not of which is called the start."""
+    ends: list[Node] = []
+    for which in ("start", "end"):
+        element = connection.get(f"{which}Element")
+        node: Node = ((path if element is None else (*path, element)), connection.get(f"{which}Connector"))
+        if node not in into.kinds:
+            raise UsageError(f"connection to {said(node)}: there is no such connector")
+        ends.append(node)
+    gives = [into.kinds[node] in (("input", "parameter") if node[0] == path else ("output",)) for node in ends]
+    if gives[0] == gives[1]:
+        kinds = " and ".join(f"{said(node)} ({into.kinds[node]})" for node in ends)
+        raise UsageError(f"connection of {kinds}: expected an output and an input")
+    start, end = (ends[0], ends[1]) if gives[0] else (ends[1], ends[0])
+    if end in into.wires:
+        raise UsageError(f"connection to {said(end)}: is connected already; expected one connection")
+    into.wires[end] = Wire(
+        start=start,
+        end=end,
+        transformation=transformation(connection),
+        converts_units=connection.get("suppressUnitConversion", "false") not in ("true", "1"),
+    )
+
+
+def _meant(name: str, path: Path_, elements: dict[str, Read]) -> Node:
+    """What a name in a parameter set of a system means: of an element, if it begins with that one's name."""
+    owners = [owner for owner in elements if name.startswith(f"{owner}.")]
+    if not owners:
+        return path, name
+    owner = max(owners, key=len)
+    inside = elements[owner]
+    rest = name[len(owner) + 1 :]
+    if not inside.tag.endswith("}System"):
+        return (*path, owner), rest
+    return _meant(rest, (*path, owner), {child.get("name"): child for child in all_of(inside, "ssd:Elements/*")})
+
+
+def _stop(root: Read) -> float | None:
+    for experiment in all_of(root, "ssd:DefaultExperiment"):
+        start = float(experiment.get("startTime", 0.0))
+        if start != 0.0:
+            raise UsageError(f"DefaultExperiment.startTime = {start:g}: expected 0; runs begin there")
+        if experiment.get("stopTime") is not None:
+            return float(experiment.get("stopTime"))
+    return None
+
+
+def _step(root: Read) -> float | None:
+    """From the annotations of other tools; the standard has no place for it."""
+    names = {
+        "FixedStepAlgorithm": "baseStepSize",
+        "FixedStepMaster": "stepSize",
+        "SimulationInformation": "fixedStepSize",
+    }
+    for tag, attribute in names.items():
+        for found in root.iter(f"{{*}}{tag}"):
+            if found.get(attribute) is not None:
+                return float(found.get(attribute))
+    return None

@@ -1,0 +1,474 @@
+"""The master: steps components through the instants of an agenda, and records every row.
+
+At one instant, in this order: components in continuous time have reached it; messages that arrive are delivered;
+sampled components that are due read what they have received, step and send, and what arrives without delay is
+delivered; the row is recorded. So a row is the value just after its instant, and at the end nothing samples.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from orchestration.errors import SimulatorError
+from orchestration.master.agenda import Agenda, Due, Message
+from orchestration.master.board import Board
+from orchestration.master.channel import Channel
+from orchestration.master.feeds import Feed
+from orchestration.master.plan import Plan
+from orchestration.master.recording import ROWS, Chunk, Event, Recorder
+from orchestration.master.sources import Values
+from orchestration.master.streams import NOISE, Streams
+from orchestration.simulator import Floats, Simulator, Transfer
+from orchestration.system.model import System, variable_of
+from orchestration.system.times import NANOSECONDS
+
+ROWS_PENDING = "rows"
+"""Beside the names of the components in `Master.saved`"""
+SWEEPS, CONVERGED = 100, 1e-12
+"""How often values go around a loop at initialisation, until they change by less, relative to what they are"""
+
+Watch = Callable[[float], str | None]
+"""At t [s], says how the values of the row have diverged, or None"""
+
+
+@dataclass(kw_only=True)
+class _Task:
+    """A sampled component at work."""
+
+    step: Callable[[float, float], None]
+    read: Transfer
+    outputs: Floats
+    """connected ones, in the row"""
+    names: tuple[str, ...]
+    feeds: list[Feed]
+    held: list[Channel]
+    """into it, with a first-order hold"""
+    ratio: float
+    by_itself: bool
+    """whether it has a clock of its own and is stepped at every instant"""
+
+
+@dataclass(kw_only=True)
+class _Body:
+    """A component in continuous time at work."""
+
+    step: Callable[[float, float], None]
+    read: Transfer
+    outputs: Floats
+    names: tuple[str, ...]
+    ahead: list[Channel]
+    """wires from components that are stepped before it: their new values"""
+    behind: list[Channel]
+    """wires from others: their values of the instant before"""
+    feeds: list[Feed]
+    held: list[Channel]
+    now: int = 0
+
+
+class Master:
+    """One run of a system whose components are instantiated and have their parameters."""
+
+    def __init__(
+        self,
+        system: System,
+        simulators: Mapping[str, Simulator],
+        *,
+        agenda: Agenda,
+        streams: Streams,
+        recorded: Mapping[str, Sequence[str]],
+        recorder: Recorder,
+        sources: Sequence[tuple[Sequence[str], Values]] = (),
+        feeds: Sequence[Feed] = (),
+        interrupted: Callable[[], bool] = lambda: False,
+        watch: Callable[[Board], Watch] | None = None,
+        first_exchange: Sequence[Sequence[int]] | None = None,
+    ) -> None:
+        self.board = board = Board(system, recorded)
+        self.events: list[tuple[int, str, str, int]] = []  # fields of `Event`, made cheaply
+        self._arrived: list[tuple[int, str, str, int]] = []  # of this instant: noted after what was sent at it
+        self.interrupted_at: int | None = None
+        self.divergence: str | None = None
+        self.divergence_time: int | None = None
+        self.steps = 0
+        self.now = 0
+        self._system, self._simulators, self._agenda = system, simulators, agenda
+        self._plan = plan = Plan(system)
+        self._names = names = list(system.components)
+        self._sources, self._interrupted, self.recorder = list(sources), interrupted, recorder
+        self.columns = (*board.columns, *(signal for signals, _ in self._sources for signal in signals))
+        """of every row: those of the board, then the signals of the sources"""
+        self._rows = bytearray()  # not handed over yet, and the times of `events` may lie before them
+        self._chunk = ROWS * board.row.nbytes
+        self._handed_over = False
+        recorder.begin(self.columns)
+        self._watch = watch(board) if watch is not None else lambda t: None
+        self._feeds = list(feeds)
+        self._connections = [x.name for x in system.connections]
+        self._channels = [self._channel(i, streams) for i in range(len(system.connections))]
+        self._first_exchange = [(i,) for i in range(len(self._channels))] if first_exchange is None else first_exchange
+        self._readers = {name: simulators[name].reader(board.outputs[name], self._outputs(name)) for name in names}
+        self._bodies = {names.index(name): self._body(name) for name in plan.continuous}
+        self._tasks = {names.index(name): self._task(name) for name in plan.sampled}
+        self._settling = any(body.held or body.behind or body.feeds for body in self._bodies.values())
+        self._by_itself = [i for i, task in self._tasks.items() if task.by_itself]
+
+    # -- a run ---------------------------------------------------------------------------------------------------
+
+    def initialise(self) -> None:
+        """The first exchange, in the order of the dependencies: never lost, late or noisy."""
+        try:
+            self._exchange_first()
+        except (Diverged, SimulatorError) as error:
+            self._diverged(error)
+
+    def run(self, *, pause_at: int | None = None, progress: Callable[[float], None] | None = None) -> bool:
+        """Run to the end, to divergence or to the first instant from `pause_at` [ns]; whether it is over.
+
+        So it is at the first instant after an interruption, but not at its end.
+        """
+        over = self.divergence is not None or self._run(pause_at, progress)
+        if over and (self._rows or self.events or not self._handed_over):
+            self._hand_over()
+        return over
+
+    def _run(self, pause_at: int | None, progress: Callable[[float], None] | None) -> bool:
+        agenda, by_itself, count = self._agenda, self._by_itself, 0
+        try:
+            for instant in agenda:
+                time, halts = instant.time, instant.halts
+                if halts:
+                    self._step_bodies(time, halts)
+                if instant.posted:
+                    self._post(instant.posted, time)
+                if instant.measured:
+                    self._measure(instant.measured)
+                if instant.arrivals:
+                    self._arrive(instant.arrivals, time)
+                for sample in instant.due:
+                    self._sample(sample, time)
+                if by_itself and time < agenda.stop:
+                    self._step_by_themselves(time, instant.due)
+                if self._settling:
+                    self._settle(time, halts)
+                if self._arrived:
+                    self.events += self._arrived
+                    self._arrived.clear()
+                self._record(time)
+                if self._interrupted() and time < agenda.stop:
+                    self.interrupted_at = time
+                    self._drop_later_events()
+                    return True
+                if pause_at is not None and pause_at <= time < agenda.stop:
+                    return False
+                count += 1
+                if progress is not None and count % 512 == 0:
+                    progress(time / agenda.stop)
+        except (Diverged, SimulatorError) as error:
+            self._diverged(error)
+        if progress is not None:
+            progress(1.0)
+        return True
+
+    def pending(self) -> Chunk:
+        """What was recorded since the last chunk was handed over; messages that go out later are left out."""
+        rows = np.frombuffer(bytes(self._rows), dtype=np.float64).reshape(-1, len(self.board.columns))
+        events = sorted((event for event in self.events if event[0] <= self.now), key=lambda event: event[0])
+        return Chunk(
+            columns=self.columns,
+            rows=np.column_stack([rows, *(values.over(rows[:, 0]) for _, values in self._sources)]),
+            events=tuple(map(Event._make, events)),
+        )
+
+    def state(self) -> dict[str, Any]:
+        """All that the rest of the run depends on, and what the recorder does not have yet, but for `saved`."""
+        return {
+            "instants": self._agenda.count,
+            "now": self.now,
+            "reached": {name: self._bodies[self._names.index(name)].now for name in self._plan.continuous},
+            "steps": self.steps,
+            "row": self.board.row.tolist(),
+            "handed_over": self._handed_over,
+            "channels": [channel.state() for channel in self._channels],
+            "events": list(self.events),
+        }
+
+    def saved(self) -> dict[str, bytes]:
+        """The states of the components, and the rows that the recorder does not have yet, as bytes."""
+        return {
+            **{name: simulator.save() for name, simulator in self._simulators.items()},
+            ROWS_PENDING: bytes(self._rows),
+        }
+
+    def restore(self, state: Mapping[str, Any], saved: Mapping[str, bytes]) -> None:
+        """Continue where `state` and `saved` were taken, instead of `initialise`."""
+        for name, simulator in self._simulators.items():
+            simulator.restore(saved[name])
+        for _ in range(state["instants"]):  # the agenda is the same again: it follows from the system and the seed
+            next(self._agenda)
+        self.now, self.steps = state["now"], state["steps"]
+        for name, time in state["reached"].items():
+            self._bodies[self._names.index(name)].now = time
+        self.board.row[:] = state["row"]
+        self._rows, self._handed_over = bytearray(saved[ROWS_PENDING]), state["handed_over"]
+        for channel, content in zip(self._channels, state["channels"], strict=True):
+            channel.restore(content)
+        self.events = [(time, kind, what, k) for time, kind, what, k in state["events"]]
+
+    # -- what happens at an instant ------------------------------------------------------------------------------
+
+    def _step_bodies(self, time: int, halts: Sequence[int]) -> None:
+        """Components in continuous time reach `time`; divergence is noticed before any value is passed on."""
+        self.now = time
+        moved = False
+        for index in halts:
+            body = self._bodies[index]
+            start = body.now
+            if time == start:
+                continue
+            for channel in body.ahead:
+                channel.pass_on()
+            body.now = time
+            body.step(start / NANOSECONDS, (time - start) / NANOSECONDS)
+            self.steps += 1
+            body.read()
+            if not math.isfinite(sum(body.outputs.tolist())):
+                _expect_finite(body.names, body.outputs.tolist(), time / NANOSECONDS)
+            moved = True
+        if moved:
+            self._look(time / NANOSECONDS)
+
+    def _look(self, t: float) -> None:
+        complaint = self._watch(t)
+        if complaint is not None:
+            raise Diverged(complaint)
+
+    def _post(self, messages: Sequence[Message], time: int) -> None:
+        for message in messages:
+            self._note_sending(message)
+            channel = self._channels[message.connection]
+            channel.send(message.k, lost=message.arrival is None)
+            if message.arrival == time:
+                self._deliver(message, time)
+
+    def _measure(self, messages: Sequence[Message]) -> None:
+        """Values for samples to come."""
+        for message in messages:
+            self._channels[message.connection].send(message.k, lost=message.arrival is None)
+
+    def _arrive(self, messages: Sequence[Message], time: int) -> None:
+        for message in messages:
+            self._deliver(message, time)
+
+    def _deliver(self, message: Message, time: int) -> None:
+        self._arrived.append((time, "arrived", self._connections[message.connection], message.k))
+        self._channels[message.connection].deliver(message.k, time)
+
+    def _sample(self, due: Due, time: int) -> None:
+        task = self._tasks[due.component]
+        self._sense(due, time)
+        for channel in task.held:
+            channel.extrapolate(time)
+        for feed in task.feeds:
+            feed.write(time / NANOSECONDS)
+        if not task.by_itself:
+            self._step_task(task, time, due.next_time)
+            self._send(due, time)
+
+    def _step_task(self, task: _Task, time: int, end: int) -> None:
+        self.now = time
+        start, stop = time / NANOSECONDS, self._agenda.stop
+        task.step(task.ratio * start, task.ratio * ((min(end, stop) - time) / NANOSECONDS))
+        task.read()
+        if not math.isfinite(sum(task.outputs.tolist())):
+            _expect_finite(task.names, task.outputs.tolist(), start)
+
+    def _step_by_themselves(self, time: int, due: Sequence[Due]) -> None:
+        """Components with a clock of their own are stepped at every instant; the agenda knows when they sample."""
+        samples = {sample.component: sample for sample in due}
+        for index in self._by_itself:
+            self._step_task(self._tasks[index], time, self._agenda.next_time())
+            if index in samples:
+                self._send(samples[index], time)
+
+    def _sense(self, due: Due, time: int) -> None:
+        """The sample reads what it measures itself."""
+        for message in due.received:
+            name, lost = self._connections[message.connection], message.arrival is None
+            self.events.append((message.sent, "sampled", name, message.k))
+            if lost:
+                self.events.append((message.sent, "lost", name, message.k))
+            channel = self._channels[message.connection]
+            if message.sent == time:
+                if lost:
+                    channel.skip()
+                else:
+                    channel.apply(channel.take(), time)
+            elif not lost:
+                channel.deliver(message.k, time)
+
+    def _send(self, due: Due, time: int) -> None:
+        """All messages take their values before any arrives."""
+        at_once = []
+        for message in due.sent:
+            self._note_sending(message)
+            channel = self._channels[message.connection]
+            if message.arrival == time:
+                at_once.append((message, channel, channel.take()))
+            else:
+                channel.send(message.k, lost=message.arrival is None)
+        for message, channel, value in at_once:
+            self._arrived.append((time, "arrived", self._connections[message.connection], message.k))
+            channel.apply(value, time)
+
+    def _note_sending(self, message: Message) -> None:
+        if message.sent > self._agenda.stop:
+            return
+        name = self._connections[message.connection]
+        self.events.append((message.sent, "sent", name, message.k))
+        if message.arrival is None:
+            self.events.append((message.sent, "lost", name, message.k))
+
+    def _settle(self, time: int, halts: Sequence[int]) -> None:
+        """What components in continuous time hold over the step that begins now."""
+        for index in halts:
+            body = self._bodies[index]
+            for channel in body.held:
+                channel.extrapolate(time)
+            for channel in body.behind:
+                channel.pass_on()
+            for feed in body.feeds:
+                feed.write(time / NANOSECONDS)
+
+    def _record(self, time: int) -> None:
+        row = self.board.row
+        row[0] = time / NANOSECONDS
+        self._rows += row.data
+        if len(self._rows) >= self._chunk:
+            self._hand_over()
+
+    def _hand_over(self) -> None:
+        self.recorder.take(self.pending())
+        self.events = [event for event in self.events if event[0] > self.now]
+        self._rows.clear()
+        self._handed_over = True
+
+    def _diverged(self, error: Exception) -> None:
+        """Take divergence as the end of the run; any other failure of an FMU is raised."""
+        if isinstance(error, SimulatorError) and not error.divergence:
+            raise error
+        self.divergence, self.divergence_time = str(error), self.now
+        self._drop_later_events()
+        if not self._rows and not self._handed_over:
+            self._record(self.now)
+
+    def _drop_later_events(self) -> None:
+        """In Jacobi order a message is written down before it goes out; after the end none does."""
+        self.events = [event for event in self.events if event[0] <= self.now]
+
+    # -- initialisation ------------------------------------------------------------------------------------------
+
+    def _exchange_first(self) -> None:
+        stop = self._agenda.stop / NANOSECONDS
+        for name in self._names:
+            self._simulators[name].enter_initialization(0.0, stop)
+        for feed in self._feeds:
+            feed.write(0.0)
+        for group in self._first_exchange:
+            self._exchange(group)
+        for name in self._names:
+            self._simulators[name].exit_initialization()
+            self._readers[name]()
+        for channel in self._channels:
+            channel.start()
+        for name in self._names:
+            outputs = self._outputs(name)[: self.board.connected[name]].tolist()
+            _expect_finite([f"{name}.{output}" for output in self.board.outputs[name]], outputs, 0.0)
+        self._look(0.0)
+
+    def _exchange(self, group: Sequence[int]) -> None:
+        """Pass on what the connections of a group carry; again and again until it stays, if they form a loop."""
+        connections = [self._system.connections[i] for i in group]
+        for _ in range(SWEEPS):
+            settled = True
+            for index, x in zip(group, connections):
+                self._readers[x.sender]()
+                before = self._channels[index].received.copy()
+                self._channels[index].pass_on()
+                after = self._channels[index].received
+                settled &= bool(np.all(np.abs(after - before) <= CONVERGED * np.maximum(1.0, np.abs(after))))
+            if settled or len(group) == 1:
+                return
+        ends = "; ".join(f"{', '.join(x.start)} -> {', '.join(x.end)}" for x in connections)
+        raise SimulatorError(f"initialisation: no values found around the loop {ends} after {SWEEPS} exchanges")
+
+    # -- how it is made ------------------------------------------------------------------------------------------
+
+    def _outputs(self, name: str) -> Floats:
+        return self.board.of([f"{name}.{output}" for output in self.board.outputs[name]])
+
+    def _channel(self, index: int, streams: Streams) -> Channel:
+        x = self._system.connections[index]
+        inputs = [variable_of(end) for end in x.end]
+        sampled = self._system.components[x.receiver].sampling is not None
+        received: Floats = np.zeros(len(inputs)) if sampled else self.board.of(x.end)
+        return Channel(
+            x,
+            row=self.board.row,
+            places=self.board.places(x.start),
+            received=received,
+            write=self._simulators[x.receiver].writer(inputs, received),
+            noise=streams.of(f"connections.{x.name}", NOISE),
+        )
+
+    def _body(self, name: str) -> _Body:
+        order = list(self._plan.continuous)
+        wires = [i for i in self._plan.wires if self._system.connections[i].receiver == name]
+        ahead = [
+            i
+            for i in wires
+            if self._system.connections[i].order == "gauss-seidel"
+            and order.index(self._system.connections[i].sender) < order.index(name)
+        ]
+        outputs = self._outputs(name)[: self.board.connected[name]]
+        return _Body(
+            step=self._simulators[name].step,
+            read=self._readers[name],
+            outputs=outputs,
+            names=tuple(f"{name}.{output}" for output in self.board.outputs[name][: len(outputs)]),
+            ahead=[self._channels[i] for i in ahead],
+            behind=[self._channels[i] for i in wires if i not in ahead],
+            feeds=[feed for feed in self._feeds if feed.feeds(name)],
+            held=self._held(name),
+        )
+
+    def _task(self, name: str) -> _Task:
+        sampling = self._system.components[name].sampling
+        assert sampling is not None
+        outputs = self._outputs(name)[: self.board.connected[name]]
+        return _Task(
+            step=self._simulators[name].step,
+            read=self._readers[name],
+            outputs=outputs,
+            names=tuple(f"{name}.{output}" for output in self.board.outputs[name][: len(outputs)]),
+            feeds=[feed for feed in self._feeds if feed.feeds(name)],
+            held=self._held(name),
+            ratio=sampling.clock_ratio,
+            by_itself=sampling.clock == "fmu",
+        )
+
+    def _held(self, name: str) -> list[Channel]:
+        connections = self._system.connections
+        return [self._channels[i] for i, x in enumerate(connections) if x.receiver == name and x.hold == "first"]
+
+
+def _expect_finite(names: Sequence[str], values: Sequence[float], t: float) -> None:
+    for name, value in zip(names, values):
+        if not math.isfinite(value):
+            raise Diverged(f"{name} = {value} at t = {t:g} s, expected a finite value")
+
+
+class Diverged(Exception):
+    """The loop has left the region that counts as running."""

@@ -1,0 +1,73 @@
+"""How the connections of a system are carried out, and who comes first at one instant."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from orchestration.master.order import ranked
+from orchestration.system.model import Connection, System
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A system, sorted: indices of connections by what their ends are, components in the order of an instant."""
+
+    system: System
+
+    @cached_property
+    def wires(self) -> tuple[int, ...]:
+        """Between components in continuous time, nothing late, lost or noisy: read whenever the receiver is stepped."""
+        return tuple(i for i, x in enumerate(self._connections) if self._between_continuous(x) and is_plain(x))
+
+    @cached_property
+    def posted(self) -> tuple[int, ...]:
+        """Between components in continuous time otherwise: a message at each point of the sender."""
+        return tuple(i for i, x in enumerate(self._connections) if self._between_continuous(x) and not is_plain(x))
+
+    @cached_property
+    def measured(self) -> tuple[int, ...]:
+        """From a component in continuous time to a sampled one: a message for each sample of the receiver."""
+        return tuple(
+            i
+            for i, x in enumerate(self._connections)
+            if self._continuous(x.sender) and not self._continuous(x.receiver)
+        )
+
+    @cached_property
+    def commanded(self) -> tuple[int, ...]:
+        """From a sampled component: a message for each of its samples."""
+        return tuple(i for i, x in enumerate(self._connections) if not self._continuous(x.sender))
+
+    @cached_property
+    def continuous(self) -> tuple[str, ...]:
+        """Components in continuous time, in the order in which they are stepped to one instant."""
+        members = [name for name in self.system.components if self._continuous(name)]
+        return ranked(members, (self._pair(i) for i in self.wires if self._follows(i)))
+
+    @cached_property
+    def sampled(self) -> tuple[str, ...]:
+        """Sampled components, in the order in which those that are due at one instant are processed."""
+        members = [name for name in self.system.components if not self._continuous(name)]
+        return ranked(members, (self._pair(i) for i in self.commanded if self._follows(i)))
+
+    def _follows(self, index: int) -> bool:
+        return self._connections[index].order == "gauss-seidel"
+
+    def _pair(self, index: int) -> tuple[str, str]:
+        return self._connections[index].sender, self._connections[index].receiver
+
+    @property
+    def _connections(self) -> tuple[Connection, ...]:
+        return self.system.connections
+
+    def _continuous(self, name: str) -> bool:
+        return self.system.components[name].sampling is None
+
+    def _between_continuous(self, x: Connection) -> bool:
+        return self._continuous(x.sender) and self._continuous(x.receiver)
+
+
+def is_plain(x: Connection) -> bool:
+    """Whether what arrives is what was sent, at once."""
+    return not (
+        x.delay or x.delay_jitter or x.loss or any(x.noise.values()) or any(x.quantisation.values()) or x.hold != "zero"
+    )

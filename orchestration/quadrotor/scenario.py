@@ -1,0 +1,144 @@
+"""What a run is, as one frozen value."""
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+from orchestration.errors import UsageError, shown
+from orchestration.quadrotor.timing import Timing, is_number
+from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT, SAMPLE_OFFSET, SAMPLE_PERIOD
+
+Parameter = float | bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class FmuChoice:
+    """An FMU, by the name of one of this project's or a path, and the parameters to set."""
+
+    fmu: str
+    parameters: dict[str, Parameter] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReferenceChoice:
+    """Where the reference comes from: the controller's built-in trajectory unless a CSV file is named."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    file: Path | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Record:
+    """Variables to record beside what is exchanged; None: all outputs and locals."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    plant: tuple[str, ...] | None = None
+    controller: tuple[str, ...] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """One run; the defaults are the paper's scenario (section V) at a 10 ms period.
+
+    Raises `UsageError` for values that cannot be.
+    """
+
+    stop_time: float = 30.0
+    """[s]"""
+    seed: int = 0
+    """of all random numbers"""
+    model_mismatch: bool = False
+    """whether it is meant if the controller's nominal mass or inertia is not the plant's; no effect on the flight"""
+    controller: FmuChoice = field(default_factory=lambda: FmuChoice(fmu=DEFAULT_CONTROLLER))
+    plant: FmuChoice = field(default_factory=lambda: FmuChoice(fmu=DEFAULT_PLANT))
+    timing: Timing = field(default_factory=Timing)
+    reference: ReferenceChoice = field(default_factory=ReferenceChoice)
+    record: Record = field(default_factory=Record)
+
+    def __post_init__(self) -> None:
+        if not (is_number(self.stop_time) and math.isfinite(self.stop_time) and self.stop_time > 0.0):
+            raise UsageError(f"stop_time = {shown(self.stop_time)}: expected a positive number of seconds")
+        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or not 0 <= self.seed < 2**63:
+            raise UsageError(f"seed = {shown(self.seed)}: expected a whole number from 0 to 2^63 - 1")
+        for name, flag in ((SAMPLE_PERIOD, "--period and --clock"), (SAMPLE_OFFSET, "--offset")):
+            if name in self.controller.parameters:
+                raise UsageError(
+                    f"controller.{name}: expected {flag} instead; the master sets it, to 0 with clock master "
+                    "(the master decides when to sample) and to the timing's value with clock fmu"
+                )
+
+    def with_changes(
+        self,
+        *,
+        timing: Mapping[str, Any] | None = None,
+        parameters: Mapping[str, Parameter] | None = None,
+        **fields: Any,
+    ) -> "Scenario":
+        """This scenario with other timing keys, parameters (`controller.NAME`, `plant.NAME`) or fields.
+
+        Raises `UsageError` for a key that does not exist.
+        """
+        _expect_keys("", fields, Scenario)
+        _expect_keys("timing.", timing or {}, Timing)
+        changed = dataclasses.replace(self, **fields)
+        if timing:
+            changed = dataclasses.replace(changed, timing=dataclasses.replace(self.timing, **dict(timing)))
+        for name, value in (parameters or {}).items():
+            side, _, parameter = name.partition(".")
+            if side not in ("controller", "plant") or not parameter:
+                raise UsageError(f"{name}: expected controller.NAME or plant.NAME")
+            choice: FmuChoice = getattr(changed, side)
+            choice = dataclasses.replace(choice, parameters={**choice.parameters, parameter: value})
+            replaced: dict[str, Any] = {side: choice}
+            changed = dataclasses.replace(changed, **replaced)
+        return changed
+
+    def with_fmus(self, *, plant: Path, controller: Path) -> "Scenario":
+        """This scenario with its FMUs at these paths, so that none is looked for."""
+        return dataclasses.replace(
+            self,
+            plant=dataclasses.replace(self.plant, fmu=str(plant)),
+            controller=dataclasses.replace(self.controller, fmu=str(controller)),
+        )
+
+    def to_toml(self) -> str:
+        """The scenario file that loads as this scenario."""
+        import tomli_w
+
+        timing = {
+            key: value
+            for key, value in dataclasses.asdict(self.timing).items()
+            if value is not None and value != {}
+        }  # fmt: skip
+        tables: dict[str, Any] = {
+            "stop_time": self.stop_time,
+            "seed": self.seed,
+            **({"model_mismatch": True} if self.model_mismatch else {}),
+            "controller": _table(self.controller),
+            "plant": _table(self.plant),
+            "timing": timing,
+        }
+        if self.reference.file is not None:
+            tables["reference"] = {"file": str(self.reference.file.absolute())}
+        record = {key: list(value) for key, value in dataclasses.asdict(self.record).items() if value is not None}
+        if record:
+            tables["record"] = record
+        return tomli_w.dumps(tables)
+
+
+def _expect_keys(prefix: str, given: Mapping[str, Any], table: type) -> None:
+    known = [f.name for f in dataclasses.fields(table)]
+    for key in given:
+        if key not in known:
+            raise UsageError(f"{prefix}{key}: no such key; expected one of {', '.join(known)}")
+
+
+def _table(choice: FmuChoice) -> dict[str, Any]:
+    """A choice as a table of a scenario file that may lie in any folder."""
+    fmu = str(Path(choice.fmu).absolute()) if choice.fmu.endswith(".fmu") else choice.fmu
+    return {"fmu": fmu, **choice.parameters}

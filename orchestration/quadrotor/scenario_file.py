@@ -1,0 +1,131 @@
+"""Reads scenario files: keys and types are checked here, values where they mean something."""
+
+import dataclasses
+import json
+import typing
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pydantic
+
+from orchestration.documents import read_toml
+from orchestration.errors import UsageError, shown
+from orchestration.quadrotor.presets import preset_timing
+from orchestration.quadrotor.scenario import FmuChoice, Record, ReferenceChoice, Scenario
+from orchestration.quadrotor.timing import Timing
+from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScenarioFile:
+    """The tables of a scenario file; parameters of the FMUs are still as the file nests them."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    stop_time: float = Scenario.stop_time
+    seed: int = Scenario.seed
+    model_mismatch: bool = Scenario.model_mismatch
+    controller: dict[str, Any] = field(default_factory=dict)
+    plant: dict[str, Any] = field(default_factory=dict)
+    timing: Timing = field(default_factory=Timing)
+    reference: ReferenceChoice = field(default_factory=ReferenceChoice)
+    record: Record = field(default_factory=Record)
+
+
+def load_scenario(path: str | Path) -> Scenario:
+    """Read a scenario file; paths in it are relative to its folder.
+
+    Raises `UsageError` for a file that cannot be read, a key that does not exist (naming those that do)
+    or a value of the wrong kind.
+    """
+    path = Path(path)
+    tables = read_toml(path, "scenario file")
+    try:
+        return scenario_from_tables(tables, path.parent)
+    except UsageError as error:
+        raise UsageError(f"{path}: {error}") from error
+
+
+def scenario_from_tables(tables: dict[str, Any], folder: Path) -> Scenario:
+    """The scenario of a TOML document whose relative paths start at `folder`; raises `UsageError`."""
+    parsed = _parse(_expanded(tables))
+    file = parsed.reference.file
+    return Scenario(
+        stop_time=parsed.stop_time,
+        seed=parsed.seed,
+        model_mismatch=parsed.model_mismatch,
+        controller=_choice("controller", parsed.controller, DEFAULT_CONTROLLER, folder),
+        plant=_choice("plant", parsed.plant, DEFAULT_PLANT, folder),
+        timing=parsed.timing,
+        reference=ReferenceChoice(file=None if file is None else folder / file),
+        record=parsed.record,
+    )
+
+
+SHORTHANDS = ("loss", "preset")
+"""Keys of `[timing]` that stand for others."""
+
+
+def _expanded(tables: dict[str, Any]) -> dict[str, Any]:
+    """The tables with `timing.preset` and `timing.loss` written out, below what the file says itself."""
+    timing = tables.get("timing")
+    if not isinstance(timing, dict):
+        return tables
+    written = {key: value for key, value in timing.items() if key not in SHORTHANDS}
+    if "loss" in timing:
+        written = {"measurement_loss": timing["loss"], "command_loss": timing["loss"], **written}
+    if "preset" in timing:
+        written = {**preset_timing(str(timing["preset"])), **written}
+    return {**tables, "timing": written}
+
+
+def _choice(side: str, table: dict[str, Any], default: str, folder: Path) -> FmuChoice:
+    parameters = dict(_flattened(table))
+    fmu = parameters.pop("fmu", default)
+    if not isinstance(fmu, str):
+        raise UsageError(f"{side}.fmu = {shown(fmu)}: expected the name of an FMU or a path")
+    for name, value in parameters.items():
+        if not isinstance(value, (int, float, bool)):
+            raise UsageError(f"{side}.{name} = {shown(repr(value))}: expected a number, true or false")
+    if fmu.endswith(".fmu"):
+        fmu = str(folder / fmu)
+    return FmuChoice(fmu=fmu, parameters=parameters)
+
+
+def _flattened(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Nested tables as dotted names: `gain.eta = 15` and `"gain.eta" = 15` mean the same."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _flattened(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def _parse(tables: dict[str, Any]) -> ScenarioFile:
+    """The typed form of a TOML document; raises `UsageError` in one line for the first thing wrong."""
+    try:
+        return pydantic.TypeAdapter(ScenarioFile).validate_json(json.dumps(tables, default=str), strict=True)
+    except pydantic.ValidationError as error:
+        raise UsageError(first_problem(error, ScenarioFile)) from error
+
+
+def first_problem(error: pydantic.ValidationError, file: type) -> str:
+    """The first thing wrong with a document of the shape `file`, in one line that says what is valid."""
+    problem = error.errors()[0]
+    place = ".".join(str(part) for part in problem["loc"])
+    if problem["type"] == "unexpected_keyword_argument":
+        table: Any = file
+        for part in problem["loc"][:-1]:
+            if isinstance(part, str):
+                hint = next(f.type for f in dataclasses.fields(table) if f.name == part)
+                table = typing.get_args(hint)[0] if typing.get_origin(hint) is list else hint
+        names = [f.name for f in dataclasses.fields(table)] + list(SHORTHANDS if table is Timing else ())
+        keys = ", ".join(names)
+        return f"{place}: no such key; expected one of {keys}"
+    if problem["type"] in ("missing", "missing_argument", "missing_keyword_only_argument"):
+        return f"{place}: expected a value"
+    value = problem["input"]
+    message = problem["msg"].replace("Input should be", "expected")
+    return f"{place} = {shown(value if isinstance(value, float) else repr(value))}: {message[:1].lower()}{message[1:]}"

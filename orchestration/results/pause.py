@@ -1,0 +1,145 @@
+"""Stopping a run at a communication point and going on later, in another process, to the same bits."""
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestration.errors import UsageError
+from orchestration.master.recording import InMemory, Recorder
+from orchestration.request import Request, load_request, system_meant, text_of
+from orchestration.results.result import Result
+from orchestration.results.run_directory import METRICS, SCENARIO, STATE, keep_flight
+from orchestration.results.tables import InFolder, ToFolder
+from orchestration.simulation import Announce, Progress, Simulation, prepared
+from orchestration.system.times import nanoseconds
+
+
+def fly_until(
+    asked: Request,
+    pause_at: float,
+    folder: str | Path,
+    *,
+    figures: bool = True,
+    progress: Progress | None = None,
+    announce: Announce | None = None,
+) -> Result | None:
+    """Fly to the first communication point from `pause_at` [s] and write the state into `folder`, a new one.
+
+    Returns None, or the result if the run was over before: its directory is then in `folder`.
+    """
+    stop_time = system_meant(asked).stop_time
+    if not 0.0 <= pause_at < stop_time:
+        raise UsageError(f"pause at {pause_at:g} s: expected a time from 0 to before stop_time {stop_time:g} s")
+
+    def fly(recorder: ToFolder) -> Result | None:
+        with prepared(asked, announce, recorder=recorder) as flight:
+            _expect_states(flight)
+            flight.master.initialise()
+            if flight.master.run(pause_at=nanoseconds(pause_at), progress=progress):
+                return flight.result()
+            recorder.finish()
+            _write(flight, recorder.folder)
+            return None
+
+    return keep_flight(folder, fly, figures=figures, replaces=())
+
+
+def resume(
+    folder: str | Path,
+    out: str | Path | None = None,
+    *,
+    figures: bool = True,
+    progress: Progress | None = None,
+    announce: Announce | None = None,
+) -> Result:
+    """Go on with the run paused in `folder`, to the end; its directory is then in `out`, which may be `folder`.
+
+    Raises `UsageError` if there is none, or if the scenario, its reference or an FMU is not the one that it was
+    paused with.
+    """
+    folder = Path(folder)
+    if not (folder / STATE).is_file():
+        raise UsageError(f"{folder}: expected the directory of a paused run; it has no {STATE}")
+    asked = load_request(folder / SCENARIO)
+    state, saved = read_state(folder / STATE)
+
+    def fly(recorder: Recorder) -> Result:
+        with prepared(asked, announce, recorder=recorder) as flight:
+            _expect_same(state.pop("of"), flight, folder)
+            for chunk in InFolder(folder).chunks():
+                recorder.take(chunk)
+            flight.master.restore(state, saved)
+            flight.master.run(progress=progress)
+            return flight.result()
+
+    if out is None:
+        return fly(InMemory())
+    same = folder.resolve() == Path(out).resolve()
+    result = keep_flight(out, fly, figures=figures, replaces=(METRICS, STATE) if same else (METRICS,))
+    assert result is not None
+    return result
+
+
+def read_state(path: Path) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """What `Master.restore` needs, from the file of a paused run.
+
+    Raises `UsageError` for any other than the one that was written.
+    """
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+            text = str(archive["json"])
+            parts = {name: archive[name].tobytes() for name in archive.files if name not in ("json", "digest")}
+            whole = str(archive["digest"]) == _digest(text, parts)
+    except Exception as error:  # what a damaged file raises is not documented
+        raise UsageError(f"{path}: expected the state of a paused run, as it was written: {error}") from error
+    if not whole:
+        raise UsageError(f"{path}: expected the state of a paused run, as it was written")
+    state: dict[str, Any] = json.loads(text)
+    return state, parts
+
+
+def _write(flight: Simulation, folder: Path) -> None:
+    state, parts = flight.master.state(), flight.master.saved()
+    text = json.dumps({**state, "of": _hashes(flight)})
+    arrays = {name: np.frombuffer(part, dtype=np.uint8) for name, part in parts.items()}
+    (folder / SCENARIO).write_text(text_of(flight.asked), encoding="utf-8")
+    strings = {"json": np.array(text), "digest": np.array(_digest(text, parts))}
+    np.savez(folder / STATE, allow_pickle=False, **strings, **arrays)
+
+
+def _digest(text: str, parts: dict[str, bytes]) -> str:
+    """Of all that a state is made of, so that only what was written is restored."""
+    content = hashlib.sha256(text.encode())
+    for name in sorted(parts):
+        content.update(hashlib.sha256(parts[name]).digest())
+    return content.hexdigest()
+
+
+def _hashes(flight: Simulation) -> dict[str, str]:
+    """Of everything that a run goes on from beside its state."""
+    files = {name: source.file for name, source in flight.system.sources.items() if source.file is not None}
+    return {
+        SCENARIO: hashlib.sha256(text_of(flight.asked).encode()).hexdigest(),
+        **{f"the file of {name}": _hash(path) for name, path in files.items()},
+        **{f"the FMU of {name}": _hash(instance.path) for name, instance in flight.instances.items()},
+    }
+
+
+def _expect_states(flight: Simulation) -> None:
+    """Raise `UsageError` naming components whose state cannot be saved."""
+    without = [name for name, instance in flight.instances.items() if not instance.model.saves_state]
+    if without:
+        raise UsageError(f"pause: the FMU of {', '.join(without)} cannot save its state; expected FMUs that can")
+
+
+def _hash(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _expect_same(paused: dict[str, str], flight: Simulation, folder: Path) -> None:
+    for what, found in _hashes(flight).items():
+        if found != paused.get(what):
+            raise UsageError(f"{folder}: {what} is not as when the run was paused; expected it unchanged")

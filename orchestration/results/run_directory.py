@@ -1,0 +1,147 @@
+"""A run's directory: there when it is whole, so that a killed run leaves none that looks it."""
+
+import json
+from collections.abc import Callable, Container
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from orchestration.documents import read_json
+from orchestration.errors import UsageError, shown
+from orchestration.request import load_request, system_meant, text_of
+from orchestration.results import plots, tables
+from orchestration.results.folder import NewFolder, new_folder
+from orchestration.results.result import Result
+from orchestration.results.tables import ToFolder
+from orchestration.simulation import RunInterrupted, columns_of
+
+SIGNALS, EVENTS = tables.SIGNALS, tables.EVENTS
+METRICS, SCENARIO, PROVENANCE = "metrics.json", "scenario.toml", "provenance.json"
+STATE = "paused.npz"
+"""of a run that has been paused"""
+
+
+def save_run(result: Result, folder: str | Path, *, figures: bool = True) -> Path:
+    """Write the directory of a run, replacing an earlier run there; returns it.
+
+    Raises `UsageError` if `folder` holds something else.
+    """
+    with run_folder(Path(folder), (METRICS,)) as new:
+        tables.copy(result.recording, new.path)
+        _write(result, new.path, figures=figures)
+    return Path(folder)
+
+
+def _write(result: Result, folder: Path, *, figures: bool) -> None:
+    """All that is in the directory of a run but its recording."""
+    notes = {
+        **result.provenance,
+        "divergence": result.divergence,
+        "interrupted_at": result.interrupted_at,
+        "warnings": list(result.warnings),
+    }
+    (folder / METRICS).write_text(json.dumps(result.metrics, indent=2) + "\n", encoding="utf-8")
+    (folder / SCENARIO).write_text(text_of(result.asked), encoding="utf-8")
+    (folder / PROVENANCE).write_text(json.dumps(notes, indent=2) + "\n", encoding="utf-8")
+    if figures:
+        plots.draw(result, folder)
+
+
+def load_run(folder: str | Path) -> Result:
+    """Read the directory of a run; raises `UsageError` if it is none, or damaged."""
+    folder = Path(folder)
+    missing = [name for name in (SIGNALS, EVENTS, METRICS, SCENARIO, PROVENANCE) if not (folder / name).is_file()]
+    if missing:
+        raise UsageError(f"{folder}: expected the directory of a run; it has no {', '.join(missing)}")
+    notes = _object(folder / PROVENANCE, divergence=_TEXT, interrupted_at=_NUMBER, warnings=(list,))
+    recording = tables.InFolder(folder)
+    asked = load_request(folder / SCENARIO)
+    system = system_meant(asked)
+    missing = [name for name in columns_of(system) if name not in recording.columns]
+    if missing:
+        raise UsageError(f"{folder / SIGNALS}: no column {', '.join(missing)}; expected those of a run")
+    if not len(recording):
+        raise UsageError(f"{folder}: expected the directory of a run; it has no rows")
+    for _ in recording.chunks():  # what is damaged is to be known now
+        pass
+    return Result(
+        asked=asked,
+        system=system,
+        recording=recording,
+        metrics=_object(folder / METRICS, diverged=(bool,), divergence_time=_NUMBER),
+        divergence=notes.pop("divergence"),
+        interrupted_at=notes.pop("interrupted_at"),
+        warnings=tuple(notes.pop("warnings")),
+        provenance=notes,
+    )
+
+
+_TEXT, _NUMBER = (str, type(None)), (int, float, type(None))
+
+
+def _object(path: Path, **types: tuple[type, ...]) -> dict[str, Any]:
+    """The object in a JSON file, whose values by these names have one of these types; raises `UsageError`."""
+    content = read_json(path, "JSON file")
+    if not isinstance(content, dict):
+        raise UsageError(f"{path}: expected an object")
+    for name, kinds in types.items():
+        if name not in content or not isinstance(content[name], kinds):
+            raise UsageError(f"{path}: {name}: expected what was written, got {shown(content.get(name))}")
+    return content
+
+
+def keep_flight(
+    folder: str | Path,
+    fly: Callable[[ToFolder], Result | None],
+    *,
+    figures: bool = True,
+    replaces: Container[str] = (METRICS,),
+) -> Result | None:
+    """Fly, and write the directory of the run, whose place is made sure of before; the result.
+
+    `fly` is given what records in the new directory as the flight goes on; if it comes to no result, it has
+    written there what is to be kept. The directory takes the place of an earlier one that has a file of
+    `replaces`. If that cannot be after all, it is kept beside `folder`, and `QuadcosimError` says where. After
+    Ctrl-C what was recorded is kept too, but not in place of anything: `RunInterrupted` says where. Raises
+    `UsageError` if `folder` holds something else or cannot be written.
+    """
+    interrupted: RunInterrupted | None = None
+    with run_folder(Path(folder), replaces) as new:
+        try:
+            result = fly(ToFolder(new.path))
+        except RunInterrupted as stop:
+            interrupted, result = stop, stop.result
+            new.replaces = result.interrupted_at is None
+        new.precious = True
+        if result is not None:
+            _write(result, new.path, figures=figures)
+    if interrupted is not None:
+        result = replace(interrupted.result, recording=tables.InFolder(new.place))
+        raise RunInterrupted(f"{interrupted}; what was recorded is in {new.place}", result)
+    return result and replace(result, recording=tables.InFolder(new.place))
+
+
+def run_folder(folder: Path, replaces: Container[str] = ()) -> AbstractContextManager[NewFolder]:
+    """A new folder of a run that takes the place of `folder` if that has a file of `replaces` and no unknown one."""
+    kinds = {METRICS: "an earlier run", STATE: "a paused run"}
+    allowed = [text for name, text in kinds.items() if name in replaces]
+    expected = ", or that of ".join(["a new or empty directory", *allowed]) + " with nothing else in it" * bool(allowed)
+
+    def replaceable(place: Path) -> bool:
+        names = {path.name for path in place.iterdir() if path.is_file()}
+        others = {path.name for path in place.iterdir()} - _KNOWN
+        return not others and any(name in names and name in replaces for name in kinds)
+
+    return new_folder(folder, replaceable, expected)
+
+
+_KNOWN = {
+    SIGNALS,
+    EVENTS,
+    METRICS,
+    SCENARIO,
+    PROVENANCE,
+    STATE,
+    *(f"{name}.png" for name in (*plots.FIGURES, plots.SYSTEM_FIGURE)),
+}

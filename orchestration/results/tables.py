@@ -1,0 +1,147 @@
+"""Signals and events as Parquet files, a row group for each chunk."""
+
+from collections.abc import Collection, Iterable, Iterator
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from orchestration.errors import UsageError
+from orchestration.master.recording import Chunk, Event, Recording
+from orchestration.simulator import Floats
+
+SIGNALS, EVENTS = "signals.parquet", "events.parquet"
+_EVENT = pa.schema([("time", pa.float64()), ("event", pa.string()), ("what", pa.string()), ("sample", pa.int64())])
+
+
+class ToFolder:
+    """A recorder that writes each chunk to the files of a folder as it comes."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._writers: tuple[Any, Any] | None = None
+
+    def begin(self, columns: tuple[str, ...]) -> None:
+        """As `Recorder`."""
+        self._writers = (
+            pq.ParquetWriter(self.folder / SIGNALS, _signals_schema(columns), write_page_checksum=True),
+            pq.ParquetWriter(self.folder / EVENTS, _EVENT, write_page_checksum=True),
+        )
+
+    def take(self, chunk: Chunk) -> None:
+        """As `Recorder`."""
+        assert self._writers is not None
+        signals, events = self._writers
+        signals.write_table(_signals_table(chunk))
+        events.write_table(_events_table(chunk.events))
+
+    def finish(self) -> "InFolder":
+        """As `Recorder`; the files are complete then."""
+        for writer in self._writers or ():
+            writer.close()
+        self._writers = None
+        return InFolder(self.folder)
+
+
+class InFolder:
+    """A recording in the files of a folder, of which a chunk at a time is read.
+
+    Raises `UsageError` for files that are not as they were written: what is in a chunk is seen when that is read.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        with _opened(folder / SIGNALS) as signals, _opened(folder / EVENTS) as events:
+            names = signals.schema_arrow.names
+            if "time" not in names:
+                raise UsageError(f"{folder / SIGNALS}: no column time; expected those of a run")
+            _expect_schema(folder / SIGNALS, signals, _signals_schema(names))
+            _expect_schema(folder / EVENTS, events, _EVENT)
+            self._count: int = signals.metadata.num_rows
+            if signals.num_row_groups != events.num_row_groups:
+                raise UsageError(f"{folder}: expected as many groups of events as of rows")
+            self.columns = tuple(names)
+
+    def __len__(self) -> int:
+        return self._count
+
+    def chunks(self, columns: Collection[str] | None = None) -> Iterator[Chunk]:
+        """As `Recording`."""
+        names = tuple(name for name in self.columns if columns is None or name in columns)
+        with _opened(self._folder / SIGNALS) as signals, _opened(self._folder / EVENTS) as events:
+            for group in range(signals.num_row_groups):
+                table = _group(self._folder / SIGNALS, signals, group, [*names])
+                yield Chunk(
+                    columns=names,
+                    rows=_matrix(table, names),
+                    events=_events(_group(self._folder / EVENTS, events, group, _EVENT.names)),
+                )
+
+
+def _opened(path: Path) -> Any:
+    """A Parquet file whose pages are held to their checksums."""
+    try:
+        return pq.ParquetFile(path, page_checksum_verification=True)
+    except Exception as error:  # of many kinds, none of them documented
+        raise UsageError(f"{path}: expected a Parquet file, as it was written: {error}") from error
+
+
+def _group(path: Path, file: Any, group: int, names: Collection[str]) -> Any:
+    """The columns `names` of one row group, without gaps."""
+    try:
+        table = file.read_row_group(group, names)
+        table.validate(full=True)
+    except Exception as error:
+        raise UsageError(f"{path}: expected a Parquet file, as it was written: {error}") from error
+    if any(column.null_count for column in table.columns):
+        raise UsageError(f"{path}: expected columns without gaps")
+    if "time" in names and not np.isfinite(table["time"].to_numpy()).all():
+        raise UsageError(f"{path}: expected finite times")
+    return table
+
+
+def _expect_schema(path: Path, file: Any, schema: Any) -> None:
+    if not file.schema_arrow.equals(schema):
+        expected = ", ".join(f"{field.name} ({field.type})" for field in schema)
+        raise UsageError(f"{path}: expected the columns {expected}, in this order")
+
+
+def copy(recording: Recording, folder: Path) -> None:
+    """Write the files of `folder`."""
+    recorder = ToFolder(folder)
+    recorder.begin(recording.columns)
+    for chunk in recording.chunks():
+        recorder.take(chunk)
+    recorder.finish()
+
+
+def write_signals(path: Path | BinaryIO, recording: Recording) -> None:
+    """One column each for what is recorded, all float64."""
+    with pq.ParquetWriter(path, _signals_schema(recording.columns), write_page_checksum=True) as writer:
+        for chunk in recording.chunks():
+            writer.write_table(_signals_table(chunk))
+
+
+def _signals_schema(columns: Iterable[str]) -> Any:
+    return pa.schema([(name, pa.float64()) for name in columns])
+
+
+def _signals_table(chunk: Chunk) -> Any:
+    return pa.table(chunk.signals)
+
+
+def _matrix(table: Any, names: tuple[str, ...]) -> Floats:
+    return np.column_stack([table[name].to_numpy() for name in names])
+
+
+def _events_table(events: tuple[Event, ...]) -> Any:
+    """`time` [s], `event`, `what` and `sample`, in order of time."""
+    columns = list(zip(*((event.time / 1e9, *event[1:]) for event in events))) or [()] * 4
+    return pa.table([pa.array(c, field.type) for c, field in zip(columns, _EVENT, strict=True)], schema=_EVENT)
+
+
+def _events(table: Any) -> tuple[Event, ...]:
+    time, *others = (table[name].to_pylist() for name in _EVENT.names)
+    return tuple(map(Event._make, zip([round(t * 1e9) for t in time], *others, strict=True)))
