@@ -83,7 +83,9 @@ def build_slaves(targets: Sequence[Target], folder: Path, announce: Callable[[st
     named = [f"{target.module}:{target.model}" for target in targets]
     root = targets[0].root if targets else None
     done = subprocess.run(
-        subprocesses.command("fmu_kit.packaging", folder.resolve(), *(() if root is None else ("--root", root)), *named),
+        subprocesses.command(
+            "fmu_kit.packaging", folder.resolve(), *(() if root is None else ("--root", root)), *named
+        ),
         capture_output=True, text=True, env=subprocesses.environment(), check=False,
     )  # fmt: skip
     if done.returncode != 0:
