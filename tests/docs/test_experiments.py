@@ -62,6 +62,7 @@ def test_an_island_is_told_beside_the_first_end() -> None:
     import pandas as pd
 
     outcomes = ["settled", "bounded", "settled", "diverged"]
-    table = pd.DataFrame({"k": 1.0, "period": [0.01, 0.02, 0.03, 0.04], "outcome": outcomes})
+    good = [float(outcome == "settled") for outcome in outcomes]
+    table = pd.DataFrame({"k": 1.0, "period": [0.01, 0.02, 0.03, 0.04], "outcome": outcomes, "good": good})
     (line,) = flying_up_to(table, "k", "period")
     assert line == "k 1: flies up to period 0.01; again at [0.03], bounded at [0.02]"
