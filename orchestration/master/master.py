@@ -35,36 +35,43 @@ Watch = Callable[[float], str | None]
 
 
 @dataclass(kw_only=True)
-class _Task:
-    """A sampled component at work."""
+class _Worked:
+    """A component at work."""
 
     step: Callable[[float, float], None]
     read: Transfer
     outputs: Floats
     """connected ones, in the row"""
     names: tuple[str, ...]
+    """of those"""
     feeds: list[Feed]
     held: list[Channel]
     """into it, with a first-order hold"""
+
+    def expect_finite(self, t: float) -> None:
+        """Raise `Diverged` for an output that is not finite, before it is passed on."""
+        outputs = self.outputs.tolist()
+        if not math.isfinite(sum(outputs)):
+            _expect_finite(self.names, outputs, t)
+
+
+@dataclass(kw_only=True)
+class _Task(_Worked):
+    """A sampled component at work."""
+
     ratio: float
     by_itself: bool
     """whether it has a clock of its own and is stepped at every instant"""
 
 
 @dataclass(kw_only=True)
-class _Body:
+class _Body(_Worked):
     """A component in continuous time at work."""
 
-    step: Callable[[float, float], None]
-    read: Transfer
-    outputs: Floats
-    names: tuple[str, ...]
     ahead: list[Channel]
     """wires from components that are stepped before it: their new values"""
     behind: list[Channel]
     """wires from others: their values of the instant before"""
-    feeds: list[Feed]
-    held: list[Channel]
     now: int = 0
 
 
@@ -234,8 +241,7 @@ class Master:
             body.step(start / NANOSECONDS, (time - start) / NANOSECONDS)
             self.steps += 1
             body.read()
-            if not math.isfinite(sum(body.outputs.tolist())):
-                _expect_finite(body.names, body.outputs.tolist(), time / NANOSECONDS)
+            body.expect_finite(time / NANOSECONDS)
             moved = True
         if moved:
             self._look(time / NANOSECONDS)
@@ -282,8 +288,7 @@ class Master:
         start, stop = time / NANOSECONDS, self._agenda.stop
         task.step(task.ratio * start, task.ratio * ((min(end, stop) - time) / NANOSECONDS))
         task.read()
-        if not math.isfinite(sum(task.outputs.tolist())):
-            _expect_finite(task.names, task.outputs.tolist(), start)
+        task.expect_finite(start)
 
     def _step_by_themselves(self, time: int, due: Sequence[Due]) -> None:
         """Components with a clock of their own are stepped at every instant; the agenda knows when they sample."""
@@ -424,44 +429,34 @@ class Master:
         )
 
     def _body(self, name: str) -> _Body:
-        order = list(self._plan.continuous)
-        wires = [i for i in self._plan.wires if self._system.connections[i].receiver == name]
+        order, connections = list(self._plan.continuous), self._system.connections
+        wires = [i for i in self._plan.wires if connections[i].receiver == name]
         ahead = [
             i
             for i in wires
-            if self._system.connections[i].order == "gauss-seidel"
-            and order.index(self._system.connections[i].sender) < order.index(name)
+            if connections[i].order == "gauss-seidel" and order.index(connections[i].sender) < order.index(name)
         ]
-        outputs = self._outputs(name)[: self.board.connected[name]]
         return _Body(
-            step=self._simulators[name].step,
-            read=self._readers[name],
-            outputs=outputs,
-            names=tuple(f"{name}.{output}" for output in self.board.outputs[name][: len(outputs)]),
+            **self._worked(name),
             ahead=[self._channels[i] for i in ahead],
             behind=[self._channels[i] for i in wires if i not in ahead],
-            feeds=[feed for feed in self._feeds if feed.feeds(name)],
-            held=self._held(name),
         )
 
     def _task(self, name: str) -> _Task:
         sampling = self._system.components[name].sampling
         assert sampling is not None
-        outputs = self._outputs(name)[: self.board.connected[name]]
-        return _Task(
-            step=self._simulators[name].step,
-            read=self._readers[name],
-            outputs=outputs,
-            names=tuple(f"{name}.{output}" for output in self.board.outputs[name][: len(outputs)]),
-            feeds=[feed for feed in self._feeds if feed.feeds(name)],
-            held=self._held(name),
-            ratio=sampling.clock_ratio,
-            by_itself=sampling.clock == "fmu",
-        )
+        return _Task(**self._worked(name), ratio=sampling.clock_ratio, by_itself=sampling.clock == "fmu")
 
-    def _held(self, name: str) -> list[Channel]:
-        connections = self._system.connections
-        return [self._channels[i] for i, x in enumerate(connections) if x.receiver == name and x.hold == "first"]
+    def _worked(self, name: str) -> dict[str, Any]:
+        connections, count = self._system.connections, self.board.connected[name]
+        return {
+            "step": self._simulators[name].step,
+            "read": self._readers[name],
+            "outputs": self._outputs(name)[:count],
+            "names": tuple(f"{name}.{output}" for output in self.board.outputs[name][:count]),
+            "feeds": [feed for feed in self._feeds if feed.feeds(name)],
+            "held": [self._channels[i] for i, x in enumerate(connections) if x.receiver == name and x.hold == "first"],
+        }
 
 
 def _expect_finite(names: Sequence[str], values: Sequence[float], t: float) -> None:

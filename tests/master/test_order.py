@@ -2,7 +2,7 @@
 
 from orchestration.master.initial import groups, is_loop
 from orchestration.master.order import ranked
-from tests.stepping.stubs import wire
+from tests.master.stubs import wire
 
 
 def test_the_order_of_the_file_holds_where_nothing_feeds_anything():

@@ -6,7 +6,7 @@ from orchestration.errors import UsageError
 from orchestration.master.agenda import Agenda, FixedStep
 from orchestration.master.streams import Streams
 from orchestration.system.times import Grid, exact_nanoseconds
-from tests.stepping.stubs import continuous, sampled, system, wire
+from tests.master.stubs import continuous, sampled, system, wire
 
 MS = 1_000_000
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from orchestration.master.agenda import Agenda
 from orchestration.master.streams import Streams
-from tests.stepping.stubs import continuous, sampled, system, wire
+from tests.master.stubs import continuous, sampled, system, wire
 
 
 def test_a_stream_is_made_as_the_documents_say():

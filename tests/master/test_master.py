@@ -9,7 +9,7 @@ from orchestration.master.agenda import Agenda
 from orchestration.master.master import Master
 from orchestration.master.recording import InMemory
 from orchestration.master.streams import Streams
-from tests.stepping.stubs import Stub, clock, column, continuous, events, near, sampled, system, wire
+from tests.master.stubs import Stub, clock, column, continuous, events, near, sampled, system, wire
 
 
 def run(what, stubs, **keys):
