@@ -8,6 +8,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from fmu_kit.syntax_trees import parsed
+
 SHARED_PACKAGES = ("fmu_kit", "pythonfmu")
 """What every FMU bundles; else only what lies beside its slave, and the standard library, may be imported."""
 
@@ -117,7 +119,7 @@ def place(module: str, root: Path | None = None) -> str:
 def tree_of(text: str, path: Path) -> ast.Module:
     """The syntax tree of a source; raises `PackagingError` if it is no Python."""
     try:
-        return ast.parse(text, str(path))
+        return parsed(text, str(path))
     except (SyntaxError, ValueError) as error:
         line = getattr(error, "lineno", None) or 1
         raise PackagingError(f"{path}:{line}: {getattr(error, 'msg', error)}; expected Python") from error
@@ -157,7 +159,7 @@ def renamed(text: str, bundle: str, target: Target) -> str:
     lines = text.encode().splitlines(keepends=True)
     imports = [
         node
-        for node in ast.walk(ast.parse(text))
+        for node in ast.walk(parsed(text))
         if isinstance(node, ast.ImportFrom) and node.level == 0 and target.bundles(node.module or "")
     ]
     for node in sorted(imports, key=lambda node: -node.col_offset):  # from the right, so that columns stay true

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from fmu_kit.syntax_trees import parsed_expression
 from orchestration.errors import UsageError
 
 LONGEST, DEEPEST = 10_000, 60
@@ -76,7 +77,7 @@ def parse(text: str) -> Node:
     if not isinstance(text, str) or len(text) > LONGEST:
         raise UsageError(f"expected an expression of at most {LONGEST} characters")
     try:
-        tree = ast.parse(text.strip(), mode="eval")
+        tree = parsed_expression(text.strip())
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         problem = error.msg if isinstance(error, SyntaxError) else type(error).__name__
         raise UsageError(f"{_short(text)}: expected an expression: {problem}") from None

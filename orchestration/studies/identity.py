@@ -11,6 +11,7 @@ from collections.abc import Container, Mapping
 from pathlib import Path
 from typing import Any
 
+from fmu_kit.syntax_trees import parsed
 from orchestration.quadrotor import translation
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import in_words_of_a_scenario
@@ -45,7 +46,7 @@ def flight_sources() -> dict[str, Path]:
         if name in found or name in _ASIDE or (path := _source(name)) is None:
             continue
         found[name] = path
-        for node in ast.walk(ast.parse(path.read_bytes())):
+        for node in ast.walk(parsed(path.read_bytes())):
             if isinstance(node, ast.ImportFrom) and node.module:
                 waiting += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
             elif isinstance(node, ast.Import):

@@ -227,7 +227,7 @@ def test_plot_zooms_on_a_window(main: Main, here: Path) -> None:
 @pytest.mark.parametrize("out", [[], ["--out", "stopped", "--no-figures"]], ids=["nothing kept", "kept"])
 def test_ctrl_c_ends_a_flight_with_one_line_and_130(here: Path, out: list[str]) -> None:
     code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n" + (
-        "from orchestration import terminal; terminal.SPARSE = 0.0\n"  # says when it flies
+        "from orchestration.command import terminal; terminal.SPARSE = 0.0\n"  # says when it flies
         "from orchestration.command.cli import main; main()"
     )
     with subprocess.Popen(

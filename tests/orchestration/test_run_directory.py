@@ -25,10 +25,10 @@ from orchestration import (
     Timing,
     UsageError,
     load_run,
-    plots,
     save_run,
 )  # fmt: skip
 from orchestration.master.recording import Chunk, InMemory, Recorder
+from orchestration.results import plots
 from orchestration.results.run_directory import keep_flight
 
 FILES = {"signals.parquet", "events.parquet", "metrics.json", "scenario.toml"}

@@ -6,6 +6,8 @@ import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from fmu_kit.syntax_trees import parsed
+
 ENTRY = "resources/slavemodule.txt"
 _MODULES = (".py", ".so", ".pyd")
 _FORGIVING = {"ImportError", "ModuleNotFoundError"}
@@ -34,7 +36,7 @@ def read(archive: zipfile.ZipFile) -> PythonSources | None:
     for name in names:
         if name.startswith("resources/") and name.endswith(".py"):
             try:
-                imports |= set(_needed(ast.parse(archive.read(name))))
+                imports |= set(_needed(parsed(archive.read(name))))
             except (SyntaxError, ValueError) as error:
                 problems.append(f"{name}: not Python {sys.version_info[0]}.{sys.version_info[1]}: {error}")
     beyond = imports - bundled - sys.stdlib_module_names
