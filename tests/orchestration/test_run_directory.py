@@ -208,7 +208,7 @@ def failing(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
         raise OSError("no space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr(f"orchestration.{request.param}", fail)
+        patch.setattr(f"orchestration.results.{request.param}", fail)
         yield
 
 
