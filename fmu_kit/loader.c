@@ -164,6 +164,8 @@ static int finds_its_home(int minor)
     return 0;
 }
 
+#define OPENED "QUADCOSIM_OPENED_PYTHON" /* set in a process whose Python is not its own but was opened here */
+
 static void *opened_for_all(Text path)
 {
     void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
@@ -174,6 +176,7 @@ static void *opened_for_all(Text path)
         dlclose(library);
         return NULL;
     }
+    setenv(OPENED, "1", 1);
     return dlopen(path, RTLD_NOW | RTLD_GLOBAL | RTLD_NODELETE);
 }
 
@@ -278,23 +281,35 @@ __attribute__((constructor)) static void remember_the_folder(void)
     }
 }
 
+static void *closing; /* pythonfmu's library, if it goes with this one */
+
+/* In a Python program, hosts unpack and load an FMU again for each instance: what is unloaded must be gone. In any
+   other, pythonfmu's library holds the Python that runs, so it stays. */
+__attribute__((destructor)) static void close_the_rest(void)
+{
+    if (closing)
+        dlclose(closing);
+}
+
 static int open_the_rest(void)
 {
     char path[LONGEST + sizeof BESIDE];
     if (opened.Instantiate)
         return 1;
+    const int in_python = dlsym(RTLD_DEFAULT, "Py_GetVersion") && !getenv(OPENED);
     if (!have_python())
         return 0;
     snprintf(path, sizeof path, "%s%s", folder, BESIDE);
-    void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
-    if (!library)
+    void *rest = dlopen(path, RTLD_NOW | RTLD_LOCAL | (in_python ? 0 : RTLD_NODELETE));
+    if (!rest)
         return failed("%s", dlerror()) != NULL;
-#define CALL(name, parameters, arguments) find(library, "fmi2" #name, &opened.name);
+    closing = in_python ? rest : NULL;
+#define CALL(name, parameters, arguments) find(rest, "fmi2" #name, &opened.name);
     CALLS
 #undef CALL
-    find(library, "fmi2FreeInstance", &opened.FreeInstance);
-    find(library, "finalizePythonInterpreter", &opened.finalize);
-    find(library, "fmi2Instantiate", &opened.Instantiate);
+    find(rest, "fmi2FreeInstance", &opened.FreeInstance);
+    find(rest, "finalizePythonInterpreter", &opened.finalize);
+    find(rest, "fmi2Instantiate", &opened.Instantiate);
     return opened.Instantiate != NULL;
 }
 
