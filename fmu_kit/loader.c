@@ -287,8 +287,10 @@ static void *closing; /* pythonfmu's library, if it goes with this one */
    other, pythonfmu's library holds the Python that runs, so it stays. */
 __attribute__((destructor)) static void close_the_rest(void)
 {
-    if (closing)
-        dlclose(closing);
+    if (!closing)
+        return;
+    finalizePythonInterpreter(); /* pythonfmu frees a pointer twice as it is unloaded, unless it has let go before */
+    dlclose(closing);
 }
 
 static int open_the_rest(void)
