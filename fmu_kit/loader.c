@@ -164,7 +164,23 @@ static int finds_its_home(int minor)
     return 0;
 }
 
-#define OPENED "QUADCOSIM_OPENED_PYTHON" /* set in a process whose Python is not its own but was opened here */
+#define STARTED "QUADCOSIM_STARTED_PYTHON" /* the process, not a Python program, in which an FMU has started Python */
+
+/* Whether the host is a Python program; told at the first FMU, since that one starts Python where none runs. */
+static int in_python_program(void)
+{
+    char process[32];
+    const Text started = getenv(STARTED);
+    int (*is_initialised)(void);
+    snprintf(process, sizeof process, "%ld", (long)getpid());
+    if (started && strcmp(started, process) == 0)
+        return 0;
+    find(RTLD_DEFAULT, "Py_IsInitialized", &is_initialised);
+    if (is_initialised && is_initialised())
+        return 1;
+    setenv(STARTED, process, 1);
+    return 0;
+}
 
 static void *opened_for_all(Text path)
 {
@@ -176,7 +192,6 @@ static void *opened_for_all(Text path)
         dlclose(library);
         return NULL;
     }
-    setenv(OPENED, "1", 1);
     return dlopen(path, RTLD_NOW | RTLD_GLOBAL | RTLD_NODELETE);
 }
 
@@ -298,7 +313,7 @@ static int open_the_rest(void)
     char path[LONGEST + sizeof BESIDE];
     if (opened.Instantiate)
         return 1;
-    const int in_python = dlsym(RTLD_DEFAULT, "Py_GetVersion") && !getenv(OPENED);
+    const int in_python = in_python_program();
     if (!have_python())
         return 0;
     snprintf(path, sizeof path, "%s%s", folder, BESIDE);
