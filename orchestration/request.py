@@ -10,7 +10,7 @@ from orchestration.errors import UsageError
 from orchestration.exchange.ssp.reading import ENDINGS, tables_of
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.scenario_file import scenario_from_tables
-from orchestration.quadrotor.translation import system_of
+from orchestration.quadrotor.translation import in_its_own_words, system_of
 from orchestration.system.model import System
 from orchestration.system.system_file import is_system, system_from_tables, to_toml
 
@@ -63,8 +63,9 @@ def _said_of(path: Path) -> Iterator[None]:
 
 
 def system_meant(request: Request) -> System:
-    """The system that a request means."""
-    return system_of(request) if isinstance(request, Scenario) else request
+    """The system that a request means; raises `UsageError` in the request's own words."""
+    with in_its_own_words(request):
+        return system_of(request) if isinstance(request, Scenario) else request
 
 
 def text_of(request: Request) -> str:

@@ -22,7 +22,6 @@ from orchestration.fmi.values import number_of
 from orchestration.interrupt import Interrupt, Interrupted, interrupts_held_back
 from orchestration.master import initial
 from orchestration.master.agenda import Agenda, FixedStep
-from orchestration.master.channel import expand
 from orchestration.master.feeds import Feed
 from orchestration.master.master import Master
 from orchestration.master.recording import InMemory, Recorder
@@ -185,9 +184,6 @@ def checked(system: System, models: Mapping[str, Model]) -> tuple[System, dict[s
     check(system, models)
     for name, component in system.components.items():
         _expect_clock(name, component, models[name])
-    for x in system.connections:
-        for what in ("noise", "quantisation"):
-            expand(f"connections.{x.name}.{what}", getattr(x, what), list(map(variable_of, x.start)))
     parameters = _parameters(system, models)
     return objectives.known(system, _signals(system, models), set(parameters)), parameters
 

@@ -1,14 +1,13 @@
 """A connection at work: what of the sender's values reaches the receiver, with noise, rounding, and a hold."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from orchestration.errors import UsageError
 from orchestration.simulator import Floats, Transfer
-from orchestration.system.model import Connection, variable_of
+from orchestration.system.model import Connection
 
 Indices: TypeAlias = npt.NDArray[np.intp]
 
@@ -26,16 +25,15 @@ class Channel:
         write: Transfer,
         noise: np.random.Generator,
     ) -> None:
-        names = [variable_of(start) for start in connection.start]
         self.received = received
         """what the receiver has been told, in place"""
         self._row, self._places, self._write = row, places, write
-        self._sigma = expand(f"connections.{connection.name}.noise", connection.noise, names)
-        self._quantum = expand(f"connections.{connection.name}.quantisation", connection.quantisation, names)
+        self._sigma = _of_each(connection, connection.noise)
+        self._quantum = _of_each(connection, connection.quantisation)
         self._noisy = bool(self._sigma.any())
         self._rounded = np.flatnonzero(self._quantum)
         self._quantum = self._quantum[self._rounded]
-        self._noise: Floats = np.zeros(len(names))
+        self._noise: Floats = np.zeros(len(connection.start))
         self._stream = noise
         self._scale, self._offset = connection.scale, connection.offset
         self._plain = connection.scale == 1.0 and connection.offset == 0.0
@@ -125,16 +123,9 @@ class Channel:
         value += self._offset
 
 
-def expand(what: str, values: Mapping[str, float], names: Sequence[str]) -> Floats:
-    """One value for each of `names`, 0 where none is given; a vector's name stands for its components.
-
-    Raises `UsageError` for a name that is not among them.
-    """
-    result = np.zeros(len(names))
-    for given, value in values.items():
-        places = [i for i, name in enumerate(names) if given in (name, name.rpartition(".")[0])]
-        if not places:
-            vectors = dict.fromkeys(name.rpartition(".")[0] or name for name in names)
-            raise UsageError(f"{what}: {given} is no signal of it; expected one of {', '.join(vectors)}")
-        result[places] = value
+def _of_each(connection: Connection, values: Mapping[str, float]) -> Floats:
+    """One value for each variable of a message, 0 where none is given; a vector's name stands for its components."""
+    result = np.zeros(len(connection.start))
+    for name, value in values.items():
+        result[connection.places(name)] = value
     return result

@@ -115,6 +115,8 @@ class Connection:
             for name, value in values.items():
                 positive = _is_number(value) and math.isfinite(value) and value >= 0.0
                 _require(positive, f"{what} of {name}", value, "zero or positive")
+                if not self.places(name):
+                    raise UsageError(f"{what}: {name} is no signal of it; expected one of {', '.join(self._vectors())}")
         for what in ("scale", "offset"):
             value = getattr(self, what)
             _require(_is_number(value) and math.isfinite(value), what, value, "a finite number")
@@ -132,6 +134,16 @@ class Connection:
                 self.loss <= possible or self.loss == 1.0, "loss", self.loss,
                 f"at most {possible:g} in bursts of {length:g}",
             )  # fmt: skip
+
+    def places(self, name: str) -> list[int]:
+        """Where in a message a variable of the sender is; those of its components for a vector; none if in no place."""
+        carried = map(variable_of, self.start)
+        return [i for i, variable in enumerate(carried) if name in (variable, variable.rpartition(".")[0])]
+
+    def _vectors(self) -> list[str]:
+        """What it carries, vectors by their name."""
+        carried = map(variable_of, self.start)
+        return list(dict.fromkeys(variable.rpartition(".")[0] or variable for variable in carried))
 
     @property
     def sender(self) -> str:

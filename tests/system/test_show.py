@@ -92,6 +92,15 @@ def test_flags_change_what_is_shown(file: Path, main: Main) -> None:
     assert "command      controller -> plant  delay 4 ms" in main("show", "--delay", "0.004").stdout
 
 
+def test_noise_of_what_no_message_carries_is_refused_in_the_words_of_who_wrote_it(file: Path, main: Main) -> None:
+    file.write_text(SYSTEM.replace("noise = 0.01", "noise = { volts = 0.01 }"), encoding="utf-8")
+    for given, said in (
+        ([file], f"{file}: connections.2.noise: volts is no signal of it; expected one of u"),
+        (["--noise", "angle=0.1"], "timing.noise: angle is no signal of it; expected one of position, velocity, "),
+    ):
+        assert main("show", *given, code=2).stderr.startswith(f"quadcosim: {said}")
+
+
 def test_times_have_the_unit_that_makes_them_readable() -> None:
     values = [0.0, 2.0, 0.25, 1e-3, 2.5e-6, 3e-9]
     assert [seconds(value) for value in values] == ["0 s", "2 s", "250 ms", "1 ms", "2.5 µs", "3 ns"]

@@ -106,6 +106,16 @@ def refusal(folder: Path, text: str) -> str:
         ("loss = 0.1", "loss = 1.1", "connections.valve.loss = 1.1: expected a probability in [0, 1]"),
         ("loss = 0.1", "loss = 0.9", "connections.valve.loss = 0.9: expected at most 0.666667 in bursts of 2"),
         ("noise = 0.001", "noise = -1.0", "connections.0.noise of level = -1.0: expected zero or positive"),
+        (
+            "noise = 0.001",
+            "noise = { lvl = 1.0 }",
+            "connections.0.noise: lvl is no signal of it; expected one of level",
+        ),
+        (
+            "noise = 0.001",
+            "quantisation = { lvl = 1.0 }",
+            "connections.0.quantisation: lvl is no signal of it; expecte",
+        ),
         ('hold = "first"', 'hold = "last"', "connections.1.hold = last: input should be 'zero' or 'first'"),
         ("period = 0.5", "", "sources.rain.period = none: expected how long each value is held, in seconds"),
         ("noise = 0.1\n", "", "sources.rain.source = nothing: expected one of constant, file, noise, trajectory"),
