@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from orchestration.expressions.over_run import Marks, Recorded, Spans, evaluate, expect_names, vectors
+from orchestration.expressions.over_run import evaluate, expect_names
+from orchestration.expressions.recorded import Marks, Recorded, Spans, vectors
 from orchestration.expressions.syntax import names, parse
 from orchestration.master.recording import Event, Recording
 from orchestration.simulator import Floats

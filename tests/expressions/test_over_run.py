@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestration.errors import UsageError
-from orchestration.expressions.over_run import Recorded, evaluate, series
+from orchestration.expressions.over_run import evaluate
+from orchestration.expressions.recorded import Recorded
 from orchestration.expressions.syntax import parse
 
 TIME = np.array([0.0, 0.5, 1.0, 3.0])
@@ -143,7 +144,3 @@ def test_however_a_run_is_cut_into_spans_the_numbers_are_the_same(count, cuts, s
     cut = evaluate(EVERYTHING, lambda: spans(edges))
     for name, expected in whole.items():
         assert cut[name] == (None if expected is None else pytest.approx(expected, rel=1e-12, abs=1e-12)), name
-
-
-def test_a_series_has_a_value_for_each_row():
-    assert series(parse("2 * tank.level + tank.area"), run_of()).tolist() == (2.0 * LINEAR + 2.0).tolist()

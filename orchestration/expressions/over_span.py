@@ -1,0 +1,148 @@
+"""Expressions over one span of a run: at its rows, just before the next ones, and half-way between."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from orchestration.errors import UsageError
+from orchestration.expressions.recorded import STOP_TIME, TIME, Recorded
+from orchestration.expressions.reductions import Course, Fold
+from orchestration.expressions.syntax import Call, Name, Node, Number, Operation, Sampled, is_over_run, names
+from orchestration.simulator import Floats
+
+
+class SpanValues:
+    """Expressions over one span: at its rows, just before the next ones, and half-way between; each found once."""
+
+    def __init__(self, recorded: Recorded, known: Mapping[Node, float | None]) -> None:
+        self._recorded, self._known = recorded, known
+        self._found: dict[tuple[Node, str], Any] = {}
+
+    def into(self, fold: Fold) -> None:
+        """Add this span to a number of the whole run."""
+        argument, *rest = fold.call.arguments
+        fold.add(self._course(argument, fold.call.function), *(self.number(other) for other in rest))
+
+    def number(self, node: Node) -> float | None:
+        """The value of an expression that is one number."""
+        data = self._at(node, "rows")
+        if isinstance(data, np.ndarray) and data.ndim:
+            raise UsageError("it has a value at each instant; expected one number of the run, as max(…) or last(…)")
+        return None if data is None else float(data)
+
+    def at_rows(self, node: Node) -> Any:
+        """The values of an expression at the rows."""
+        data = self._at(node, "rows")
+        if isinstance(data, np.ndarray) and data.ndim > 1:
+            raise UsageError("it is a vector; expected a number, as norm(…)")
+        return data
+
+    def _at(self, node: Node, place: str) -> Any:
+        key = (node, place)
+        if key not in self._found:
+            self._found[key] = self._computed(node, place)
+        return self._found[key]
+
+    def _computed(self, node: Node, place: str) -> Any:
+        match node:
+            case Number(value):
+                return value
+            case Name(name):
+                return self._named(name, place)
+            case Operation(sign, operands):
+                return _applied(_OPERATIONS[sign], [self._at(operand, place) for operand in operands])
+            case Sampled(connection, _):
+                expected = "inside max, mean, rms, share or growth_share"
+                raise UsageError(f"sampled({connection}, …): expected {expected}")
+            case Call(function, arguments) if not is_over_run(node):
+                return _applied(_FUNCTIONS[function], [self._at(argument, place) for argument in arguments])
+        return self._known[node]
+
+    def _named(self, name: str, place: str) -> Any:
+        recorded = self._recorded
+        if name in recorded.numbers:
+            return recorded.numbers[name]
+        if name == STOP_TIME:
+            return recorded.stop_time
+        if name == TIME:
+            return _between(recorded.time, None, place)
+        if name in recorded.signals:
+            return _between(recorded.signals[name], recorded.ends.get(name), place)
+        if name in recorded.vectors:
+            return np.array([self._named(part, place) for part in recorded.vectors[name]])
+        raise UsageError(f"there is no {name}; expected a recorded signal, time, stop_time or an objective above it")
+
+    def _course(self, node: Node, function: str) -> Course:
+        recorded, first = self._recorded, int(self._recorded.goes_on)
+        if isinstance(node, Sampled):
+            if node.connection not in recorded.arrivals:
+                known = ", ".join(recorded.arrivals)
+                raise UsageError(f"sampled({node.connection}, …): expected the name of a connection: {known}")
+            marks = recorded.arrivals[node.connection].copy()
+            marks[:first] = False
+            values = np.broadcast_to(self.at_rows(node.argument), recorded.time.shape)[marks]
+            return Course(recorded.time[marks], values, values[1:], None, True, 0)
+        values = self.at_rows(node)
+        if values is None:
+            values = np.full(recorded.time.shape, math.nan)
+        if not isinstance(values, np.ndarray) or not values.ndim:
+            raise UsageError(f"{function} of a number; expected a signal")
+        held = all(self._is_held(name) for name in names(node))
+        middles = self._at(node, "middles") if held else None
+        return Course(recorded.time, values, self._at(node, "ends"), middles, False, first)
+
+    def _is_held(self, name: str) -> bool:
+        recorded = self._recorded
+        parts = recorded.vectors.get(name, (name,))
+        return name in recorded.numbers or name == STOP_TIME or all(part in recorded.ends for part in parts)
+
+
+def _between(values: Floats, ends: Floats | None, place: str) -> Floats:
+    if place == "rows":
+        return values
+    before_next = values[1:] if ends is None else ends
+    return before_next if place == "ends" else 0.5 * (values[:-1] + before_next)
+
+
+def _applied(function: Callable[..., Any], values: list[Any]) -> Any:
+    return None if any(value is None for value in values) else function(*values)
+
+
+def _norm(*parts: Any) -> Any:
+    squares = [np.square(part).sum(axis=0) if np.ndim(part) == 2 else np.square(part) for part in parts]
+    return np.sqrt(sum(squares))
+
+
+def _logic(function: Callable[..., Any]) -> Callable[..., Any]:
+    def wrapped(*values: Any) -> Any:
+        found = np.asarray(function(*(np.asarray(value) != 0.0 for value in values)))
+        return found.astype(float) if found.ndim else float(found)
+
+    return wrapped
+
+
+def _comparison(function: Callable[..., Any]) -> Callable[..., Any]:
+    def wrapped(a: Any, b: Any) -> Any:
+        found = np.asarray(function(a, b))
+        return found.astype(float) if found.ndim else float(found)
+
+    return wrapped
+
+
+_OPERATIONS: dict[str, Callable[..., Any]] = {
+    "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power, "neg": np.negative,
+    "<": _comparison(np.less), "<=": _comparison(np.less_equal), ">": _comparison(np.greater),
+    ">=": _comparison(np.greater_equal), "==": _comparison(np.equal), "!=": _comparison(np.not_equal),
+    "not": _logic(np.logical_not),
+    "and": _logic(lambda *sides: np.logical_and.reduce(np.broadcast_arrays(*sides))),
+    "or": _logic(lambda *sides: np.logical_or.reduce(np.broadcast_arrays(*sides))),
+}  # fmt: skip
+
+_FUNCTIONS: dict[str, Callable[..., Any]] = {
+    "abs": np.abs, "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "sin": np.sin, "cos": np.cos, "tan": np.tan,
+    "asin": np.arcsin, "acos": np.arccos, "atan2": np.arctan2, "tanh": np.tanh, "hypot": _norm, "norm": _norm,
+    "min": lambda *v: np.minimum.reduce(np.broadcast_arrays(*v)),
+    "max": lambda *v: np.maximum.reduce(np.broadcast_arrays(*v)),
+}  # fmt: skip

@@ -1,0 +1,56 @@
+"""What expressions see of a run: its rows, what signals become between them, and where messages arrived.
+
+A run is gone through span by span, so that it need not fit into memory; each span begins with the last row of the
+one before.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from orchestration.simulator import Floats
+
+TIME, STOP_TIME = "time", "stop_time"
+Marks: TypeAlias = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recorded:
+    """A span of a run: `time` [s], shape (n,), increasing, and a signal of shape (n,) by name."""
+
+    time: Floats
+    signals: Mapping[str, Floats]
+    ends: Mapping[str, Floats] = field(default_factory=dict)
+    """of signals that are held: what each has become just before the next row, shape (n - 1,), along a line; all
+    others are in continuous time, known at the rows and taken as linear between them"""
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    """what has one value in the run, such as parameters, by name"""
+    arrivals: Mapping[str, Marks] = field(default_factory=dict)
+    """by connection, the rows at which a message arrived, shape (n,)"""
+    stop_time: float
+    """[s], at which the run ended"""
+    goes_on: bool = False
+    """whether the first row is the last one of the span before"""
+
+    @cached_property
+    def vectors(self) -> dict[str, tuple[str, ...]]:
+        """Names that stand for several signals: `plant.position` for its .x, .y, .z (and .w)."""
+        return vectors(self.signals)
+
+
+Spans: TypeAlias = Callable[[], Iterator[Recorded]]
+"""The spans of a run, in order; to be gone through as often as need be"""
+
+
+def vectors(signals: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
+    """Names that stand for several of `signals`, by what they stand for."""
+    found: dict[str, list[str]] = {}
+    for axis in "xyzw":
+        for name in signals:
+            if name.endswith(f".{axis}"):
+                found.setdefault(name[:-2], []).append(name)
+    return {name: tuple(parts) for name, parts in found.items() if len(parts) > 1 and name not in signals}
