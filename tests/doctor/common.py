@@ -10,9 +10,9 @@ from typing import Any
 
 from elftools.elf.elffile import ELFFile
 
-from orchestration.checks.doctor.archive import Fmu
 from orchestration.checks.doctor.binaries import LINUX
 from orchestration.checks.doctor.dependencies import needed
+from orchestration.checks.doctor.fmu import Fmu
 from orchestration.checks.doctor.machine import Library, Machine
 from orchestration.checks.doctor.pythons import PythonLibrary
 

@@ -222,7 +222,7 @@ def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(plant: Path, tmp_p
     ("content", "text"),
     [
         (None, "expected an .fmu file"),
-        (b"no zip", "expected an FMU, which is a zip file: File is not a zip file"),
+        (b"no zip", "expected a zip archive that is whole: File is not a zip file"),
     ],
 )
 def test_what_is_no_fmu_is_wrong_usage_in_one_line(content: bytes | None, text: str, tmp_path: Path) -> None:
@@ -238,5 +238,5 @@ def test_an_archive_without_a_description_is_wrong_usage_in_one_line(plant: Path
     done = doctor(changed(plant, tmp_path / "a.fmu", {"modelDescription.xml": None}))
     assert done.returncode == 2
     assert done.stderr.splitlines() == [
-        f"quadcosim: {tmp_path / 'a.fmu'}: expected an FMU; it has no modelDescription.xml"
+        f"quadcosim: {tmp_path / 'a.fmu'}: expected an FMU, with modelDescription.xml at the top of the archive"
     ]

@@ -9,12 +9,12 @@ from xml.etree.ElementTree import Element, SubElement, fromstring
 import pytest
 
 from orchestration.checks import confined
+from orchestration.checks.archive import Archive
 from orchestration.checks.confined import Ending, Limits
 from orchestration.checks.validation import Finding, confined_process, run_rules, validate
-from orchestration.checks.validation.archive import Archive
 from orchestration.checks.validation.exercise import Bench
 from orchestration.checks.validation.finding import check
-from orchestration.checks.validation.fmu import Fmu, read_fmu, read_root
+from orchestration.checks.validation.fmu import Fmu, read_co_simulation, read_fmu
 from orchestration.checks.validation.own_description import differences, elements
 from orchestration.checks.validation.progress import REPORT, Told
 from orchestration.checks.validation.structure import initial_unknowns, known_dependencies, outputs
@@ -194,7 +194,7 @@ def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(low_pass: Path, tm
     with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("resources/zeros", bytes(20_000_000))
     (found,) = validate(path, limits=Limits(size=10.0))
-    assert found == Finding("readable", "zeros.fmu: unpacks to 21 MB: expected at most 10 MB (--size-limit)")
+    assert found == Finding("readable", "unpacks to 21 MB: expected at most 10 MB (--size-limit)")
 
 
 def test_an_fmu_of_fmi_3_is_told_by_its_version(low_pass: Path, tmp_path: Path) -> None:
@@ -213,7 +213,7 @@ def test_a_file_that_is_no_fmu_is_one_problem(tmp_path: Path, capsys: pytest.Cap
     assert end.value.code == 1
     first, second = capsys.readouterr().out.splitlines()
     assert first == f"{path}: 1 problem"
-    assert second.startswith("  readable: no.fmu: expected a zip archive that is whole: ")
+    assert second.startswith("  readable: expected a zip archive that is whole: ")
 
 
 @pytest.mark.parametrize("limit", ["0", "-1", "nan"])
@@ -292,7 +292,7 @@ def fmu(variables: str, structure: str = "", units: str = "", tool: str = "anoth
 
 def read(text: str) -> Fmu:
     archive = Archive(Path("m.fmu"), (), {DESCRIPTION: text.encode()})
-    return read_fmu(archive, read_root(archive))
+    return read_fmu(archive, read_co_simulation(archive))
 
 
 def scalar(name: str, reference: int, attributes: str = "", real: str = "") -> str:

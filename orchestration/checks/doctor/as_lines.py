@@ -2,9 +2,9 @@
 
 from collections.abc import Iterable, Iterator
 
-from orchestration.checks.doctor.archive import PLATFORMS, Fmu, PlatformBinary
 from orchestration.checks.doctor.binaries import Dependency, newest
 from orchestration.checks.doctor.dependencies import PYTHON_DLL, missing_versions, needed, offered, part_for
+from orchestration.checks.doctor.fmu import PLATFORMS, Fmu, PlatformBinary
 from orchestration.checks.doctor.machine import Library, Machine
 from orchestration.checks.doctor.report import Report
 from orchestration.checks.doctor.verdict import Host, Verdict

@@ -3,8 +3,8 @@
 import re
 from collections.abc import Iterator
 
-from orchestration.checks.doctor.archive import Fmu, PlatformBinary
 from orchestration.checks.doctor.binaries import Dependency, newest
+from orchestration.checks.doctor.fmu import Fmu, PlatformBinary
 from orchestration.checks.doctor.machine import Libraries, Library, Machine
 
 PYTHON_DLL = re.compile(r"python3\d*\.dll", re.IGNORECASE)

@@ -15,8 +15,9 @@ from pydantic import TypeAdapter, ValidationError
 
 from orchestration import subprocesses
 from orchestration.checks import confined
+from orchestration.checks.archive import UnreadableFmuError
 from orchestration.checks.confined import Ending, Limits, restrict
-from orchestration.checks.doctor.archive import CO_SIMULATION, Fmu, open_fmu
+from orchestration.checks.doctor.fmu import CO_SIMULATION, Fmu, read_fmu
 from orchestration.errors import QuadcosimError, UsageError
 
 _READ, _LOADED = "read", "loaded"
@@ -95,9 +96,9 @@ def main(path: Path, folder: Path, size_limit: float) -> None:
     """Read, unpack, instantiate, initialise and free the FMU."""
     restrict(size_limit)
     try:
-        fmu = open_fmu(path, size_limit)
-    except UsageError as error:
-        _write(folder / _READ, error=str(error).removeprefix(f"{path}: "))
+        fmu = read_fmu(path, size_limit)
+    except UnreadableFmuError as error:
+        _write(folder / _READ, error=str(error))
         return
     _write(folder / _READ, fmu=json.loads(_FMU.dump_json(fmu)))
     if CO_SIMULATION in fmu.kinds:

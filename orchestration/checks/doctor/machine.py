@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from orchestration.checks.doctor import loader
-from orchestration.checks.doctor.archive import Fmu
 from orchestration.checks.doctor.binaries import LINUX, MACOS, WINDOWS
+from orchestration.checks.doctor.fmu import Fmu
 from orchestration.checks.doctor.loader import Loader
 from orchestration.checks.doctor.pythons import PythonLibrary, python_libraries
 

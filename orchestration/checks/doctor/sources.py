@@ -2,8 +2,7 @@
 
 import ast
 import sys
-import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from fmu_kit.syntax_trees import parsed
@@ -22,21 +21,20 @@ class PythonSources:
     problems: tuple[str, ...]
 
 
-def read(archive: zipfile.ZipFile) -> PythonSources | None:
-    """Look through the sources in `resources`; None for an FMU that pythonfmu did not make."""
-    names = archive.namelist()
-    if ENTRY not in names:
+def read(files: Mapping[str, bytes]) -> PythonSources | None:
+    """Look through the sources in `resources`, of files by name; None for an FMU that pythonfmu did not make."""
+    if ENTRY not in files:
         return None
-    bundled = set(filter(None, map(_bundled, names)))
+    bundled = set(filter(None, map(_bundled, files)))
     imports: set[str] = set()
     problems = []
-    entry = archive.read(ENTRY).decode("utf-8", "replace").strip()
-    if f"resources/{entry}.py" not in names:
+    entry = files[ENTRY].decode("utf-8", "replace").strip()
+    if f"resources/{entry}.py" not in files:
         problems.append(f"{ENTRY} names {entry}, but there is no resources/{entry}.py")
-    for name in names:
+    for name in files:
         if name.startswith("resources/") and name.endswith(".py"):
             try:
-                imports |= set(_needed(parsed(archive.read(name))))
+                imports |= set(_needed(parsed(files[name])))
             except (SyntaxError, ValueError) as error:
                 problems.append(f"{name}: not Python {sys.version_info[0]}.{sys.version_info[1]}: {error}")
     beyond = imports - bundled - sys.stdlib_module_names

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 from packaging.specifiers import InvalidSpecifier, SpecifierSet
 
-from orchestration.checks.doctor.archive import Fmu, PlatformBinary
 from orchestration.checks.doctor.binaries import LINUX, WINDOWS
 from orchestration.checks.doctor.dependencies import PYTHON_DLL, lacking, part_for
+from orchestration.checks.doctor.fmu import Fmu, PlatformBinary
 from orchestration.checks.doctor.machine import Machine
 from orchestration.checks.doctor.pythons import BY_LOADER, ON_PATH, PRELOADED, PythonLibrary
 from orchestration.fmi.pythonfmu import uri_is_read

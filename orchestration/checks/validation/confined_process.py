@@ -9,12 +9,13 @@ from pathlib import Path
 
 import fmpy
 
+from orchestration.checks.archive import UnreadableFmuError, read_archive
 from orchestration.checks.confined import Limits, restrict
 from orchestration.checks.validation import rules, run_rules
-from orchestration.checks.validation.archive import UnreadableError, can_be_unpacked, read_archive
+from orchestration.checks.validation.archive_rules import can_be_unpacked
 from orchestration.checks.validation.description import standard
 from orchestration.checks.validation.exercise import Bench
-from orchestration.checks.validation.fmu import read_fmu, read_root
+from orchestration.checks.validation.fmu import read_co_simulation, read_fmu
 from orchestration.checks.validation.instance import RefusedError
 from orchestration.checks.validation.own_description import own_description
 from orchestration.checks.validation.progress import PULSE, REPORT, Pulse, Report
@@ -32,7 +33,7 @@ def main(path: Path, folder: Path, limits: Limits) -> None:
         report.rule(READABLE)
         _look(path, folder, limits, report)
         report.end()
-    except UnreadableError as error:
+    except UnreadableFmuError as error:
         report.rule(READABLE)
         report.found(str(error))
         report.end()
@@ -44,7 +45,7 @@ def main(path: Path, folder: Path, limits: Limits) -> None:
 def _look(path: Path, folder: Path, limits: Limits, report: Report) -> None:
     archive = read_archive(path, limits.size)
     report.tried(rules.OF_ARCHIVES, archive, RefusedError)
-    root = read_root(archive)
+    root = read_co_simulation(archive)
     report.tried((standard,), archive, RefusedError)
     fmu = read_fmu(archive, root)
     report.tried((*rules.OF_DESCRIPTIONS, *(rules.OUR_DESCRIPTIONS if fmu.is_ours else ())), fmu, RefusedError)

@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Iterator
 
-from orchestration.checks.validation.archive import Archive
+from orchestration.checks.archive import Archive
 from orchestration.checks.validation.fmu import Fmu
 
 _PLATFORM_SUFFIXES = (".so", ".dll", ".dylib")

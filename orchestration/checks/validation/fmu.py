@@ -2,11 +2,10 @@
 
 from dataclasses import dataclass
 from typing import NoReturn
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from fmu_kit.packaging import SOURCE_HASH_FILE
-from orchestration.checks.validation.archive import DESCRIPTION, Archive, UnreadableError
+from orchestration.checks.archive import DESCRIPTION, Archive, UnreadableFmuError, read_root
 
 TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 NUMBERS = ("Real", "Integer", "Enumeration")
@@ -114,22 +113,16 @@ class Fmu:
         return element
 
 
-def read_root(archive: Archive) -> Element:
-    """The description of an FMU; raises `UnreadableError` if it is not of FMI 2.0 for co-simulation."""
-    try:
-        root = ElementTree.fromstring(archive.files[DESCRIPTION])
-    except ElementTree.ParseError as error:
-        raise UnreadableError(f"{DESCRIPTION}: expected well-formed XML: {error}") from error
-    version = root.get("fmiVersion")
-    if version != "2.0":
-        raise UnreadableError(f"fmiVersion = {version}: expected 2.0; an FMU of FMI {version} is not checked")
+def read_co_simulation(archive: Archive) -> Element:
+    """The description of an FMU; raises `UnreadableFmuError` if it is not of FMI 2.0 for co-simulation."""
+    root = read_root(archive)
     if root.find("CoSimulation") is None:
-        raise UnreadableError(f"{DESCRIPTION}: expected a CoSimulation element, nothing else was checked")
+        raise UnreadableFmuError(f"{DESCRIPTION}: expected a CoSimulation element, nothing else was checked")
     return root
 
 
 def read_fmu(archive: Archive, root: Element) -> Fmu:
-    """The view of an archive and its description; raises `UnreadableError` for a number that is none."""
+    """The view of an archive and its description; raises `UnreadableFmuError` for a number that is none."""
     types = {element.get("name"): element[0] for element in root.iterfind("TypeDefinitions/SimpleType") if len(element)}
     structure = {
         name: tuple(_unknown(e) for e in root.iterfind(f"ModelStructure/{name}/Unknown"))
@@ -218,4 +211,4 @@ def _whole(text: str | None, what: str) -> int:
 
 
 def _refuse(text: str) -> NoReturn:
-    raise UnreadableError(text)
+    raise UnreadableFmuError(text)

@@ -1,7 +1,7 @@
 """Every rule, by what it looks at and whose FMUs it is for."""
 
 from orchestration.checks.validation import (
-    archive,
+    archive_rules,
     dependencies,
     description,
     own_rules,
@@ -13,7 +13,7 @@ from orchestration.checks.validation import (
 )
 from orchestration.checks.validation.own_description import own_description
 
-OF_ARCHIVES = archive.RULES
+OF_ARCHIVES = archive_rules.RULES
 OF_DESCRIPTIONS = (*description.RULES, *variables.RULES, *units.RULES, *structure.RULES)
 OF_RUNS = run_rules.RULES
 """After `run_rules.FIRST`, without which they cannot be tried."""

@@ -3,18 +3,16 @@
 import io
 import math
 import posixpath
-import zipfile
-import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 from fmu_kit import loader
+from orchestration.checks.archive import DESCRIPTION, UnreadableFmuError, read_archive, read_root
 from orchestration.checks.doctor import sources
 from orchestration.checks.doctor.binaries import LINUX, MACOS, WINDOWS, Binary, UnreadableError, joined, origin_in, read
-from orchestration.errors import UsageError
 
-DESCRIPTION = "modelDescription.xml"
 CO_SIMULATION, MODEL_EXCHANGE = "CoSimulation", "ModelExchange"
 
 PLATFORMS = {
@@ -64,33 +62,14 @@ class Fmu:
     """None if it is not made by pythonfmu."""
 
 
-def open_fmu(path: Path, size_limit: float = math.inf) -> Fmu:
-    """Read an .fmu file; raises `UsageError` if it is not an FMI 2.0 FMU, or unpacks to more than `size_limit` MB."""
-    if not path.is_file():
-        raise UsageError(f"{path}: expected an .fmu file")
-    try:
-        with zipfile.ZipFile(path) as archive:
-            size = sum(entry.file_size for entry in archive.infolist()) / 1e6
-            if size > size_limit:
-                raise UsageError(f"{path}: unpacks to {size:.0f} MB: expected at most {size_limit:g} MB (--size-limit)")
-            if DESCRIPTION not in archive.namelist():
-                raise UsageError(f"{path}: expected an FMU; it has no {DESCRIPTION}")
-            description = ElementTree.fromstring(archive.read(DESCRIPTION))
-            return _read(path, archive, description)
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
-        raise UsageError(f"{path}: expected an FMU, which is a zip file: {error}") from error
-    except ElementTree.ParseError as error:
-        raise UsageError(f"{path}: expected XML in {DESCRIPTION}: {error}") from error
-
-
-def _read(path: Path, archive: zipfile.ZipFile, description: ElementTree.Element) -> Fmu:
-    version = description.get("fmiVersion")
-    if version != "2.0":
-        raise UsageError(f"{path}: an FMU of FMI {version}: expected one of FMI 2.0")
+def read_fmu(path: Path, size_limit: float = math.inf) -> Fmu:
+    """What a file says; raises `UnreadableFmuError` if it is not an FMI 2.0 FMU, or unpacks to over `size_limit` MB."""
+    archive = read_archive(path, size_limit)
+    description = read_root(archive)
     kinds = tuple(kind for kind in (CO_SIMULATION, MODEL_EXCHANGE) if description.find(kind) is not None)
     chosen = description.find(kinds[0]) if kinds else None
     if chosen is None:
-        raise UsageError(f"{path}: expected {CO_SIMULATION} or {MODEL_EXCHANGE} in {DESCRIPTION}")
+        raise UnreadableFmuError(f"expected {CO_SIMULATION} or {MODEL_EXCHANGE} in {DESCRIPTION}")
     declared = description.find("VendorAnnotations/Tool[@name='quadcosim']/Python")
     tool = description.get("generationTool", "the tool that made it")
     return Fmu(
@@ -100,13 +79,13 @@ def _read(path: Path, archive: zipfile.ZipFile, description: ElementTree.Element
         guid=description.get("guid", ""),
         start_time=_start_time(description),
         needs_tool=tool if chosen.get("needsExecutionTool") in ("true", "1") else None,
-        platforms=_platforms(archive, chosen.get("modelIdentifier", "")),
+        platforms=_platforms(archive.files, chosen.get("modelIdentifier", "")),
         requires_python=None if declared is None else declared.get("requires"),
-        python=sources.read(archive),
+        python=sources.read(archive.files),
     )
 
 
-def _start_time(description: ElementTree.Element) -> float:
+def _start_time(description: Element) -> float:
     experiment = description.find("DefaultExperiment")
     try:
         return float("0" if experiment is None else experiment.get("startTime", "0"))
@@ -114,28 +93,27 @@ def _start_time(description: ElementTree.Element) -> float:
         return 0.0
 
 
-def _platforms(archive: zipfile.ZipFile, identifier: str) -> tuple[PlatformBinary, ...]:
-    parts = [name.split("/") for name in archive.namelist()]
+def _platforms(files: Mapping[str, bytes], identifier: str) -> tuple[PlatformBinary, ...]:
+    parts = [name.split("/") for name in files]
     folders = sorted({part[1] for part in parts if part[0] == "binaries" and len(part) > 2 and part[2]})
-    return tuple(_platform(archive, folder, identifier) for folder in folders)
+    return tuple(_platform(files, folder, identifier) for folder in folders)
 
 
-def _platform(archive: zipfile.ZipFile, folder: str, identifier: str) -> PlatformBinary:
-    names = archive.namelist()
+def _platform(files: Mapping[str, bytes], folder: str, identifier: str) -> PlatformBinary:
     suffixes = [suffix for system, suffix in _SUFFIXES.items() if folder.startswith(system)] or _SUFFIXES.values()
     expected = [f"binaries/{folder}/{identifier}{suffix}" for suffix in suffixes]
-    found = next((name for name in expected if name in names), None)
+    found = next((name for name in expected if name in files), None)
     if found is None:
         return PlatformBinary(platform=folder, problem=f"expected {' or '.join(expected)}")
     try:
-        binary = read(io.BytesIO(archive.read(found)))
-        finds_python = folder == posixpath.basename(loader.PLATFORM) and loader.BESIDE in names
+        binary = read(io.BytesIO(files[found]))
+        finds_python = folder == posixpath.basename(loader.PLATFORM) and loader.BESIDE in files
         if finds_python:
-            binary = joined(binary, read(io.BytesIO(archive.read(loader.BESIDE))))
+            binary = joined(binary, read(io.BytesIO(files[loader.BESIDE])))
     except UnreadableError as error:
         return PlatformBinary(platform=folder, problem=f"{found}: {error}")
     looked_at = {f"binaries/{folder}"} if binary.system == WINDOWS else set(_inside(binary, folder))
-    bundled = {name for name in binary.dependency_names for place in looked_at if f"{place}/{name}" in names}
+    bundled = {name for name in binary.dependency_names for place in looked_at if f"{place}/{name}" in files}
     problem = _mismatch(folder, binary)
     return PlatformBinary(
         platform=folder, binary=binary, finds_python=finds_python, bundled=frozenset(bundled), problem=problem

@@ -1,0 +1,87 @@
+"""The archive that an FMU is, opened once for all checks, and the description in it."""
+
+import math
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+from orchestration.errors import QuadcosimError
+
+DESCRIPTION = "modelDescription.xml"
+
+
+class UnreadableFmuError(QuadcosimError):
+    """The file is so damaged that there is nothing to look at; the text, without its path, says what was expected."""
+
+
+@dataclass(frozen=True, slots=True)
+class Archive:
+    """The content of an .fmu file."""
+
+    path: Path
+    entries: tuple[zipfile.ZipInfo, ...]
+    """As they are listed, one name perhaps more than once"""
+    files: Mapping[str, bytes]
+    """Content by name"""
+
+
+class _Files(Mapping[str, bytes]):
+    """The files of an archive, each read when it is asked for: together they may be larger than the memory."""
+
+    def __init__(self, archive: zipfile.ZipFile) -> None:
+        self._archive = archive
+        self._names = dict.fromkeys(archive.namelist())
+
+    def __getitem__(self, name: str) -> bytes:
+        if name not in self._names:
+            raise KeyError(name)
+        return self._archive.read(name)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
+def read_archive(path: Path, size_limit: float = math.inf) -> Archive:
+    """The file, found whole; it is kept open.
+
+    Raises `UnreadableFmuError` if it is no archive, or damaged, or unpacks to more than `size_limit` MB, or has no
+    model description.
+    """
+    if not path.is_file():
+        raise UnreadableFmuError("expected an .fmu file")
+    try:
+        archive = zipfile.ZipFile(path)
+        size = sum(entry.file_size for entry in archive.infolist()) / 1e6
+        if size > size_limit:
+            raise UnreadableFmuError(f"unpacks to {size:.0f} MB: expected at most {size_limit:g} MB (--size-limit)")
+        damaged = archive.testzip()
+    except (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, ValueError) as error:
+        raise UnreadableFmuError(f"expected a zip archive that is whole: {error}") from error
+    if damaged is not None:
+        raise UnreadableFmuError(f"expected a zip archive that is whole: wrong CRC or header of {damaged}")
+    files = _Files(archive)
+    if DESCRIPTION not in files:
+        raise UnreadableFmuError(f"expected an FMU, with {DESCRIPTION} at the top of the archive")
+    return Archive(path, tuple(archive.infolist()), files)
+
+
+def read_root(archive: Archive) -> Element:
+    """The description of an FMU; raises `UnreadableFmuError` if it is no XML or not of FMI 2.0."""
+    try:
+        root = ElementTree.fromstring(archive.files[DESCRIPTION])
+    except ElementTree.ParseError as error:
+        raise UnreadableFmuError(f"{DESCRIPTION}: expected well-formed XML: {error}") from error
+    version = root.get("fmiVersion")
+    if version != "2.0":
+        raise UnreadableFmuError(f"fmiVersion = {version}: expected 2.0; an FMU of FMI {version} is not checked")
+    return root
