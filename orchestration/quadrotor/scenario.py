@@ -1,15 +1,15 @@
 """What a run is, as one frozen value."""
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
 from orchestration.errors import UsageError, shown
-from orchestration.quadrotor.timing import Timing, is_number
+from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT, SAMPLE_OFFSET, SAMPLE_PERIOD
+from orchestration.system.requirements import is_finite
 
 Parameter = float | bool
 
@@ -61,7 +61,7 @@ class Scenario:
     record: Record = field(default_factory=Record)
 
     def __post_init__(self) -> None:
-        if not (is_number(self.stop_time) and math.isfinite(self.stop_time) and self.stop_time > 0.0):
+        if not (is_finite(self.stop_time) and self.stop_time > 0.0):
             raise UsageError(f"stop_time = {shown(self.stop_time)}: expected a positive number of seconds")
         if isinstance(self.seed, bool) or not isinstance(self.seed, int) or not 0 <= self.seed < 2**63:
             raise UsageError(f"seed = {shown(self.seed)}: expected a whole number from 0 to 2^63 - 1")

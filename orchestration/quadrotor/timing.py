@@ -1,17 +1,24 @@
 """How the digital loop is clocked: the timing of a run as one frozen value, and time in integer nanoseconds."""
 
-import math
 from dataclasses import dataclass, field, fields
 from fractions import Fraction
-from typing import ClassVar, Literal, get_args
+from typing import ClassVar
 
-from orchestration.errors import UsageError, shown
+from orchestration.errors import shown
+from orchestration.system.model import Clock, Distribution, Hold, Order
+from orchestration.system.requirements import (
+    is_finite,
+    require,
+    require_bursts,
+    require_choice,
+    require_not_negative,
+    require_own_clock,
+    require_positive,
+    require_share,
+)
 from orchestration.system.times import exact_nanoseconds
 
-Order = Literal["gauss-seidel", "jacobi"]
-Hold = Literal["zero", "first"]
-ClockSource = Literal["master", "fmu"]
-Distribution = Literal["uniform", "normal"]
+_PLACE = "timing."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +41,7 @@ class Timing:
     """whether a command is available at its sample (gauss-seidel) or at the next one (jacobi)"""
     hold: Hold = "zero"
     """of the command between arrivals: constant, or the line through the last two applied"""
-    clock: ClockSource = "master"
+    clock: Clock = "master"
     """who decides when the controller samples"""
     delay: float = 0.0
     """d, from sample to application; may exceed the period"""
@@ -58,52 +65,22 @@ class Timing:
     """quantum by measurement name"""
 
     def __post_init__(self) -> None:
-        for name, choices in _CHOICES.items():
-            _require(getattr(self, name) in choices, name, getattr(self, name), f"one of {', '.join(choices)}")
-        for name in _NUMBERS:
-            _require(is_number(getattr(self, name)), name, getattr(self, name), "a number")
-        for name in ("period", "plant_interval", "clock_ratio"):
-            value = getattr(self, name)
-            _require(math.isfinite(value) and value > 0.0, name, value, "a positive number")
+        require_choice(self, place=_PLACE, order=Order, hold=Hold, clock=Clock, jitter_distribution=Distribution)
+        require_positive(self, "period", "plant_interval", "clock_ratio", place=_PLACE)
         for name, ratio in (("period", self.clock_ratio), ("plant_interval", 1.0)):
             value = getattr(self, name)
-            _require(exact_nanoseconds(value) >= Fraction(repr(float(ratio))), name, value, "at least a nanosecond")
-        for name in ("offset", "delay", "delay_jitter", "jitter"):
-            value = getattr(self, name)
-            _require(math.isfinite(value) and value >= 0.0, name, value, "zero or a positive number of seconds")
-        for name in ("measurement_loss", "command_loss"):
-            _require(0.0 <= getattr(self, name) <= 1.0, name, getattr(self, name), "a probability in [0, 1]")
-        for name in ("noise", "quantisation"):
-            for variable, value in getattr(self, name).items():
-                valid = is_number(value) and math.isfinite(value) and value >= 0.0
-                _require(valid, f"{name} of {variable}", value, "zero or positive")
+            least = Fraction(repr(float(ratio)))
+            require(exact_nanoseconds(value) >= least, _PLACE + name, value, "at least a nanosecond")
+        require_not_negative(self, "offset", "delay", "delay_jitter", "jitter", place=_PLACE)
+        require_share(self, "measurement_loss", "command_loss", place=_PLACE)
+        for what in ("noise", "quantisation"):
+            for variable, value in getattr(self, what).items():
+                require(is_finite(value) and value >= 0.0, f"{_PLACE}{what} of {variable}", value, "zero or positive")
         longest = self.period / self.clock_ratio
-        _require(self.jitter < longest, "jitter", self.jitter, f"less than the period of {longest:g} s")
-        self._check_bursts()
-        self._check_fmu_clock()
-
-    def _check_bursts(self) -> None:
-        if self.burst_length is None:
-            return
-        length = self.burst_length
-        _require(is_number(length) and 1.0 <= length < math.inf, "burst_length", length, "at least 1 loss")
-        for name in ("measurement_loss", "command_loss"):
-            loss = getattr(self, name)
-            possible = self.burst_length / (self.burst_length + 1.0)
-            _require(
-                loss <= possible or loss == 1.0, name, loss, f"at most {possible:g} in bursts of {self.burst_length:g}"
-            )
-
-    def _check_fmu_clock(self) -> None:
-        if self.clock != "fmu":
-            return
-        _require(self.jitter == 0.0, "jitter", self.jitter, "0 with clock fmu: only the master's clock can be late")
-        _require(self.clock_ratio == 1.0, "clock_ratio", self.clock_ratio, "1 with clock fmu")
-        whole = all(exact_nanoseconds(t).denominator == 1 for t in (self.period, self.offset))
-        _require(
-            whole or self.period >= 1e-3, "period", self.period,
-            "a whole number of nanoseconds with clock fmu, whose tolerance is 1e-6 of a period",
-        )  # fmt: skip
+        require(self.jitter < longest, f"{_PLACE}jitter", self.jitter, f"less than the period of {longest:g} s")
+        require_bursts(self, self.burst_length, "measurement_loss", "command_loss", place=_PLACE)
+        if self.clock == "fmu":
+            require_own_clock(self, _PLACE)
 
     def warnings(self, stop_time: float) -> tuple[str, ...]:
         """What a run of this length [s] hardly shows of this timing."""
@@ -121,30 +98,6 @@ class Timing:
         return not (
             self.jitter or self.delay_jitter or self.measurement_loss or self.command_loss or any(self.noise.values())
         )
-
-
-_CHOICES: dict[str, tuple[str, ...]] = {
-    "order": get_args(Order),
-    "hold": get_args(Hold),
-    "clock": get_args(ClockSource),
-    "jitter_distribution": get_args(Distribution),
-}
-_NUMBERS = (
-    "period", "offset", "plant_interval", "delay", "delay_jitter", "jitter", "measurement_loss", "command_loss",
-    "clock_ratio",
-)  # fmt: skip
-
-
-def is_number(value: object) -> bool:
-    """Whether `value` can be a time, a share or a factor; true and false are none, nor is what no float holds."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return False
-    return isinstance(value, float) or abs(value) < 2**63
-
-
-def _require(condition: bool, name: str, value: object, expected: str) -> None:
-    if not condition:
-        raise UsageError(f"timing.{name} = {shown(value)}: expected {expected}")
 
 
 TIMING_KEYS = tuple(f.name for f in fields(Timing))

@@ -1,7 +1,6 @@
 """Holds a system to what its FMUs say of themselves, before any of them is loaded."""
 
 import difflib
-import math
 from collections.abc import Iterable, Mapping
 
 from orchestration.errors import UsageError, expected_name
@@ -10,6 +9,7 @@ from orchestration.fmi.model import NUMERIC, Model, Variable
 from orchestration.fmi.values import taken
 from orchestration.system.conversion import BECOMES, OtherQuantity, conversion
 from orchestration.system.model import Connection, Parameter, System, component_of, variable_of
+from orchestration.system.requirements import is_finite
 from orchestration.system.system_file import expressions
 
 
@@ -151,19 +151,15 @@ def _check_parameter(place: str, model: Model, name: str, value: Parameter, is_f
     if not variable.is_settable or is_fed:
         expected = "a parameter or an input that nothing is connected to"
         raise UsageError(f"{place}: is {'connected' if is_fed else _article(variable)}; expected {expected}")
-    if isinstance(taken(variable, value, place), float) and not _is_number(value):
+    if isinstance(taken(variable, value, place), float) and not is_finite(value):
         raise UsageError(f"{place} = {value}: expected a finite number")
     low, high = variable.minimum, variable.maximum
-    outside = (low is not None and value < low) or (high is not None and value > high) if _is_number(value) else False  # type: ignore[operator]
+    outside = (low is not None and value < low) or (high is not None and value > high) if is_finite(value) else False
     if outside:
         bounds = " and ".join(
             f"{word} {bound:g}" for word, bound in (("at least", low), ("at most", high)) if bound is not None
         )
         raise UsageError(f"{place} = {value}: expected {bounds}")
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _list(names: Iterable[str], most: int = 12) -> str:

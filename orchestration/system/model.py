@@ -1,12 +1,21 @@
 """What a system is: frozen values, checked for what they mean by themselves; no FMU is opened here."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 from orchestration.errors import UsageError
+from orchestration.system.requirements import (
+    is_finite,
+    require,
+    require_bursts,
+    require_choice,
+    require_not_negative,
+    require_own_clock,
+    require_positive,
+    require_share,
+)
 from orchestration.system.times import exact_nanoseconds
 
 Order = Literal["gauss-seidel", "jacobi"]
@@ -34,20 +43,14 @@ class Sampling:
     """who decides when it samples: the master, or the FMU by its parameters sample_period and sample_offset"""
 
     def __post_init__(self) -> None:
-        _positive(self, "period", "clock_ratio")
-        _not_negative(self, "offset", "jitter")
-        _choice(self, jitter_distribution=Distribution, clock=Clock)
-        _require(exact_nanoseconds(self.period) >= self.clock_ratio, "period", self.period, "at least a nanosecond")
+        require_positive(self, "period", "clock_ratio")
+        require_not_negative(self, "offset", "jitter")
+        require_choice(self, jitter_distribution=Distribution, clock=Clock)
+        require(exact_nanoseconds(self.period) >= self.clock_ratio, "period", self.period, "at least a nanosecond")
         longest = self.period / self.clock_ratio
-        _require(self.jitter < longest, "jitter", self.jitter, f"less than the period of {longest:g} s")
+        require(self.jitter < longest, "jitter", self.jitter, f"less than the period of {longest:g} s")
         if self.clock == "fmu":
-            _require(self.jitter == 0.0, "jitter", self.jitter, "0 with clock fmu: only the master's clock can be late")
-            _require(self.clock_ratio == 1.0, "clock_ratio", self.clock_ratio, "1 with clock fmu")
-            whole = all(exact_nanoseconds(t).denominator == 1 for t in (self.period, self.offset))
-            _require(
-                whole or self.period >= 1e-3, "period", self.period,
-                "a whole number of nanoseconds with clock fmu, whose tolerance is 1e-6 of a period",
-            )  # fmt: skip
+            require_own_clock(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,14 +70,14 @@ class Component:
     """variables to record beside what is exchanged; None: all outputs and local Reals"""
 
     def __post_init__(self) -> None:
-        _choice(self, align=Align)
-        _require(isinstance(self.fmu, str), "fmu", self.fmu, "a name or the path of an .fmu file")
+        require_choice(self, align=Align)
+        require(isinstance(self.fmu, str), "fmu", self.fmu, "a name or the path of an .fmu file")
         if self.sampling is None:
-            _require(self.step is not None, "step", "none", "step (continuous time) or sampling (a digital task)")
-            _positive(self, "step")
-            _require(exact_nanoseconds(self.step or 0.0) >= 1, "step", self.step, "at least a nanosecond")
+            require(self.step is not None, "step", "none", "step (continuous time) or sampling (a digital task)")
+            require_positive(self, "step")
+            require(exact_nanoseconds(self.step or 0.0) >= 1, "step", self.step, "at least a nanosecond")
         else:
-            _require(self.step is None, "step", self.step, "none beside sampling, whose period it follows")
+            require(self.step is None, "step", self.step, "none beside sampling, whose period it follows")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,32 +111,24 @@ class Connection:
     """what arrives is scale · value + offset"""
 
     def __post_init__(self) -> None:
-        _choice(self, order=Order, hold=Hold, jitter_distribution=Distribution)
-        _not_negative(self, "delay", "delay_jitter")
-        _require(_is_number(self.loss) and 0.0 <= self.loss <= 1.0, "loss", self.loss, "a probability in [0, 1]")
+        require_choice(self, order=Order, hold=Hold, jitter_distribution=Distribution)
+        require_not_negative(self, "delay", "delay_jitter")
+        require_share(self, "loss")
         for what, values in (("noise", self.noise), ("quantisation", self.quantisation)):
             for name, value in values.items():
-                positive = _is_number(value) and math.isfinite(value) and value >= 0.0
-                _require(positive, f"{what} of {name}", value, "zero or positive")
+                require(is_finite(value) and value >= 0.0, f"{what} of {name}", value, "zero or positive")
                 if not self.places(name):
                     raise UsageError(f"{what}: {name} is no signal of it; expected one of {', '.join(self._vectors())}")
         for what in ("scale", "offset"):
             value = getattr(self, what)
-            _require(_is_number(value) and math.isfinite(value), what, value, "a finite number")
-        _require(
+            require(is_finite(value), what, value, "a finite number")
+        require(
             len(self.start) == len(self.end) > 0, "to", len(self.end), f"{len(self.start)} inputs, one for each output"
         )
         for what, ends in (("from", self.start), ("to", self.end)):
             owners = {component_of(end) for end in ends}
-            _require(len(owners) == 1, what, ", ".join(ends), "variables of one component")
-        if self.burst_length is not None:
-            length = self.burst_length
-            _require(_is_number(length) and 1.0 <= length < math.inf, "burst_length", length, "at least 1 loss")
-            possible = length / (length + 1.0)
-            _require(
-                self.loss <= possible or self.loss == 1.0, "loss", self.loss,
-                f"at most {possible:g} in bursts of {length:g}",
-            )  # fmt: skip
+            require(len(owners) == 1, what, ", ".join(ends), "variables of one component")
+        require_bursts(self, self.burst_length, "loss")
 
     def places(self, name: str) -> list[int]:
         """Where in a message a variable of the sender is; those of its components for a vector; none if in no place."""
@@ -178,13 +173,13 @@ class Source:
     def __post_init__(self) -> None:
         kinds = ("constant", "file", "noise", "trajectory")
         given = [kind for kind in kinds if getattr(self, kind) is not None]
-        _require(len(given) == 1, "source", " and ".join(given) or "nothing", f"one of {', '.join(kinds)}")
+        require(len(given) == 1, "source", " and ".join(given) or "nothing", f"one of {', '.join(kinds)}")
         if self.noise is not None:
-            _not_negative(self, "noise")
-            _require(self.period is not None, "period", "none", "how long each value is held, in seconds")
-            _positive(self, "period")
+            require_not_negative(self, "noise")
+            require(self.period is not None, "period", "none", "how long each value is held, in seconds")
+            require_positive(self, "period")
         else:
-            _require(self.period is None, "period", self.period, "none without noise")
+            require(self.period is None, "period", self.period, "none without noise")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -225,12 +220,12 @@ class System:
     """what to change, by path, to be at rest: where the local limit is taken"""
 
     def __post_init__(self) -> None:
-        _positive(self, "stop_time")
+        require_positive(self, "stop_time")
         whole = isinstance(self.seed, int) and not isinstance(self.seed, bool)
-        _require(whole and 0 <= self.seed < 2**63, "seed", self.seed, "a whole number from 0 to 2^63 - 1")
+        require(whole and 0 <= self.seed < 2**63, "seed", self.seed, "a whole number from 0 to 2^63 - 1")
         if "rows" in self.components:
             raise UsageError("components.rows: expected another name; this one is taken")
-        _require(len(self.components) > 0, "components", "none", "at least one")
+        require(len(self.components) > 0, "components", "none", "at least one")
         fed: dict[str, str] = {}
         for place, start, end in self._feeds():
             for what, given in (("from", start), ("to", end)):
@@ -242,7 +237,7 @@ class System:
             fed[end] = place
         names = [x.name for x in self.connections]
         for name in names:
-            _require(names.count(name) == 1, "connections", name, "a name of its own for each")
+            require(names.count(name) == 1, "connections", name, "a name of its own for each")
 
     def _feeds(self) -> list[tuple[str, str | None, str]]:
         feeds: list[tuple[str, str | None, str]] = [
@@ -259,29 +254,3 @@ def component_of(variable: str) -> str:
 def variable_of(variable: str) -> str:
     """The variable of COMPONENT.VARIABLE."""
     return variable.partition(".")[2]
-
-
-def _require(condition: bool, name: str, value: object, expected: str) -> None:
-    if not condition:
-        raise UsageError(f"{name} = {value}: expected {expected}")
-
-
-def _positive(of: object, *names: str) -> None:
-    for name in names:
-        value = getattr(of, name)
-        _require(_is_number(value) and math.isfinite(value) and value > 0.0, name, value, "a positive number")
-
-
-def _not_negative(of: object, *names: str) -> None:
-    for name in names:
-        value = getattr(of, name)
-        _require(_is_number(value) and math.isfinite(value) and value >= 0.0, name, value, "zero or a positive number")
-
-
-def _choice(of: object, **choices: Any) -> None:
-    for name, kind in choices.items():
-        _require(getattr(of, name) in get_args(kind), name, getattr(of, name), f"one of {', '.join(get_args(kind))}")
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)

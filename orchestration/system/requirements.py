@@ -1,0 +1,75 @@
+"""What a value of a system or of a timing must be, told in one line: `UsageError` for what cannot be."""
+
+import math
+from typing import Any, TypeGuard, get_args
+
+from orchestration.errors import UsageError, shown
+from orchestration.system.times import exact_nanoseconds
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether `value` can be a time, a share or a factor; true and false are none, nor is what no float holds."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return False
+    return isinstance(value, float) or abs(value) < 2**63
+
+
+def is_finite(value: object) -> TypeGuard[float]:
+    """Whether it is a number and neither infinite nor NaN."""
+    return is_number(value) and math.isfinite(value)
+
+
+def require(condition: bool, name: str, value: object, expected: str) -> None:
+    """`name` = `value` is what is `expected` where the condition holds."""
+    if not condition:
+        raise UsageError(f"{name} = {shown(value)}: expected {expected}")
+
+
+def require_positive(of: object, *names: str, place: str = "") -> None:
+    """The fields `names` are finite and above 0."""
+    for name in names:
+        value = getattr(of, name)
+        require(is_finite(value) and value > 0.0, place + name, value, "a positive number")
+
+
+def require_not_negative(of: object, *names: str, place: str = "") -> None:
+    """The fields `names` are finite and not below 0."""
+    for name in names:
+        value = getattr(of, name)
+        require(is_finite(value) and value >= 0.0, place + name, value, "zero or a positive number")
+
+
+def require_share(of: object, *names: str, place: str = "") -> None:
+    """The fields `names` are probabilities."""
+    for name in names:
+        value = getattr(of, name)
+        require(is_number(value) and 0.0 <= value <= 1.0, place + name, value, "a probability in [0, 1]")
+
+
+def require_choice(of: object, *, place: str = "", **choices: Any) -> None:
+    """The fields that `choices` names are among what their `Literal` allows."""
+    for name, kind in choices.items():
+        value = getattr(of, name)
+        require(value in get_args(kind), place + name, value, f"one of {', '.join(get_args(kind))}")
+
+
+def require_bursts(of: object, length: float | None, *losses: str, place: str = "") -> None:
+    """Losses of the probabilities in the fields `losses` can come `length` in a row on average; None: independent."""
+    if length is None:
+        return
+    require(is_number(length) and 1.0 <= length < math.inf, f"{place}burst_length", length, "at least 1 loss")
+    possible = length / (length + 1.0)
+    for name in losses:
+        loss = getattr(of, name)
+        fits = loss <= possible or loss == 1.0
+        require(fits, place + name, loss, f"at most {possible:g} in bursts of {length:g}")
+
+
+def require_own_clock(of: Any, place: str = "") -> None:
+    """`period`, `offset`, `jitter` and `clock_ratio` are what an FMU that keeps the clock itself can have."""
+    late = "0 with clock fmu: only the master's clock can be late"
+    require(of.jitter == 0.0, f"{place}jitter", of.jitter, late)
+    require(of.clock_ratio == 1.0, f"{place}clock_ratio", of.clock_ratio, "1 with clock fmu")
+    whole = all(exact_nanoseconds(t).denominator == 1 for t in (of.period, of.offset))
+    counts = "a whole number of nanoseconds with clock fmu, whose tolerance is 1e-6 of a period"
+    require(whole or of.period >= 1e-3, f"{place}period", of.period, counts)
