@@ -1,7 +1,5 @@
 """An instance of an FMI 2.0 FMU for co-simulation."""
 
-import ctypes
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -10,14 +8,14 @@ from fmpy import fmi2
 
 from orchestration.errors import UsageError
 from orchestration.fmi.messages import WARNING, collecting_callbacks
-from orchestration.fmi.native import NativeInstance, Numbers
-from orchestration.simulator import Transfer
+from orchestration.fmi.native import NativeInstance
 
 
 class Fmi2Instance(NativeInstance):
     """See `NativeInstance`."""
 
     stored: ClassVar = {"Real": np.float64, "Integer": np.int32, "Boolean": np.int32, "Enumeration": np.int32}
+    counts_values = False
     state_calls = ("getFMUstate", "serializeFMUstate", "freeFMUstate", "deSerializeFMUstate", "setFMUstate")
 
     def _expect_supported(self) -> None:
@@ -48,16 +46,3 @@ class Fmi2Instance(NativeInstance):
 
     def _access(self, action: str, type: str) -> str:
         return f"fmi2{action}{'Integer' if type == 'Enumeration' else type}"
-
-    def _transfer(self, function: str, references: Sequence[int], values: Numbers) -> Transfer:
-        count = len(references)
-        of = (ctypes.c_uint32 * count)(*references)
-        kind = ctypes.c_double if values.dtype == np.float64 else ctypes.c_int32
-        at = (kind * count).from_buffer(values)  # type: ignore[arg-type]
-        call, component, failure = getattr(self._fmu.dll, function), self._component, self._failure
-
-        def transfer() -> None:
-            if call(component, of, count, at) > WARNING:
-                raise failure(function)
-
-        return transfer

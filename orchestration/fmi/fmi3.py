@@ -1,7 +1,6 @@
 """An instance of an FMI 3.0 FMU for co-simulation: scalars and arrays of numbers; no clocks, no event mode."""
 
 import ctypes
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -10,9 +9,8 @@ from fmpy import fmi3
 
 from orchestration.errors import UsageError
 from orchestration.fmi.messages import WARNING
-from orchestration.fmi.native import NativeInstance, Numbers
+from orchestration.fmi.native import NativeInstance
 from orchestration.fmi.values import INTEGERS
-from orchestration.simulator import Transfer
 
 
 class Fmi3Instance(NativeInstance):
@@ -25,6 +23,7 @@ class Fmi3Instance(NativeInstance):
         "Boolean": np.bool_,
         "Enumeration": np.int64,
     }
+    counts_values = True
     state_calls = ("getFMUState", "serializeFMUState", "freeFMUState", "deserializeFMUState", "setFMUState")
 
     def _expect_supported(self) -> None:
@@ -70,15 +69,3 @@ class Fmi3Instance(NativeInstance):
 
     def _access(self, action: str, type: str) -> str:
         return f"fmi3{action}{'Int64' if type == 'Enumeration' else type}"
-
-    def _transfer(self, function: str, references: Sequence[int], values: Numbers) -> Transfer:
-        count, length = len(references), len(values)
-        of = (ctypes.c_uint32 * count)(*references)
-        at = (np.ctypeslib.as_ctypes_type(values.dtype) * length).from_buffer(values)  # type: ignore[arg-type]
-        call, component, failure = getattr(self._fmu.dll, function), self._component, self._failure
-
-        def transfer() -> None:
-            if call(component, of, count, at, length) > WARNING:
-                raise failure(function)
-
-        return transfer

@@ -4,12 +4,11 @@
 the FMU itself prints goes to standard error.
 """
 
-import os
 import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
@@ -64,7 +63,7 @@ def main(path: Path, name: str) -> None:
     """Serve one instance."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it comes here nevertheless
     subprocesses.end_with_parent()
-    requests, answers = _streams()
+    requests, answers = subprocesses.private_pipes()
     served = _Served(path, name)
     while True:
         try:
@@ -82,16 +81,6 @@ def main(path: Path, name: str) -> None:
         )
     if served.instance is not None:
         served.instance.close()
-
-
-def _streams() -> tuple[IO[bytes], IO[bytes]]:
-    """Standard input and output, kept from whatever reads and prints here."""
-    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)
-    os.close(nothing)
-    os.dup2(2, 1)
-    return requests, answers
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 Every array of a step is allocated once.
 """
 
+import ctypes
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -82,6 +83,8 @@ class NativeInstance(Instance):
 
     stored: ClassVar[Mapping[str, type[np.generic]]]
     """by type, what holds its values"""
+    counts_values: ClassVar[bool]
+    """whether a call says how many values it transfers beside how many references: arrays have more"""
     state_calls: tuple[str, str, str, str, str]
     """fmpy's names of the calls that get, serialise, free, deserialise and set a state"""
 
@@ -100,10 +103,6 @@ class NativeInstance(Instance):
     @abstractmethod
     def _access(self, action: str, type: str) -> str:
         """The function that does an action, Get or Set, to variables of a type."""
-
-    @abstractmethod
-    def _transfer(self, function: str, references: Sequence[int], values: Numbers) -> Transfer:
-        """A call of a function of `_access` that transfers `values`."""
 
     # -- a run ---------------------------------------------------------------------------------------------------
 
@@ -225,6 +224,20 @@ class NativeInstance(Instance):
         value = np.zeros(1)
         self.reader((name,), value)()
         return bool(value[0]) if variable.kind == "Boolean" else float(value[0])
+
+    def _transfer(self, function: str, references: Sequence[int], values: Numbers) -> Transfer:
+        """A call of a function of `_access` that transfers `values`."""
+        of = (ctypes.c_uint32 * len(references))(*references)
+        at = (np.ctypeslib.as_ctypes_type(values.dtype) * len(values)).from_buffer(values)  # type: ignore[arg-type]
+        counts = (len(values),) if self.counts_values else ()
+        arguments = (self._component, of, len(references), at, *counts)
+        call, failure = getattr(self._fmu.dll, function), self._failure
+
+        def transfer() -> None:
+            if call(*arguments) > WARNING:
+                raise failure(function)
+
+        return transfer
 
     def _put(self, variable: Variable, value: Value) -> None:
         if isinstance(value, str):

@@ -14,6 +14,7 @@ from typing import Any, BinaryIO
 from orchestration import scratch
 from orchestration.studies.identity import machine, versions
 from orchestration.studies.worker import Broken, BrokenPlaceError, Hangar, Outcome, Ready, Task
+from orchestration.subprocesses import private_pipes
 
 
 def main() -> None:
@@ -21,7 +22,7 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # an FMU must not be blamed for an interrupt
     own_folder = Path(sys.argv[1])
     tempfile.tempdir = str(own_folder)  # and no other if it is full
-    tasks, answers = _private_pipes()
+    tasks, answers = private_pipes()
     waiting: queue.SimpleQueue[Task] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(tasks, waiting, own_folder), daemon=True).start()
     _send(answers, Ready(versions=versions(), machine=machine()))
@@ -35,16 +36,6 @@ def _fly(hangar: Hangar, task: Task) -> Outcome | Broken:
         return hangar.fly(task)
     except BrokenPlaceError as error:
         return Broken(message=str(error))
-
-
-def _private_pipes() -> tuple[BinaryIO, BinaryIO]:
-    """Standard input and output under other numbers: what an FMU prints goes to standard error."""
-    tasks, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)
-    os.close(nothing)
-    os.dup2(2, 1)
-    return tasks, answers
 
 
 def _listen(tasks: BinaryIO, waiting: "queue.SimpleQueue[Task]", own_folder: Path) -> None:
