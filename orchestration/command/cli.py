@@ -13,7 +13,8 @@ import typer.core
 
 from orchestration.command import systems as system_commands
 from orchestration.command.flags import FlightFlags, Timing, flies, request_from
-from orchestration.command.limit_flags import MemoryLimit, OutputLimit, SizeLimit, TimeLimit, limits_from
+from orchestration.command.limit_flags import LimitFlags
+from orchestration.command.shared_flags import takes
 from orchestration.command.terminal import progress_bar, say
 from orchestration.errors import QuadcosimError, SimulatorError, UsageError, shown
 from orchestration.exchange.interop import cli as interop
@@ -161,13 +162,12 @@ def plot(
 
 
 @app.command()
+@takes("limits", LimitFlags)
 def validate(
     fmu: Annotated[list[Path] | None, typer.Argument(help="FMUs; without any, those of this project.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
-    time_limit: TimeLimit = 60.0,
-    memory_limit: MemoryLimit = 2000.0,
-    size_limit: SizeLimit = 1000.0,
-    output_limit: OutputLimit = 10.0,
+    *,
+    limits: LimitFlags,
 ) -> None:
     """Check FMUs: archive, description, and what they do when they run; exit code 1 if there is any problem.
 
@@ -178,14 +178,13 @@ def validate(
     from orchestration.checks.validation import validate as findings_of
     from orchestration.quadrotor.wiring import MODELS
 
-    limits = limits_from(time_limit, memory_limit, size_limit, output_limit)
     paths = fmu or [fmus.locate(name, say) for name in MODELS]
     for path in paths:
         if not path.is_file():
             raise UsageError(f"{path}: expected an .fmu file")
     results, problems = [], 0
     for path in paths:
-        findings = findings_of(path, limits=limits)
+        findings = findings_of(path, limits=limits.limits)
         results.append({"fmu": str(path), "findings": [asdict(finding) for finding in findings]})
         count = sum(not finding.note for finding in findings)
         problems += count
@@ -200,13 +199,12 @@ def validate(
 
 
 @app.command()
+@takes("limits", LimitFlags)
 def doctor(
     fmu: Annotated[list[Path] | None, typer.Argument(help="FMUs; without any, those of this project.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the same facts as JSON.")] = False,
-    time_limit: TimeLimit = 60.0,
-    memory_limit: MemoryLimit = 2000.0,
-    size_limit: SizeLimit = 1000.0,
-    output_limit: OutputLimit = 10.0,
+    *,
+    limits: LimitFlags,
 ) -> None:
     """Say what FMUs need to load, what of it this machine has, and try; exit code 1 if anything is missing."""
     from orchestration import fmus
@@ -214,8 +212,7 @@ def doctor(
     from orchestration.checks.doctor.report import as_tables, examine
     from orchestration.quadrotor.wiring import MODELS
 
-    limits = limits_from(time_limit, memory_limit, size_limit, output_limit)
-    report = examine(fmu or [fmus.locate(name, say) for name in MODELS], limits)
+    report = examine(fmu or [fmus.locate(name, say) for name in MODELS], limits.limits)
     print(json.dumps(as_tables(report), indent=2) if as_json else as_text(report))
     if not report.good:
         raise typer.Exit(1)

@@ -1,14 +1,13 @@
 """The flags of every command that flies, declared once."""
 
-import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from orchestration.command.shared_flags import takes
 from orchestration.errors import UsageError
 from orchestration.quadrotor.timing import TIMING_KEYS
 
@@ -178,22 +177,8 @@ _BY_MEASUREMENT = ("noise", "quantisation")
 _TIMING_FLAGS = tuple(key for key in TIMING_KEYS if key not in _BY_MEASUREMENT)
 
 
-def flies(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command all flight flags; it receives them as its argument `flags`."""
-    own = [p for p in inspect.signature(command).parameters.values() if p.name != "flags"]
-    shared = [
-        inspect.Parameter(f.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=f.type)
-        for f in fields(FlightFlags)
-    ]
-
-    @wraps(command)
-    def call(**given: Any) -> None:
-        flags = FlightFlags(**{f.name: given.pop(f.name) for f in fields(FlightFlags)})
-        command(flags=flags, **given)
-
-    call.__signature__ = inspect.Signature(own + shared)  # type: ignore[attr-defined]
-    call.__annotations__ = {p.name: p.annotation for p in own + shared}
-    return call
+flies = takes("flags", FlightFlags)
+"""Gives a command all flight flags."""
 
 
 def scenario_from(path: Path | None, flags: FlightFlags) -> "Scenario":

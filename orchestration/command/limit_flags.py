@@ -1,29 +1,38 @@
 """Flags of the commands that look at foreign files: what the process that does so may take."""
 
-from typing import Annotated, TypeAlias
+from dataclasses import dataclass
+from typing import Annotated
 
 import typer
 
 from orchestration.checks.confined import Limits
 from orchestration.errors import UsageError
 
-TimeLimit: TypeAlias = Annotated[
-    float, typer.Option("--time-limit", help="For all that is done with an FMU.", metavar="SECONDS")
-]
-MemoryLimit: TypeAlias = Annotated[
-    float, typer.Option("--memory-limit", help="Of the FMU's process and what it starts (Linux).", metavar="MB")
-]
-SizeLimit: TypeAlias = Annotated[
-    float, typer.Option("--size-limit", help="That an FMU may unpack to, and a file that it writes.", metavar="MB")
-]
-OutputLimit: TypeAlias = Annotated[float, typer.Option("--output-limit", help="That an FMU may print.", metavar="MB")]
 
+@dataclass(frozen=True, kw_only=True)
+class LimitFlags:
+    """What was given on the command line; raises `UsageError` for what is not positive."""
 
-def limits_from(time: float, memory: float, size: float, output: float) -> Limits:
-    """The limits that the flags ask for; raises `UsageError` for one that is not positive."""
-    for flag, value, unit in (
-        ("time", time, "seconds"), ("memory", memory, "MB"), ("size", size, "MB"), ("output", output, "MB"),
-    ):  # fmt: skip
-        if not value > 0.0:
-            raise UsageError(f"--{flag}-limit {value:g}: expected a positive number of {unit}")
-    return Limits(time=time, memory=memory, size=size, output=output)
+    time_limit: Annotated[
+        float, typer.Option("--time-limit", help="For all that is done with an FMU.", metavar="SECONDS")
+    ] = Limits.time
+    memory_limit: Annotated[
+        float, typer.Option("--memory-limit", help="Of the FMU's process and what it starts (Linux).", metavar="MB")
+    ] = Limits.memory
+    size_limit: Annotated[
+        float, typer.Option("--size-limit", help="That an FMU may unpack to, and a file that it writes.", metavar="MB")
+    ] = Limits.size
+    output_limit: Annotated[float, typer.Option("--output-limit", help="That an FMU may print.", metavar="MB")] = (
+        Limits.output
+    )
+
+    def __post_init__(self) -> None:
+        for name in ("time", "memory", "size", "output"):
+            value, unit = getattr(self, f"{name}_limit"), "seconds" if name == "time" else "MB"
+            if not value > 0.0:
+                raise UsageError(f"--{name}-limit {value:g}: expected a positive number of {unit}")
+
+    @property
+    def limits(self) -> Limits:
+        """The same for the process."""
+        return Limits(time=self.time_limit, memory=self.memory_limit, size=self.size_limit, output=self.output_limit)
