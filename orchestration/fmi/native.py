@@ -1,6 +1,6 @@
 """An FMU loaded into this process, through fmpy: what instances of FMI 2.0 and FMI 3.0 have in common.
 
-Every array of a step is allocated once.
+Every array of a step is allocated once, and every argument of a transfer is made once, as C has it.
 """
 
 import ctypes
@@ -229,9 +229,9 @@ class NativeInstance(Instance):
         """A call of a function of `_access` that transfers `values`."""
         of = (ctypes.c_uint32 * len(references))(*references)
         at = (np.ctypeslib.as_ctypes_type(values.dtype) * len(values)).from_buffer(values)  # type: ignore[arg-type]
-        counts = (len(values),) if self.counts_values else ()
-        arguments = (self._component, of, len(references), at, *counts)
-        call, failure = getattr(self._fmu.dll, function), self._failure
+        counts = (ctypes.c_size_t(len(values)),) if self.counts_values else ()
+        arguments = (ctypes.c_void_p(self._component), of, ctypes.c_size_t(len(references)), at, *counts)
+        call, failure = self._fmu.dll[function], self._failure  # without the types by which ctypes would convert
 
         def transfer() -> None:
             if call(*arguments) > WARNING:
