@@ -61,7 +61,7 @@ class Instant:
         self.posted: tuple[Message, ...] = ()
         """of components in continuous time to one another, where a message can be late or lost"""
         self.measured: tuple[Message, ...] = ()
-        """values that are measured now for a sample to come"""
+        """values that are measured now for samples to come, in the order of the samples"""
         self.arrivals: tuple[Message, ...] = ()
         """messages on their way that arrive, in the order of sending"""
         self.due: tuple[Due, ...] = ()
@@ -87,6 +87,16 @@ class FixedStep:
                 '; align = "next" moves it there'
             )
         return point
+
+    def expect_end(self, stop: int) -> None:
+        """Raise `UsageError` unless `stop` [ns] is on the grid: the end moves for nobody."""
+        point = self.grid.from_(stop)
+        if point != stop:
+            step = self.grid[1]
+            raise UsageError(
+                f"stop_time = {_seconds(stop)}: falls between two points of components.{self.name}, which takes "
+                f"steps of {_seconds(step)} s only: expected {_seconds(point - step)} or {_seconds(point)}"
+            )
 
 
 @dataclass(kw_only=True)
@@ -142,6 +152,8 @@ class _Task:
     """components in continuous time that it reads at its sampling instant, as bits"""
     ahead: int
     """how long before a sample its earliest measurement may be taken [ns]"""
+    stop: int
+    """end of the run [ns]"""
     k: int = 0
     time: int = 0
     drawn: deque[Due] = field(default_factory=deque)
@@ -149,6 +161,16 @@ class _Task:
     def instant(self, k: int) -> int:
         """The true time of sample k [ns]; to be asked for in order."""
         time = self.grid[k] + self.late()
+        while time < self.stop + self.ahead and (moved := self._aligned(time)) != time:
+            time = moved
+        if self.align and k > 0 and time == self.time < self.stop:
+            raise UsageError(
+                f"samples {k - 1} and {k} of components.{self.name} both move to t = {_seconds(time)} s, the next "
+                f"point of components.{self.align[-1].name}: expected a period that leaves one for each"
+            )
+        return time
+
+    def _aligned(self, time: int) -> int:
         for fixed in self.align:
             time = fixed.aligned(time, f"a sample of components.{self.name}")
         return time
@@ -161,7 +183,7 @@ class Agenda(Iterator[Instant]):
     """The instants of one run over [0, stop], in order.
 
     Instants are the points of each component in continuous time, every sample, every measurement that is taken
-    ahead of its sample, every arrival, every change of a source, and the end, at which nothing samples.
+    ahead of its sample, every arrival, every change of a source, the start, and the end, at which nothing samples.
     """
 
     def __init__(self, system: System, streams: Streams, fixed: Mapping[str, FixedStep] | None = None) -> None:
@@ -184,6 +206,8 @@ class Agenda(Iterator[Instant]):
         self._sender = [self._names.index(x.sender) for x in system.connections]
         receivers = [self._names.index(x.receiver) for x in system.connections]
         self._halt_of_receiver = [1 << i if i in self._grids else 0 for i in receivers]
+        for each in (fixed or {}).values():
+            each.expect_end(self.stop)
         links = self._links(system, streams, fixed or {})
         self._posted = {i: [links[j] for j in plan.posted if self._sender[j] == i] for i in self._order}
         self._tasks = self._sampled(system, streams, links, receivers, fixed or {})
@@ -216,7 +240,9 @@ class Agenda(Iterator[Instant]):
         return instant
 
     def next_time(self) -> int:
-        """The time of the instant that comes next [ns]."""
+        """The time of the instant that comes next [ns]; the first is the start."""
+        if self.count == 0:
+            return 0
         return min(self._heap[0][0], self.stop) if self._heap else self.stop
 
     def _push(self, time: int, phase: int, which: int, item: Any) -> None:
@@ -282,7 +308,7 @@ class Agenda(Iterator[Instant]):
             task.k, task.time = k + 1, task.instant(k + 1)
             received = tuple(link.measurement(k, time) for link in task.incoming)
             for message in received:
-                if message.sent < time:
+                if message.connection in self._plan.read_ahead:
                     self._push(message.sent, _MEASURE, self._sender[message.connection], message)
             sent = tuple(link.message(k, task.time if link.jacobi else time) for link in task.outgoing)
             task.drawn.append(Due(task.index, k, time, task.time, received, sent))
@@ -319,7 +345,9 @@ class Agenda(Iterator[Instant]):
             index, ratio = self._names.index(name), Fraction(repr(float(sampling.clock_ratio)))
             incoming = [links[i] for i in self._plan.measured if receivers[i] == index]
             partners = {system.connections[link.index].sender for link in incoming}
+            read_now = {self._sender[link.index] for link in incoming if link.index not in self._plan.read_ahead}
             largest = nanoseconds(sampling.jitter)
+            ahead = max((link.longest for link in incoming), default=0)
             tasks[index] = _Task(
                 index=index,
                 name=name,
@@ -329,8 +357,9 @@ class Agenda(Iterator[Instant]):
                 incoming=incoming,
                 outgoing=[links[i] for i in self._plan.commanded if self._sender[i] == index],
                 align=[fixed[partner] for partner in sorted(partners) if partner in fixed],
-                halts=sum(1 << self._names.index(partner) for partner in partners),
-                ahead=max((link.longest for link in incoming), default=0),
+                halts=sum(1 << sender for sender in read_now),
+                ahead=ahead,
+                stop=self.stop,
             )
         return tasks
 

@@ -6,7 +6,7 @@ delivered; the row is recorded. So a row is the value just after its instant, an
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -71,7 +71,7 @@ class _Body(_Worked):
     ahead: list[Channel]
     """wires from components that are stepped before it: their new values"""
     behind: list[Channel]
-    """wires from others: their values of the instant before"""
+    """wires from others: their values where its step begins"""
     now: int = 0
 
 
@@ -120,7 +120,7 @@ class Master:
         self._bodies = {names.index(name): self._body(name) for name in plan.continuous}
         self._tasks = {names.index(name): self._task(name) for name in plan.sampled}
         self._settling = any(body.held or body.behind or body.feeds for body in self._bodies.values())
-        self._by_itself = [i for i, task in self._tasks.items() if task.by_itself]
+        self._some_by_themselves = any(task.by_itself for task in self._tasks.values())
 
     # -- a run ---------------------------------------------------------------------------------------------------
 
@@ -142,10 +142,11 @@ class Master:
         return over
 
     def _run(self, pause_at: int | None, progress: Callable[[float], None] | None) -> bool:
-        agenda, by_itself, count = self._agenda, self._by_itself, 0
+        agenda, by_themselves, count = self._agenda, self._some_by_themselves, 0
         try:
             for instant in agenda:
-                time, halts = instant.time, instant.halts
+                self.now = time = instant.time
+                halts = instant.halts
                 if halts:
                     self._step_bodies(time, halts)
                 if instant.posted:
@@ -154,10 +155,8 @@ class Master:
                     self._measure(instant.measured)
                 if instant.arrivals:
                     self._arrive(instant.arrivals, time)
-                for sample in instant.due:
+                for sample in self._in_turn(instant.due, time) if by_themselves else instant.due:
                     self._sample(sample, time)
-                if by_itself and time < agenda.stop:
-                    self._step_by_themselves(time, instant.due)
                 if self._settling:
                     self._settle(time, halts)
                 if self._arrived:
@@ -228,7 +227,6 @@ class Master:
 
     def _step_bodies(self, time: int, halts: Sequence[int]) -> None:
         """Components in continuous time reach `time`; divergence is noticed before any value is passed on."""
-        self.now = time
         moved = False
         for index in halts:
             body = self._bodies[index]
@@ -279,24 +277,25 @@ class Master:
             channel.extrapolate(time)
         for feed in task.feeds:
             feed.write(time / NANOSECONDS)
-        if not task.by_itself:
-            self._step_task(task, time, due.next_time)
-            self._send(due, time)
+        self._step_task(task, time, self._agenda.next_time() if task.by_itself else due.next_time)
+        self._send(due, time)
+
+    def _in_turn(self, due: Sequence[Due], time: int) -> Iterator[Due]:
+        """The samples; components with a clock of their own that do not sample now are stepped in between."""
+        samples = {sample.component: sample for sample in due}
+        for index, task in self._tasks.items():
+            if index in samples:
+                yield samples[index]
+            elif task.by_itself and time < self._agenda.stop:
+                for channel in task.held:
+                    channel.extrapolate(time)
+                self._step_task(task, time, self._agenda.next_time())
 
     def _step_task(self, task: _Task, time: int, end: int) -> None:
-        self.now = time
         start, stop = time / NANOSECONDS, self._agenda.stop
         task.step(task.ratio * start, task.ratio * ((min(end, stop) - time) / NANOSECONDS))
         task.read()
         task.expect_finite(start)
-
-    def _step_by_themselves(self, time: int, due: Sequence[Due]) -> None:
-        """Components with a clock of their own are stepped at every instant; the agenda knows when they sample."""
-        samples = {sample.component: sample for sample in due}
-        for index in self._by_itself:
-            self._step_task(self._tasks[index], time, self._agenda.next_time())
-            if index in samples:
-                self._send(samples[index], time)
 
     def _sense(self, due: Due, time: int) -> None:
         """The sample reads what it measures itself."""
@@ -306,12 +305,9 @@ class Master:
             if lost:
                 self.events.append((message.sent, "lost", name, message.k))
             channel = self._channels[message.connection]
-            if message.sent == time:
-                if lost:
-                    channel.skip()
-                else:
-                    channel.apply(channel.take(), time)
-            elif not lost:
+            if message.connection not in self._plan.read_ahead:
+                channel.send(message.k, lost=lost)
+            if not lost:
                 channel.deliver(message.k, time)
 
     def _send(self, due: Due, time: int) -> None:

@@ -33,6 +33,11 @@ class Plan:
         )
 
     @cached_property
+    def read_ahead(self) -> frozenset[int]:
+        """Of `measured`, those whose messages can be read before the sample that they are for."""
+        return frozenset(i for i in self.measured if self._connections[i].delay or self._connections[i].delay_jitter)
+
+    @cached_property
     def commanded(self) -> tuple[int, ...]:
         """From a sampled component: a message for each of its samples."""
         return tuple(i for i, x in enumerate(self._connections) if not self._continuous(x.sender))
@@ -47,7 +52,10 @@ class Plan:
     def sampled(self) -> tuple[str, ...]:
         """Sampled components, in the order in which those that are due at one instant are processed."""
         members = [name for name in self.system.components if not self._continuous(name)]
-        return ranked(members, (self._pair(i) for i in self.commanded if self._follows(i)))
+        at_once = (
+            i for i in self.commanded if not self._connections[i].delay and not self._connections[i].delay_jitter
+        )
+        return ranked(members, (self._pair(i) for i in at_once if self._follows(i)))
 
     def _follows(self, index: int) -> bool:
         return self._connections[index].order == "gauss-seidel"

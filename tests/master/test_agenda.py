@@ -45,14 +45,14 @@ def test_a_component_halts_only_where_something_happens_to_it():
 def test_what_is_measured_late_is_measured_before_its_sample():
     found = instants(loop(sampled(0.2), measurement={"delay": 0.03}, stop_time=0.5))
     taken = [(i.time // MS, [m.arrival // MS for m in i.measured]) for i in found if i.measured]
-    assert taken == [(170, [200]), (370, [400])]  # the first sample has the value of the start
+    assert taken == [(0, [0]), (170, [200]), (370, [400])]
 
 
 def test_a_delay_of_measurements_longer_than_periods_is_the_same():
     found = instants(loop(sampled(0.1), measurement={"delay": 0.25}, stop_time=1.0))
     taken = [(m.sent // MS, m.arrival // MS) for i in found for m in i.measured]
-    assert taken[:2] == [(0, 100), (0, 200)]
-    assert taken[2:] == [(50 + 100 * k, 300 + 100 * k) for k in range(10)]  # also for samples beyond the end
+    assert taken[:3] == [(0, 0), (0, 100), (0, 200)]
+    assert taken[3:] == [(50 + 100 * k, 300 + 100 * k) for k in range(10)]  # also for samples beyond the end
     received = [[m.sent // MS for m in due.received] for i in found for due in i.due]
     assert received[:4] == [[0], [0], [0], [50]]
 
