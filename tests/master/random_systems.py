@@ -1,0 +1,83 @@
+"""What hypothesis draws from: systems of any components and connections, with times that meet each other."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from hypothesis import strategies as st
+
+from orchestration.system.model import Component, Connection, Sampling, System
+
+OUTPUTS = ("y", "z")
+TIMES = (0.01, 0.02, 0.025, 0.03, 0.05, 0.1)
+
+
+def some(*values: Any) -> st.SearchStrategy[float]:
+    """0 in half of the cases, else a round decimal, which meets others, or any float, which hardly does."""
+    return st.just(0.0) | st.sampled_from(values or TIMES) | st.floats(0.001, 0.1)
+
+
+@st.composite
+def samplings(draw: st.DrawFn) -> Sampling:
+    """Of a task."""
+    period, ratio = draw(st.sampled_from(TIMES)), draw(st.sampled_from((1.0, 1.0, 0.5, 1.001, 1.7)))
+    if draw(st.integers(0, 9)) == 0:
+        return Sampling(period=period, offset=draw(st.sampled_from((0.0, 0.01))), clock="fmu")
+    return Sampling(
+        period=period, clock_ratio=ratio, offset=draw(some()),
+        jitter=draw(st.just(0.0) | st.floats(0.0, 0.99)) * period / ratio,
+        jitter_distribution=draw(st.sampled_from(("uniform", "normal"))),
+    )  # fmt: skip
+
+
+@st.composite
+def components(draw: st.DrawFn) -> Component:
+    """In continuous time, or a task."""
+    if draw(st.booleans()):
+        return Component(fmu="stub", step=draw(st.sampled_from(TIMES) | st.floats(0.01, 0.1)))
+    return Component(fmu="stub", sampling=draw(samplings()))
+
+
+@st.composite
+def connections(draw: st.DrawFn, index: int, names: Sequence[str]) -> Connection:
+    """From any component to any other, to inputs of its own."""
+    sender, receiver = draw(st.permutations(names))[:2]
+    outputs = OUTPUTS[: draw(st.integers(1, len(OUTPUTS)))]
+    by_name = st.dictionaries(st.sampled_from(outputs), st.just(0.0) | st.floats(0.01, 1.0))
+    is_dull = draw(st.booleans())
+    disturbed: dict[str, Any] = {} if is_dull else {
+        "delay": draw(some(*TIMES, 0.2)), "delay_jitter": draw(some()), "loss": draw(some(0.3, 0.5)),
+        "jitter_distribution": draw(st.sampled_from(("uniform", "normal"))),
+        "burst_length": draw(st.none() | st.floats(1.0, 5.0)), "noise": draw(by_name),
+    }  # fmt: skip
+    return Connection(
+        name=f"c{index}",
+        start=tuple(f"{sender}.{output}" for output in outputs),
+        end=tuple(f"{receiver}.u{index}{output}" for output in outputs),
+        order=draw(st.sampled_from(("gauss-seidel", "gauss-seidel", "jacobi"))),
+        hold=draw(st.sampled_from(("zero", "first"))),
+        quantisation=draw(by_name),
+        scale=draw(st.sampled_from((1.0, 2.0, -0.3))),
+        offset=draw(st.sampled_from((0.0, 0.7))),
+        **disturbed,
+    )
+
+
+@st.composite
+def systems(draw: st.DrawFn, most: int = 6) -> System:
+    """Of two components and more."""
+    names = [f"k{i}" for i in range(draw(st.integers(2, most)))]
+    made = {name: draw(components()) for name in names}
+    wires = [draw(connections(i, names)) for i in range(draw(st.integers(1, 2 * len(names))))]
+    stop_time = draw(st.sampled_from((0.1, 0.2, 0.3)) | st.floats(0.01, 0.3))
+    return System(stop_time=stop_time, seed=draw(st.integers(0, 2**32)), components=made, connections=tuple(wires))
+
+
+@st.composite
+def systems_of_fixed_steps(draw: st.DrawFn) -> tuple[System, list[str]]:
+    """Systems in which some components take steps of one length only, and which."""
+    system = draw(systems(most=4))
+    names = [name for name, component in system.components.items() if component.sampling is None]
+    fixed = [name for name in names if draw(st.booleans())]
+    steps = {name: Component(fmu="stub", step=draw(st.sampled_from(TIMES)), align="next") for name in fixed}
+    return replace(system, stop_time=0.3, components={**system.components, **steps}), fixed
