@@ -149,12 +149,12 @@ class Master:
                 halts = instant.halts
                 if halts:
                     self._step_bodies(time, halts)
+                if instant.arrivals:  # before what is sent now, which is delivered last if it arrives at once
+                    self._arrive(instant.arrivals, time)
                 if instant.posted:
                     self._post(instant.posted, time)
                 if instant.measured:
                     self._measure(instant.measured)
-                if instant.arrivals:
-                    self._arrive(instant.arrivals, time)
                 for sample in self._in_turn(instant.due, time) if by_themselves else instant.due:
                     self._sample(sample, time)
                 if self._settling:

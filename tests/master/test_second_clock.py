@@ -190,6 +190,14 @@ def test_a_sample_that_reads_two_of_one_step_moves_to_a_point_of_both() -> None:
     assert [round(1000 * step.t) for step in seen.steps["c"]] == [0, 120, 240]
 
 
+def test_of_messages_that_move_to_one_point_the_last_sent_stays() -> None:
+    link = wire("a.y", "b.u", "link", hold="first")
+    seen = same(system({"a": continuous(0.01), "b": continuous(0.02)}, [link], stop_time=0.06), ["b"])
+    assert [row["b.u"] for row in seen.rows if row["time"] in (0.02, 0.04)] == [
+        row["a.y"] for row in seen.rows if row["time"] in (0.02, 0.04)
+    ]
+
+
 def test_samples_that_would_move_to_one_point_are_an_error() -> None:
     what = system({"a": continuous(0.03), "b": sampled(0.01)}, [wire("a.y", "b.u")], stop_time=0.3)
     with pytest.raises(UsageError, match=r"samples 1 and 2 of components\.b both move to t = 0\.03 s"):
