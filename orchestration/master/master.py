@@ -18,7 +18,7 @@ from orchestration.master.board import Board
 from orchestration.master.channel import Channel
 from orchestration.master.feeds import Feed
 from orchestration.master.plan import Plan
-from orchestration.master.recording import ROWS, Chunk, Event, Recorder
+from orchestration.master.recording import ARRIVED, EVENTS, LOST, ROWS, SAMPLED, SENT, Chunk, Events, Integers, Recorder
 from orchestration.master.sources import Values
 from orchestration.master.streams import NOISE, Streams
 from orchestration.simulator import Floats, Simulator, Transfer
@@ -94,8 +94,8 @@ class Master:
         first_exchange: Sequence[Sequence[int]] | None = None,
     ) -> None:
         self.board = board = Board(system, recorded)
-        self.events: list[tuple[int, str, str, int]] = []  # fields of `Event`, made cheaply
-        self._arrived: list[tuple[int, str, str, int]] = []  # of this instant: noted after what was sent at it
+        self._events: list[int] = []  # a table of `Events`, row after row: no object an event, for the collector to see
+        self._arrived: list[int] = []  # of this instant: noted after what was sent at it
         self.interrupted_at: int | None = None
         self.divergence: str | None = None
         self.divergence_time: int | None = None
@@ -107,13 +107,13 @@ class Master:
         self._sources, self._interrupted, self.recorder = list(sources), interrupted, recorder
         self.columns = (*board.columns, *(signal for signals, _ in self._sources for signal in signals))
         """of every row: those of the board, then the signals of the sources"""
-        self._rows = bytearray()  # not handed over yet, and the times of `events` may lie before them
+        self._rows = bytearray()  # not handed over yet, and the times of the events may lie before them
         self._chunk = ROWS * board.row.nbytes
         self._handed_over = False
         recorder.begin(self.columns)
         self._watch = watch(board) if watch is not None else lambda t: None
         self._feeds = list(feeds)
-        self._connections = [x.name for x in system.connections]
+        self._connections = tuple(x.name for x in system.connections)
         self._channels = [self._channel(i, streams) for i in range(len(system.connections))]
         self._first_exchange = [(i,) for i in range(len(self._channels))] if first_exchange is None else first_exchange
         self._readers = {name: simulators[name].reader(board.outputs[name], self._outputs(name)) for name in names}
@@ -137,7 +137,7 @@ class Master:
         So it is at the first instant after an interruption, but not at its end.
         """
         over = self.divergence is not None or self._run(pause_at, progress)
-        if over and (self._rows or self.events or not self._handed_over):
+        if over and (self._rows or self._events or not self._handed_over):
             self._hand_over()
         return over
 
@@ -160,7 +160,7 @@ class Master:
                 if self._settling:
                     self._settle(time, halts)
                 if self._arrived:
-                    self.events += self._arrived
+                    self._events += self._arrived
                     self._arrived.clear()
                 self._record(time)
                 if self._interrupted() and time < agenda.stop:
@@ -181,11 +181,11 @@ class Master:
     def pending(self) -> Chunk:
         """What was recorded since the last chunk was handed over; messages that go out later are left out."""
         rows = np.frombuffer(bytes(self._rows), dtype=np.float64).reshape(-1, len(self.board.columns))
-        events = sorted((event for event in self.events if event[0] <= self.now), key=lambda event: event[0])
+        events, _ = self._past_and_later()
         return Chunk(
             columns=self.columns,
             rows=np.column_stack([rows, *(values.over(rows[:, 0]) for _, values in self._sources)]),
-            events=tuple(map(Event._make, events)),
+            events=Events(self._connections, events[np.argsort(events[:, 0], kind="stable")]),
         )
 
     def state(self) -> dict[str, Any]:
@@ -198,7 +198,7 @@ class Master:
             "row": self.board.row.tolist(),
             "handed_over": self._handed_over,
             "channels": [channel.state() for channel in self._channels],
-            "events": list(self.events),
+            "events": list(self._events),
         }
 
     def saved(self) -> dict[str, bytes]:
@@ -221,7 +221,7 @@ class Master:
         self._rows, self._handed_over = bytearray(saved[ROWS_PENDING]), state["handed_over"]
         for channel, content in zip(self._channels, state["channels"], strict=True):
             channel.restore(content)
-        self.events = [(time, kind, what, k) for time, kind, what, k in state["events"]]
+        self._events = list(state["events"])
 
     # -- what happens at an instant ------------------------------------------------------------------------------
 
@@ -267,7 +267,7 @@ class Master:
             self._deliver(message, time)
 
     def _deliver(self, message: Message, time: int) -> None:
-        self._arrived.append((time, "arrived", self._connections[message.connection], message.k))
+        self._arrived += (time, ARRIVED, message.connection, message.k)
         self._channels[message.connection].deliver(message.k, time)
 
     def _sample(self, due: Due, time: int) -> None:
@@ -300,10 +300,10 @@ class Master:
     def _sense(self, due: Due, time: int) -> None:
         """The sample reads what it measures itself."""
         for message in due.received:
-            name, lost = self._connections[message.connection], message.arrival is None
-            self.events.append((message.sent, "sampled", name, message.k))
+            lost = message.arrival is None
+            self._events += (message.sent, SAMPLED, message.connection, message.k)
             if lost:
-                self.events.append((message.sent, "lost", name, message.k))
+                self._events += (message.sent, LOST, message.connection, message.k)
             channel = self._channels[message.connection]
             if message.connection not in self._plan.read_ahead:
                 channel.send(message.k, lost=lost)
@@ -321,16 +321,15 @@ class Master:
             else:
                 channel.send(message.k, lost=message.arrival is None)
         for message, channel, value in at_once:
-            self._arrived.append((time, "arrived", self._connections[message.connection], message.k))
+            self._arrived += (time, ARRIVED, message.connection, message.k)
             channel.apply(value, time)
 
     def _note_sending(self, message: Message) -> None:
         if message.sent > self._agenda.stop:
             return
-        name = self._connections[message.connection]
-        self.events.append((message.sent, "sent", name, message.k))
+        self._events += (message.sent, SENT, message.connection, message.k)
         if message.arrival is None:
-            self.events.append((message.sent, "lost", name, message.k))
+            self._events += (message.sent, LOST, message.connection, message.k)
 
     def _settle(self, time: int, halts: Sequence[int]) -> None:
         """What components in continuous time hold over the step that begins now."""
@@ -347,14 +346,20 @@ class Master:
         row = self.board.row
         row[0] = time / NANOSECONDS
         self._rows += row.data
-        if len(self._rows) >= self._chunk:
+        if len(self._rows) >= self._chunk or len(self._events) >= 4 * EVENTS:
             self._hand_over()
 
     def _hand_over(self) -> None:
         self.recorder.take(self.pending())
-        self.events = [event for event in self.events if event[0] > self.now]
+        self._events = self._past_and_later()[1].ravel().tolist()
         self._rows.clear()
         self._handed_over = True
+
+    def _past_and_later(self) -> tuple[Integers, Integers]:
+        """The events up to now, and those of messages that go out later."""
+        table = np.array(self._events, dtype=np.int64).reshape(-1, 4)
+        past = table[:, 0] <= self.now
+        return table[past], table[~past]
 
     def _diverged(self, error: Exception) -> None:
         """Take divergence as the end of the run; any other failure of an FMU is raised."""
@@ -367,7 +372,7 @@ class Master:
 
     def _drop_later_events(self) -> None:
         """In Jacobi order a message is written down before it goes out; after the end none does."""
-        self.events = [event for event in self.events if event[0] <= self.now]
+        self._events = self._past_and_later()[0].ravel().tolist()
 
     # -- initialisation ------------------------------------------------------------------------------------------
 

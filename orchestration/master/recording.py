@@ -1,15 +1,19 @@
 """What a flight leaves: its rows and events, handed over in chunks as it goes on."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeAlias, overload
 
 import numpy as np
+import numpy.typing as npt
 
 from orchestration.simulator import Floats
 
-ROWS = 2**15
-"""in each chunk but the last, so that what is computed by chunks does not depend on where they are kept"""
+Integers: TypeAlias = npt.NDArray[np.int64]
+
+ROWS, EVENTS = 2**15, 2**18
+"""A chunk is whole as soon as it has so many rows or events, so that what is computed by chunks does not depend on
+where they are kept."""
 
 
 class Event(NamedTuple):
@@ -25,6 +29,52 @@ class Event(NamedTuple):
     """index of the message"""
 
 
+KINDS = ("sampled", "sent", "arrived", "lost")
+SAMPLED, SENT, ARRIVED, LOST = range(len(KINDS))
+
+
+@dataclass(frozen=True, eq=False)
+class Events(Sequence[Event]):
+    """Events in order, as columns: one object for all of them, where a million are no rarity."""
+
+    names: tuple[str, ...]
+    """of connections"""
+    table: Integers
+    """shape (n, 4): time [ns], index in `KINDS`, index in `names`, index of the message"""
+
+    @classmethod
+    def of(cls, events: Iterable[Event]) -> "Events":
+        """The same as columns."""
+        listed = list(events)
+        names = tuple(dict.fromkeys(event.what for event in listed))
+        rows = [(time, KINDS.index(kind), names.index(what), sample) for time, kind, what, sample in listed]
+        return cls(names, np.array(rows, dtype=np.int64).reshape(-1, 4))
+
+    def are(self, kind: str, what: str | None = None) -> npt.NDArray[np.bool_]:
+        """Which are of a kind, and of that connection if it is given; shape (n,)."""
+        found: npt.NDArray[np.bool_] = self.table[:, 1] == KINDS.index(kind)
+        if what is not None:
+            found &= self.table[:, 2] == (self.names.index(what) if what in self.names else -1)
+        return found
+
+    def __len__(self) -> int:
+        return len(self.table)
+
+    def __iter__(self) -> Iterator[Event]:
+        names = self.names
+        return (Event(time, KINDS[kind], names[what], sample) for time, kind, what, sample in self.table.tolist())
+
+    @overload
+    def __getitem__(self, place: int) -> Event: ...
+    @overload
+    def __getitem__(self, place: slice) -> "Events": ...
+    def __getitem__(self, place: int | slice) -> "Event | Events":
+        if isinstance(place, slice):
+            return Events(self.names, self.table[place])
+        (event,) = Events(self.names, self.table[place].reshape(1, 4))
+        return event
+
+
 @dataclass(frozen=True, kw_only=True)
 class Chunk:
     """Rows that follow each other, and what happened after the row before them up to the last one."""
@@ -32,7 +82,7 @@ class Chunk:
     columns: tuple[str, ...]
     rows: Floats
     """shape (n, number of columns), at most `ROWS` of them"""
-    events: tuple[Event, ...]
+    events: Events
     """in order of time; the last chunk has those after its last row too"""
 
     @property
@@ -62,7 +112,7 @@ class Recorder(Protocol):
         """The names of what every row has; before the first chunk."""
 
     def take(self, chunk: Chunk) -> None:
-        """The next chunk; one with less than `ROWS` rows is the last."""
+        """The next chunk."""
 
     def finish(self) -> Recording:
         """What was taken."""
@@ -105,13 +155,10 @@ def thinned(recording: Recording, columns: Collection[str], window: tuple[float,
     for chunk in recording.chunks(columns):
         t = chunk.signals["time"]
         keep = (np.arange(len(t)) % stride == 0) | ((t >= window[0]) & (t <= window[1]))
-        times = set(np.round(t[keep] * 1e9).astype(np.int64).tolist()) if stride > 1 else set()
+        events = chunk.events
+        if stride > 1:
+            stays = np.isin(events.table[:, 0], np.round(t[keep] * 1e9).astype(np.int64))
+            events = Events(events.names, events.table[stays])
         result.begin(chunk.columns)
-        result.take(
-            Chunk(
-                columns=chunk.columns,
-                rows=chunk.rows[keep],
-                events=tuple(event for event in chunk.events if stride == 1 or event.time in times),
-            )
-        )
+        result.take(Chunk(columns=chunk.columns, rows=chunk.rows[keep], events=events))
     return result

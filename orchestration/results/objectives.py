@@ -1,6 +1,6 @@
 """What a run comes to, as numbers: the objectives and the criterion of its system."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from orchestration.expressions.over_run import evaluate, expect_names
 from orchestration.expressions.recorded import Marks, Recorded, Spans, vectors
 from orchestration.expressions.syntax import names, parse
-from orchestration.master.recording import Event, Recording
+from orchestration.master.recording import Events, Recording
 from orchestration.simulator import Floats
 from orchestration.system.model import System
 from orchestration.system.system_file import expressions
@@ -64,12 +64,10 @@ def spans(system: System, recording: Recording, parameters: Mapping[str, float],
     columns = [c for c in recording.columns if c == "time" or c in wanted or c.rpartition(".")[0] in wanted]
     lines = {x.name: _Line() for x in system.connections if x.hold == "first"}
     before: Floats | None = None
-    lost: set[tuple[str, int]] = set()
     for chunk in recording.chunks(columns):
         rows = chunk.rows if before is None else np.vstack([before, chunk.rows])
         signals = {name: rows[:, i] for i, name in enumerate(chunk.columns)}
-        lost |= {(event.what, event.sample) for event in chunk.events if event.kind == "lost"}
-        arrivals = _arrivals(system, signals["time"], chunk.events, lost)
+        arrivals = _arrivals(system, signals["time"], chunk.events)
         yield Recorded(
             time=signals["time"],
             signals={name: values for name, values in signals.items() if name != "time"},
@@ -82,16 +80,16 @@ def spans(system: System, recording: Recording, parameters: Mapping[str, float],
         before = rows[-1:]
 
 
-def _arrivals(
-    system: System, time: Floats, events: Sequence[Event], lost: Collection[tuple[str, int]]
-) -> dict[str, Marks]:
+def _arrivals(system: System, time: Floats, events: Events) -> dict[str, Marks]:
     """By connection, the rows at which a message of it arrived, or was measured and not lost."""
     instants = np.round(time * NANOSECONDS).astype(np.int64)
-    times: dict[str, list[int]] = {x.name: [] for x in system.connections}
-    for event in events:
-        if event.kind == "arrived" or (event.kind == "sampled" and (event.what, event.sample) not in lost):
-            times[event.what].append(event.time)
-    return {name: np.isin(instants, np.array(found, dtype=np.int64)) for name, found in times.items()}
+    found = {}
+    for x in system.connections:
+        arrived = events.table[events.are("arrived", x.name)]
+        sampled, lost = events.table[events.are("sampled", x.name)], events.table[events.are("lost", x.name)]
+        measured = sampled[~np.isin(sampled[:, 3], lost[:, 3])]  # what is lost is so at the time of its sample
+        found[x.name] = np.isin(instants, np.concatenate([arrived[:, 0], measured[:, 0]]))
+    return found
 
 
 def known(system: System, signals: set[str], numbers: set[str]) -> System:

@@ -6,10 +6,11 @@ from typing import Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from orchestration.errors import UsageError
-from orchestration.master.recording import Chunk, Event, Recording
+from orchestration.master.recording import KINDS, Chunk, Events, Recording
 from orchestration.simulator import Floats
 
 SIGNALS, EVENTS = "signals.parquet", "events.parquet"
@@ -76,7 +77,7 @@ class InFolder:
                 yield Chunk(
                     columns=names,
                     rows=_matrix(table, names),
-                    events=_events(_group(self._folder / EVENTS, events, group, _EVENT.names)),
+                    events=_events(self._folder / EVENTS, _group(self._folder / EVENTS, events, group, _EVENT.names)),
                 )
 
 
@@ -136,12 +137,18 @@ def _matrix(table: Any, names: tuple[str, ...]) -> Floats:
     return np.column_stack([table[name].to_numpy() for name in names])
 
 
-def _events_table(events: tuple[Event, ...]) -> Any:
+def _events_table(events: Events) -> Any:
     """`time` [s], `event`, `what` and `sample`, in order of time."""
-    columns = list(zip(*((event.time / 1e9, *event[1:]) for event in events))) or [()] * 4
-    return pa.table([pa.array(c, field.type) for c, field in zip(columns, _EVENT, strict=True)], schema=_EVENT)
+    time, kind, what, sample = map(pa.array, np.ascontiguousarray(events.table.T))
+    kinds, names = pa.array(KINDS), pa.array(events.names, pa.string())
+    return pa.table([pc.divide(time, 1e9), kinds.take(kind), names.take(what), sample], schema=_EVENT)
 
 
-def _events(table: Any) -> tuple[Event, ...]:
-    time, *others = (table[name].to_pylist() for name in _EVENT.names)
-    return tuple(map(Event._make, zip([round(t * 1e9) for t in time], *others, strict=True)))
+def _events(path: Path, table: Any) -> Events:
+    kind = pc.index_in(table["event"], value_set=pa.array(KINDS))
+    if kind.null_count:
+        raise UsageError(f"{path}: expected events that are one of {', '.join(KINDS)}")
+    what = table["what"].combine_chunks().dictionary_encode()
+    time = np.round(table["time"].to_numpy() * 1e9)
+    columns = (time, kind.to_numpy(), what.indices.to_numpy(), table["sample"].to_numpy())
+    return Events(tuple(what.dictionary.to_pylist()), np.column_stack([x.astype(np.int64) for x in columns]))

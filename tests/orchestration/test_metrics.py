@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from orchestration.master.recording import Chunk, Event, InMemory
+from orchestration.master.recording import Chunk, Event, Events, InMemory
 from orchestration.quadrotor import wiring
 from orchestration.quadrotor.translation import quadrotor
 from orchestration.quadrotor.wiring import COMMAND, POSITION
@@ -80,7 +80,7 @@ def recorded(signals: Mapping[str, Array], events: Sequence[Event], cuts: Sequen
     after = -1
     for start, end in itertools.pairwise((0, *cuts, len(rows))):
         last = round(rows[end - 1, 0] * 1e9)
-        here = tuple(event for event in events if after < event.time <= last)
+        here = Events.of(event for event in events if after < event.time <= last)
         recording.take(Chunk(columns=columns, rows=rows[start:end], events=here))
         after = last
     return recording

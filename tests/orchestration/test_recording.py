@@ -49,6 +49,18 @@ def test_what_is_on_disk_is_what_was_flown_chunk_by_chunk(whole: Result, tmp_pat
         assert after is None or chunk.events[-1].time <= chunk.rows[-1, 0] * 1e9 < after.events[0].time
 
 
+def test_many_events_make_a_chunk_whole_too(whole: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("orchestration.master.master.ROWS", 10**6)
+    monkeypatch.setattr("orchestration.master.master.EVENTS", 20)
+    keep_flight(tmp_path / "run", lambda to: orchestration.run(SCENARIO, recorder=to), figures=False)
+    found = load_run(tmp_path / "run")
+    sizes = [len(chunk.events) for chunk in found.recording.chunks()]
+    assert len(sizes) > 5
+    assert max(sizes) < 20 + 10
+    assert found.rows.tobytes() == whole.rows.tobytes()
+    assert found.events == whole.events
+
+
 def test_rows_are_on_disk_before_the_flight_is_over(tmp_path: Path) -> None:
     sizes: list[int] = []
 

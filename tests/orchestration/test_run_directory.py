@@ -27,7 +27,7 @@ from orchestration import (
     load_run,
     save_run,
 )  # fmt: skip
-from orchestration.master.recording import Chunk, InMemory, Recorder
+from orchestration.master.recording import Chunk, Events, InMemory, Recorder
 from orchestration.results import plots
 from orchestration.results.run_directory import keep_flight
 
@@ -145,7 +145,7 @@ def test_no_energy_is_drawn_of_a_controller_that_has_none(tmp_path: Path) -> Non
     place = flown.columns.index("controller.energy")
     columns, without = (*flown.columns[:place], *flown.columns[place + 1 :]), InMemory()
     without.begin(columns)
-    without.take(Chunk(columns=columns, rows=np.delete(flown.rows, place, axis=1), events=flown.events))
+    without.take(Chunk(columns=columns, rows=np.delete(flown.rows, place, axis=1), events=Events.of(flown.events)))
     written = plots.draw(dataclasses.replace(flown, recording=without), tmp_path)
     assert {path.name for path in written} == {path.name for path in tmp_path.iterdir()} == FIGURES - {"energy.png"}
 
