@@ -154,7 +154,7 @@ def prepared(
             master = Master(
                 system,
                 instances,
-                agenda=Agenda(system, streams, _fixed_steps(system, models)),
+                agenda=Agenda(system, streams, fixed_steps(system, models)),
                 streams=streams,
                 recorded=recorded(system, models),
                 recorder=recorder,
@@ -317,8 +317,8 @@ def _picked(values: Values, places: Sequence[int], count: int) -> Callable[[floa
     return at
 
 
-def _fixed_steps(system: System, models: Mapping[str, Model]) -> dict[str, FixedStep]:
-    """Components in continuous time that take steps of one length only."""
+def fixed_steps(system: System, models: Mapping[str, Model]) -> dict[str, FixedStep]:
+    """Components in continuous time that take steps of one length only, by name."""
     found = {}
     for name, component in system.components.items():
         if component.step is not None and not models[name].varies_step:

@@ -102,6 +102,11 @@ class Channel:
         self.received[:] = last + share * (last - before)
         self._write()
 
+    def held(self) -> list[Floats]:
+        """The values that what it will pass on depends on, in place: received, on their way, and of the hold."""
+        past = [value for _, value in self._applied] if self._extrapolates else []
+        return [self.received, *self._in_flight.values(), *past]
+
     def state(self) -> dict[str, Any]:
         """All that what it will pass on depends on, in JSON types."""
         return {

@@ -188,6 +188,11 @@ class Master:
             events=Events(self._connections, events[np.argsort(events[:, 0], kind="stable")]),
         )
 
+    @property
+    def channels(self) -> Sequence[Channel]:
+        """The connections at work, in the order of the system."""
+        return self._channels
+
     def state(self) -> dict[str, Any]:
         """All that the rest of the run depends on, and what the recorder does not have yet, but for `saved`."""
         return {

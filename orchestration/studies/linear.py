@@ -26,6 +26,7 @@ from orchestration.quadrotor.translation import system_of
 from orchestration.simulation import prepared
 from orchestration.simulator import Floats
 from orchestration.studies.files import files_of
+from orchestration.system.model import System
 
 STEP = 1e-6
 """of each coordinate in a difference; a thousandth of a boundary layer that is smaller than 1 mm"""
@@ -51,6 +52,25 @@ def hover_of(scenario: Scenario) -> Scenario:
         plant=dataclasses.replace(scenario.plant, parameters=plant),
         reference=dataclasses.replace(scenario.reference, file=None),
     )
+
+
+def at_hover(scenario: Scenario) -> System:
+    """The system that hovers as `scenario` would, by values for what its FMUs have."""
+    system = system_of(hover_of(scenario))
+    given = {"plant": scenario.plant.parameters, "controller": scenario.controller.parameters}
+    models = files_of(system).models_of(system)
+    components = {
+        name: dataclasses.replace(
+            component,
+            parameters={
+                key: value
+                for key, value in component.parameters.items()
+                if key in given[name] or key in models[name].variables
+            },
+        )
+        for name, component in system.components.items()
+    }
+    return dataclasses.replace(system, components=components, operating_point={})
 
 
 def at_edge(scenario: Scenario) -> Scenario | None:

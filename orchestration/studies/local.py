@@ -1,21 +1,33 @@
 """Local limits: where what is small about an operating point ceases to decay."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
-from orchestration.errors import UsageError
+from orchestration.errors import SimulatorError, UsageError
 from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.studies.linear import HoverLoop, at_edge
+from orchestration.studies.at_rest import NotAtRest
+from orchestration.studies.linear import HoverLoop, at_edge, at_hover
 from orchestration.studies.ranges import Range, Varied, range_of
+from orchestration.studies.sampled_loop import growth_of_loop
 from orchestration.studies.search import first_failure
+from orchestration.studies.study import with_values
+from orchestration.studies.tangent import PULSE
 from orchestration.studies.twins import growth_of
+from orchestration.system.model import System
 
-LINEAR = "spectral radius of the sampled loop about hover, by differences through saved states"
-LINEAR_ACCURACY = 1e-3
+HOVER = "spectral radius of the sampled loop about hover, by differences through saved states"
+HOVER_ACCURACY = 1e-3
 """of the limit, relative: what the differences leave"""
-TWINS = "growth of the difference of twin runs from the operating point, one of them struck by a pulse"
-FINER = 0.2
+LOOP = "spectral radius of the sampled loop about the operating point, by differences through saved states"
+LOOP_FINER, TWINS_FINER = 0.01, 0.2
 """of the tolerance of the measured limit"""
+TWINS = "growth of the difference of twin runs from the operating point, one of them struck by a pulse"
+OTHER_PULSE = 4.0
+"""by which pulses differ whose limits are compared"""
+
+Growth = Callable[[float], float]
+"""Of what is small, by the value of the quantity [1/s]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,46 +60,102 @@ def radius(loop: HoverLoop, scenario: Scenario, of: str, value: float) -> float:
 
 
 def local_limits(varied: Varied, span: Range) -> Local:
-    """The local limit of a quantity: of the quadrotor by linear theory, of any other system by perturbed twin runs."""
-    if isinstance(varied.request, Scenario):
-        return about_hover(varied.request, varied.of)
-    if not varied.system.operating_point:
-        return Local(reason="no local limit: the system file names no operating_point")
-    return _by_twins(varied, span)
+    """The local limit of a quantity, through saved states where the FMUs have them, else by perturbed twin runs."""
+    scenario = varied.request
+    if not isinstance(scenario, Scenario):
+        if not varied.system.operating_point:
+            return Local(reason="no local limit: the system file names no operating_point")
+        return about_rest(varied.at, span)
+    if varied.of in ("jitter", "loss"):
+        return Local(reason=f"linear theory has no local limit of {varied.of}")
+    why = "the quantity is neither period nor delay"
+    try:
+        if varied.of in ("period", "delay"):
+            return about_hover(scenario, varied.of)
+    except UsageError as error:
+        why = str(error)
+    return _without_hover_loop(scenario, varied, span, why)
 
 
 def about_hover(scenario: Scenario, of: str) -> Local:
-    """The local limits of the quadrotor by linear theory, inside its boundary layer and just outside of it."""
-    if of not in ("period", "delay"):
-        return Local(reason=f"linear theory has no local limit of {of}")
+    """The local limits of the quadrotor in period or delay, inside its boundary layer and just outside of it.
+
+    Raises `UsageError` for a scenario whose loop about hover cannot be had.
+    """
     if scenario.timing.hold != "zero":
-        return Local(reason="the linear loop is for zero-order hold only")
-    try:
-        loop = HoverLoop.of(scenario)
-    except UsageError as error:
-        return Local(reason=str(error))
+        raise UsageError("the loop about hover is for zero-order hold only")
+    loop = HoverLoop.of(scenario)
     edge = at_edge(scenario)
     limit = local_limit(loop, scenario, of)
     return Local(
         limit=limit,
         outside=None if edge is None else local_limit(loop.with_law(edge), edge, of),
-        method=LINEAR,
-        accuracy=None if limit is None else LINEAR_ACCURACY * limit,
+        method=HOVER,
+        accuracy=None if limit is None else HOVER_ACCURACY * limit,
         reason="the spectral radius about hover stays below one in the range, or above",
     )
 
 
-def _by_twins(varied: Varied, span: Range) -> Local:
-    """By the growth of the difference of twin runs, up through the scan, and bisected."""
-    width, instances = span.tolerance * FINER, Instances()
+def _without_hover_loop(scenario: Scenario, varied: Varied, span: Range, why: str) -> Local:
+    """The quadrotor as any other system, and why."""
     try:
-        bracket = first_failure(lambda value: growth_of(varied.at(value), instances).rate > 0.0, span.values(), width)
+        hover = at_hover(scenario)
     except UsageError as error:
+        return Local(reason=f"no local limit: {error}")
+    found = about_rest(lambda value: with_values(hover, dict.fromkeys(varied.paths, value)), span)
+    if found.method is None:
+        return replace(found, reason=f"{found.reason} ({why})")
+    return replace(found, method=f"{found.method} ({why})")
+
+
+def about_rest(at: Callable[[float], System], span: Range) -> Local:
+    """The local limit of any system, `at` each value of the quantity."""
+    instances = Instances()
+    try:
+        return _through_saved_states(at, span, instances)
+    except NotAtRest as error:
+        return Local(reason=f"no local limit: {error}")
+    except (UsageError, SimulatorError) as error:
+        why = str(error)
+    finally:
+        instances.close()
+    instances = Instances()
+    try:
+        found = _by_twins(at, span, instances)
+    except (UsageError, SimulatorError) as error:
         return Local(reason=f"no local limit: {error}")
     finally:
         instances.close()
+    return replace(found, method=f"{TWINS}, as saved states do not serve: {why}")
+
+
+def _through_saved_states(at: Callable[[float], System], span: Range, instances: Instances) -> Local:
+    """Its accuracy is what other pulses would make of it, beside the bracket."""
+    growths: dict[float, float] = {}
+
+    def growth(value: float) -> float:
+        growths[value] = found = growth_of_loop(at(value), instances)
+        return found
+
+    found = _first_growth(growth, span, LOOP_FINER, LOOP)
+    if found.limit is None or found.accuracy is None:
+        return found
+    below, above = (max(v for v in growths if v < found.limit), min(v for v in growths if v > found.limit))
+    slope = (growths[above] - growths[below]) / (above - below)
+    apart = abs(growth_of_loop(at(below), instances, OTHER_PULSE * PULSE) - growths[below])
+    return replace(found, accuracy=found.accuracy + apart / slope)
+
+
+def _by_twins(at: Callable[[float], System], span: Range, instances: Instances) -> Local:
+    return _first_growth(lambda value: growth_of(at(value), instances).rate, span, TWINS_FINER, TWINS)
+
+
+def _first_growth(growth: Growth, span: Range, finer: float, method: str) -> Local:
+    """Where what is small first grows, up through the scan, and bisected."""
+    width = span.tolerance * finer
+    bracket = first_failure(lambda value: growth(value) > 0.0, span.values(), width)
     if bracket is None or bracket.good is None:
         return Local(
-            method=TWINS, reason=f"what is small {'decays' if bracket is None else 'grows'} throughout the range"
+            method=method, reason=f"what is small {'decays' if bracket is None else 'grows'} throughout the range"
         )
-    return Local(limit=0.5 * (bracket.good + bracket.bad), method=TWINS, accuracy=width, reason="")
+    return Local(limit=0.5 * (bracket.good + bracket.bad), method=method, accuracy=width, reason="")

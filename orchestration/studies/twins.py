@@ -22,16 +22,14 @@ from orchestration.fmi.instance import Instance, Loader
 from orchestration.fmi.reuse import Instances
 from orchestration.simulation import prepared
 from orchestration.simulator import Floats, Transfer
-from orchestration.system.model import Component, Criterion, System
-from orchestration.system.paths import changed
+from orchestration.studies.at_rest import calmed, common_period, exchanged, expect_rest, latest_offset, longest_period
+from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 
 PULSE = 1e-6
 """of an input: of its value, or absolute where that is smaller than 1"""
 LARGE, SMALL = 1e3, 1e-7
 """of what the pulse has made: sizes between which the difference is followed, linear and above what rounding leaves"""
-AT_REST = 1e-6
-"""what may move in the first periods of the run that nothing strikes"""
 FEWEST, MOST = 100, 400
 """instants of a run at which the twins are compared"""
 DELAYS = 24
@@ -56,9 +54,13 @@ class Growth:
 
 def growth_of(system: System, instances: Instances) -> Growth:
     """The growth about the operating point of `system`; raises `UsageError` where the system does not rest there."""
-    nominal, interval = _at_rest(system)
+    nominal = calmed(system)
+    period = common_period(nominal) or longest_period(nominal)
+    horizon = max(exact_nanoseconds(nominal.stop_time), FEWEST * period)
+    nominal = replace(nominal, stop_time=float(horizon) / NANOSECONDS)
+    interval = period * max(1, math.floor(horizon / period / MOST))
     calm, struck = (_exchanged(nominal, load, interval) for load in (instances.load, _striking(instances)))
-    _expect_rest(nominal, calm)
+    expect_rest(nominal, calm[1:6])
     count = min(len(calm), len(struck))
     scale = np.maximum(1.0, np.abs(calm[0]))
     difference = (struck[:count] - calm[:count]) / scale
@@ -107,46 +109,6 @@ def _between(size: Floats, begin: int, end: int) -> float:
     return math.log(float(size[end] / size[begin])) / (end - begin)
 
 
-def _at_rest(system: System) -> tuple[System, Fraction]:
-    """`system` at its operating point with nothing random, and the time between instants that are compared [ns]."""
-    chosen = changed(system, system.operating_point)
-    interval = _period(chosen)
-    horizon = max(exact_nanoseconds(chosen.stop_time), FEWEST * interval)
-    return replace(
-        chosen,
-        stop_time=float(horizon) / NANOSECONDS,
-        components={name: _punctual(component) for name, component in chosen.components.items()},
-        connections=tuple(
-            replace(x, delay_jitter=0.0, loss=0.0, burst_length=None, noise={}, quantisation={})
-            for x in chosen.connections
-        ),
-        sources={
-            name: source if source.noise is None else replace(source, noise=0.0)
-            for name, source in chosen.sources.items()
-        },
-        objectives={},
-        criterion=Criterion(diverged=chosen.criterion.diverged),
-    ), interval * max(1, math.floor(horizon / interval / MOST))
-
-
-def _punctual(component: Component) -> Component:
-    if component.sampling is None:
-        return replace(component, record=())
-    return replace(component, record=(), sampling=replace(component.sampling, jitter=0.0))
-
-
-def _period(system: System) -> Fraction:
-    """The time after which all sampled components are due together again, or the longest period if that is long."""
-    periods = [
-        exact_nanoseconds(one.sampling.period) / Fraction(one.sampling.clock_ratio)
-        for one in system.components.values()
-        if one.sampling is not None
-    ] or [exact_nanoseconds(one.step) for one in system.components.values() if one.step is not None]
-    denominator = math.lcm(*(period.denominator for period in periods))
-    together = Fraction(math.lcm(*(int(period * denominator) for period in periods)), denominator)
-    return together if together <= 20 * max(periods) else max(periods)
-
-
 def _exchanged(system: System, load: Loader, interval: Fraction) -> Floats:
     """What connections carry at each instant that is compared, shape (n, signals)."""
     with prepared(system, load=load) as simulation:
@@ -155,24 +117,11 @@ def _exchanged(system: System, load: Loader, interval: Fraction) -> Floats:
         result = simulation.result()
     times = np.round(result.rows[:, 0] * NANOSECONDS).astype(np.int64)
     count = math.floor(Fraction(int(times[-1])) / interval)  # at the stop itself nobody samples
-    offsets = [exact_nanoseconds(c.sampling.offset) for c in system.components.values() if c.sampling is not None]
-    instants = [math.floor(max(offsets, default=Fraction(0)) + k * interval) + 1 for k in range(count)]
+    instants = [math.floor(latest_offset(system) + k * interval) + 1 for k in range(count)]
     rows = np.searchsorted(times, instants, side="right") - 1
-    columns = [result.columns.index(name) for name in _signals(system)]
+    columns = [result.columns.index(name) for name in exchanged(system)]
     found: Floats = result.rows[rows][:, columns]
     return found
-
-
-def _signals(system: System) -> Sequence[str]:
-    return tuple(dict.fromkeys(start for x in system.connections for start in x.start))
-
-
-def _expect_rest(system: System, calm: Floats) -> None:
-    first = calm[1 : min(6, len(calm))]
-    moved = np.abs(first - first[0]).max(axis=0) / np.maximum(1.0, np.abs(first[0]))
-    worst = int(moved.argmax())
-    if moved[worst] > AT_REST:
-        raise UsageError(f"the operating point is not at rest: {_signals(system)[worst]} moves by {moved[worst]:.2g}")
 
 
 def _striking(instances: Instances) -> Loader:

@@ -557,13 +557,6 @@ def test_a_mass_mismatch_has_no_local_limit_and_says_why() -> None:
     assert len(found.note.splitlines()) == 1
 
 
-@pytest.mark.usefixtures("stubbed")
-def test_with_a_first_order_hold_there_is_no_local_limit() -> None:
-    found = find(scenario_of(hold="first"), "period")
-    assert found.local_limit is None
-    assert "zero-order hold only" in found.note
-
-
 def test_find_flies_the_scenario_and_its_result_is_json() -> None:
     base = dataclasses.replace(hover_of(short(stop_time=2.0, plant_interval=0.01)), stop_time=2.0)
     base = base.with_changes(parameters={"plant.initial.position.x": 0.005})

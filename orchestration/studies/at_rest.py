@@ -1,0 +1,94 @@
+"""A system at its operating point: nothing random, nothing rounded, and whether it rests there."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+
+from orchestration.errors import UsageError
+from orchestration.simulator import Floats
+from orchestration.system.model import Component, Criterion, System
+from orchestration.system.paths import changed
+from orchestration.system.times import exact_nanoseconds
+
+AT_REST = 1e-6
+"""what may move in the first periods of the run that nothing strikes"""
+TOGETHER = 20
+"""longest periods, after which sampled components are due together again at the latest"""
+
+
+class NotAtRest(UsageError):
+    """The operating point is none, whatever the method."""
+
+
+def calmed(system: System) -> System:
+    """`system` at its operating point, punctual and without loss, noise, quantisation and objectives."""
+    chosen = changed(system, system.operating_point)
+    return replace(
+        chosen,
+        components={name: _punctual(component) for name, component in chosen.components.items()},
+        connections=tuple(
+            replace(x, delay_jitter=0.0, loss=0.0, burst_length=None, noise={}, quantisation={})
+            for x in chosen.connections
+        ),
+        sources={
+            name: source if source.noise is None else replace(source, noise=0.0)
+            for name, source in chosen.sources.items()
+        },
+        objectives={},
+        criterion=Criterion(diverged=chosen.criterion.diverged),
+    )
+
+
+def _punctual(component: Component) -> Component:
+    if component.sampling is None:
+        return replace(component, record=())
+    return replace(component, record=(), sampling=replace(component.sampling, jitter=0.0))
+
+
+def longest_period(system: System) -> Fraction:
+    """Of all sampled components, or the longest step where none is sampled [ns]."""
+    return max(_periods(system))
+
+
+def common_period(system: System) -> Fraction | None:
+    """The time after which all sampled components are due together again [ns]; None: not within `TOGETHER`."""
+    periods = _periods(system)
+    denominator = math.lcm(*(period.denominator for period in periods))
+    together = Fraction(math.lcm(*(int(period * denominator) for period in periods)), denominator)
+    return together if together <= TOGETHER * max(periods) else None
+
+
+def _periods(system: System) -> list[Fraction]:
+    return [
+        exact_nanoseconds(one.sampling.period) / Fraction(repr(float(one.sampling.clock_ratio)))
+        for one in system.components.values()
+        if one.sampling is not None
+    ] or [exact_nanoseconds(one.step) for one in system.components.values() if one.step is not None]
+
+
+def latest_offset(system: System) -> Fraction:
+    """True time of the first sample of the component that begins last [ns]."""
+    return max(
+        (
+            exact_nanoseconds(one.sampling.offset) / Fraction(repr(float(one.sampling.clock_ratio)))
+            for one in system.components.values()
+            if one.sampling is not None
+        ),
+        default=Fraction(0),
+    )
+
+
+def exchanged(system: System) -> Sequence[str]:
+    """The signals that connections carry."""
+    return tuple(dict.fromkeys(start for x in system.connections for start in x.start))
+
+
+def expect_rest(system: System, calm: Floats) -> None:
+    """Raise `NotAtRest` for a signal of `exchanged` that moves; rows a period apart, shape (n, signals)."""
+    moved = np.abs(calm - calm[0]).max(axis=0) / np.maximum(1.0, np.abs(calm[0]))
+    worst = int(moved.argmax())
+    if moved[worst] > AT_REST:
+        raise NotAtRest(f"the operating point is not at rest: {exchanged(system)[worst]} moves by {moved[worst]:.2g}")

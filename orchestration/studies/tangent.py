@@ -1,0 +1,251 @@
+"""A component about a point where it rests, as a linear simulator: its derivatives, measured through saved states.
+
+What an FMU saves is opaque. So a state near rest is made by a pulse on an input, and known by what the outputs do
+afterwards, the inputs at rest again: those are its coordinates, reduced by their singular values to as many as there
+are. What no input moves, or no output shows, is no part of a loop. Restored to such states, the component shows the
+derivatives of a step of any length.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from orchestration.errors import UsageError
+from orchestration.fmi.instance import Instance
+from orchestration.simulator import Floats, Transfer
+from orchestration.system.times import NANOSECONDS
+
+PULSE = 1e-6
+"""of an input, both ways: of its value, or absolute where that is smaller than 1"""
+LARGEST = 1e-2
+"""of an output, likewise: what a pulse may make of it; later outputs are not looked at"""
+NOISE = 100.0 * np.finfo(float).eps
+"""of an output, likewise: what rounding may make of it"""
+SEEN = 1e-11
+"""of the largest singular value: what is smaller is none"""
+FEWEST = 6
+"""points of the ladder at which states are made at least"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rest:
+    """An instance that has come to rest, and what was done to it last."""
+
+    fmu: Instance
+    inputs: tuple[str, ...]
+    """Reals that a connection feeds"""
+    held: Floats
+    """their values"""
+    outputs: tuple[str, ...]
+    """Reals that a connection takes"""
+    time: float
+    """at which it is to be stepped next, in its own seconds"""
+
+
+@dataclass(frozen=True)
+class _State:
+    saved: bytes
+    time: float
+
+
+_Pair = tuple[_State, _State]
+"""A state after a pulse up, and after one down"""
+
+
+class Tangent:
+    """A component about rest; as a `Simulator` it is linear, and begins at rest.
+
+    `ladder` are the lengths of the steps [s] that make and tell states; where the component takes steps of a `unit`
+    only, whole numbers of it. Raises `UsageError` for a component of which these show less than there is.
+    """
+
+    def __init__(self, rest: Rest, ladder: Sequence[float], pulse: float = PULSE, *, unit: float | None = None) -> None:
+        self._unit = unit
+        self._fmu, self._inputs, self._names, self._outputs = rest.fmu, rest.inputs, rest.fmu.name, rest.outputs
+        self._held, self._given = rest.held, rest.held.copy()
+        self._write = rest.fmu.writer(rest.inputs, self._given)
+        self._found: Floats = np.zeros(len(rest.outputs))
+        self._read = rest.fmu.reader(rest.outputs, self._found)
+        self._pulse = pulse * np.maximum(1.0, np.abs(rest.held))
+        self._time = rest.time
+        self._rest = _State(rest.fmu.save(), rest.time)
+        self._read()
+        self._weight = np.maximum(1.0, np.abs(self._found))
+        self._ladder = list(ladder)
+        self._known: dict[int, tuple[Floats, Floats]] = {}
+        self._find_coordinates()
+        self.state: Floats = np.zeros(len(self._axes.T))
+        self.input: Floats = np.zeros(len(rest.inputs))
+        self._output: Floats = np.zeros(len(rest.outputs))
+
+    # -- a linear simulator --------------------------------------------------------------------------------------
+
+    def reader(self, names: Sequence[str], into: Floats) -> Transfer:
+        """As `Simulator`; what is no Real stays."""
+        chosen = [(i, self._outputs.index(name)) for i, name in enumerate(names) if name in self._outputs]
+        to, places = [i for i, _ in chosen], [place for _, place in chosen]
+
+        def read() -> None:
+            into[to] = self._output[places]
+
+        return read
+
+    def writer(self, names: Sequence[str], source: Floats) -> Transfer:
+        """As `Simulator`; what is no Real is left out."""
+        chosen = [(i, self._inputs.index(name)) for i, name in enumerate(names) if name in self._inputs]
+        of, places = [i for i, _ in chosen], [place for _, place in chosen]
+
+        def write() -> None:
+            self.input[places] = source[of]
+
+        return write
+
+    def enter_initialization(self, start: float, stop: float) -> None:
+        """At rest it is already."""
+
+    def exit_initialization(self) -> None:
+        """At rest it is already."""
+
+    def step(self, t: float, h: float) -> None:
+        """The same at any time."""
+        by_state, by_input = self._derivatives(h)
+        found = by_state @ self.state + by_input @ self.input
+        self._output[:] = found[: len(self._output)]
+        self.state[:] = found[len(self._output) :]
+
+    def save(self) -> bytes:
+        """State and inputs."""
+        return np.concatenate([self.state, self.input]).tobytes()
+
+    def restore(self, state: bytes) -> None:
+        """Put them back."""
+        self.state[:], self.input[:] = np.split(np.frombuffer(state), [len(self.state)])
+
+    # -- what it is made of --------------------------------------------------------------------------------------
+
+    def _short_enough(self, ladder: Sequence[float]) -> list[float]:
+        """`ladder` as long as what pulses make stays small."""
+        longest = len(ladder)
+        for i in range(len(self._inputs)):
+            up, down = (self._outputs_after(self._rest, self._pulses(i, sign), ladder[:longest]) for sign in (1, -1))
+            large = np.abs(up - down).max(axis=1, initial=0.0) > 2.0 * LARGEST
+            longest = min(longest, int(np.argmax(large))) if large.any() else longest
+        if longest < min(2, len(ladder)):
+            raise UsageError(f"{self._fmu.name}: a pulse of {PULSE:g} on its inputs becomes large within a step")
+        return list(ladder[:longest])
+
+    def _find_coordinates(self) -> None:
+        """As many points of the ladder as show states, and so many of these as have coordinates of their own."""
+        made, before, rank = [self._struck()], 0, 0
+        for shown in range(1, len(self._ladder) + 1):
+            self._shown = shown
+            columns = [self._futures(pairs) for pairs in made]
+            while not _is_spanned(columns) and len(made) < len(self._ladder):
+                later = self._coasted(made[-1], self._ladder[len(made)])
+                if later is None:
+                    break
+                made.append(later)
+                columns.append(self._futures(later))
+            futures = np.column_stack(columns)
+            rank = _rank(futures)
+            if rank == before and rank < len(futures):
+                break
+            before = rank
+        if 0 < rank == min(futures.shape):
+            raise UsageError(f"{self._fmu.name}: has more states than {len(made)} pulses and {self._shown} steps tell")
+        self._choose([pair for pairs in made for pair in pairs], futures, rank)
+
+    def _choose(self, pairs: Sequence[_Pair], futures: Floats, rank: int) -> None:
+        """The coordinates that `futures` span, and states that span them."""
+        self._axes = np.linalg.svd(futures, full_matrices=False)[0][:, :rank]
+        coordinates = self._axes.T @ futures
+        chosen = scipy.linalg.qr(coordinates, mode="r", pivoting=True)[1][:rank] if rank else []
+        self._pairs = [pairs[i] for i in chosen]
+        self._inverse = np.linalg.inv(coordinates[:, chosen]) if rank else np.zeros((0, 0))
+
+    def _derivatives(self, h: float) -> tuple[Floats, Floats]:
+        """Of the outputs after a step of `h` [s] and of the coordinates then: by coordinates, and by inputs."""
+        key = round(h * NANOSECONDS)
+        if key not in self._known:
+            by_pair = [self._difference([self._stepped(s, self._held, h) for s in pair]) for pair in self._pairs]
+            by_input = [
+                self._difference([self._stepped(self._rest, self._pulses(i, sign), h) for sign in (1, -1)])
+                / (self._pulse[i] / PULSE)
+                for i in range(len(self._inputs))
+            ]
+            size = len(self._outputs) + self._axes.shape[1]
+            after, moved = (np.column_stack(c) if c else np.zeros((size, 0)) for c in (by_pair, by_input))
+            self._known[key] = after @ self._inverse, moved
+        return self._known[key]
+
+    def _stepped(self, start: _State, held: Floats, h: float) -> tuple[Floats, _State]:
+        outputs = self._outputs_after(start, held, [h])[0]
+        return outputs, _State(self._fmu.save(), self._time)
+
+    def _difference(self, both: Sequence[tuple[Floats, _State]]) -> Floats:
+        """Outputs and coordinates after a step, by the unit of what was done up and down."""
+        (up, after_up), (down, after_down) = both
+        future = self._axes.T @ self._future((after_up, after_down))
+        found: Floats = np.concatenate([(up - down) / (2.0 * PULSE), future])
+        return found
+
+    def _struck(self) -> list[_Pair]:
+        """For each input the states after a pulse on it over the first step of the ladder."""
+        return [
+            (self._stepped(self._rest, self._pulses(i, 1), h)[1], self._stepped(self._rest, self._pulses(i, -1), h)[1])
+            for i, h in enumerate([self._ladder[0]] * len(self._inputs))
+        ]
+
+    def _coasted(self, pairs: Sequence[_Pair], h: float) -> list[_Pair] | None:
+        """The states `h` [s] later, the inputs at rest; None if one has become large."""
+        later = []
+        for pair in pairs:
+            (up, after_up), (down, after_down) = (self._stepped(state, self._held, h) for state in pair)
+            if np.abs((up - down) / self._weight).max(initial=0.0) > LARGEST:
+                return None
+            later.append((after_up, after_down))
+        return later
+
+    def _futures(self, pairs: Sequence[_Pair]) -> Floats:
+        columns = [self._future(pair) for pair in pairs]
+        return np.column_stack(columns) if columns else np.zeros((self._shown * len(self._outputs), 0))
+
+    def _future(self, pair: _Pair) -> Floats:
+        """The coordinates of a state before they are reduced: outputs at the points of the ladder, as differences."""
+        up, down = (self._outputs_after(state, self._held, self._ladder[: self._shown]) for state in pair)
+        found: Floats = ((up - down) / self._weight).ravel() / (2.0 * PULSE)
+        return found
+
+    def _pulses(self, i: int, sign: int) -> Floats:
+        held: Floats = self._held.copy()
+        held[i] += sign * self._pulse[i]
+        return held
+
+    def _outputs_after(self, start: _State, held: Floats, steps: Sequence[float]) -> Floats:
+        """Shape (steps, outputs); the inputs are `held` over all steps."""
+        self._fmu.restore(start.saved)
+        self._time, self._given[:] = start.time, held
+        self._write()
+        found: Floats = np.zeros((len(steps), len(self._outputs)))
+        for k, h in enumerate(steps):
+            count = 1 if self._unit is None else round(h / self._unit)
+            for _ in range(count):
+                self._fmu.step(self._time, h / count)
+                self._time += h / count
+            self._read()
+            found[k] = self._found
+        return found
+
+
+def _is_spanned(columns: Sequence[Floats]) -> bool:
+    """Whether the last states have not added a coordinate."""
+    return len(columns) >= FEWEST and _rank(np.column_stack(columns)) == _rank(np.column_stack(columns[:-2]))
+
+
+def _rank(futures: Floats) -> int:
+    if not futures.size:
+        return 0
+    values = np.linalg.svd(futures, compute_uv=False)
+    return int((values > max(SEEN * values[0], NOISE * np.sqrt(futures.size) / PULSE)).sum())
