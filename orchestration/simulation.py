@@ -193,11 +193,12 @@ def _seconds(time: int | None) -> float | None:
 
 
 def signals_of(source: str, system: System) -> tuple[str, ...]:
-    """The names by which the signals of a source are recorded."""
+    """The names by which the signals of a source are recorded: those of the inputs, unless it feeds two of one name."""
     described = system.sources[source]
     if described.trajectory is not None:
         return tuple(f"{source}.position.{axis}" for axis in "xyz")
-    names = [variable_of(end) for end in described.to]
+    variables = [variable_of(end) for end in described.to]
+    names = [end if variables.count(variable_of(end)) > 1 else variable_of(end) for end in described.to]
     return tuple(name if name.startswith(f"{source}.") else f"{source}.{name}" for name in names)
 
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from fractions import Fraction
 from typing import Protocol
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from fmu_kit.scalar import ScalarOps
 from fmu_kit.trajectory import Trajectory
 from orchestration.simulator import Floats
-from orchestration.system.times import NANOSECONDS, nanoseconds
+from orchestration.system.times import NANOSECONDS, Grid, exact_nanoseconds
 
 
 class Values(Protocol):
@@ -85,7 +86,8 @@ class WhiteNoise:
     """
 
     def __init__(self, intensity: float, period: float, count: int, stream: np.random.Generator) -> None:
-        self._sigma, self._period, self._count = math.sqrt(intensity / period), nanoseconds(period), count
+        self._sigma, self._period, self._count = math.sqrt(intensity / period), exact_nanoseconds(period), count
+        self._grid = Grid(Fraction(0), self._period)  # the agenda's
         self._stream, self._drawn = stream, np.zeros((0, count))
 
     def at(self, t: float) -> Sequence[float]:
@@ -95,12 +97,14 @@ class WhiteNoise:
 
     def over(self, t: Floats) -> Floats:
         """The values held at times `t`."""
-        indices = (np.round(t * NANOSECONDS).astype(np.int64)) // self._period
+        indices = np.array([self._index(time) for time in t.tolist()])
         result: Floats = self._upto(int(indices.max()))[indices]
         return result
 
     def _index(self, t: float) -> int:
-        return round(t * NANOSECONDS) // self._period
+        time = round(t * NANOSECONDS)
+        k = time * self._period.denominator // self._period.numerator
+        return k + (self._grid[k + 1] <= time)
 
     def _upto(self, index: int) -> Floats:
         while len(self._drawn) <= index:
