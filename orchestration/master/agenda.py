@@ -4,6 +4,7 @@ All of it follows from the system, the stop time and the seed; no value of a sig
 """
 
 import heapq
+import itertools
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -46,6 +47,10 @@ class Due(NamedTuple):
     """what it reads of components in continuous time, each `sent` when it was measured"""
     sent: tuple[Message, ...]
     """what it sends; a message whose arrival is this instant is delivered at once"""
+
+
+_made = tuple.__new__
+"""Makes a named tuple from a tuple, as its class does by way of a Python function: there is one for each message"""
 
 
 class Instant:
@@ -106,8 +111,8 @@ class _Link:
     index: int
     name: str
     delay: int
-    late: Lateness
-    lost: Losses
+    late: Lateness | None
+    lost: Losses | None
     jacobi: bool
     align: FixedStep | None
     longest: int
@@ -117,23 +122,27 @@ class _Link:
 
     def message(self, k: int, sent: int) -> Message:
         """The next message, sent at `sent` [ns]."""
-        lost, late = self.lost(), self.late()
+        lost = self.lost is not None and self.lost()
+        arrival = sent + self.delay if self.late is None else sent + self.delay + self.late()
         if lost:
-            return Message(self.index, k, sent, None)
-        arrival = max(sent + self.delay + late, self.last)
+            return _made(Message, (self.index, k, sent, None))
+        if arrival < self.last:
+            arrival = self.last
         if self.align is not None:
             arrival = self.align.aligned(arrival, f"an arrival over connections.{self.name}")
         self.last = arrival
-        return Message(self.index, k, sent, arrival)
+        return _made(Message, (self.index, k, sent, arrival))
 
     def measurement(self, k: int, sample: int) -> Message:
         """The message for a sample at `sample` [ns], `sent` when it is measured."""
-        lost, late = self.lost(), self.late()
-        taken = max(sample - self.delay - late, self.last)
+        lost = self.lost is not None and self.lost()
+        taken = sample - self.delay if self.late is None else sample - self.delay - self.late()
+        if taken < self.last:
+            taken = self.last
         if self.align is not None:
             taken = self.align.aligned(taken, f"a measurement over connections.{self.name}")
         self.last = taken
-        return Message(self.index, k, taken, None if lost else sample)
+        return _made(Message, (self.index, k, taken, None if lost else sample))
 
 
 @dataclass(kw_only=True)
@@ -143,13 +152,16 @@ class _Task:
     index: int
     name: str
     rank: int
-    grid: Grid
-    late: Lateness
+    nominal: Iterator[int]
+    """the times of the samples to come, were none of them late [ns]"""
+    late: Lateness | None
     incoming: list[_Link]
     outgoing: list[_Link]
     align: list[FixedStep]
     halts: int
     """components in continuous time that it reads at its sampling instant, as bits"""
+    reads_ahead: bool
+    """whether any of what it receives is measured before"""
     ahead: int
     """how long before a sample its earliest measurement may be taken [ns]"""
     stop: int
@@ -159,24 +171,27 @@ class _Task:
     drawn: deque[Due] = field(default_factory=deque)
 
     def instant(self, k: int) -> int:
-        """The true time of sample k [ns]; to be asked for in order."""
-        time = self.grid[k] + self.late()
-        while time < self.stop + self.ahead and (moved := self._aligned(time)) != time:
-            time = moved
-        if self.align and k > 0 and time == self.time < self.stop:
+        """The true time of sample k [ns]; to be asked for in order, once."""
+        time = next(self.nominal)
+        if self.late is not None:
+            time += self.late()
+        return self._aligned(time, k) if self.align else time
+
+    def _aligned(self, time: int, k: int) -> int:
+        before = None
+        while time < self.stop + self.ahead and time != before:
+            before = time
+            for fixed in self.align:
+                time = fixed.aligned(time, f"a sample of components.{self.name}")
+        if k > 0 and time == self.time < self.stop:
             raise UsageError(
                 f"samples {k - 1} and {k} of components.{self.name} both move to t = {_seconds(time)} s, the next "
                 f"point of components.{self.align[-1].name}: expected a period that leaves one for each"
             )
         return time
 
-    def _aligned(self, time: int) -> int:
-        for fixed in self.align:
-            time = fixed.aligned(time, f"a sample of components.{self.name}")
-        return time
 
-
-_CHANGE, _POINT, _MEASURE, _ARRIVE, _DUE = range(5)
+_CHANGE, _POINT, _MEASURE, _ARRIVE, _DUE, _END = range(6)
 
 
 class Agenda(Iterator[Instant]):
@@ -193,27 +208,29 @@ class Agenda(Iterator[Instant]):
         self._names = list(system.components)
         self._plan = plan = Plan(system)
         self._heap: list[tuple[int, int, int, int, Any]] = []
-        self._serial = 0
+        self._serial = itertools.count()
         self._finished = False
         self._handlers: tuple[Callable[[int, Any, Instant], int], ...] = (
-            self._change, self._point, self._measure, self._arrive, self._sample,
+            self._change, self._point, self._measure, self._arrive, self._sample, self._end,
         )  # fmt: skip
         self._order = [self._names.index(name) for name in plan.continuous]
         self._ordered: dict[int, tuple[int, ...]] = {}
-        self._grids = {
-            i: Grid(Fraction(0), exact_nanoseconds(system.components[self._names[i]].step or 0.0)) for i in self._order
+        self._points = {
+            i: iter(Grid(Fraction(0), exact_nanoseconds(system.components[self._names[i]].step or 0.0)))
+            for i in self._order
         }
         self._sender = [self._names.index(x.sender) for x in system.connections]
         receivers = [self._names.index(x.receiver) for x in system.connections]
-        self._halt_of_receiver = [1 << i if i in self._grids else 0 for i in receivers]
+        self._halt_of_receiver = [1 << i if i in self._points else 0 for i in receivers]
         for each in (fixed or {}).values():
             each.expect_end(self.stop)
         links = self._links(system, streams, fixed or {})
         self._posted = {i: [links[j] for j in plan.posted if self._sender[j] == i] for i in self._order}
         self._tasks = self._sampled(system, streams, links, receivers, fixed or {})
         self._sources = self._changing(system)
-        for i in self._order:
-            self._push(0, _POINT, i, 0)
+        self._push(self.stop, _END, 0, None)
+        for i, points in self._points.items():
+            self._push(next(points), _POINT, i, 0)
         for task in self._tasks.values():
             task.time = task.instant(0)
             self._draw(task)
@@ -224,14 +241,10 @@ class Agenda(Iterator[Instant]):
             raise StopIteration
         heap, handlers, time = self._heap, self._handlers, self.next_time()
         instant, halts = Instant(time), 0
-        self._finished = time == self.stop
-        while heap and heap[0][0] == time:
+        while heap[0][0] == time:
             _, phase, which, _, item = heap[0]
             halts |= handlers[phase](which, item, instant)
         self.count += 1
-        if self._finished:
-            halts = (1 << len(self._names)) - 1
-            instant.due = ()
         if halts:
             ordered = self._ordered.get(halts)
             if ordered is None:
@@ -243,16 +256,14 @@ class Agenda(Iterator[Instant]):
         """The time of the instant that comes next [ns]; the first is the start."""
         if self.count == 0:
             return 0
-        return min(self._heap[0][0], self.stop) if self._heap else self.stop
+        return self._heap[0][0]
 
     def _push(self, time: int, phase: int, which: int, item: Any) -> None:
-        self._serial += 1
-        heapq.heappush(self._heap, (time, phase, which, self._serial, item))
+        heapq.heappush(self._heap, (time, phase, which, next(self._serial), item))
 
     def _push_instead(self, time: int, phase: int, which: int, item: Any) -> None:
         """In place of the item that comes first."""
-        self._serial += 1
-        heapq.heapreplace(self._heap, (time, phase, which, self._serial, item))
+        heapq.heapreplace(self._heap, (time, phase, which, next(self._serial), item))
 
     # -- what happens: each takes its item off the heap and note of it in the instant, and says who must halt, as bits
 
@@ -262,7 +273,7 @@ class Agenda(Iterator[Instant]):
         return halts
 
     def _point(self, component: int, k: int, instant: Instant) -> int:
-        self._push_instead(self._grids[component][k + 1], _POINT, component, k + 1)
+        self._push_instead(next(self._points[component]), _POINT, component, k + 1)
         halts = 1 << component
         for link in self._posted[component]:
             message = link.message(k, instant.time)
@@ -292,6 +303,13 @@ class Agenda(Iterator[Instant]):
             halts |= self._under_way(message, instant.time)
         return halts
 
+    def _end(self, which: int, item: None, instant: Instant) -> int:
+        """Everybody halts, and nothing samples."""
+        self._finished = True
+        self._push_instead(self.stop + 1, _END, which, item)
+        instant.due = ()
+        return (1 << len(self._names)) - 1
+
     def _under_way(self, message: Message, time: int) -> int:
         """Have a message arrive later, unless it is lost or arrives at once."""
         if message.arrival is None:
@@ -306,14 +324,19 @@ class Agenda(Iterator[Instant]):
         while not task.drawn or task.drawn[-1].time - task.ahead < task.drawn[0].time:
             time, k = task.time, task.k
             task.k, task.time = k + 1, task.instant(k + 1)
-            received = tuple(link.measurement(k, time) for link in task.incoming)
-            for message in received:
-                if message.connection in self._plan.read_ahead:
-                    self._push(message.sent, _MEASURE, self._sender[message.connection], message)
-            sent = tuple(link.message(k, task.time if link.jacobi else time) for link in task.outgoing)
-            task.drawn.append(Due(task.index, k, time, task.time, received, sent))
+            received = tuple([link.measurement(k, time) for link in task.incoming])
+            if task.reads_ahead:
+                self._expect_measurements(received)
+            sent = tuple([link.message(k, task.time if link.jacobi else time) for link in task.outgoing])
+            task.drawn.append(_made(Due, (task.index, k, time, task.time, received, sent)))
             if task.ahead == 0:
                 return
+
+    def _expect_measurements(self, messages: tuple[Message, ...]) -> None:
+        """Have those taken that are not read at the sample itself."""
+        for message in messages:
+            if message.connection in self._plan.read_ahead:
+                self._push(message.sent, _MEASURE, self._sender[message.connection], message)
 
     # -- how it is made --------------------------------------------------------------------------------------------
 
@@ -352,12 +375,15 @@ class Agenda(Iterator[Instant]):
                 index=index,
                 name=name,
                 rank=rank,
-                grid=Grid(exact_nanoseconds(sampling.offset) / ratio, exact_nanoseconds(sampling.period) / ratio),
+                nominal=iter(
+                    Grid(exact_nanoseconds(sampling.offset) / ratio, exact_nanoseconds(sampling.period) / ratio)
+                ),
                 late=lateness(largest, sampling.jitter_distribution, partial(streams.of, f"components.{name}", JITTER)),
                 incoming=incoming,
                 outgoing=[links[i] for i in self._plan.commanded if self._sender[i] == index],
                 align=[fixed[partner] for partner in sorted(partners) if partner in fixed],
                 halts=sum(1 << sender for sender in read_now),
+                reads_ahead=any(link.index in self._plan.read_ahead for link in incoming),
                 ahead=ahead,
                 stop=self.stop,
             )
@@ -372,7 +398,7 @@ class Agenda(Iterator[Instant]):
             receivers = {self._names.index(end.partition(".")[0]) for end in source.to}
             found[i] = (
                 Grid(Fraction(0), exact_nanoseconds(source.period)),
-                sum(1 << j for j in receivers if j in self._grids),
+                sum(1 << j for j in receivers if j in self._points),
             )
             self._push(found[i][0][1], _CHANGE, i, 1)  # the value of the start is that of initialisation
         return found

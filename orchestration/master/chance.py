@@ -15,20 +15,20 @@ Losses = Callable[[], bool]
 """Whether the next message is lost"""
 
 
-def lateness(largest: int, distribution: str, stream: Stream) -> Lateness:
-    """Latenesses in [0, `largest`] ns; nothing is drawn if that is 0."""
+def lateness(largest: int, distribution: str, stream: Stream) -> Lateness | None:
+    """Latenesses in [0, `largest`] ns; None if that is 0."""
     if largest == 0:
-        return lambda: 0
+        return None
     draw = stream().random
     if distribution == "normal":
         return lambda: math.floor(cut_normal(draw()) * largest)
     return lambda: math.floor(draw() * largest)
 
 
-def losses(probability: float, burst_length: float | None, stream: Stream) -> Losses:
-    """Losses, independent or in bursts of a mean length (Gilbert-Elliott); nothing is drawn without any."""
+def losses(probability: float, burst_length: float | None, stream: Stream) -> Losses | None:
+    """Losses, independent or in bursts of a mean length (Gilbert-Elliott); None if nothing is ever lost."""
     if probability == 0.0:
-        return lambda: False
+        return None
     draw = stream().random
     if burst_length is None or probability == 1.0:
         return lambda: draw() < probability

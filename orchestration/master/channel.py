@@ -40,6 +40,9 @@ class Channel:
         self._extrapolates = connection.hold == "first"
         self._in_flight: dict[int, Floats] = {}
         self._applied: list[tuple[int, Floats]] = []  # the last two, with their times, of a first-order hold
+        self._sent: Floats | None = None
+        if isinstance(places, slice) and self._plain and not (self._noisy or len(self._rounded) or self._extrapolates):
+            self._sent = row[places]  # a view: what is sent at any time, and arrives as it is
 
     def pass_on(self) -> None:
         """The sender's values as they are reach the receiver: at initialisation, and over a plain wire."""
@@ -66,6 +69,16 @@ class Channel:
         if not self._plain:
             self._convert(value)
         return value
+
+    def hand_over(self, time: int, *, lost: bool) -> None:
+        """A message that arrives, unless it is lost, at the time at which it is sent [ns]."""
+        if lost:
+            self.skip()
+        elif self._sent is not None:
+            np.copyto(self.received, self._sent)
+            self._write()
+        else:
+            self.apply(self.take(), time)
 
     def skip(self) -> None:
         """Noise is drawn for each variable of each message, lost or not, so that nothing shifts another's numbers."""

@@ -103,10 +103,12 @@ class Master:
         self.now = 0
         self._system, self._simulators, self._agenda = system, simulators, agenda
         self._plan = plan = Plan(system)
+        self._read_ahead = plan.read_ahead
         self._names = names = list(system.components)
         self._sources, self._interrupted, self.recorder = list(sources), interrupted, recorder
         self.columns = (*board.columns, *(signal for signals, _ in self._sources for signal in signals))
         """of every row: those of the board, then the signals of the sources"""
+        self._row = board.row.data.cast("B")
         self._rows = bytearray()  # not handed over yet, and the times of the events may lie before them
         self._chunk = ROWS * board.row.nbytes
         self._handed_over = False
@@ -233,6 +235,7 @@ class Master:
     def _step_bodies(self, time: int, halts: Sequence[int]) -> None:
         """Components in continuous time reach `time`; divergence is noticed before any value is passed on."""
         moved = False
+        t = time / NANOSECONDS
         for index in halts:
             body = self._bodies[index]
             start = body.now
@@ -244,10 +247,10 @@ class Master:
             body.step(start / NANOSECONDS, (time - start) / NANOSECONDS)
             self.steps += 1
             body.read()
-            body.expect_finite(time / NANOSECONDS)
+            body.expect_finite(t)
             moved = True
         if moved:
-            self._look(time / NANOSECONDS)
+            self._look(t)
 
     def _look(self, t: float) -> None:
         complaint = self._watch(t)
@@ -305,36 +308,34 @@ class Master:
     def _sense(self, due: Due, time: int) -> None:
         """The sample reads what it measures itself."""
         for message in due.received:
-            lost = message.arrival is None
-            self._events += (message.sent, SAMPLED, message.connection, message.k)
-            if lost:
-                self._events += (message.sent, LOST, message.connection, message.k)
-            channel = self._channels[message.connection]
-            if message.connection not in self._plan.read_ahead:
-                channel.send(message.k, lost=lost)
-            if not lost:
-                channel.deliver(message.k, time)
+            index, k, measured, arrival = message
+            channel = self._channels[index]
+            self._events += (measured, SAMPLED, index, k)
+            if arrival is None:
+                self._events += (measured, LOST, index, k)
+            if index not in self._read_ahead:
+                channel.hand_over(time, lost=arrival is None)
+            elif arrival is not None:
+                channel.deliver(k, time)
 
     def _send(self, due: Due, time: int) -> None:
-        """All messages take their values before any arrives."""
-        at_once = []
+        """What it sends are its outputs, which no arrival changes."""
         for message in due.sent:
             self._note_sending(message)
-            channel = self._channels[message.connection]
-            if message.arrival == time:
-                at_once.append((message, channel, channel.take()))
+            index, k, _, arrival = message
+            if arrival == time:
+                self._arrived += (time, ARRIVED, index, k)
+                self._channels[index].hand_over(time, lost=False)
             else:
-                channel.send(message.k, lost=message.arrival is None)
-        for message, channel, value in at_once:
-            self._arrived += (time, ARRIVED, message.connection, message.k)
-            channel.apply(value, time)
+                self._channels[index].send(k, lost=arrival is None)
 
     def _note_sending(self, message: Message) -> None:
-        if message.sent > self._agenda.stop:
+        index, k, sent, arrival = message
+        if sent > self._agenda.stop:
             return
-        self._events += (message.sent, SENT, message.connection, message.k)
-        if message.arrival is None:
-            self._events += (message.sent, LOST, message.connection, message.k)
+        self._events += (sent, SENT, index, k)
+        if arrival is None:
+            self._events += (sent, LOST, index, k)
 
     def _settle(self, time: int, halts: Sequence[int]) -> None:
         """What components in continuous time hold over the step that begins now."""
@@ -348,9 +349,8 @@ class Master:
                 feed.write(time / NANOSECONDS)
 
     def _record(self, time: int) -> None:
-        row = self.board.row
-        row[0] = time / NANOSECONDS
-        self._rows += row.data
+        self.board.row[0] = time / NANOSECONDS
+        self._rows += self._row
         if len(self._rows) >= self._chunk or len(self._events) >= 4 * EVENTS:
             self._hand_over()
 

@@ -1,6 +1,8 @@
 """Time in integer nanoseconds, from the decimal form in which people write seconds."""
 
+import itertools
 import math
+from collections.abc import Iterator
 from fractions import Fraction
 
 NANOSECONDS = 1_000_000_000
@@ -28,6 +30,11 @@ class Grid:
         if self._denominator == 1:
             return self._offset + k * self._period
         return _round_ratio(self._offset + k * self._period, self._denominator)
+
+    def __iter__(self) -> Iterator[int]:
+        if self._denominator == 1:
+            return itertools.count(self._offset, self._period)
+        return map(self.__getitem__, itertools.count())
 
     def from_(self, time: int) -> int:
         """The first instant of the grid that is not before `time` [ns]."""
