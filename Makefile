@@ -53,4 +53,4 @@ interop: .venv/.test .venv-cofmupy/.made
 	touch $@
 
 clean:
-	rm -rf .venv .venv-cofmupy results fmus/*.fmu fmus/*.ssp examples/*/*.fmu
+	rm -rf .venv .venv-cofmupy results fmus/*.fmu fmus/native fmus/*.ssp examples/*/*.fmu examples/*/native

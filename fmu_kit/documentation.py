@@ -8,7 +8,7 @@ import itertools
 import posixpath
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 from string import Template
@@ -19,30 +19,54 @@ from fmu_kit.variables import Variable
 
 TEMPLATE = Path(__file__).with_name("page.html")
 """The page around the part written by hand."""
+IN_PYTHON = Path(__file__).with_name("needs.html")
+"""What an FMU needs whose slave runs in Python."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Making:
+    """How an FMU was made: what the page says of it."""
+
+    needs: Path
+    """what it needs and where its sources are, as a template like the page"""
+    source: str
+    """the link from the page to where its sources begin"""
+    status: str
+    """of a call that fails"""
+    afterwards: str
+    """what to do then"""
+
 
 HEADINGS = {"input": "Inputs", "output": "Outputs", "parameter": "Parameters", "local": "Locals"}
 """The causalities in the order of the page."""
 
 
-def to_html(slave: Any, source: str, fragment: str = "") -> str:
+def to_html(slave: Any, making: Making, fragment: str = "") -> str:
     """The page of a `Slave` class.
 
-    `source` is the link from the page to the slave's module. `fragment` is the part written by hand: sections
-    of XHTML, whose relative links start at the folder of the slave.
+    `fragment` is the part written by hand: sections of XHTML, whose relative links start at the folder of the
+    sources.
     """
     experiment = slave.default_experiment
+    said = {
+        "model": escape(slave.__name__),
+        "license": escape(slave.license),
+        "python": escape(PYTHON_REQUIRED),
+        "source": escape(making.source),
+    }
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
-        model=escape(slave.__name__),
+        model=said["model"],
         description=escape(slave.description),
         author=escape(slave.author),
-        license=escape(slave.license),
-        python=escape(PYTHON_REQUIRED),
+        license=said["license"],
         start=_number(experiment.start_time),
         stop=_number(experiment.stop_time),
         step=_number(experiment.step_size),
-        source=escape(source),
+        status=making.status,
+        afterwards=escape(making.afterwards),
+        needs=Template(making.needs.read_text(encoding="utf-8")).substitute(said),
         contents="".join(f"{link} · " for link in _contents(fragment)),
-        fragment=_relocated(fragment, posixpath.dirname(source)).strip(),
+        fragment=_relocated(fragment, posixpath.dirname(making.source)).strip(),
         variables="\n".join(_tables(slave.variables)),
         categories=_table(("Category", "Messages"), [(_code(k), escape(v)) for k, v in slave.log_categories.items()]),
     )

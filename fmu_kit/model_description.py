@@ -6,6 +6,7 @@ digits only; here every number is written in its shortest exact form.
 
 import datetime
 import os
+from collections.abc import Sequence
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
@@ -19,8 +20,11 @@ GUID_PLACEHOLDER = "guid-of-the-content"
 """Stands where packaging writes the GUID, once it knows the content."""
 
 
-def to_xml(slave: Any) -> Element:
-    """The FMI 2.0 description of a `Slave` class, its GUID still the placeholder."""
+def to_xml(slave: Any, sources: Sequence[str] | None = None) -> Element:
+    """The FMI 2.0 description of a `Slave` class, its GUID still the placeholder.
+
+    With `sources`, the files to compile, it is the one of an FMU without Python inside.
+    """
     root = Element(
         "fmiModelDescription",
         fmiVersion="2.0",
@@ -33,7 +37,7 @@ def to_xml(slave: Any) -> Element:
         generationDateAndTime=generation_date(),
         variableNamingConvention="structured",
     )
-    SubElement(
+    kind = SubElement(
         root,
         "CoSimulation",
         modelIdentifier=slave.__name__,
@@ -45,9 +49,14 @@ def to_xml(slave: Any) -> Element:
         canGetAndSetFMUstate="true",
         canSerializeFMUstate="true",
     )
+    if sources is not None:
+        files = SubElement(kind, "SourceFiles")
+        for name in sources:
+            SubElement(files, "File", name=name)
     _add_units(root, slave.variables)
     categories = SubElement(root, "LogCategories")
-    for name, description in slave.log_categories.items():
+    native = {} if sources is None else {"logStatusError": "All other failures."}
+    for name, description in {**slave.log_categories, **native}.items():
         SubElement(categories, "Category", name=name, description=description)
     experiment = slave.default_experiment
     SubElement(
@@ -58,7 +67,9 @@ def to_xml(slave: Any) -> Element:
         stepSize=repr(experiment.step_size),
     )
     annotations = SubElement(root, "VendorAnnotations")
-    SubElement(SubElement(annotations, "Tool", name="quadcosim"), "Python", requires=PYTHON_REQUIRED)
+    tool = SubElement(annotations, "Tool", name="quadcosim")
+    if sources is None:
+        SubElement(tool, "Python", requires=PYTHON_REQUIRED)
     variables = SubElement(root, "ModelVariables")
     for value_reference, variable in enumerate(slave.variables):
         variables.append(_scalar_variable(variable, value_reference))

@@ -18,26 +18,30 @@ import re
 import sys
 import uuid
 import zipfile
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 from xml.dom.minidom import parseString
-from xml.etree.ElementTree import ParseError, fromstring, tostring
+from xml.etree.ElementTree import Element, ParseError, fromstring, tostring
 
 from fmu_kit import bundle, documentation, loader
 from fmu_kit.bundle import PackagingError, Target, bundled_sources, module_path, place, renamed
-from fmu_kit.model_description import GUID_PLACEHOLDER, PYTHON_REQUIRED
+from fmu_kit.documentation import Making
+from fmu_kit.model_description import GUID_PLACEHOLDER, PYTHON_REQUIRED, to_xml
 
 PAGE, ICON = "documentation/index.html", "model.png"
 """The documentation of an FMU and its icon, by their place in the archive."""
 
+NATIVE_TABLES = "sources/tables.h"
+"""Of an FMU without Python inside: the file of its sources that has the GUID."""
 SOURCE_HASH_FILE = "resources/source_hash.txt"
 _STAMP = (1980, 1, 1, 0, 0, 0)
 
-_LICENCES = """\
-quadcosim.txt: quadcosim, which packed this FMU.
-pythonfmu.txt: pythonfmu, which connects it to FMI.
-The licence of the model itself is named in modelDescription.xml.
-"""
+_LICENCES = {
+    "quadcosim": "quadcosim, which packed this FMU.",
+    "pythonfmu": "pythonfmu, which connects it to FMI.",
+}
+_LICENCE_OF_THE_MODEL = "The licence of the model itself is named in modelDescription.xml.\n"
 
 _ENTRY = '''\
 """Entry of {model}.fmu. pythonfmu runs this file once for each instance."""
@@ -64,20 +68,25 @@ class {model}(Model):
 
 def source_hash(target: Target) -> str:
     """The hash of all that decides the content of the FMU: its modules and other files, and the packaging itself."""
-    digest = hashlib.sha256()
-    sources = bundled_sources(target)
     own = (
         Path(__file__),
         Path(bundle.__file__),
         Path(documentation.__file__),
         documentation.TEMPLATE,
+        documentation.IN_PYTHON,
         Path(loader.__file__),
         loader.SOURCE,
     )
-    packaging = {path.name: _text(path) for path in own} | {"compiler": str(loader.compiler() is not None)}
-    for name, text in {**sources, **packaging, "fragment": _fragment(target)}.items():
+    return hash_of(target, own, {"compiler": str(loader.compiler() is not None)}, unchanged_files(target))
+
+
+def hash_of(target: Target, packaging: Iterable[Path], facts: dict[str, str], unchanged: dict[str, bytes]) -> str:
+    """The hash of what a slave's modules are, of the files that pack it, of facts, and of what is packed as it is."""
+    digest = hashlib.sha256()
+    texts = bundled_sources(target) | {path.name: _text(path) for path in packaging} | facts
+    for name, text in {**texts, "fragment": _fragment(target)}.items():
         digest.update(f"{name}\0{text}\0".encode())
-    for name, content in _unchanged_files(target).items():
+    for name, content in unchanged.items():
         digest.update(name.encode() + b"\0" + hashlib.sha256(content).digest())
     return digest.hexdigest()
 
@@ -102,20 +111,38 @@ def build(target: Target, folder: Path) -> Path:
     files[f"resources/{entry}.py"] = _entry(name, target).encode()
     files["resources/slavemodule.txt"] = entry.encode()
     files[SOURCE_HASH_FILE] = digest.encode()
-    files |= _with_loader(_unchanged_files(target), target.model)
-    slave = _slave(target)
-    source = f"../resources/{name}/{place(target.module, target.root)}"
-    files[PAGE] = documentation.to_html(slave, source, _well_formed_fragment(target)).encode()
-    for link in documentation.files_linked(files[PAGE].decode()):
+    files |= _with_loader(unchanged_files(target), target.model)
+    making = Making(
+        needs=documentation.IN_PYTHON,
+        source=f"../resources/{name}/{place(target.module, target.root)}",
+        status="fmi2Fatal",
+        afterwards="After a failure, do not call the instance again: make a new one.",
+    )
+    described(files, target, making, to_xml(slave_class(target)))
+    files[loader.GUID_FILE] = put_guid(files).encode()
+    return written(files, target, folder)
+
+
+def described(files: dict[str, bytes], target: Target, making: Making, description: Element) -> None:
+    """Add the description and the page of a slave to the files of its FMU; raises `PackagingError` for dead links."""
+    page = documentation.to_html(slave_class(target), making, _well_formed_fragment(target))
+    files[PAGE] = page.encode()
+    for link in documentation.files_linked(page):
         if posixpath.normpath(posixpath.join(posixpath.dirname(PAGE), link)) not in files:
             raise PackagingError(f"{target.fragment}: links to {link}, which is not in the FMU")
-    description = parseString(tostring(slave(instance_name="description").to_xml())).toprettyxml(
-        indent="  ", encoding="UTF-8"
-    )
-    files["modelDescription.xml"] = description
-    guid = content_guid(files).encode()
-    files["modelDescription.xml"] = description.replace(GUID_PLACEHOLDER.encode(), guid)
-    files[loader.GUID_FILE] = guid
+    text = parseString(tostring(description)).toprettyxml(indent="  ", encoding="UTF-8")
+    files["modelDescription.xml"] = text
+
+
+def put_guid(files: dict[str, bytes]) -> str:
+    """Put the GUID of the content into the description, and return it."""
+    guid = content_guid(files)
+    files["modelDescription.xml"] = files["modelDescription.xml"].replace(GUID_PLACEHOLDER.encode(), guid.encode())
+    return guid
+
+
+def written(files: dict[str, bytes], target: Target, folder: Path) -> Path:
+    """Write the FMU, replacing it in one go, and return its path."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{target.model}.fmu"
     temporary = path.with_suffix(f".{os.getpid()}.partial")
@@ -133,12 +160,18 @@ def _entry(bundle: str, target: Target) -> str:
 
 
 def content_guid(files: dict[str, bytes]) -> str:
-    """A GUID from the content of an FMU: all files but that of the GUID, in the description all but it and the date."""
+    """A GUID from the content of an FMU: all files but that of the GUID, in the description all but it and the date.
+
+    Of an FMU that was written out as C, the libraries do not count: compiled anywhere, it is the same FMU.
+    """
+    compiled = "binaries/" if NATIVE_TABLES in files else "\0"
     digest = hashlib.sha256()
-    for name in sorted(files.keys() - {loader.GUID_FILE}):
+    for name in sorted(name for name in files if name != loader.GUID_FILE and not name.startswith(compiled)):
         content = files[name]
         if name == "modelDescription.xml":
             content = re.sub(rb'(guid|generationDateAndTime)="[^"]*"', rb"", content)
+        elif name == NATIVE_TABLES:
+            content = re.sub(rb'#define GUID "[^"]*"', rb"", content)
         digest.update(name.encode() + b"\0" + hashlib.sha256(content).digest())
     return str(uuid.UUID(bytes=digest.digest()[:16]))
 
@@ -156,7 +189,7 @@ def write_archive(path: Path, files: dict[str, bytes], *, first: str) -> None:
             archive.writestr(entry, files[name])
 
 
-def _slave(target: Target) -> Any:
+def slave_class(target: Target) -> Any:
     """The class; raises `PackagingError` if it says nothing of itself, only what its base class says."""
     slave = getattr(importlib.import_module(target.module), target.model, None)
     if slave is None:
@@ -188,15 +221,16 @@ def _with_loader(files: dict[str, bytes], model: str) -> dict[str, bytes]:
         return files
 
 
-def _unchanged_files(target: Target) -> dict[str, bytes]:
+def unchanged_files(target: Target) -> dict[str, bytes]:
     """What goes into the FMU as it is, by its place there: binaries, licences, the slave's icon if it has one."""
-    files = _binaries(target.model)
-    for name, text in {
-        "license": _LICENCES,
-        "quadcosim": _text(Path(__file__).with_name("LICENSE")),
-        "pythonfmu": _license_of_pythonfmu(),
-    }.items():
-        files[f"documentation/licenses/{name}.txt"] = text.encode()
+    return {**_binaries(target.model), **licences_and_icon(target, pythonfmu=_license_of_pythonfmu())}
+
+
+def licences_and_icon(target: Target, **others: str) -> dict[str, bytes]:
+    """The licence of quadcosim and those of others by name, a list of them, and the slave's icon if it has one."""
+    texts = {"quadcosim": _text(Path(__file__).with_name("LICENSE")), **others}
+    texts["license"] = "".join(f"{name}.txt: {_LICENCES[name]}\n" for name in texts) + _LICENCE_OF_THE_MODEL
+    files = {f"documentation/licenses/{name}.txt": text.encode() for name, text in texts.items()}
     if target.icon.is_file():
         files[ICON] = target.icon.read_bytes()
     return files
@@ -235,7 +269,7 @@ def _license_of_pythonfmu() -> str:
     return text
 
 
-def main(arguments: list[str]) -> int:
+def main(arguments: list[str], build: Callable[[Target, Path], Path] = build) -> int:
     """`python -m fmu_kit.packaging FOLDER [--root ROOT] MODULE:CLASS …`: build each, print its path.
 
     ROOT is the folder in which modules are found before all others.

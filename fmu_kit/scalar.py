@@ -8,7 +8,7 @@ those of a computer-algebra system. Nothing here imports either.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 Scalar = Any  # a float, a numpy array of one value a point, or a symbol
 
@@ -39,3 +39,16 @@ FLOAT = ScalarOps(
     all=bool,
 )
 """Python floats, through the standard library."""
+
+
+_State = TypeVar("_State")
+
+
+def repeat(count: int, body: Callable[[int, _State], _State], state: _State) -> _State:
+    """`state = body(i, state)` for i = 0 … count - 1: a loop that becomes one in C where `count` is computed.
+
+    `body` may depend on the state in no other way, and returns one of the same structure.
+    """
+    for i in range(count):
+        state = body(i, state)
+    return state

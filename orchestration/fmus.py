@@ -3,12 +3,15 @@
 import os
 import subprocess
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
+from fmu_kit import packaging
 from fmu_kit.bundle import PackagingError, Target
 from fmu_kit.discovery import slave_beside, slaves_in
-from fmu_kit.packaging import read_source_hash, source_hash
+from fmu_kit.native import freshness
+from fmu_kit.packaging import read_source_hash
 from orchestration import subprocesses
 from orchestration.errors import QuadcosimError, UsageError
 from orchestration.quadrotor.wiring import MODELS
@@ -25,6 +28,23 @@ def default_folder() -> Path:
     return Path(platformdirs.user_cache_dir("quadcosim")) / "fmus"
 
 
+NATIVE = "native"
+"""The folder of the FMUs without Python inside, beside the others; so `native/NAME` is one of this project's."""
+
+
+@dataclass(frozen=True)
+class _Packing:
+    """One way to make an FMU of a slave."""
+
+    module: str
+    """that is run to pack"""
+    source_hash: Callable[[Target], str]
+
+
+_IN_PYTHON = _Packing("fmu_kit.packaging", packaging.source_hash)
+_IN_C = _Packing("fmu_kit.native.building", freshness.source_hash)
+
+
 def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
     """The .fmu for the name of one of this project's FMUs, or for a path; built first if need be.
 
@@ -32,18 +52,20 @@ def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
     sources or is none of ours. Raises `UsageError` naming the valid names if there is none; `announce` hears of
     a build.
     """
-    if fmu in MODELS:
-        folder = default_folder()
-        if out_of_date([fmu], folder):
-            _announce_build(folder / f"{fmu}.fmu", announce)
-            build([fmu], folder, announce)
-        return folder / f"{fmu}.fmu"
+    name = fmu.removeprefix(f"{NATIVE}/")
+    if name in MODELS:
+        native = name != fmu
+        folder = default_folder() / NATIVE if native else default_folder()
+        if out_of_date([name], folder, native=native):
+            _announce_build(folder / f"{name}.fmu", announce)
+            build([name], folder, announce, native=native)
+        return folder / f"{name}.fmu"
     path = Path(fmu)
     if path.suffix == ".fmu":
-        target = _told(slave_beside, path)
-        if target is not None and _is_old(path, target):
+        native, target = _slave_of(path)
+        if target is not None and _is_old(path, target, native):
             _announce_build(path, announce)
-            build_slaves([target], path.parent, announce)
+            build_slaves([target], path.parent, announce, native=native)
         if path.is_file():
             return path
     raise UsageError(
@@ -52,16 +74,40 @@ def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
     )
 
 
-def out_of_date(names: Iterable[str], folder: Path) -> list[str]:
+def native_twin(fmu: str) -> str:
+    """What to `locate` for the same slave without Python inside; the FMU itself if it is of no slave that is known."""
+    path = Path(fmu)
+    if fmu in MODELS:
+        return f"{NATIVE}/{fmu}"
+    if path.suffix == ".fmu" and path.parent.name != NATIVE and _told(slave_beside, path) is not None:
+        return str(path.parent / NATIVE / path.name)
+    return fmu
+
+
+def _slave_of(path: Path) -> tuple[bool, Target | None]:
+    """Whether an FMU is one without Python inside, by the name of its folder, and the slave that it is built from."""
+    if path.parent.name == NATIVE:
+        target = _told(slave_beside, path.parent.parent / path.name)
+        if target is not None:
+            return True, target
+    return False, _told(slave_beside, path)
+
+
+def out_of_date(names: Iterable[str], folder: Path, *, native: bool = False) -> list[str]:
     """Those of this project's FMUs that are missing in `folder` or carry another hash than the sources."""
+    packing = _IN_C if native else _IN_PYTHON
     return [
-        name for name in names if read_source_hash(folder / f"{name}.fmu") != source_hash(Target.parse(MODELS[name]))
+        name
+        for name in names
+        if read_source_hash(folder / f"{name}.fmu") != packing.source_hash(Target.parse(MODELS[name]))
     ]
 
 
-def build(names: Iterable[str], folder: Path, announce: Callable[[str], None] | None = None) -> list[Path]:
+def build(
+    names: Iterable[str], folder: Path, announce: Callable[[str], None] | None = None, *, native: bool = False
+) -> list[Path]:
     """Build FMUs of this project into `folder`; their paths. Else as `build_slaves`."""
-    return build_slaves([Target.parse(MODELS[name]) for name in names], folder, announce)
+    return build_slaves([Target.parse(MODELS[name]) for name in names], folder, announce, native=native)
 
 
 def slaves_of(folder: Path) -> list[Target]:
@@ -74,17 +120,21 @@ def slaves_of(folder: Path) -> list[Target]:
     return found
 
 
-def build_slaves(targets: Sequence[Target], folder: Path, announce: Callable[[str], None] | None = None) -> list[Path]:
+def build_slaves(
+    targets: Sequence[Target], folder: Path, announce: Callable[[str], None] | None = None, *, native: bool = False
+) -> list[Path]:
     """Build slaves whose modules are found in one place into `folder`, in a process of its own; the FMUs' paths.
 
+    `native`: without Python inside, by the C compiler of this machine.
     `announce` hears, a line each, of what could not be packed. Raises `QuadcosimError` with what the build said if
     it fails.
     """
     named = [f"{target.module}:{target.model}" for target in targets]
     root = targets[0].root if targets else None
+    packing = _IN_C if native else _IN_PYTHON
     done = subprocess.run(
         subprocesses.command(
-            "fmu_kit.packaging", folder.resolve(), *(() if root is None else ("--root", root)), *named
+            packing.module, folder.resolve(), *(() if root is None else ("--root", root)), *named
         ),
         capture_output=True, text=True, env=subprocesses.environment(), check=False,
     )  # fmt: skip
@@ -97,10 +147,11 @@ def build_slaves(targets: Sequence[Target], folder: Path, announce: Callable[[st
     return [Path(line) for line in done.stdout.splitlines()]
 
 
-def _is_old(path: Path, target: Target) -> bool:
+def _is_old(path: Path, target: Target, native: bool) -> bool:
     """Whether an FMU is missing, or made by packaging from other sources than those of its slave."""
     carried = read_source_hash(path)
-    return not path.exists() if carried is None else carried != _told(source_hash, target)
+    packing = _IN_C if native else _IN_PYTHON
+    return not path.exists() if carried is None else carried != _told(packing.source_hash, target)
 
 
 def _announce_build(path: Path, announce: Callable[[str], None] | None) -> None:

@@ -5,6 +5,7 @@ import math
 from fmu_kit.algebra import Vec3
 from fmu_kit.errors import require, require_finite_state
 from fmu_kit.saved_state import State
+from fmu_kit.scalar import repeat
 from fmu_kit.slave import Slave
 from plant_fmu.dynamics import Actuators, Body, RigidState, Wind, Wrench, acceleration, derivative, tilt
 from plant_fmu.integrator import internal_steps, rk4_step
@@ -64,8 +65,9 @@ class QuadrotorPlant(Slave):
         )
         count = internal_steps(h, self._largest_step)
         internal = h / count
-        for i in range(count):
-            self._state = rk4_step(f, t + i * internal, self._state, internal).normalised()
+        self._state = repeat(
+            count, lambda i, state: rk4_step(f, t + i * internal, state, internal).normalised(), self._state
+        )
         self._wrench = actuators.response(start, target, h)
         self._write(t + h)
 

@@ -1,0 +1,1 @@
+"""Slaves without Python inside: run on symbols, and written out as C."""

@@ -68,15 +68,20 @@ def build(
         Path | None,
         typer.Option("--out", help="Folder for the FMUs; FOLDER, or fmus/ for this project's, unless told."),
     ] = None,
+    native: Annotated[
+        bool,
+        typer.Option("--native", help="Without Python inside, by a C compiler; in the folder native/ unless told."),
+    ] = False,
 ) -> None:
     """Build every slave that the modules of FOLDER define, each as an .fmu. Same sources give the same bytes."""
     from orchestration import fmus
     from orchestration.quadrotor.wiring import MODELS
 
+    where = out or ((folder or fmus.default_folder()) / (fmus.NATIVE if native else ""))
     if folder is None:
-        built = fmus.build(MODELS, out or fmus.default_folder(), say)
+        built = fmus.build(MODELS, where, say, native=native)
     else:
-        built = fmus.build_slaves(fmus.slaves_of(folder), out or folder, say)
+        built = fmus.build_slaves(fmus.slaves_of(folder), where, say, native=native)
     for path in built:
         print(path)
 

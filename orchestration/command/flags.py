@@ -122,6 +122,15 @@ class FlightFlags:
             text="The controller's nominal mass or inertia is not the plant's on purpose: no warning.",
         ),
     ] = None
+    native: Annotated[
+        bool | None,
+        _option(
+            "--native",
+            panel=MODEL,
+            metavar="",
+            text="FMUs without Python inside, of this project and of slaves beside a system file; built if need be.",
+        ),
+    ] = None
     set: Annotated[
         list[str] | None,
         _option(
@@ -134,6 +143,7 @@ class FlightFlags:
 
     def applied_to(self, scenario: "Scenario") -> "Scenario":
         """`scenario` with what was given; raises `UsageError` for what cannot be."""
+        from orchestration.fmus import native_twin
         from orchestration.quadrotor.presets import preset_timing
 
         timing: dict[str, Any] = {} if self.preset is None else preset_timing(self.preset)
@@ -152,19 +162,28 @@ class FlightFlags:
             if (value := getattr(self, name)) is not None
         }
         parameters = {key: _value(key, text) for key, text in _pairs("set", self.set or [])}
-        return scenario.with_changes(timing=timing, parameters=parameters, **top)
+        changed = scenario.with_changes(timing=timing, parameters=parameters, **top)
+        if not self.native:
+            return changed
+        return changed.with_fmus(plant=native_twin(changed.plant.fmu), controller=native_twin(changed.controller.fmu))
 
     def applied_to_system(self, system: "System") -> "System":
         """`system` with what was given; raises `UsageError` for flags that are for the quadrotor only."""
+        from orchestration.fmus import native_twin
         from orchestration.system.paths import changed
 
-        top = {name: value for name in ("seed", "stop_time") if (value := getattr(self, name)) is not None}
-        foreign = [f.name for f in fields(self) if f.name not in ("seed", "stop_time", "set") and getattr(self, f.name)]
+        of_systems = ("seed", "stop_time", "set", "native")
+        top: dict[str, Any] = {
+            name: value for name in ("seed", "stop_time") if (value := getattr(self, name)) is not None
+        }
+        foreign = [f.name for f in fields(self) if f.name not in of_systems and getattr(self, f.name)]
         if foreign:
             flags = ", ".join(f"--{name.replace('_', '-')}" for name in foreign)
             raise UsageError(
                 f"{flags}: for the quadrotor only; expected --set PATH=V for a system, as connections.NAME.delay"
             )
+        if self.native:
+            top |= {f"components.{name}.fmu": native_twin(each.fmu) for name, each in system.components.items()}
         return changed(system, {**top, **{key: _value(key, text) for key, text in _pairs("set", self.set or [])}})
 
 

@@ -98,7 +98,7 @@ class Scenario:
             changed = dataclasses.replace(changed, **replaced)
         return changed
 
-    def with_fmus(self, *, plant: Path, controller: Path) -> "Scenario":
+    def with_fmus(self, *, plant: str | Path, controller: str | Path) -> "Scenario":
         """This scenario with its FMUs at these paths, so that none is looked for."""
         return dataclasses.replace(
             self,

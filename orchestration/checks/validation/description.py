@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Iterator
 
+from fmu_kit.packaging import NATIVE_TABLES
 from orchestration.checks.archive import Archive
 from orchestration.checks.validation.fmu import Fmu
 
@@ -67,10 +68,10 @@ def binaries(fmu: Fmu) -> Iterator[str]:
 
 
 def slave_module(fmu: Fmu) -> Iterator[str]:
-    """The script that pythonfmu is told to run is there."""
+    """The script that pythonfmu is told to run is there, unless the FMU has no Python inside."""
     files = fmu.archive.files
     if SLAVE_MODULE not in files:
-        if fmu.is_ours:
+        if fmu.is_ours and NATIVE_TABLES not in files:
             yield f"{SLAVE_MODULE}: expected this file, with the name of the script in resources/"
         return
     name = files[SLAVE_MODULE].decode("utf-8", "replace").strip()

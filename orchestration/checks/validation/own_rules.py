@@ -4,7 +4,7 @@ import datetime
 from collections.abc import Iterator
 
 from fmu_kit.loader import GUID_FILE
-from fmu_kit.packaging import ICON, content_guid
+from fmu_kit.packaging import ICON, NATIVE_TABLES, content_guid
 from orchestration.checks.validation.fmu import Fmu, Variable
 from orchestration.checks.validation.units import base_units, dimensions
 from orchestration.quadrotor import wiring
@@ -19,6 +19,8 @@ def guid_of_content(fmu: Fmu) -> Iterator[str]:
     expected = content_guid(dict(fmu.archive.files))
     if fmu.guid != expected:
         yield f"guid = {fmu.guid}: expected {expected}, that of the content"
+    if NATIVE_TABLES in fmu.archive.files:
+        return
     known = fmu.archive.files.get(GUID_FILE, b"").decode(errors="replace")
     if known != fmu.guid:
         yield f"{GUID_FILE} = {known}: expected {fmu.guid}, the guid"

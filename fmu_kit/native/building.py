@@ -1,0 +1,77 @@
+"""Packing a slave as an .fmu without Python inside: C from its sources, and a library compiled from that.
+
+Packing imports the slave, so it runs in a process of its own: `python -m fmu_kit.native.building`.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import types
+from pathlib import Path
+
+from fmu_kit.bundle import PackagingError, Target, bundled_sources, place
+from fmu_kit.documentation import Making
+from fmu_kit.model_description import GUID_PLACEHOLDER, to_xml
+from fmu_kit.native.c_code import c_code
+from fmu_kit.native.compiler import compiled, host_platform
+from fmu_kit.native.freshness import source_hash
+from fmu_kit.native.symbols import TraceError
+from fmu_kit.native.tables import tables
+from fmu_kit.native.tracing import Program, trace
+from fmu_kit.packaging import SOURCE_HASH_FILE, described, licences_and_icon, main, put_guid, slave_class, written
+
+_HERE = Path(__file__).parent
+MAIN = "fmi2.c"
+"""The file to compile; it includes the others."""
+HEADERS = ("lanes.h", "mathematics.h", "text.h")
+_NEEDS = _HERE / "needs.html"
+_PYTHON = "python"
+"""Where in the documentation the Python is from which the C was written."""
+
+
+def build(target: Target, folder: Path) -> Path:
+    """Write `folder`/Model.fmu, replacing it in one go, and return its path."""
+    try:
+        program = trace(slave_class(target), modules_of(target))
+        sources = c_sources(program, GUID_PLACEHOLDER)
+    except TraceError as error:
+        raise PackagingError(f"{target.model}: {error}") from error
+    files = {f"sources/{name}": text for name, text in sources.items()}
+    files |= {f"documentation/{_PYTHON}/{path}": text.encode() for path, text in _python_sources(target).items()}
+    files |= licences_and_icon(target)
+    files[SOURCE_HASH_FILE] = source_hash(target).encode()
+    making = Making(
+        needs=_NEEDS,
+        source=f"{_PYTHON}/{place(target.module, target.root)}",
+        status="fmi2Error",
+        afterwards="After a failure, reset the instance, set it to a state that was saved before, or free it.",
+    )
+    described(files, target, making, to_xml(slave_class(target), [MAIN]))
+    sources = c_sources(program, put_guid(files))
+    files |= {f"sources/{name}": text for name, text in sources.items()}
+    platform = host_platform()
+    if platform is not None:
+        files[f"binaries/{platform}/{target.model}.so"] = compiled(sources, MAIN)
+    return written(files, target, folder)
+
+
+def c_sources(program: Program, guid: str) -> dict[str, bytes]:
+    """The sources of an FMU, by the names of their files."""
+    fixed = {name: (_HERE / name).read_bytes() for name in (MAIN, *HEADERS)}
+    return {**fixed, "tables.h": tables(program, guid).encode(), "functions.h": c_code(program).encode()}
+
+
+def modules_of(target: Target) -> list[types.ModuleType]:
+    """The modules that a slave is made of, its own and those of the kit; they are imported."""
+    names = [path.removesuffix(".py").removesuffix("/__init__").replace("/", ".") for path in _python_sources(target)]
+    return [importlib.import_module(name) for name in names]
+
+
+def _python_sources(target: Target) -> dict[str, str]:
+    """The modules that a slave is made of, its own and those of the kit, by their paths."""
+    return {path: text for path, text in bundled_sources(target).items() if not path.startswith("pythonfmu")}
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:], build))

@@ -1,0 +1,430 @@
+"""A program as C: one function for each method, in words as near to the Python as C has."""
+
+from __future__ import annotations
+
+import keyword
+import re
+from collections.abc import Iterable
+
+from fmu_kit.native.statements import Block, Call, Function, Place, Statement, ends, symbols_of
+from fmu_kit.native.symbols import Symbol, TraceError, value_of
+from fmu_kit.native.tracing import Program
+
+_BINARY = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
+_COMPARED = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
+_CALLED = {
+    **{name: f"q_{name}" for name in (
+        "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "tanh", "exp", "expm1", "log", "pow",
+        "floor", "ceil", "copysign", "isfinite", "isnan",
+    )},
+    "abs": "q_fabs",
+    "mod": "q_modulo",
+}  # fmt: skip
+ERRORS = ("FmuError", "DivergenceError", "ZeroDivisionError", "OverflowError", "ValueError")
+"""What a function may end with; the place here, from 1 on, is what it returns."""
+
+
+def c_code(program: Program) -> str:
+    """The functions of a program, each after those that it calls."""
+    names = place_names(program.places)
+    return "\n\n".join(_Writer(function, program, names).text() for function in program.functions) + "\n"
+
+
+def place_names(places: Iterable[Place]) -> dict[str, str]:
+    """The name in C of each place."""
+    found: dict[str, str] = {}
+    for place in places:
+        name = _identifier(place.name).upper()
+        while name in found.values():
+            name += "_"
+        found[place.name] = name
+    return found
+
+
+class _Writer:
+    """Writes one function."""
+
+    def __init__(self, function: Function, program: Program, places: dict[str, str]) -> None:
+        self.function = function
+        self.program = program
+        self.places = places
+        self.declared: list[str] = []
+        self.pinned: dict[int, str] = {}
+        self.scopes: list[dict[int, str]] = [{}]
+        self.lines: list[list[str]] = [[]]
+        self.count = 0
+        self.parameters = [f"{_identifier(name)}_" for name in function.names]
+        self.used = _used(function.body)
+
+    def text(self) -> str:
+        f = self.function
+        for symbol, name in zip(f.parameters, self.parameters):
+            self.scopes[0][id(symbol)] = name
+        for symbol in self.used.values():
+            if symbol.op == "load" and symbol.data[1] == 0:
+                self.scopes[0][id(symbol)] = self._define(symbol, self._load(symbol))
+        self._block(f.body)
+        if not ends(f.body):
+            self._line("return 0;")
+        parameters = ["Instance *m"]
+        parameters += [f"{_type(symbol)} {name}" for symbol, name in zip(f.parameters, self.parameters)]
+        parameters += [f"q_real *r{k}" for k in range(f.results)]
+        head = f"static int {c_name(f.name)}({', '.join(parameters)})\n{{\n"
+        doc = f"/* {f.doc.replace('*/', '* /')} */\n" if f.doc else ""
+        before = ["    q_real *const v = m->state.memory;"]
+        unused = [name for symbol, name in zip(f.parameters, self.parameters) if id(symbol) not in self.used]
+        before.append("    " + ", ".join(f"(void){name}" for name in ("v", *unused)) + ";")
+        return doc + head + "\n".join([*before, *(f"    {line}" for line in self.declared), *self.lines[0]]) + "\n}"
+
+    # -- lines and names -------------------------------------------------------------------------------------
+
+    def _line(self, text: str) -> None:
+        self.lines[-1].append("    " * len(self.scopes) + text)
+
+    def _name(self, prefix: str = "x") -> str:
+        self.count += 1
+        return f"{prefix}{self.count}"
+
+    def _define(self, symbol: Symbol, expression: str) -> str:
+        name = self._name()
+        self._line(f"const {_type(symbol)} {name} = {expression};")
+        return name
+
+    def _pin(self, symbol: Symbol) -> str:
+        """The variable of what a statement gives its value; declared where the function begins."""
+        if id(symbol) not in self.pinned:
+            name = self.pinned[id(symbol)] = self._name("y")
+            self.declared.append(f"{_type(symbol)} {name} = {'Q_TEST(0)' if symbol.kind == 'bool' else 'q_all(0.0)'};")
+        return self.pinned[id(symbol)]
+
+    def _load(self, symbol: Symbol) -> str:
+        value = f"v[{self.places[symbol.data[0]]}]"
+        return f"Q_TEST({value} != 0.0)" if symbol.kind == "bool" else value
+
+    # -- values ----------------------------------------------------------------------------------------------
+
+    def value(self, symbol: Symbol) -> str:
+        """The name of a value, computed here if it is not yet known here."""
+        for scope in reversed(self.scopes):
+            if id(symbol) in scope:
+                return scope[id(symbol)]
+        if id(symbol) in self.pinned:
+            return self.pinned[id(symbol)]
+        if symbol.op == "constant":
+            return _constant(symbol)
+        if symbol.op in ("load", "result", "failed", "phi", "outcome", "variable", "index", "parameter"):
+            if symbol.op in ("load", "result", "failed", "phi", "outcome"):
+                return self._pin(symbol)
+            raise TraceError(f"{self.function.name}: {symbol.op} {symbol.data} is used outside of its loop")
+        for waiting in _unknown_below(symbol, self._is_known):
+            self.scopes[-1][id(waiting)] = self._define(waiting, self._expression(waiting))
+        return self.scopes[-1][id(symbol)]
+
+    def _is_known(self, symbol: Symbol) -> bool:
+        return not symbol.args or symbol.op == "phi" or any(id(symbol) in scope for scope in self.scopes)
+
+    def _real(self, symbol: Symbol) -> str:
+        if symbol.kind == "bool" and symbol.op == "constant":
+            return f"q_all({value_of(symbol)!r})"
+        name = self.value(symbol)
+        return f"q_select({name}, q_all(1.0), q_all(0.0))" if symbol.kind == "bool" else name
+
+    def _lanes(self, symbol: Symbol) -> str:
+        """A value as the argument of a function: a constant in all lanes."""
+        text = self._real(symbol)
+        return f"q_all({text.strip('()')})" if symbol.op == "constant" and not text.startswith("q_all") else text
+
+    def _expression(self, symbol: Symbol) -> str:
+        op, args = symbol.op, symbol.args
+        if op in _BINARY:
+            return f"{self._real(args[0])} {_BINARY[op]} {self._real(args[1])}"
+        if op in _COMPARED:
+            return f"Q_TEST({self._real(args[0])} {_COMPARED[op]} {self._real(args[1])})"
+        if op == "neg":
+            return f"-{self._real(args[0])}"
+        if op == "isinf":
+            return f"Q_TEST(q_fabs({self._real(args[0])}) > DBL_MAX)"
+        if op in ("and", "or"):
+            return f"{self.value(args[0])} {'&' if op == 'and' else '|'} {self.value(args[1])}"
+        if op == "not":
+            return f"q_not({self.value(args[0])})"
+        if op == "select":
+            if symbol.kind == "bool":
+                c, a, b = map(self.value, args)
+                return f"({c} & {a}) | (q_not({c}) & {b})"
+            return f"q_select({self.value(args[0])}, {self._lanes(args[1])}, {self._lanes(args[2])})"
+        if op in _CALLED:
+            return f"{_CALLED[op]}({', '.join(map(self._lanes, args))})"
+        raise TraceError(f"{op} of computed values cannot be written in C: expected math.floor(a / b) for a // b")
+
+    # -- statements ------------------------------------------------------------------------------------------
+
+    def _block(self, block: Block) -> None:
+        for i, each in enumerate(block):
+            getattr(self, f"_{each.op}")(each, block[i + 1 :])
+
+    def _if(self, each: Statement, rest: Block) -> None:
+        (condition,), (then, otherwise) = each.symbols, each.blocks
+        name = self.value(condition)
+        if not ends(then):
+            self._hoist(then, otherwise, rest)
+        self._line(f"if ({name}) {{")
+        self._inner(then)
+        if otherwise:
+            self._line("} else {")
+            self._inner(otherwise)
+        self._line("}")
+
+    def _hoist(self, then: Block, otherwise: Block, rest: Block) -> None:
+        """Compute before a branch what is needed in more than one of its ways, or in one and after it."""
+        a, b, after = (_closure(symbols_of(block)) for block in (then, otherwise, rest))
+        for key, symbol in {**a, **b}.items():
+            if (key in a) + (key in b) + (key in after) > 1:
+                self._compute_unless_given_in(symbol, (*then, *otherwise))
+
+    def _compute_unless_given_in(self, symbol: Symbol, block: Block, depth: int = -1) -> None:
+        """Compute a value now, if nothing that it depends on gets its own in a block, or in the loop of a depth."""
+        if symbol.args and not self._is_known(symbol):
+            below = _closure([symbol]).values()
+            if not any(_is_of_loop(each, depth) or self._is_given(each, block) for each in below):
+                self.value(symbol)
+
+    def _is_given(self, symbol: Symbol, block: Block) -> bool:
+        """Whether a statement of a block gives a symbol its value."""
+        for each in block:
+            if symbol.op == "phi" and each.op == "assign" and each.symbols[0] is symbol:
+                return True
+            if symbol.op == "outcome" and symbol.data[1] is each:
+                return True
+            after = self.program.versions[each.data.memory, each] if each.op == "call" else None
+            if symbol.op in ("load", "result", "failed") and symbol.data[1] == after:
+                return True
+            if any(self._is_given(symbol, inner) for inner in each.blocks):
+                return True
+        return False
+
+    def _inner(self, block: Block) -> None:
+        self.scopes.append({})
+        self._block(block)
+        self.scopes.pop()
+
+    def _assign(self, each: Statement, rest: Block) -> None:
+        target, value = each.symbols
+        if id(target) not in self.used:
+            return
+        given = self.value(value) if target.kind == "bool" else self._real(value)
+        self._line(f"{self._pin(target)} = {given};")
+
+    def _store(self, each: Statement, rest: Block) -> None:
+        self._line(f"v[{self.places[each.data]}] = {self._real(each.symbols[0])};")
+
+    def _return(self, each: Statement, rest: Block) -> None:
+        for k, symbol in enumerate(each.symbols):
+            self._line(f"*r{k} = {self._real(symbol)};")
+        self._line("return 0;")
+
+    def _call(self, each: Statement, rest: Block) -> None:
+        call: Call = each.data
+        callee, version = call.function, self.program.versions[call.memory, each]
+        given = ["m"]
+        for symbol, parameter in zip(each.symbols, callee.parameters):
+            given.append(self.value(symbol) if parameter.kind == "bool" else self._real(symbol))
+        mine = {s.data: s for s in self.used.values() if s.op in ("result", "failed", "load") and s.data[1] == version}
+        results = []
+        for _ in range(callee.results):
+            name = self._name("r")
+            self.declared.append(f"q_real {name} = q_all(0.0);")
+            given.append(f"&{name}")
+            results.append(name)
+        caught = any(symbol.op == "failed" for symbol in mine.values())
+        text = f"{c_name(callee.name)}({', '.join(given)})"
+        status = self._name("status")
+        if callee.raises:
+            self._line(f"const int {status} = {text};")
+            if not caught:
+                self._line(f"if ({status}) return {status};")
+        else:
+            self._line(f"{text};")
+        for symbol in mine.values():
+            if symbol.op == "failed":
+                self._line(f"{self._pin(symbol)} = {status} == {1 + ERRORS.index(symbol.data[0])};")
+            elif symbol.op == "result":
+                name = results[symbol.data[0]]
+                self._line(f"{self._pin(symbol)} = {f'Q_TEST({name} != 0.0)' if symbol.kind == 'bool' else name};")
+            else:
+                self._line(f"{self._pin(symbol)} = {self._load(symbol)};")
+
+    def _loop(self, each: Statement, rest: Block) -> None:
+        depth, (body,) = each.data, each.blocks
+        size = (len(each.symbols) - 1) // 2
+        count, starts, nexts = each.symbols[0], each.symbols[1 : 1 + size], each.symbols[1 + size :]
+        needed = _closure([*symbols_of(body), *nexts])
+        for symbol in needed.values():
+            self._compute_unless_given_in(symbol, body, depth)
+        states = []
+        for start in starts:
+            states.append(self._name("s"))
+            self._line(f"{_type(start)} {states[-1]} = {self.value(start)};")
+        last, index = self.value(count), self._name("i")
+        self._line(f"for (q_real {index} = q_all(0.0); {index} < {last}; {index} = {index} + 1.0) {{")
+        self.scopes.append({})
+        for symbol in needed.values():
+            if symbol.op == "index" and symbol.data == depth:
+                self.scopes[-1][id(symbol)] = index
+            elif symbol.op == "variable" and symbol.data[0] == depth:
+                self.scopes[-1][id(symbol)] = self._define(symbol, states[symbol.data[1]])
+        self._block(body)
+        for state, name in zip(states, [self.value(symbol) for symbol in nexts]):
+            self._line(f"{state} = {name};")
+        self.scopes.pop()
+        self._line("}")
+        for symbol in self.used.values():
+            if symbol.op == "outcome" and symbol.data[1] is each:
+                self.scopes[-1][id(symbol)] = states[symbol.data[0]]
+
+    def _warn(self, each: Statement, rest: Block) -> None:
+        key, words = each.data
+        bit = self.program.warnings.index(key)
+        self._line(f"if (!(m->state.warned & {1 << bit}u)) {{")
+        self.scopes.append({})
+        self._line(f"m->state.warned |= {1 << bit}u;")
+        self._text(each, words)
+        self._line("warn(m);")
+        self.scopes.pop()
+        self._line("}")
+
+    def _raise(self, each: Statement, rest: Block) -> None:
+        kind, words = each.data
+        if words == (("failure",),):
+            self._line(f"return {1 + ERRORS.index(kind)};")
+            return
+        self._text(each, words)
+        self._line(f"return fail(m, {1 + ERRORS.index(kind)}); /* {kind} */")
+
+    def _text(self, each: Statement, words: tuple[str | tuple[str], ...]) -> None:
+        values = iter(each.symbols)
+        self._line("text_begin(m);")
+        for word in words:
+            if isinstance(word, str):
+                self._line(f"text_add(m, {c_string(word)});")
+                continue
+            symbol, (spec,) = next(values), word
+            if spec == "failure":
+                self._line("text_add(m, m->failure);")
+            elif symbol.kind == "bool":
+                self._line(f'text_add(m, {self.value(symbol)} ? "True" : "False");')
+            elif spec == "":
+                self._line(f"text_{'integer' if symbol.kind == 'int' else 'real'}(m, {self.value(symbol)});")
+            elif spec == "g" and symbol.kind == "real":
+                self._line(f"text_general(m, {self.value(symbol)});")
+            else:
+                raise TraceError(f"{{value:{spec}}} in a message: expected {{value}} or {{value:g}}")
+
+
+def _identifier(name: str) -> str:
+    return re.sub(r"\W+", "_", name)
+
+
+def c_name(name: str) -> str:
+    """The name of a function in C: no word of C, none of libc."""
+    return f"{name}_of_the_model" if keyword.iskeyword(name) or name in _TAKEN else name
+
+
+_TAKEN = frozenset(
+    (
+        *("auto", "case", "char", "const", "default", "do", "double", "enum", "extern", "float", "goto", "int", "long"),
+        *(
+            "register",
+            "short",
+            "signed",
+            "sizeof",
+            "static",
+            "struct",
+            "switch",
+            "typedef",
+            "union",
+            "unsigned",
+            "void",
+        ),
+        *("volatile", "write", "read", "open", "close", "signal", "index", "time", "clock", "start", "select"),
+        *("warn", "fail", "tell", "refuse", "expect", "settle"),
+    )
+)
+
+
+def c_string(text: str) -> str:
+    """A text as C writes it."""
+    escaped = "".join(
+        c if 32 <= ord(c) < 127 and c not in '"\\?' else "".join(f"\\{byte:03o}" for byte in c.encode()) for c in text
+    )
+    return f'"{escaped}"'
+
+
+def _type(symbol: Symbol) -> str:
+    return "q_mask" if symbol.kind == "bool" else "q_real"
+
+
+def _constant(symbol: Symbol) -> str:
+    value = value_of(symbol)
+    if symbol.kind == "bool":
+        return f"Q_TEST({int(value)})"
+    if value != value or value in (float("inf"), float("-inf")):
+        raise TraceError(f"{value} as a constant: expected a finite number")
+    return f"({value!r})" if value < 0 or repr(value).startswith("-") else repr(value)
+
+
+def _closure(symbols: Iterable[Symbol]) -> dict[int, Symbol]:
+    """All symbols that some are computed from, each after its operands."""
+    found: dict[int, Symbol] = {}
+    for start in symbols:
+        stack: list[tuple[Symbol, bool]] = [(start, False)]
+        while stack:
+            symbol, visited = stack.pop()
+            if visited:
+                found[id(symbol)] = symbol
+            elif id(symbol) not in found:
+                stack.append((symbol, True))
+                if symbol.op != "phi":
+                    stack += [(arg, False) for arg in symbol.args]
+    return found
+
+
+def _used(block: Block) -> dict[int, Symbol]:
+    """The symbols that a block makes use of, other than to choose between values that nobody asks for."""
+    assigned: dict[int, list[Symbol]] = {}
+    named: list[Symbol] = []
+
+    def note(block: Block) -> None:
+        for each in block:
+            if each.op == "assign":
+                assigned.setdefault(id(each.symbols[0]), []).append(each.symbols[1])
+            else:
+                named.extend(each.symbols)
+            for inner in each.blocks:
+                note(inner)
+
+    note(block)
+    found: dict[int, Symbol] = {}
+    while named:
+        new = {key: symbol for key, symbol in _closure(named).items() if key not in found}
+        found |= new
+        named = [value for key in new for value in assigned.get(key, ())]
+    return found
+
+
+def _unknown_below(symbol: Symbol, is_known: object) -> list[Symbol]:
+    """What must be computed for a symbol, in order."""
+    found: dict[int, Symbol] = {}
+    stack: list[tuple[Symbol, bool]] = [(symbol, False)]
+    while stack:
+        one, visited = stack.pop()
+        if visited:
+            found[id(one)] = one
+        elif id(one) not in found and not is_known(one):  # type: ignore[operator]
+            stack.append((one, True))
+            stack += [(arg, False) for arg in reversed(one.args)]
+    return list(found.values())
+
+
+def _is_of_loop(symbol: Symbol, depth: int) -> bool:
+    return (symbol.op == "index" and symbol.data == depth) or (symbol.op == "variable" and symbol.data[0] == depth)

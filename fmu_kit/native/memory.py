@@ -1,0 +1,192 @@
+"""What a slave keeps from call to call: its variables, and the attributes that its model sets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from fmu_kit.native.statements import Block, Place, Statement, statement
+from fmu_kit.native.structure import Path, Snapshot, children, is_number, leaves, mapped
+from fmu_kit.native.symbols import Kind, Symbol, TraceError, common_kind, lifted, node
+
+_KINDS: dict[str, Kind] = {"Real": "real", "Integer": "int", "Boolean": "bool"}
+KEPT_BY_THE_BASE = ("_reals", "_others", "_stale", "_start_time")
+
+
+def name_of_kept(path: Path) -> str:
+    """The name of a place beside the variables."""
+    return ".".join(str(part).lstrip("_") for part in ("self", *path))
+
+
+class Memory:
+    """The memory of one slave while it is traced: every number in it has a place with a name."""
+
+    def __init__(self, slave: Any) -> None:
+        self.slave = slave
+        self.places: dict[str, Place] = {}
+        self.written: dict[str, Symbol] = {}
+        """what lies in each place now, as far as it has been written"""
+        self.version = 0
+        """of the memory: another one after each call"""
+        self.versions: dict[tuple[int, Statement], int] = {}
+        """after each call, by the one before it and the call"""
+        self._joined: dict[tuple[int, int, int], int] = {}
+        self._base = frozenset(vars(slave)) - set(KEPT_BY_THE_BASE)
+
+    # -- the attributes -----------------------------------------------------------------------------------------
+
+    def attributes(self) -> dict[str, Any]:
+        """Those that are memory, by name."""
+        return {name: value for name, value in vars(self.slave).items() if name not in self._base}
+
+    def _set_attributes(self, values: dict[str, Any]) -> None:
+        for name in self.attributes().keys() - values.keys():
+            delattr(self.slave, name)
+        for name, value in values.items():
+            setattr(self.slave, name, value)
+
+    def snapshot(self, args: Any, kwargs: Any) -> _Held:
+        """What is held now, in the memory and in the arguments of a call."""
+        return _Held(self, args, kwargs)
+
+    def view(self, roots: Any) -> tuple[Any, dict[Path, int]]:
+        """A copy of all that is held, and which object holds what, by path."""
+        everything = {"self": self.attributes(), "arguments": roots}
+        holders: dict[Path, int] = {}
+        _note_holders(everything, (), holders)
+        return mapped(everything, lambda _, leaf: leaf), holders
+
+    def install(self, view: Any, holders: dict[Path, int], roots: Any) -> None:
+        """Hold what a view says: in the objects that are there, where all paths left the same ones."""
+        live = {"self": self.attributes(), "arguments": roots}
+        grafted = _graft(live, view, (), holders)
+        self._set_attributes(grafted["self"])
+
+    # -- places -------------------------------------------------------------------------------------------------
+
+    def name(self, path: Path) -> str:
+        """The name of a place."""
+        first, *rest = path
+        if first in ("_reals", "_others"):
+            return str(self.slave.variables[rest[0]].name)
+        return name_of_kept(path)
+
+    def place(self, path: Path, symbol: Symbol) -> Place:
+        """The place of a path, made when it is first seen."""
+        name = self.name(path)
+        found = self.places.get(name)
+        reference = path[1] if path[0] in ("_reals", "_others") else None
+        if found is None:
+            kind = symbol.kind if reference is None else _KINDS[self.slave.variables[reference].type]
+            found = self.places[name] = Place(name, kind, reference)
+        elif found.kind != symbol.kind and reference is None:
+            widened = common_kind(node("load", (), found.kind), symbol)
+            found = self.places[name] = Place(name, widened, None)
+        return found
+
+    def enter(self) -> None:
+        """Forget all values: at the start of a function the memory holds whatever it holds."""
+        self.written = {}
+        self.version = 0
+
+        def load(path: Path, leaf: Any) -> Any:
+            if not is_number(leaf):
+                return leaf
+            place = self.place(path, lifted(leaf))
+            loaded = self.written[place.name] = node("load", (), place.kind, (place.name, 0))
+            return loaded
+
+        self._set_attributes({name: mapped(value, load, (name,)) for name, value in self.attributes().items()})
+
+    def flushed(self) -> Block:
+        """The stores that bring the memory up to date."""
+        stores = []
+        for path, leaf in leaves(self.attributes()):
+            if not is_number(leaf):
+                continue
+            symbol = lifted(leaf)
+            place = self.place(path, symbol)
+            if self.written.get(place.name) is not symbol:
+                stores.append(statement("store", (symbol,), place.name))
+                self.written[place.name] = symbol
+        return tuple(stores)
+
+    def returned(self, exit_view: dict[str, Any], stores: Iterable[str], before: dict[str, Symbol]) -> None:
+        """After a call: what it stored is read anew, all else is as it was before."""
+        stored = frozenset(stores)
+
+        def now(path: Path, leaf: Any) -> Any:
+            if not is_number(leaf):
+                return leaf
+            place = self.place(path, lifted(leaf))
+            if place.name in stored:
+                self.written[place.name] = node("load", (), place.kind, (place.name, self.version))
+            elif place.name not in before:
+                raise TraceError(f"{place.name}: set on some paths only")
+            else:
+                self.written[place.name] = before[place.name]
+            return self.written[place.name]
+
+        self.written = dict(self.written)
+        self._set_attributes({name: mapped(value, now, (name,)) for name, value in exit_view.items()})
+
+    def next_version(self, call: Statement) -> int:
+        """The version after a call."""
+        return self.versions.setdefault((self.version, call), self._unused())
+
+    def joined(self, condition: Symbol, a: int, b: int) -> int:
+        """The version after two paths that left different ones."""
+        return self._joined.setdefault((id(condition), a, b), self._unused())
+
+    def _unused(self) -> int:
+        return 1 + len(self.versions) + len(self._joined)
+
+
+class _Held:
+    """A state of the memory, to go back to."""
+
+    def __init__(self, memory: Memory, args: Any, kwargs: Any) -> None:
+        self._memory = memory
+        self._attributes = memory.attributes()
+        self._written, self._version = dict(memory.written), memory.version
+        self._objects = Snapshot(*self._attributes.values(), args, kwargs)
+
+    def restore(self) -> None:
+        """Go back to it."""
+        self._objects.restore()
+        self._memory._set_attributes(self._attributes)
+        self._memory.written, self._memory.version = dict(self._written), self._version
+
+
+def _note_holders(value: Any, path: Path, found: dict[Path, int]) -> None:
+    inside = children(value)
+    if not isinstance(value, tuple) and (inside or isinstance(value, list | dict)):
+        found[path] = id(value)
+    for key, child in inside:
+        _note_holders(child, (*path, key), found)
+
+
+def _graft(live: Any, new: Any, path: Path, holders: dict[Path, int]) -> Any:
+    """`new`, but in the objects of `live` where these are what all paths left."""
+    if not children(new):
+        return new
+    held = dict(children(live)) if type(live) is type(new) else {}
+    if path not in holders or holders[path] != id(live):
+        if isinstance(new, tuple) and held.keys() == dict(children(new)).keys():
+            grafted = [_graft(held[key], child, (*path, key), holders) for key, child in children(new)]
+            if all(a is b for a, b in zip(grafted, held.values())):
+                return live
+            return type(new)(*grafted) if hasattr(new, "_fields") else tuple(grafted)
+        if len(path) > 1 or not isinstance(new, dict):
+            return new
+        return {
+            key: _graft(held[key], child, (*path, key), holders) if key in held else child for key, child in new.items()
+        }
+    for key, child in children(new):
+        now = _graft(held.get(key), child, (*path, key), holders) if key in held else child
+        if now is not held.get(key):
+            if isinstance(live, list | dict):
+                live[key] = now
+            else:
+                object.__setattr__(live, key, now)
+    return live

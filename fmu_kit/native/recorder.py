@@ -1,0 +1,441 @@
+"""What a slave does, path by path, put together to functions.
+
+Code that is run on symbols takes one way wherever it asks whether a condition holds. So it is run again for the
+other way, until all have been taken; then the paths are merged where they meet again: at the end of each function.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from fmu_kit.errors import DivergenceError, FmuError
+from fmu_kit.native.memory import Memory
+from fmu_kit.native.statements import Block, Call, Function, Statement, branched, statement
+from fmu_kit.native.structure import is_number, leaves, mapped, shape
+from fmu_kit.native.symbols import (
+    Piece,
+    Symbol,
+    TraceError,
+    common_kind,
+    hooks,
+    lifted,
+    node,
+    pieces,
+    select,
+    token,
+    truth,
+)
+
+
+class _EndedError(BaseException):
+    """This path ends in an error of the FMU, wherever it is."""
+
+
+@dataclass(frozen=True)
+class _Fork:
+    """Where a path asked whether a condition holds."""
+
+    condition: Symbol
+
+
+@dataclass
+class _Path:
+    """One run of the code, with the ways that it is told to take first."""
+
+    script: tuple[bool, ...]
+    known: dict[int, bool]
+    entries: list[Statement | _Fork] = field(default_factory=list)
+    taken: list[bool] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class _Leaf:
+    """How a path ended, other than in an error."""
+
+    value: Any
+    view: Any
+    holders: dict[Any, int]
+    written: dict[str, Symbol]
+    version: int
+
+
+@dataclass(frozen=True)
+class _Tree:
+    block: Block
+    end: _Leaf | tuple[Symbol, _Tree, _Tree] | None
+
+
+class Recorder:
+    """Records what is done on the path that is being run, and explores them all."""
+
+    def __init__(self, memory: Memory) -> None:
+        self.memory = memory
+        self.functions: list[Function] = []
+        self._by_content: dict[Any, Function] = {}
+        self._path: _Path | None = None
+        self._depth = 0
+        self._catches = False
+        self._traced: dict[Any, tuple[Function, Any, Any]] = {}
+
+    def listen(self) -> None:
+        """Have the symbols tell this recorder."""
+        hooks.decide = self._decide
+        hooks.fail_if = self.fail_if
+
+    # -- what happens on a path -----------------------------------------------------------------------------
+
+    def add(self, *done: Statement) -> None:
+        """The next statements of this path."""
+        self._now.entries += done
+
+    def fail_if(self, condition: Any, error: Exception) -> None:
+        """The next statement: an error, if the condition holds."""
+        if condition is True:
+            raise error
+        if condition is not False:
+            self.add(*branched(truth(condition), (_raise(error),), ()))
+
+    def warn(self, key: str, text: str) -> None:
+        """The next statement: a warning, the first time only."""
+        found = pieces(text)
+        self.add(statement("warn", _values(found), (key, _words(found))))
+
+    @property
+    def _now(self) -> _Path:
+        if self._path is None:
+            raise TraceError("a computed value is used outside of a call that is traced")
+        return self._path
+
+    def _decide(self, condition: Symbol) -> bool:
+        if condition.op == "not":
+            return not self._decide(condition.args[0])
+        path = self._now
+        if id(condition) in path.known:
+            return path.known[id(condition)]
+        at = len(path.taken)
+        way = path.script[at] if at < len(path.script) else True
+        path.taken.append(way)
+        path.known[id(condition)] = way
+        path.entries.append(_Fork(condition))
+        return way
+
+    # -- all paths through a piece of code ---------------------------------------------------------------------
+
+    def region(self, function: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
+        """Call a function so that the paths through it are one when it returns."""
+        outer = self._now
+        held = self.memory.snapshot(args, kwargs)
+        block, leaf, forked = self._explored(lambda: function(*args, **kwargs), (args, kwargs), held.restore)
+        outer.entries += block
+        if leaf is None:
+            raise _EndedError
+        if forked:
+            self.memory.install(leaf.view, leaf.holders, (args, kwargs))
+            self.memory.written, self.memory.version = dict(leaf.written), leaf.version
+        return leaf.value
+
+    def _explored(
+        self, body: Callable[[], Any], roots: Any, restore: Callable[[], None]
+    ) -> tuple[Block, _Leaf | None, bool]:
+        tree, forked = self._tree(body, roots, restore)
+        block, leaf = self._merged(tree)
+        return block, leaf, forked
+
+    def _tree(self, body: Callable[[], Any], roots: Any, restore: Callable[[], None]) -> tuple[_Tree, bool]:
+        outer = self._path
+        runs = 0
+
+        def run(script: tuple[bool, ...]) -> tuple[_Path, _Leaf | None]:
+            nonlocal runs
+            if runs:
+                restore()
+            runs += 1
+            if runs > MOST_PATHS:
+                raise TraceError(f"more than {MOST_PATHS} paths: expected fewer conditions that depend on each other")
+            path = self._path = _Path(script, dict(outer.known) if outer else {})
+            leaf = None
+            try:
+                value = body()
+                leaf = self._leaf(value, roots)
+            except _EndedError:
+                pass
+            except (FmuError, ArithmeticError, ValueError) as error:
+                path.entries.append(_raise(error))
+            finally:
+                self._path = outer
+            return path, leaf
+
+        def grown(script: tuple[bool, ...]) -> _Tree:
+            path, leaf = run(script)
+            forks = [i for i, entry in enumerate(path.entries) if isinstance(entry, _Fork)]
+            start = forks[len(script) - 1] + 1 if script else 0
+
+            def rest(start: int, depth: int) -> _Tree:
+                if depth == len(forks):
+                    return _Tree(_statements(path.entries[start:]), leaf)
+                at = forks[depth]
+                fork = path.entries[at]
+                assert isinstance(fork, _Fork)
+                then = rest(at + 1, depth + 1)
+                otherwise = grown((*path.taken[:depth], False))
+                return _Tree(_statements(path.entries[start:at]), (fork.condition, then, otherwise))
+
+            return rest(start, len(script))
+
+        return grown(()), runs > 1
+
+    def _leaf(self, value: Any, roots: Any) -> _Leaf:
+        view, holders = self.memory.view(roots)
+        return _Leaf(value, view, holders, dict(self.memory.written), self.memory.version)
+
+    def _merged(self, tree: _Tree) -> tuple[Block, _Leaf | None]:
+        if not isinstance(tree.end, tuple):
+            return tree.block, tree.end
+        condition, then, otherwise = tree.end
+        block_a, a = self._merged(then)
+        block_b, b = self._merged(otherwise)
+        leaf = a or b
+        if a is not None and b is not None:
+            merge = _Merge(condition, self.memory, bool(block_a or block_b))
+            leaf = merge.leaf(a, b)
+            block_a, block_b = (*block_a, *merge.then), (*block_b, *merge.otherwise)
+        return (*tree.block, *branched(condition, block_a, block_b)), leaf
+
+    # -- functions -----------------------------------------------------------------------------------------------
+
+    def call(self, method: Callable[..., Any], name: str, arguments: dict[str, Any]) -> Any:
+        """Call a method of the slave, which becomes a function of its own."""
+        memory = self.memory
+        self.add(*memory.flushed())
+        given = [lifted(leaf) for _, leaf in leaves(arguments) if is_number(leaf)]
+        before = dict(memory.written)
+        key = (name, shape(arguments), shape(memory.attributes()))
+        if key not in self._traced:
+            self._traced[key] = self.function(method, name, arguments)
+        function, exit_view, returned = self._traced[key]
+        call = statement("call", given, Call(function, memory.version))
+        self.add(call)
+        memory.version = memory.next_version(call)
+        if exit_view is None:
+            raise _EndedError
+        memory.returned(exit_view, function.stores, before)
+        if self._catches:
+            for kind in sorted(function.raises):
+                if node("failed", (), "bool", (kind, memory.version)):
+                    raise error_class(kind)(token(node("failure", (), "real"), "failure"))
+        numbers = [leaf for _, leaf in leaves(returned) if is_number(leaf)]
+        results = iter([node("result", (), lifted(leaf).kind, (k, memory.version)) for k, leaf in enumerate(numbers)])
+        return mapped(returned, lambda _, leaf: next(results) if is_number(leaf) else leaf)
+
+    def function(
+        self, method: Callable[..., Any], name: str, arguments: dict[str, Any], *, catches: bool = False
+    ) -> tuple[Function, Any, Any]:
+        """A method, traced on parameters in place of the numbers given to it; what it leaves, and what it returns."""
+        memory, outer, caught = self.memory, self._path, self._catches
+        held, written, version = memory.snapshot(arguments, ()), memory.written, memory.version
+        names: list[str] = []
+
+        def parameter(path: Any, leaf: Any) -> Any:
+            if not is_number(leaf):
+                return leaf
+            names.append(".".join(map(str, path)))
+            return node("parameter", (), lifted(leaf).kind, len(names) - 1)
+
+        given = mapped(arguments, parameter)
+        memory.enter()
+        start = memory.snapshot(given, ())
+        self._path, self._catches = None, catches
+        entered = dict(memory.written)
+
+        def again() -> None:
+            start.restore()
+            memory.written, memory.version = dict(entered), 0
+
+        try:
+            block, leaf, _ = self._explored(lambda: method(**given), given, again)
+        finally:
+            self._path, self._catches = outer, caught
+        exit_view, value = None, None
+        results: list[Symbol] = []
+        if leaf is not None:
+            memory.install(leaf.view, leaf.holders, given)
+            memory.written, memory.version = dict(leaf.written), leaf.version
+            exit_view, value = memory.attributes(), leaf.value
+            results = [lifted(leaf) for _, leaf in leaves(value) if is_number(leaf)]
+            block = (*block, *memory.flushed(), statement("return", results))
+        held.restore()
+        memory.written, memory.version = written, version
+        parameters = tuple(lifted(leaf) for _, leaf in leaves(given) if is_number(leaf))
+        return self._kept(name, method, (parameters, tuple(names)), block, len(results)), exit_view, value
+
+    def _kept(
+        self, name: str, method: Any, head: tuple[tuple[Symbol, ...], tuple[str, ...]], block: Block, results: int
+    ) -> Function:
+        parameters, names = head
+        key = (name, tuple(map(id, parameters)), tuple(map(id, block)))
+        if key not in self._by_content:
+            same = sum(each.name.partition("__")[0] == name for each in self.functions)
+            made = Function(
+                name=f"{name}__{same + 1}" if same else name,
+                parameters=parameters,
+                names=names,
+                body=block,
+                results=results,
+                stores=frozenset(_stores(block)),
+                raises=frozenset(_raises(block)),
+                doc=(method.__doc__ or "").strip().partition("\n")[0],
+            )
+            self._by_content[key] = made
+            self.functions.append(made)
+        return self._by_content[key]
+
+    # -- loops -----------------------------------------------------------------------------------------------------
+
+    def repeat(self, count: Any, body: Callable[[Any, Any], Any], state: Any) -> Any:
+        """`state = body(i, state)` for i = 0 … count - 1, where the count is computed."""
+        depth = self._depth
+        starts = [lifted(leaf) for _, leaf in leaves(state) if is_number(leaf)]
+        kinds = [start.kind for start in starts]
+        variables = iter([node("variable", (), kind, (depth, k)) for k, kind in enumerate(kinds)])
+        inside = mapped(state, lambda _, leaf: next(variables) if is_number(leaf) else leaf)
+        index = node("index", (), "int", depth)
+        before = self.memory.snapshot((), {})
+        self._depth += 1
+        outer = self._now
+        try:
+            block, leaf, _ = self._explored(lambda: body(index, inside), (), before.restore)
+        finally:
+            self._depth -= 1
+        if leaf is None:
+            raise TraceError("a loop that always fails")
+        if shape(leaf.value) != shape(state):
+            raise TraceError("repeat: expected the body to return what it is given, with other numbers")
+        nexts = [lifted(leaf) for _, leaf in leaves(leaf.value) if is_number(leaf)]
+        loop = statement("loop", (lifted(count), *starts, *nexts), depth, (block,))
+        outer.entries.append(loop)
+        results = iter([node("outcome", (), kind, (k, loop)) for k, kind in enumerate(kinds)])
+        return mapped(state, lambda _, leaf: next(results) if is_number(leaf) else leaf)
+
+
+MOST_PATHS = 2000
+"""Through one function; more take minutes."""
+
+
+class _Merge:
+    """Two ends of paths that meet again."""
+
+    def __init__(self, condition: Symbol, memory: Memory, branches: bool) -> None:
+        self.condition = condition
+        self.memory = memory
+        self.branches = branches
+        self.then: list[Statement] = []
+        self.otherwise: list[Statement] = []
+
+    def leaf(self, a: _Leaf, b: _Leaf) -> _Leaf:
+        """What holds after both."""
+        version = a.version if a.version == b.version else self.memory.joined(self.condition, a.version, b.version)
+        return _Leaf(
+            self.value(a.value, b.value, "what is returned"),
+            self.value(a.view, b.view, "what is kept"),
+            {path: holder for path, holder in a.holders.items() if b.holders.get(path) == holder},
+            {name: self.number(a.written[name], b.written[name]) for name in a.written.keys() & b.written.keys()},
+            version,
+        )
+
+    def value(self, a: Any, b: Any, what: str) -> Any:
+        if shape(a) != shape(b):
+            raise TraceError(f"{what} differs in more than numbers between two paths: {_difference(a, b)}")
+        others = iter([leaf for _, leaf in leaves(b)])
+
+        def either(_: Any, leaf: Any) -> Any:
+            other = next(others)
+            return self.number(leaf, other) if is_number(leaf) else leaf
+
+        return mapped(a, either)
+
+    def number(self, a: Any, b: Any) -> Any:
+        """The number that is `a` on the one path and `b` on the other."""
+        left, right = lifted(a), lifted(b)
+        if left is right:
+            return a
+        if not self.branches and _is_cheap(left) and _is_cheap(right):
+            return select(self.condition, a, b)
+        if isinstance(a, bool) and isinstance(b, bool):
+            return select(self.condition, a, b)
+        made = node("phi", (self.condition, left, right), common_kind(left, right))
+        if not any(each.symbols[0] is made for each in self.then):
+            self.then.append(statement("assign", (made, left)))
+            self.otherwise.append(statement("assign", (made, right)))
+        return made
+
+
+def _is_cheap(symbol: Symbol) -> bool:
+    return not symbol.args or (symbol.op in ("neg", "not") and _is_cheap(symbol.args[0]))
+
+
+def _difference(a: Any, b: Any) -> str:
+    one, other = dict(leaves(a)), dict(leaves(b))
+    for path in [*one, *other]:
+        if path not in one or path not in other or shape(one[path]) != shape(other[path]):
+            name = ".".join(str(part) for part in path) or "the value"
+            return f"{name} is {one.get(path, 'absent')} and {other.get(path, 'absent')}"
+    return "their types"
+
+
+def _statements(entries: list[Statement | _Fork]) -> Block:
+    return tuple(entry for entry in entries if isinstance(entry, Statement))
+
+
+# -- errors ------------------------------------------------------------------------------------------------------
+
+_CLASSES: dict[str, type[Exception]] = {
+    each.__name__: each for each in (FmuError, DivergenceError, ZeroDivisionError, OverflowError, ValueError)
+}
+
+
+def error_class(name: str) -> type[Exception]:
+    """The class of an error by its name."""
+    return _CLASSES[name]
+
+
+def _raise(error: Exception) -> Statement:
+    name = next(name for name, each in reversed(_CLASSES.items()) if isinstance(error, each))
+    if type(error).__name__ in _CLASSES:
+        name = type(error).__name__
+    found = pieces(str(error))
+    return statement("raise", _values(found), (name, _words(found)))
+
+
+def _values(text: list[Piece]) -> list[Symbol]:
+    return [piece[0] for piece in text if not isinstance(piece, str)]
+
+
+def _words(text: list[Piece]) -> tuple[str | tuple[str], ...]:
+    """The text without its values: a format in place of each."""
+    return tuple(piece if isinstance(piece, str) else (piece[1],) for piece in text)
+
+
+def _stores(block: Block) -> set[str]:
+    found: set[str] = set()
+    for each in block:
+        if each.op == "store":
+            found.add(each.data)
+        elif each.op == "call":
+            found |= each.data.function.stores
+        for inner in each.blocks:
+            found |= _stores(inner)
+    return found
+
+
+def _raises(block: Block) -> set[str]:
+    found: set[str] = set()
+    for each in block:
+        if each.op == "raise":
+            found.add(each.data[0])
+        elif each.op == "call":
+            found |= each.data.function.raises
+        for inner in each.blocks:
+            found |= _raises(inner)
+    return found

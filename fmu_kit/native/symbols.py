@@ -1,0 +1,370 @@
+"""Symbols: what a slave computes with while it is traced, and the graph of operations that it leaves.
+
+A symbol is a node of the graph. Nodes are interned: the same operation on the same operands is the same object, so
+that nothing is computed twice and two paths through the code can be compared. No operation is rearranged or
+simplified: every one is the operation of Python floats, in their order, so that C gives the same bits.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Sequence
+from typing import Any, Literal
+
+Kind = Literal["real", "int", "bool"]
+
+
+class TraceError(Exception):
+    """The code does what cannot be traced; the text says what, and what to do instead."""
+
+
+class Symbol:
+    """A number that is not known before the FMU runs."""
+
+    __slots__ = ("args", "data", "kind", "op")
+
+    def __init__(self, op: str, args: tuple[Symbol, ...], kind: Kind, data: Any) -> None:
+        self.op = op
+        self.args = args
+        self.kind = kind
+        self.data = data
+
+    # -- arithmetic: as Python floats do it ----------------------------------------------------------------
+
+    def __add__(self, other: Any) -> Any:
+        return _arithmetic("add", self, other)
+
+    def __radd__(self, other: Any) -> Any:
+        return _arithmetic("add", other, self)
+
+    def __sub__(self, other: Any) -> Any:
+        return _arithmetic("sub", self, other)
+
+    def __rsub__(self, other: Any) -> Any:
+        return _arithmetic("sub", other, self)
+
+    def __mul__(self, other: Any) -> Any:
+        return _arithmetic("mul", self, other)
+
+    def __rmul__(self, other: Any) -> Any:
+        return _arithmetic("mul", other, self)
+
+    def __truediv__(self, other: Any) -> Any:
+        return _checked("div", self, other)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return _checked("div", other, self)
+
+    def __floordiv__(self, other: Any) -> Any:
+        return _checked("floordiv", self, other)
+
+    def __rfloordiv__(self, other: Any) -> Any:
+        return _checked("floordiv", other, self)
+
+    def __mod__(self, other: Any) -> Any:
+        return _checked("mod", self, other)
+
+    def __rmod__(self, other: Any) -> Any:
+        return _checked("mod", other, self)
+
+    def __pow__(self, other: Any) -> Any:
+        return _checked("pow", self, other)
+
+    def __rpow__(self, other: Any) -> Any:
+        return _checked("pow", other, self)
+
+    def __neg__(self) -> Symbol:
+        return node("neg", (self,), _number(self.kind))
+
+    def __pos__(self) -> Symbol:
+        return self
+
+    def __abs__(self) -> Symbol:
+        return node("abs", (self,), _number(self.kind))
+
+    # -- conditions ----------------------------------------------------------------------------------------
+
+    def __lt__(self, other: Any) -> Any:
+        return _comparison("lt", self, other)
+
+    def __le__(self, other: Any) -> Any:
+        return _comparison("le", self, other)
+
+    def __gt__(self, other: Any) -> Any:
+        return _comparison("gt", self, other)
+
+    def __ge__(self, other: Any) -> Any:
+        return _comparison("ge", self, other)
+
+    def __eq__(self, other: object) -> Any:
+        return _comparison("eq", self, other)
+
+    def __ne__(self, other: object) -> Any:
+        return _comparison("ne", self, other)
+
+    def __and__(self, other: Any) -> Any:
+        return both(self, other)
+
+    __rand__ = __and__
+
+    def __or__(self, other: Any) -> Any:
+        return either(self, other)
+
+    __ror__ = __or__
+
+    def __invert__(self) -> Any:
+        if self.kind != "bool":
+            raise TraceError("~ of a number: expected a condition")
+        return negation(self)
+
+    def __bool__(self) -> bool:
+        return hooks.decide(truth(self))
+
+    # -- what would lose the symbol --------------------------------------------------------------------------
+
+    def __float__(self) -> float:
+        raise TraceError(
+            "a function that takes floats only was given a computed value: expected one of the module `math`, "
+            "called as math.NAME, or of the ScalarOps"
+        )
+
+    def __int__(self) -> int:
+        raise TraceError("a computed value where an integer must be known: expected fmu_kit.scalar.repeat for a loop")
+
+    __index__ = __int__
+
+    def __round__(self, digits: Any = None) -> Any:
+        raise TraceError("round() of a computed value: expected math.floor or math.ceil")
+
+    def __trunc__(self) -> Any:
+        raise TraceError("math.trunc() of a computed value: expected math.floor or math.ceil")
+
+    def __floor__(self) -> Any:
+        return whole("floor", self)
+
+    def __ceil__(self) -> Any:
+        return whole("ceil", self)
+
+    def __hash__(self) -> int:
+        return object.__hash__(self)
+
+    def __reduce__(self) -> Any:
+        raise TraceError("a computed value cannot be pickled")
+
+    def __copy__(self) -> Symbol:
+        return self
+
+    def __deepcopy__(self, memo: Any) -> Symbol:
+        return self
+
+    # -- text ------------------------------------------------------------------------------------------------
+
+    def __format__(self, spec: str) -> str:
+        return token(self, spec)
+
+    def __repr__(self) -> str:
+        return token(self, "")
+
+    __str__ = __repr__
+
+
+class Hooks:
+    """What symbols tell the recorder of the path on which they come up."""
+
+    decide: Callable[[Symbol], bool]
+    """which way the path goes where this condition is asked for"""
+    fail_if: Callable[[Any, Exception], None]
+    """this error is raised if the condition holds"""
+
+
+hooks = Hooks()
+
+# -- the graph ---------------------------------------------------------------------------------------------------
+
+_interned: dict[Any, Symbol] = {}
+
+
+def node(op: str, args: Sequence[Symbol], kind: Kind, data: Any = None) -> Symbol:
+    """The one node of this operation on these operands."""
+    key = (op, tuple(map(id, args)), kind, data)
+    found = _interned.get(key)
+    if found is None:
+        found = _interned[key] = Symbol(op, tuple(args), kind, data)
+    return found
+
+
+def constant(value: float | int | bool) -> Symbol:
+    """The node of a known number."""
+    kind: Kind = "bool" if isinstance(value, bool) else "int" if isinstance(value, int) else "real"
+    return node("constant", (), kind, struct.pack("<d", value))
+
+
+def value_of(symbol: Symbol) -> float:
+    """The number of a constant."""
+    (value,) = struct.unpack("<d", symbol.data)
+    return float(value)
+
+
+def lifted(value: Any) -> Symbol:
+    """A symbol as it is, a number as a constant; raises `TraceError` for what is neither."""
+    if isinstance(value, Symbol):
+        return value
+    if isinstance(value, bool | int | float):
+        return constant(value)
+    raise TraceError(f"{type(value).__name__}: expected a number")
+
+
+def is_known(*values: Any) -> bool:
+    """Whether none of the values is a symbol."""
+    return not any(isinstance(value, Symbol) for value in values)
+
+
+def truth(value: Symbol) -> Symbol:
+    """Whether a value counts as true."""
+    return value if value.kind == "bool" else node("ne", (value, constant(0.0)), "bool")
+
+
+def negation(condition: Any) -> Any:
+    """Not, of a condition."""
+    if is_known(condition):
+        return not condition
+    return condition.args[0] if condition.op == "not" else node("not", (truth(condition),), "bool")
+
+
+def both(a: Any, b: Any) -> Any:
+    """And, of conditions."""
+    for one, other in ((a, b), (b, a)):
+        if is_known(one):
+            return other if one else False
+    return truth(a) if a is b else node("and", (truth(a), truth(b)), "bool")
+
+
+def either(a: Any, b: Any) -> Any:
+    """Or, of conditions."""
+    for one, other in ((a, b), (b, a)):
+        if is_known(one):
+            return True if one else other
+    return truth(a) if a is b else node("or", (truth(a), truth(b)), "bool")
+
+
+def select(condition: Any, a: Any, b: Any) -> Any:
+    """`a` where the condition holds, else `b`; both are computed."""
+    if is_known(condition):
+        return a if condition else b
+    if is_known(a, b) and isinstance(a, bool) and isinstance(b, bool):
+        return a if a is b else truth(condition) if a else negation(condition)
+    left, right = lifted(a), lifted(b)
+    return left if left is right else node("select", (truth(condition), left, right), common_kind(left, right))
+
+
+def common_kind(a: Symbol, b: Symbol) -> Kind:
+    """The kind of what is either of two."""
+    if a.kind == b.kind:
+        return a.kind
+    return "real" if "real" in (a.kind, b.kind) else "int"
+
+
+def whole(op: Literal["floor", "ceil"], x: Symbol) -> Symbol:
+    """math.floor, math.ceil: an integer."""
+    if x.kind != "real":
+        return x
+    hooks.fail_if(node("isnan", (x,), "bool"), raised(lambda: int(float("nan"))))
+    hooks.fail_if(node("isinf", (x,), "bool"), raised(lambda: int(float("inf"))))
+    return node(op, (x,), "int")
+
+
+def raised(call: Callable[[], object]) -> Exception:
+    """The error that Python itself raises."""
+    try:
+        call()
+    except Exception as error:
+        return error
+    raise AssertionError("expected the call to raise")
+
+
+def _number(kind: Kind) -> Kind:
+    return "int" if kind == "bool" else kind
+
+
+def _arithmetic(op: str, a: Any, b: Any) -> Any:
+    if not (isinstance(a, Symbol | float | int) and isinstance(b, Symbol | float | int)):
+        return NotImplemented
+    left, right = lifted(a), lifted(b)
+    kind: Kind = "real" if "real" in (left.kind, right.kind) else "int"
+    return node(op, (left, right), kind)
+
+
+def _checked(op: str, a: Any, b: Any) -> Any:
+    """An operation that Python refuses for some operands."""
+    if not (isinstance(a, Symbol | float | int) and isinstance(b, Symbol | float | int)):
+        return NotImplemented
+    left, right = lifted(a), lifted(b)
+    integers = "real" not in (left.kind, right.kind)
+    if op == "pow":
+        return _power(left, right, integers)
+    zero: Any = _comparison("eq", right, 0.0)
+    hooks.fail_if(zero, raised((lambda: 1 // 0) if integers else _DIVISIONS[op]))
+    return node(op, (left, right), "int" if integers and op != "div" else "real")
+
+
+_DIVISIONS: dict[str, Callable[[], object]] = {
+    "div": lambda: 1.0 / 0.0,
+    "floordiv": lambda: 1.0 // 0.0,
+    "mod": lambda: 1.0 % 0.0,
+}
+
+
+def _power(base: Symbol, exponent: Symbol, integers: bool) -> Symbol:
+    if integers and not (exponent.op == "constant" and value_of(exponent) >= 0.0):
+        raise TraceError("** of two integers: expected a float among them")
+    known = value_of(exponent) if exponent.op == "constant" else None
+    if known is None or known < 0.0:
+        negative: Any = known is not None or exponent < 0.0
+        hooks.fail_if(both(base == 0.0, negative), raised(lambda: 0.0 ** float("-1")))
+    if known is None or not known.is_integer():
+        broken: Any = known is not None or node("ne", (exponent, node("floor", (exponent,), "real")), "bool")
+        # Python goes on with a complex number, which no variable takes
+        hooks.fail_if(both(base < 0.0, broken), ValueError("a negative number to a power that is no integer"))
+    result = node("pow", (base, exponent), "int" if integers else "real")
+    finite = both(
+        node("isfinite", (base,), "bool"), True if known is not None else node("isfinite", (exponent,), "bool")
+    )
+    hooks.fail_if(both(node("isinf", (result,), "bool"), finite), raised(lambda: 10.0 ** float("400")))
+    return result
+
+
+def _comparison(op: str, a: Any, b: Any) -> Any:
+    if not (isinstance(a, Symbol | float | int) and isinstance(b, Symbol | float | int)):
+        return NotImplemented
+    return node(op, (lifted(a), lifted(b)), "bool")
+
+
+# -- text: where a value stands in a message ---------------------------------------------------------------------
+
+OPENING, CLOSING = "\x02", "\x03"
+_tokens: list[tuple[Symbol, str]] = []
+_numbers: dict[tuple[int, str], int] = {}
+
+Piece = str | tuple[Symbol, str]
+"""A part of a text: words, or a value and how it is formatted."""
+
+
+def token(symbol: Symbol, spec: str) -> str:
+    """What stands in a text for a value."""
+    key = (id(symbol), spec)
+    if key not in _numbers:
+        _numbers[key] = len(_tokens)
+        _tokens.append((symbol, spec))
+    return f"{OPENING}{_numbers[key]}{CLOSING}"
+
+
+def pieces(text: str) -> list[Piece]:
+    """A text, taken apart at the values that stand in it."""
+    first, *rest = text.split(OPENING)
+    found: list[Piece] = [first] if first else []
+    for part in rest:
+        number, _, words = part.partition(CLOSING)
+        found.append(_tokens[int(number)])
+        if words:
+            found.append(words)
+    return found

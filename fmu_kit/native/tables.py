@@ -1,0 +1,118 @@
+"""What a slave says of its variables, as tables in C: starts, types, and what it answers where it refuses.
+
+The answers are those of the slave itself: it is asked in Python, and what it says is written down.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable, Iterable
+
+from fmu_kit.errors import FmuError
+from fmu_kit.native.c_code import ERRORS, c_string, place_names
+from fmu_kit.native.memory import KEPT_BY_THE_BASE, name_of_kept
+from fmu_kit.native.statements import Place
+from fmu_kit.native.symbols import TraceError
+from fmu_kit.native.tracing import Program
+from fmu_kit.slave import Phase, Slave
+
+_UNUSED = 4_242_424_242
+"""A value reference that no variable has."""
+_CALLS = {
+    "SETUP_EXPERIMENT": (Phase.INSTANTIATED, "fmi2SetupExperiment"),
+    "ENTER_INITIALIZATION_MODE": (Phase.INSTANTIATED, "fmi2EnterInitializationMode"),
+    "EXIT_INITIALIZATION_MODE": (Phase.INITIALIZATION, "fmi2ExitInitializationMode"),
+    "DO_STEP": (Phase.STEPPING, "fmi2DoStep"),
+}
+_SET_REAL, _SET_START = inspect.unwrap(Slave.set_real), inspect.unwrap(Slave.setup_experiment)
+_TYPES = ("Real", "Integer", "Boolean", "String")
+
+
+def tables(program: Program, guid: str) -> str:
+    """The tables of a program, for the FMU of this GUID."""
+    slave = program.slave(instance_name="tables")
+    variables = program.slave.variables
+    places = place_names(program.places)
+    inputs = [(1 if v.has_start else 0) + (2 if v.causality == "input" else 0) for v in variables]
+    parts = [
+        f"#define GUID {c_string(guid)}",
+        f"enum {{ VARIABLES = {len(variables)} }};",
+        "/* The memory: the variables by value reference, then what the model keeps. */",
+        _listed("enum", [*(places[place.name] for place in program.places), "PLACES"]) + ";",
+        f"enum {{ DIVERGENCE = {1 + ERRORS.index('DivergenceError')} }}; /* what a function returns in that case */",
+        "typedef enum { REAL, INTEGER, BOOLEAN, STRING } Type;",
+        _array("Type types[VARIABLES]", (v.type.upper() for v in variables)),
+        _array("double starts[PLACES]", (repr(_start(slave, place)) for place in program.places)),
+        "enum { GIVEN = 1, INPUT = 2 }; /* from outside; while the FMU is stepped as well */",
+        _array("unsigned char kinds[VARIABLES]", map(str, inputs)),
+        _listed("typedef enum", _CALLS) + " Call;",
+        "/* What is answered in each phase; NULL: nothing, the call is carried out. */",
+        _array(
+            f"Text refused_call[{len(_CALLS)}][PHASES]", (_refused(slave, slave._expect, *c) for c in _CALLS.values())
+        ),
+        _array(
+            "Text refused_setting[VARIABLES][PHASES]",
+            (_refused(slave, slave._settable, i, v.type) for i, v in enumerate(variables)),
+        ),
+        "/* The text before a value that cannot be, and after it. */",
+        _array("Text bad_value[VARIABLES][2]", (_refused_value(slave, i) for i in range(len(variables)))),
+        f"static const Text bad_start_time[2] = {_around('nan', slave, _SET_START, slave, math.nan)};",
+        _array("Text wrong_type[4][2]", (_around(f"{_UNUSED}", slave, slave._of_type, [_UNUSED], t) for t in _TYPES)),
+    ]
+    return "\n".join(parts) + "\n"
+
+
+def _start(slave: Slave, place: Place) -> float:
+    """What a place holds before initialisation; what a model keeps is not read before it has been written."""
+    if place.reference is not None:
+        return float(slave.variables[place.reference].start)
+    kept = {name_of_kept((name,)): value for name, value in vars(slave).items() if name in KEPT_BY_THE_BASE}
+    return float(kept.get(place.name, 0.0))
+
+
+def _listed(head: str, items: Iterable[str]) -> str:
+    body = ",\n".join(f"    {item}" for item in items)
+    return f"{head} {{\n{body}\n}}"
+
+
+def _array(declaration: str, values: Iterable[str]) -> str:
+    return _listed(f"static const {declaration} =", values) + ";"
+
+
+def _row(texts: Iterable[str | None]) -> str:
+    return "{" + ", ".join("NULL" if text is None else c_string(text) for text in texts) + "}"
+
+
+def _refused(slave: Slave, call: Callable[..., object], *given: object) -> str:
+    """What the slave answers to a call in each phase."""
+    return _row(_answer(slave, phase, call, *given) for phase in Phase)
+
+
+def _refused_value(slave: Slave, reference: int) -> str:
+    """What it answers to a value that is not finite: before the value, and after it."""
+    variable = slave.variables[reference]
+    if variable.type != "Real" or not variable.has_start:
+        return _row(("", ""))
+    return _around("nan", slave, _SET_REAL, slave, [reference], [math.nan])
+
+
+def _around(value: str, slave: Slave, call: Callable[..., object], *given: object) -> str:
+    """What the slave answers to a value: before the value, and after it."""
+    text = _answer(slave, Phase.INSTANTIATED, call, *given) or ""
+    before, found, after = text.partition(value)
+    if not found:
+        raise TraceError(f"{text!r}: expected a refusal that names {value}")
+    return _row((before, after))
+
+
+def _answer(slave: Slave, phase: Phase, call: Callable[..., object], *given: object) -> str | None:
+    """What the slave answers to a call in a phase, if it refuses it."""
+    slave._phase = phase
+    try:
+        call(*given)
+    except FmuError as error:
+        return str(error)
+    finally:
+        slave._phase = Phase.INSTANTIATED
+    return None

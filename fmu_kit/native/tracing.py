@@ -1,0 +1,183 @@
+"""A slave, run on symbols: from its class to a program of functions.
+
+Whatever branches is put together again where it returns. So the functions of the slave's modules that branch are
+wrapped while it is traced; each method of the slave becomes a function of its own.
+"""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import functools
+import inspect
+import textwrap
+import traceback
+import types
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fmu_kit import scalar
+from fmu_kit.native import stand_ins
+from fmu_kit.native.memory import Memory
+from fmu_kit.native.recorder import Recorder
+from fmu_kit.native.statements import Function, Place, Statement
+from fmu_kit.native.symbols import TraceError
+from fmu_kit.slave import Phase, Slave
+
+_BASE_METHODS = ("_take_parameters", "_check_parameters")
+_UNTRACED = ("internal_state", "restore", "to_xml")
+_OWN = Path(__file__).parent
+
+
+@dataclass(frozen=True, kw_only=True)
+class Program:
+    """What a slave does, as functions over its memory."""
+
+    model: str
+    slave: type[Slave]
+    places: tuple[Place, ...]
+    """the variables by value reference, then what the model keeps"""
+    functions: tuple[Function, ...]
+    """each after those that it calls"""
+    initialise: Function
+    """compute the outputs at the start time; no parameters"""
+    do_step: Function
+    """advance; parameters t, h [s]"""
+    warnings: tuple[str, ...]
+    """keys of the warnings that are given once"""
+    versions: Mapping[tuple[int, Statement], int]
+    """of the memory, after a call, by the one before it and the call"""
+
+
+def trace(slave: type[Slave], modules: list[types.ModuleType]) -> Program:
+    """The program of a slave class that is defined, with all that it uses, in `modules`.
+
+    Raises `TraceError` naming the line that does what cannot be traced.
+    """
+    instance = slave(instance_name="traced")
+    memory = Memory(instance)
+    recorder = Recorder(memory)
+    recorder.listen()
+    warnings: list[str] = []
+
+    def warn_once(self: Slave, key: str, text: str) -> None:
+        if key not in warnings:
+            warnings.append(key)
+        recorder.warn(key, text)
+
+    try:
+        with _wrapped(slave, modules, recorder, warn_once):
+            initialise, after, _ = recorder.function(
+                lambda: Slave._initialise(instance), "enter_stepping", {}, catches=True
+            )
+            if after is None:
+                raise TraceError(f"{slave.__name__}.initialise fails whatever it is given")
+            memory._set_attributes(after)
+            instance._phase = Phase.STEPPING
+            step = functools.partial(inspect.unwrap(Slave.do_step), instance)
+            do_step, _, _ = recorder.function(lambda t, h: step(t, h), "do_step", {"t": 0.0, "h": 0.0}, catches=True)
+    except Exception as error:
+        raise TraceError(f"{_place(error)}{error}") from error
+    variables = {place.reference: place for place in memory.places.values() if place.reference is not None}
+    kept = [place for place in memory.places.values() if place.reference is None]
+    return Program(
+        model=slave.__name__,
+        slave=slave,
+        places=(*(variables[i] for i in range(len(slave.variables))), *kept),
+        functions=tuple(recorder.functions),
+        initialise=initialise,
+        do_step=do_step,
+        warnings=tuple(warnings),
+        versions=memory.versions,
+    )
+
+
+def _place(error: Exception) -> str:
+    """File and line of the slave's code that an error comes from."""
+    frames = [
+        frame
+        for frame in traceback.extract_tb(error.__traceback__)
+        if Path(frame.filename).suffix == ".py" and Path(frame.filename).parent != _OWN
+    ]
+    where = frames[-1] if frames else None
+    kind = "" if isinstance(error, TraceError) else f"{type(error).__name__}: "
+    return f"{where.filename}, line {where.lineno}: {kind}" if where else kind
+
+
+@contextlib.contextmanager
+def _wrapped(
+    slave: type[Slave], modules: list[types.ModuleType], recorder: Recorder, warn_once: Callable[..., None]
+) -> Iterator[None]:
+    """Have every function that branches, and every method of the slave, tell the recorder."""
+    lineage = slave.__mro__[: slave.__mro__.index(Slave)]
+    changed: list[tuple[type, str, Any]] = []
+    extra: dict[Any, Any] = {scalar.repeat: recorder.repeat}
+    names = {module.__name__ for module in modules}
+
+    def replace(cls: type, name: str, function: Any) -> None:
+        changed.append((cls, name, vars(cls)[name]))
+        setattr(cls, name, function)
+
+    for module in modules:
+        for value in list(vars(module).values()):
+            if getattr(value, "__module__", None) not in names:
+                continue
+            if isinstance(value, types.FunctionType) and value is not scalar.repeat and _branches(value):
+                extra[value] = _as_region(value, recorder)
+            elif isinstance(value, type) and value.__module__ == module.__name__ and not issubclass(value, Slave):
+                for name, method in list(vars(value).items()):
+                    if isinstance(method, types.FunctionType) and not name.startswith("__") and _branches(method):
+                        replace(value, name, _as_region(method, recorder))
+    for cls in lineage:
+        for name, method in list(vars(cls).items()):
+            if isinstance(method, types.FunctionType) and not name.startswith("__") and name not in _UNTRACED:
+                replace(cls, name, _as_function(method, recorder))
+    for name in _BASE_METHODS:
+        replace(Slave, name, _as_function(vars(Slave)[name], recorder))
+    replace(Slave, "warn_once", warn_once)
+    try:
+        with stand_ins.installed(modules, extra):
+            yield
+    finally:
+        for cls, name, value in reversed(changed):
+            setattr(cls, name, value)
+
+
+def _as_region(function: Callable[..., Any], recorder: Recorder) -> Callable[..., Any]:
+    @functools.wraps(function)
+    def region(*args: Any, **kwargs: Any) -> Any:
+        return recorder.region(function, args, kwargs)
+
+    return region
+
+
+def _as_function(method: Callable[..., Any], recorder: Recorder) -> Callable[..., Any]:
+    signature = inspect.signature(method)
+    name = method.__name__.lstrip("_")
+
+    @functools.wraps(method)
+    def call(self: Any, *args: Any, **kwargs: Any) -> Any:
+        bound = signature.bind(self, *args, **kwargs)
+        bound.apply_defaults()
+        given = {key: value for key, value in bound.arguments.items() if key != "self"}
+        return recorder.call(functools.partial(method, self), name, given)
+
+    return call
+
+
+@functools.cache
+def _branches(function: Callable[..., Any]) -> bool:
+    """Whether a function takes one of several ways; raises `TraceError` if it catches errors."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
+    for each in ast.walk(tree):
+        if isinstance(each, ast.Try):
+            return True
+        if isinstance(each, ast.If | ast.IfExp | ast.BoolOp | ast.While | ast.Assert):
+            return True
+        if isinstance(each, ast.Compare) and len(each.ops) > 1:
+            return True
+        if isinstance(each, ast.comprehension) and each.ifs:
+            return True
+    return False
