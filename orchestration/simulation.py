@@ -33,6 +33,7 @@ from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import in_its_own_words, system_of, warnings
 from orchestration.results import objectives
 from orchestration.results.result import Result
+from orchestration.results.units import units
 from orchestration.simulator import Floats
 from orchestration.system.check import check, recorded
 from orchestration.system.model import Component, System, component_of, variable_of
@@ -68,6 +69,8 @@ class Simulation:
     instances: Mapping[str, Instance]
     parameters: Mapping[str, float]
     """all numeric parameters of all components, as COMPONENT.NAME"""
+    units: Mapping[str, str]
+    """of what it comes to"""
     master: Master
     recorder: Recorder
     interrupt: Interrupt
@@ -89,6 +92,7 @@ class Simulation:
                 divergence_time=_seconds(master.divergence_time),
                 steps=master.steps,
             ),
+            units=self.units,
             divergence=master.divergence,
             interrupted_at=_seconds(master.interrupted_at),
             provenance={**provenance(self.instances), "wall_time": time.perf_counter() - self.started},
@@ -141,7 +145,8 @@ def prepared(
         system = system_of(asked) if isinstance(asked, Scenario) else asked
         paths = {name: fmus.locate(component.fmu, announce) for name, component in system.components.items()}
         models = {name: read_model(path) for name, path in paths.items()}
-        system, parameters = checked(system, models)
+        found = checked(system, models)
+        system, parameters = found.system, found.parameters
     streams = Streams(system.seed, system.streams)
     with interrupts_held_back() as interrupt, ExitStack() as stack:
         instances = {name: stack.enter_context(load(path, name)) for name, path in paths.items()}
@@ -150,7 +155,7 @@ def prepared(
                 _set_parameters(instances[name], component)
                 _set_clock(instances[name], component, models[name])
             sources = {name: _source(system, name, parameters, streams) for name in system.sources}
-            signals = {name: signals_of(name, system) for name in sources}
+            signals = {name: system.sources[name].signals(name) for name in sources}
             master = Master(
                 system,
                 instances,
@@ -169,6 +174,7 @@ def prepared(
             system=system,
             instances=instances,
             parameters=parameters,
+            units=found.units,
             master=master,
             recorder=recorder,
             interrupt=interrupt,
@@ -176,37 +182,37 @@ def prepared(
         )
 
 
-def checked(system: System, models: Mapping[str, Model]) -> tuple[System, dict[str, float]]:
-    """A system with the objectives that its FMUs can have, and their numeric parameters, as COMPONENT.NAME.
+@dataclass(frozen=True, kw_only=True)
+class Checked:
+    """A system that its FMUs fit."""
 
-    Raises `UsageError` for what they do not have or cannot take.
-    """
+    system: System
+    """with the objectives that they have the variables for"""
+    parameters: dict[str, float]
+    """the numeric ones of all components, as COMPONENT.NAME"""
+    units: dict[str, str]
+    """of what it comes to, where it has one"""
+
+
+def checked(system: System, models: Mapping[str, Model]) -> Checked:
+    """A system held to what its FMUs say; raises `UsageError` for what they do not have, or cannot take."""
     check(system, models)
     for name, component in system.components.items():
         _expect_clock(name, component, models[name])
     parameters = _parameters(system, models)
-    return objectives.known(system, _signals(system, models), set(parameters)), parameters
+    system = objectives.known(system, _signals(system, models), set(parameters))
+    return Checked(system=system, parameters=parameters, units=units(system, models))
 
 
 def _seconds(time: int | None) -> float | None:
     return None if time is None else time / NANOSECONDS
 
 
-def signals_of(source: str, system: System) -> tuple[str, ...]:
-    """The names by which the signals of a source are recorded: those of the inputs, unless it feeds two of one name."""
-    described = system.sources[source]
-    if described.trajectory is not None:
-        return tuple(f"{source}.position.{axis}" for axis in "xyz")
-    variables = [variable_of(end) for end in described.to]
-    names = [end if variables.count(variable_of(end)) > 1 else variable_of(end) for end in described.to]
-    return tuple(name if name.startswith(f"{source}.") else f"{source}.{name}" for name in names)
-
-
 def columns_of(system: System) -> tuple[str, ...]:
     """The columns that a run of `system` has whatever is recorded beside them."""
     exchanged = [start for x in system.connections for start in x.start]
     applied = [end for x in system.connections for end in x.end if system.components[x.receiver].sampling is None]
-    sources = [signal for name in system.sources for signal in signals_of(name, system)]
+    sources = [signal for name, source in system.sources.items() for signal in source.signals(name)]
     return ("time", *dict.fromkeys((*applied, *exchanged, *sources)))
 
 

@@ -21,6 +21,7 @@ from orchestration.exchange.interop import cli as interop
 from orchestration.fmi.banners import banners_to_stderr
 from orchestration.studies import cli as studies
 from orchestration.subprocesses import misleading_variables
+from orchestration.units import after
 
 if TYPE_CHECKING:
     from orchestration.results.result import Result
@@ -264,10 +265,10 @@ def _report(result: "Result", as_json: bool) -> None:
     if as_json:
         print(json.dumps(printed, indent=2))
         return
-    width = max(map(len, printed))
+    width, units = max(map(len, printed)), {**result.units, "wall_time": "s"}
     for name, value in printed.items():
         shown = f"{value:.6g}" if isinstance(value, float) else "-" if value is None else str(value)
-        print(f"{name:<{width}}  {shown}")
+        print(f"{name:<{width}}  {shown}{'' if value is None else after(units.get(name))}")
     if result.divergence is not None:
         print(f"diverged: {result.divergence}")
 

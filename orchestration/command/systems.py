@@ -2,12 +2,15 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from orchestration.command.flags import FlightFlags, Timing, flies, request_from
 from orchestration.command.terminal import say
+
+if TYPE_CHECKING:
+    from orchestration.system.model import System
 
 
 def schema() -> None:
@@ -59,16 +62,30 @@ def show(
     *,
     flags: FlightFlags,
 ) -> None:
-    """Show a system: components with their rates, connections with their delay, jitter, loss and hold."""
+    """Show a system: components with their rates, connections with their delay, jitter, loss and hold, units."""
     from orchestration.request import system_meant
     from orchestration.system.description import as_text
 
     meant = system_meant(request_from(system, flags, timing))
-    print(as_text(meant))
+    print(as_text(meant, _units_of(meant)))
     if out is not None:
         from orchestration.system import diagram
 
         say(str(diagram.write(meant, out)))
+
+
+def _units_of(system: "System") -> dict[str, str]:
+    """Of its objectives; none where its FMUs are not there, or do not fit."""
+    from orchestration import fmus
+    from orchestration.errors import QuadcosimError
+    from orchestration.fmi.model import read_model
+    from orchestration.simulation import checked
+
+    try:
+        models = {name: read_model(fmus.locate(c.fmu, say)) for name, c in system.components.items()}
+        return checked(system, models).units
+    except QuadcosimError:
+        return {}
 
 
 def register(app: typer.Typer) -> None:

@@ -1,5 +1,6 @@
 """The outcome of a run."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -25,6 +26,8 @@ class Result:
     recording: Recording
     """rows and events in chunks; what follows has them whole"""
     metrics: Metrics
+    units: Mapping[str, str]
+    """of metrics that have one, by name"""
     divergence: str | None
     """what diverged, if it did"""
     interrupted_at: float | None

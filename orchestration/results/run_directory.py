@@ -37,6 +37,7 @@ def _write(result: Result, folder: Path, *, figures: bool) -> None:
     """All that is in the directory of a run but its recording."""
     notes = {
         **result.provenance,
+        "units": dict(result.units),
         "divergence": result.divergence,
         "interrupted_at": result.interrupted_at,
         "warnings": list(result.warnings),
@@ -54,7 +55,7 @@ def load_run(folder: str | Path) -> Result:
     missing = [name for name in (SIGNALS, EVENTS, METRICS, SCENARIO, PROVENANCE) if not (folder / name).is_file()]
     if missing:
         raise UsageError(f"{folder}: expected the directory of a run; it has no {', '.join(missing)}")
-    notes = _object(folder / PROVENANCE, divergence=_TEXT, interrupted_at=_NUMBER, warnings=(list,))
+    notes = _object(folder / PROVENANCE, divergence=_TEXT, units=(dict,), interrupted_at=_NUMBER, warnings=(list,))
     recording = tables.InFolder(folder)
     asked = load_request(folder / SCENARIO)
     system = system_meant(asked)
@@ -70,6 +71,7 @@ def load_run(folder: str | Path) -> Result:
         system=system,
         recording=recording,
         metrics=_object(folder / METRICS, diverged=(bool,), divergence_time=_NUMBER),
+        units=notes.pop("units"),
         divergence=notes.pop("divergence"),
         interrupted_at=notes.pop("interrupted_at"),
         warnings=tuple(notes.pop("warnings")),

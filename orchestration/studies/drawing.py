@@ -18,7 +18,7 @@ from orchestration.studies.local import radius
 from orchestration.studies.store import TEXTS, metrics_with
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import store_path
-from orchestration.studies.table import frame
+from orchestration.studies.table import frame, units_in
 from orchestration.system.model import System
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def draw_study(study: Study, folder: Path | None, metric: str | None = None) -> 
     """
     metric, system = metric_of(study, metric), study.origin
     path = store_path(study.name, folder)
-    table = frame(path)
+    table, unit = frame(path), units_in(path).get(metric)
     if _is_screened(study):
         indices = indices_of(study, numbers(table, metric), metric)
         listed = sensitivity.write(indices, path.parent / f"sensitivity_{metric}.csv")
@@ -50,18 +50,13 @@ def draw_study(study: Study, folder: Path | None, metric: str | None = None) -> 
     axes = tuple(axis for axis in study.axes if _is_numeric(axis))
     if len(axes) != len(study.axes):
         raise UsageError(f"{study.name}: expected axes of numbers to draw")
-    words = system.criterion.outcomes
+    words, plain, mapped = system.criterion.outcomes, path.parent / f"{metric}.png", path.parent / f"{metric}_map.png"
     if len(axes) > 2:
-        return [figures.save(lambda: figures.scatter(table, axes, metric, words), path.parent / f"{metric}.png")]
-    written = [
-        figures.save(
-            lambda: figures.lines(table, axes, metric, words, edge(system, metric)), path.parent / f"{metric}.png"
-        )
-    ]
+        return [figures.save(lambda: figures.scatter(table, axes, metric, words, unit=unit), plain)]
+    bound = edge(system, metric)
+    written = [figures.save(lambda: figures.lines(table, axes, metric, words, bound, unit=unit), plain)]
     if len(axes) == 2 and all(axis.values is not None for axis in axes):
-        written.append(
-            figures.save(lambda: figures.heat_map(table, axes, metric, words), path.parent / f"{metric}_map.png")
-        )
+        written.append(figures.save(lambda: figures.heat_map(table, axes, metric, words, unit=unit), mapped))
     return written
 
 

@@ -16,6 +16,7 @@ from orchestration.simulator import Floats
 from orchestration.statistics import wilson
 from orchestration.studies.axes import Axis
 from orchestration.studies.ranges import is_in_seconds
+from orchestration.units import in_brackets
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,11 +25,17 @@ if TYPE_CHECKING:
 
 
 def lines(
-    table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str, words: tuple[str, str], edge: float | None = None
+    table: "pd.DataFrame",
+    axes: tuple[Axis, ...],
+    metric: str,
+    words: tuple[str, str],
+    edge: float | None = None,
+    *,
+    unit: str | None = None,
 ) -> Figure:
     """A metric against the first axis, one line for each value of the second; what is not good is crossed.
 
-    What diverged has no metric; it is marked along the lower edge.
+    What diverged has no metric; it is marked along the lower edge. `unit` is the metric's.
     """
     figure = Figure(figsize=(8.0, 4.8))
     panel = figure.add_subplot()
@@ -47,7 +54,7 @@ def lines(
         )
     panel.plot([], [], "x", color=GREY, label=words[1])
     panel.plot([], [], "v", color=GREY, markersize=4, label="diverged")
-    panel.set(xlabel=_label(x), ylabel=metric, yscale=_scale(table[metric]))
+    panel.set(xlabel=_label(x), ylabel=in_brackets(metric, unit), yscale=_scale(table[metric]))
     panel.set_xscale("log" if x.scale == "logarithmic" else "linear")
     if edge is not None:
         panel.axhline(edge, color=RED, linewidth=0.8, linestyle="--", label=f"{edge:g}: edge of {words[0]}")
@@ -58,7 +65,9 @@ def lines(
     return figure
 
 
-def scatter(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str, words: tuple[str, str]) -> Figure:
+def scatter(
+    table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str, words: tuple[str, str], *, unit: str | None = None
+) -> Figure:
     """A metric against each of many axes; what is not good is crossed, what diverged marked along the lower edge."""
     figure = Figure(figsize=(8.0, 2.4 * math.ceil(len(axes) / 2)))
     panels = figure.subplots(math.ceil(len(axes) / 2), 2, squeeze=False, sharey=True).ravel()
@@ -72,7 +81,7 @@ def scatter(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str, words: t
         panel.set_xscale("log" if axis.scale == "logarithmic" else "linear")
     for panel in panels[len(axes) :]:
         panel.set_visible(False)
-    figure.supylabel(metric)
+    figure.supylabel(in_brackets(metric, unit))
     kinds = zip((*words, DIVERGED), ("dots", "crosses", "below"), strict=True)
     counts = [f"{int((table['outcome'] == kind).sum())} {kind} ({mark})" for kind, mark in kinds]
     low, high = wilson(int((~fell).sum()), len(table))
@@ -84,7 +93,9 @@ def scatter(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str, words: t
     return figure
 
 
-def heat_map(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str, words: tuple[str, str]) -> Figure:
+def heat_map(
+    table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str, words: tuple[str, str], *, unit: str | None = None
+) -> Figure:
     """A metric over two axes where runs are good, the outcome where not, and the boundary between the two."""
     x, y = axes[0], axes[1]
     codes_of = {words[0]: 0, words[1]: 1, DIVERGED: 2}
@@ -100,7 +111,7 @@ def heat_map(table: "pd.DataFrame", axes: tuple[Axis, ...], metric: str, words: 
     panel.pcolormesh(columns, index, fell, cmap=ListedColormap(_FELL), vmin=0.5, vmax=2.5, shading="nearest")
     norm = LogNorm() if (shown > 0.0).any() else None
     mesh = panel.pcolormesh(columns, index, shown, norm=norm, cmap="viridis", shading="nearest")
-    figure.colorbar(mesh, ax=panel, label=f"{metric}, where {words[0]}")
+    figure.colorbar(mesh, ax=panel, label=f"{in_brackets(metric, unit)}, where {words[0]}")
     if 0.0 < float(np.nanmean(flying.to_numpy())) < 1.0:
         panel.contour(columns, index, flying.to_numpy(), levels=[0.5], colors=RED, linewidths=1.5)
     panel.set(xlabel=_label(x), ylabel=_label(y), title=f"red: boundary of what is {words[0]}{_by_horizon(table)}")
@@ -186,7 +197,7 @@ def _scale(values: "pd.Series") -> str:
 
 def _label(axis: Axis) -> str:
     seconds = all(is_in_seconds(target) for target in axis.targets)
-    return f"{axis.name} [s]" if seconds and not axis.multiplies else axis.name
+    return in_brackets(axis.name, "s" if seconds and not axis.multiplies else None)
 
 
 _OF = {"outcome": "whether a run is good"}

@@ -28,6 +28,8 @@ _OWN = ("design_index", *_RUN, "checksum", "settings")
 _ORIGINS = ("guid.", "version.")
 OBJECTIVES = "objectives"
 """What a store is about says them by this name; they are written when it is made."""
+UNITS = "units"
+"""likewise those of metrics that have one"""
 # Runs are found by what determines them, so that they stay when the design around them changes.
 _ABOUT = "CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL, checksum TEXT NOT NULL)"
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from orchestration.errors import UsageError
 from orchestration.interrupt import Interrupted
+from orchestration.simulation import checked
 from orchestration.studies import engine, store
 from orchestration.studies.checks import described, expect_flyable
 from orchestration.studies.crew import Package
@@ -201,9 +202,16 @@ def _describe(opened: store.Store, study: Study, files: Files) -> None:
             "grid": json.dumps(grid if all(axis.values is not None for axis in study.axes) else None),
             "guids": json.dumps({name: m.description.guid for name, m in files.models_of(study.origin).items()}),
             "versions": json.dumps(versions()),
+            store.UNITS: json.dumps(_units(study, files)),
         },
         _places(study, files),
     )
+
+
+def _units(study: Study, files: Files) -> dict[str, str]:
+    """Of what its runs come to, as the first of them has them."""
+    first = study.system(0, files.starts_of(study.origin))
+    return checked(first, files.models_of(first)).units
 
 
 def _places(study: Study, files: Files) -> Iterator[store.Place]:

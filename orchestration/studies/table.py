@@ -1,11 +1,15 @@
 """The rows of a study as tables for analysis."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from orchestration.errors import UsageError
-from orchestration.studies.store import TEXTS, open_for_reading
+from orchestration.studies.store import TEXTS, UNITS, open_for_reading
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,7 +41,7 @@ def frame(path: Path) -> "pd.DataFrame":
 
 
 def dataset(path: Path) -> "xr.Dataset":
-    """The metrics over the axes of a grid; raises `UsageError` if some axis is sampled."""
+    """The metrics over the axes of a grid, with units as attributes; raises `UsageError` if some axis is sampled."""
     import xarray as xr
 
     with open_for_reading(path) as opened:
@@ -48,14 +52,30 @@ def dataset(path: Path) -> "xr.Dataset":
     table = frame(path).set_index(list(grid))[kept]
     table = table.astype({name: float for name in kept if name not in TEXTS})
     cube: xr.Dataset = xr.Dataset.from_dataframe(table).reindex(grid)
+    for name, unit in units_in(path).items():
+        if name in cube:
+            cube[name].attrs["units"] = unit
     return cube
 
 
+def units_in(path: Path) -> dict[str, str]:
+    """The units of the metrics in a store that have one."""
+    with open_for_reading(path) as opened:
+        found: dict[str, str] = json.loads(opened.about().get(UNITS, "{}"))
+    return {**found, "duration": "s"}
+
+
+def _with_units(table: Any, units: Mapping[str, str]) -> Any:
+    """A table whose fields say their unit in their metadata."""
+    fields = [f.with_metadata({"unit": units[f.name]}) if f.name in units else f for f in table.schema]
+    return table.cast(pa.schema(fields, metadata=table.schema.metadata))
+
+
 def export(path: Path, folder: Path) -> list[Path]:
-    """Write `runs.parquet` and `runs.csv`, sorted by design index; their paths."""
+    """Write `runs.parquet`, with units in the metadata of its fields, and `runs.csv`, by design index; their paths."""
     table = frame(path)
     folder.mkdir(parents=True, exist_ok=True)
     written = [folder / "runs.parquet", folder / "runs.csv"]
-    table.to_parquet(written[0], index=False)
+    pq.write_table(_with_units(pa.Table.from_pandas(table, preserve_index=False), units_in(path)), written[0])
     table.to_csv(written[1], index=False)
     return written

@@ -1,8 +1,10 @@
 """What becomes what at the end of a connection: types by rule, units by a factor that the file states."""
 
 from dataclasses import dataclass
+from fractions import Fraction
 
 from orchestration.fmi.model import Kind, Model, Variable
+from orchestration.units import BASE, BaseUnits
 
 BECOMES: dict[Kind, tuple[Kind, ...]] = {
     "Real": ("Real",),
@@ -37,19 +39,6 @@ class Conversion:
         return f"scale = {self.scale:.12g}" + (f" and offset = {self.offset:.12g}" if self.offset else "")
 
 
-@dataclass(frozen=True, kw_only=True)
-class BaseUnits:
-    """What a unit is: value · factor + offset in the base units with these exponents."""
-
-    exponents: tuple[int, ...]
-    """of `BASE`"""
-    factor: float = 1.0
-    offset: float = 0.0
-
-
-BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-
-
 class OtherQuantity(Exception):
     """Two units that no factor turns into each other."""
 
@@ -61,13 +50,13 @@ def between(one: BaseUnits, other: BaseUnits) -> Conversion:
     return Conversion(scale=one.factor / other.factor, offset=(one.offset - other.offset) / other.factor)
 
 
-def unit_of(model: Model, name: str | None) -> BaseUnits | None:
+def base_units(model: Model, name: str | None) -> BaseUnits | None:
     """What a unit is by an FMU's definitions; None if they do not say."""
     unit = next((u for u in model.description.unitDefinitions if u.name == name), None)
     base = getattr(unit, "baseUnit", None)
     if base is None:
         return None
-    exponents = tuple(int(getattr(base, key)) for key in BASE)
+    exponents = tuple(Fraction(getattr(base, key)) for key in BASE)
     return BaseUnits(exponents=exponents, factor=float(base.factor), offset=float(base.offset))
 
 
@@ -78,5 +67,5 @@ def conversion(sender: Model, output: Variable, receiver: Model, into: Variable)
     """
     if not (output.unit and into.unit) or output.unit == into.unit:
         return Conversion()
-    one, other = unit_of(sender, output.unit), unit_of(receiver, into.unit)
+    one, other = base_units(sender, output.unit), base_units(receiver, into.unit)
     return None if one is None or other is None else between(one, other)

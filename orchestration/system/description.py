@@ -1,25 +1,30 @@
 """A system in words: its components with their rates, its connections with what happens to their messages."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from orchestration.system.model import Component, Connection, Sampling, Source, System, variable_of
+from orchestration.units import in_brackets
 
 
-def as_text(system: System) -> str:
-    """Components, connections, sources, objectives and the criterion, a line each, columns aligned."""
+def as_text(system: System, units: Mapping[str, str] = {}) -> str:
+    """Components, connections, sources, objectives with their `units`, and the criterion, a line each, in columns."""
     components = [(name, _fmu(c), rate(c), _parameters(c)) for name, c in system.components.items()]
     connections = [
         (x.name, f"{x.sender} -> {x.receiver}", timing(x) or "at once", signals(x)) for x in system.connections
     ]
     sources = [(name, what(s), ", ".join(_shortened(s.to)) or "(objectives)") for name, s in system.sources.items()]
+    named = [in_brackets(name, units.get(name)) for name in system.objectives]
     criterion = system.criterion
     criteria = [("good", criterion.good), ("diverged", criterion.diverged)]
     sections: list[tuple[str, Sequence[Sequence[str]]]] = [
         ("components", components),
         ("connections", connections),
         ("sources", sources),
-        ("objectives", [(name, " ".join(text.split())) for name, text in system.objectives.items()]),
+        (
+            "objectives",
+            [(name, " ".join(text.split())) for name, text in zip(named, system.objectives.values())],
+        ),
         ("criterion", [(name, " ".join(text.split())) for name, text in criteria if text is not None]),
     ]
     head = f"{len(system.components)} components, {len(system.connections)} connections, {system.stop_time:g} s"

@@ -170,6 +170,14 @@ class Source:
     trajectory: str | None = None
     """the component whose parameters trajectory.* say what the trajectory of `fmu_kit` is"""
 
+    def signals(self, name: str) -> tuple[str, ...]:
+        """What is recorded of the source of that name: by the names of the inputs, unless it feeds two of one name."""
+        if self.trajectory is not None:
+            return tuple(f"{name}.position.{axis}" for axis in "xyz")
+        variables = [variable_of(end) for end in self.to]
+        fed = [end if variables.count(variable_of(end)) > 1 else variable_of(end) for end in self.to]
+        return tuple(each if each.startswith(f"{name}.") else f"{name}.{each}" for each in fed)
+
     def __post_init__(self) -> None:
         kinds = ("constant", "file", "noise", "trajectory")
         given = [kind for kind in kinds if getattr(self, kind) is not None]

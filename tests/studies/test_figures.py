@@ -164,6 +164,18 @@ def test_the_axes_of_time_have_their_unit_and_the_others_none() -> None:
         assert figure.axes[0].get_xlabel() == label
 
 
+def test_a_metric_has_its_unit_wherever_it_is_drawn() -> None:
+    runs = judged(pd.concat([table().assign(**{"timing.delay": delay}) for delay in (0.0, 0.01)]))
+    axes = (axis("timing.period", 1), axis("timing.delay", 1))
+    drawn = figures.lines(runs, axes[:1], "ultimate_bound", WORDS, unit="m")
+    assert drawn.axes[0].get_ylabel() == "ultimate_bound [m]"
+    assert figures.heat_map(runs, axes, "ultimate_bound", WORDS, unit="m").axes[1].get_ylabel() == (
+        f"ultimate_bound [m], where {WORDS[0]}"
+    )
+    scattered = figures.scatter(runs, axes, "ultimate_bound", WORDS, unit="m")
+    assert scattered.get_supylabel() == "ultimate_bound [m]"
+
+
 def test_a_map_has_a_cell_for_each_run_and_the_boundary_of_what_flies() -> None:
     runs = pd.concat([table().assign(**{"timing.delay": delay}) for delay in (0.0, 0.01, 0.02)])
     figure = figures.heat_map(

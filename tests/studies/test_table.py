@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 
 import orchestration
@@ -152,6 +153,18 @@ def test_what_is_exported_reads_back_equal(grid: tuple[Study, Path], tmp_path: P
     assert list(read.columns) == list(table.columns)
     for name in table.columns:
         assert [as_text(value) for value in table[name]] == read[name].tolist(), name
+
+
+def test_metrics_say_their_units_in_the_parquet_file_and_in_the_dataset(
+    grid: tuple[Study, Path], tmp_path: Path
+) -> None:
+    _, path = grid
+    parquet, _ = export(path, tmp_path)
+    schema = pq.read_schema(parquet)
+    for name, unit in {"position_iae": b"m.s", "horizon": b"s", "duration": b"s"}.items():
+        assert schema.field(name).metadata == {b"unit": unit}
+    assert schema.field("good").metadata is None
+    assert dataset(path)["control_effort.torque"].attrs == {"units": "N2.m2.s"}
 
 
 def test_exports_are_the_same_bytes_each_time(grid: tuple[Study, Path], tmp_path: Path) -> None:

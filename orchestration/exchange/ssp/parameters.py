@@ -2,13 +2,15 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 
 from orchestration.errors import UsageError
 from orchestration.exchange.ssp.document import Read, all_of, read
 from orchestration.exchange.ssp.package import Package
-from orchestration.system.conversion import BASE, BaseUnits, Conversion
+from orchestration.system.conversion import Conversion
 from orchestration.system.model import Parameter
+from orchestration.units import BASE, BaseUnits
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,7 +101,7 @@ def definitions_in(root: Read, path: str) -> dict[str, BaseUnits]:
     for unit in all_of(root, path):
         (base,) = all_of(unit, "ssc:BaseUnit")
         found[unit.get("name")] = BaseUnits(
-            exponents=tuple(int(base.get(key, 0)) for key in BASE),
+            exponents=tuple(Fraction(int(base.get(key, 0))) for key in BASE),
             factor=float(base.get("factor", 1.0)),
             offset=float(base.get("offset", 0.0)),
         )

@@ -13,8 +13,9 @@ from orchestration.exchange.ssp.parameters import Value
 from orchestration.exchange.ssp.structure import Node, Path_, Structure, Wire, said, structure_of
 from orchestration.fmi.model import Model, read_model
 from orchestration.quadrotor.wiring import SAMPLE_OFFSET, SAMPLE_PERIOD
-from orchestration.system.conversion import BaseUnits, Conversion, OtherQuantity, between, unit_of
+from orchestration.system.conversion import Conversion, OtherQuantity, base_units, between
 from orchestration.system.model import Parameter, component_of
+from orchestration.units import BaseUnits
 
 ENDINGS = (".ssp", ".ssd")
 TAKEN = frozenset(("rows", "time", "stop_time", "sampled"))
@@ -128,7 +129,7 @@ def _in_own_unit(structure: Structure, node: Node, value: Value, model: Model | 
     if not own or not value.unit or own == value.unit or isinstance(number, (bool, str)):
         return number
     one = value.definition or structure.definitions.get(value.unit)
-    other = structure.definitions.get(own) or (unit_of(model, own) if model is not None else None)
+    other = structure.definitions.get(own) or (base_units(model, own) if model is not None else None)
     return _conversion(one, other, f"{said(node)} in {value.unit}, expected {own}")(number)
 
 
@@ -162,7 +163,7 @@ def _of_units(wire: Wire, structure: Structure, models: Mapping[Path_, Model]) -
         name = structure.units.get(node) or (variable.unit if variable is not None else None)
         named.append(name)
         own = structure.definitions.get(name) if name else None
-        defined.append(own or (unit_of(model, name) if model is not None else None))
+        defined.append(own or (base_units(model, name) if model is not None else None))
     if not all(named) or named[0] == named[1]:
         return Conversion()
     return _conversion(defined[0], defined[1], f"connection {wire.said}, from {named[0]} to {named[1]}")

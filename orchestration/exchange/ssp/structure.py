@@ -8,7 +8,8 @@ from orchestration.errors import UsageError
 from orchestration.exchange.ssp.document import Read, all_of
 from orchestration.exchange.ssp.package import Package
 from orchestration.exchange.ssp.parameters import Value, definitions_in, transformation, values_of
-from orchestration.system.conversion import BaseUnits, Conversion
+from orchestration.system.conversion import Conversion
+from orchestration.units import BaseUnits
 
 Path_ = tuple[str, ...]
 """Names from the system at the top, which is (), to an element"""

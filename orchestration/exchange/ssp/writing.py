@@ -18,8 +18,8 @@ from orchestration.exchange.ssp.carried import Carried, Part, carried
 from orchestration.exchange.ssp.document import add, document, element
 from orchestration.fmi.model import Kind, Variable
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.system.conversion import BASE
 from orchestration.system.model import System, variable_of
+from orchestration.units import BASE
 
 NAME = "QuadrotorLoop"
 """Of the quadrotor's system; any other is called after its file"""

@@ -1,0 +1,147 @@
+"""Units as FMI has them, exponents of SI's base units with a factor and an offset, and what products make of them."""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+
+
+@dataclass(frozen=True, kw_only=True)
+class BaseUnits:
+    """What a unit is: value · factor + offset in the base units with these exponents."""
+
+    exponents: tuple[Fraction, ...]
+    """of `BASE`; whole ones in FMI"""
+    factor: float = 1.0
+    offset: float = 0.0
+
+    def times(self, other: "BaseUnits") -> "BaseUnits":
+        """Of a product; an offset has no meaning there."""
+        exponents = tuple(a + b for a, b in zip(self.exponents, other.exponents, strict=True))
+        return BaseUnits(exponents=exponents, factor=self.factor * other.factor)
+
+    def power(self, exponent: Fraction) -> "BaseUnits":
+        """Of a power."""
+        return BaseUnits(exponents=tuple(a * exponent for a in self.exponents), factor=self.factor ** float(exponent))
+
+
+_NONE = BaseUnits(exponents=(Fraction(0),) * len(BASE))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unit:
+    """The unit of what an expression comes to."""
+
+    symbols: tuple[tuple[str, Fraction], ...] = ()
+    """how it is written: names with their exponents"""
+    base: BaseUnits | None = _NONE
+    """None: no FMU says what it is"""
+    has_number: bool = False
+    """whether a number is a factor of it, whose unit nobody has written: it goes with anything"""
+
+    def __str__(self) -> str:
+        ordered = sorted(self.symbols, key=lambda symbol: symbol[0] == "s")  # seconds last, as in N.m.s
+        above = [_power(name, exponent) for name, exponent in ordered if exponent > 0]
+        below = [_power(name, -exponent) for name, exponent in ordered if exponent < 0]
+        divisor = f"({'.'.join(below)})" if len(below) > 1 else "".join(below)
+        return (".".join(above) or "1") + (f"/{divisor}" if below else "")
+
+    def times(self, other: "Unit") -> "Unit":
+        """Of a product."""
+        exponents = dict(self.symbols)
+        for name, exponent in other.symbols:
+            exponents[name] = exponents.get(name, Fraction(0)) + exponent
+        return Unit(
+            symbols=tuple((name, exponent) for name, exponent in exponents.items() if exponent),
+            base=None if self.base is None or other.base is None else self.base.times(other.base),
+            has_number=self.has_number or other.has_number,
+        )
+
+    def power(self, exponent: Fraction) -> "Unit":
+        """Of a power."""
+        return replace(
+            self,
+            symbols=tuple((name, e * exponent) for name, e in self.symbols if exponent),
+            base=None if self.base is None else self.base.power(exponent),
+        )
+
+    @property
+    def is_ratio(self) -> bool | None:
+        """Whether it is 1 or rad, which SI takes for 1; None if that is not known."""
+        return None if self.base is None else _is_same(self.base, _NONE)
+
+    def agrees(self, other: "Unit") -> bool | None:
+        """Whether values in the one can be added to values in the other; None if that is not known."""
+        if self.has_number or other.has_number:
+            return True
+        same_name = self.symbols == other.symbols
+        if self.base is None or other.base is None:
+            return True if same_name else None
+        return _is_same(self.base, other.base) and (self.base.offset == other.base.offset or same_name)
+
+
+ONE, SECOND, METRE, RADIAN, NUMBER = (
+    Unit(),
+    *(
+        Unit(symbols=((name, Fraction(1)),), base=BaseUnits(exponents=tuple(Fraction(b == name) for b in BASE)))
+        for name in ("s", "m", "rad")
+    ),
+    Unit(has_number=True),
+)
+
+
+def named(name: str, base: BaseUnits | None) -> Unit:
+    """A unit by the name that an FMU has for it; a name that is no plain product is kept whole."""
+    if name == "1":
+        return ONE
+    return Unit(symbols=tuple(_factors(name).items()), base=base)
+
+
+def common(units: Sequence[Unit]) -> Unit | None:
+    """That of a sum of values that agree; None if it is not known.
+
+    Where some have a number as a factor the others decide: 1 and rad by the one that is not 1.
+    """
+    decisive = [u for u in units if not u.has_number] or [u for u in units if u.symbols] or list(units)
+    chosen = next((u for u in decisive if u.symbols), decisive[0])
+    same = all(replace(u, has_number=False).agrees(replace(chosen, has_number=False)) for u in decisive)
+    return chosen if same else None
+
+
+def _is_same(one: BaseUnits, other: BaseUnits) -> bool:
+    return one.exponents[:-1] == other.exponents[:-1] and math.isclose(one.factor, other.factor, rel_tol=1e-9)
+
+
+def _factors(name: str) -> dict[str, Fraction]:
+    """Symbols and their exponents of N.m, kg.m2, m/s^2 or W/(m2.K)."""
+    above, slash, below = name.partition("/")
+    below = below[1:-1] if below.startswith("(") and below.endswith(")") else below
+    found: dict[str, Fraction] = {}
+    for sign, product in ((1, above), (-1, below)) if slash else ((1, above),):
+        for factor in re.split(r"[.*]", product):
+            parts = re.fullmatch(r"([^\W\d_]+|%|°|1)\^?(-?\d+)?", factor)
+            if parts is None or ("." in below and not name.endswith(")")):
+                return {name: Fraction(1)}
+            if parts[1] != "1":
+                found[parts[1]] = found.get(parts[1], Fraction(0)) + sign * int(parts[2] or 1)
+    return {symbol: exponent for symbol, exponent in found.items() if exponent}
+
+
+def _power(name: str, exponent: Fraction) -> str:
+    if exponent == 1:
+        return name
+    whole = name if name[-1:].isalpha() and name.isalnum() else f"({name})"
+    return f"{whole}{exponent}" if exponent.denominator == 1 else f"{whole}^({exponent})"
+
+
+def after(unit: str | None) -> str:
+    """What stands behind a number in a unit: nothing for none and for 1."""
+    return "" if unit in (None, "1") else f" {unit}"
+
+
+def in_brackets(name: str, unit: str | None) -> str:
+    """A quantity with its unit, as axes have it."""
+    return name if unit in (None, "1") else f"{name} [{unit}]"
