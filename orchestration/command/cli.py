@@ -240,7 +240,7 @@ def ssp(
     *,
     flags: FlightFlags,
 ) -> None:
-    """Write FMUs, their connections and their parameters as one SSP 1.0 file for other tools."""
+    """Write FMUs, connections and parameters as one SSP 1.0 file for other tools, and beside it its timing."""
     from orchestration import fmus
     from orchestration.exchange.ssp import writing
     from orchestration.quadrotor.scenario import Scenario
@@ -250,7 +250,9 @@ def ssp(
         usual = fmus.default_folder() / f"{writing.NAME}.ssp"
     else:
         usual = Path(f"{scenario.stem}.ssp")
-    print(writing.write(asked, out or usual, say))
+    written, timing = writing.write_with_timing(asked, out or usual, say)
+    print(written)
+    say(f"{timing} has its timing, for quadcosim run")
 
 
 system_commands.register(app)

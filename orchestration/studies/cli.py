@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from orchestration.command.flags import FlightFlags, flies, request_from
+from orchestration.command.flags import FlightFlags, Timing, flies, request_from
 from orchestration.command.terminal import runs_bar, say
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file.", metavar="STUDY.toml", show_default=False)]
@@ -86,8 +86,9 @@ def draw(
 def limit(
     scenario: Annotated[
         Path | None,
-        typer.Argument(help="System or scenario file; without one, the paper's flight.", show_default=False),
+        typer.Argument(help="System or scenario file, or SSP; without one, the paper's flight.", show_default=False),
     ] = None,
+    timing: Timing = None,
     of: Annotated[
         str,
         typer.Option(
@@ -123,7 +124,7 @@ def limit(
     """Find the largest value that is still good (a period, delay, jitter, loss, any path), and the local limit."""
     from orchestration.studies import limit as limits
 
-    chosen = request_from(scenario, flags)
+    chosen = request_from(scenario, flags, timing)
     found = limits.find(
         chosen, of, first=first, last=last, tolerance=tolerance, scan=scan, confidence=confidence,
         continuous=continuous, workers=workers, announce=say,

@@ -251,7 +251,7 @@ def _first_problem(error: Exception, tables: Mapping[str, Any]) -> str:
     message = problem["msg"]
     shown = str(problem["input"])
     shown = shown if len(shown) <= 60 else f"{shown[:57]}..."
-    return f"{place} = {shown}: {message[:1].lower()}{message[1:]}"
+    return f"{place} = {shown}: expected {message.removeprefix('Input should be ').removeprefix('Input should ')}"
 
 
 def _keys_at(place: tuple[Any, ...]) -> list[str]:
@@ -269,6 +269,11 @@ def to_toml(system: System) -> str:
     """The system file that loads as this system, wherever it lies."""
     import tomli_w
 
+    return tomli_w.dumps({key: value for key, value in to_tables(system).items() if value not in ({}, [])})
+
+
+def to_tables(system: System) -> dict[str, Any]:
+    """The tables of `to_toml`, without what is what it is anyway."""
     tables: dict[str, Any] = {"stop_time": system.stop_time, "seed": system.seed, "optional": list(system.optional)}
     tables["components"] = {
         name: _without_defaults(component, keep=("fmu",)) for name, component in system.components.items()
@@ -284,7 +289,7 @@ def to_toml(system: System) -> str:
     for key in ("objectives", "streams", "operating_point"):
         tables[key] = dict(getattr(system, key))
     tables["criterion"] = _without_defaults(system.criterion)
-    return tomli_w.dumps({key: value for key, value in tables.items() if value not in ({}, [])})
+    return tables
 
 
 def _connection_table(x: Connection) -> dict[str, Any]:

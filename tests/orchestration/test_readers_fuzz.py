@@ -1,6 +1,7 @@
 """Every reader of a user's files, on files that are damaged or meant badly: one line, no hang, little memory."""
 
 import signal
+import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,9 +13,11 @@ from hypothesis import strategies as st
 
 import orchestration
 from orchestration import Scenario, UsageError, fly_until, load_run, load_scenario, save_run
+from orchestration.exchange.ssp import writing
 from orchestration.master.table_file import read_table
 from orchestration.quadrotor.presets import preset_timing
 from orchestration.quadrotor.wiring import REFERENCE
+from orchestration.request import load_request, text_of
 from orchestration.results.pause import read_state
 from orchestration.studies.study_file import load_study
 
@@ -67,6 +70,71 @@ stop = 1.1
 method = "latin-hypercube"
 samples = 2
 seed = 1
+"""
+SYSTEM = """stop_time = 0.2
+seed = 3
+order = "jacobi"
+optional = ["peak"]
+[components.plant]
+fmu = "QuadrotorPlant"
+step = 0.01
+align = "next"
+record = ["tilt"]
+[components.controller]
+fmu = "UnifiedController"
+parameters = { mass = 1.1, "gain.eta" = 15.0 }
+sampling = { period = 0.02, offset = 0.01, jitter = 0.001, clock_ratio = 1.001 }
+[[connections]]
+name = "up"
+from = ["plant.position.x", "plant.position.y"]
+to = ["controller.position.x", "controller.position.y"]
+noise = { "position.x" = 0.1 }
+quantisation = 0.1
+scale = 2.0
+[[connections]]
+from = ["controller.thrust"]
+to = ["plant.thrust"]
+delay = 0.01
+loss = 0.1
+burst_length = 2.0
+hold = "first"
+[sources.wind]
+noise = 1.0
+period = 0.1
+to = ["plant.external_force.x"]
+[sources.path]
+file = "path.csv"
+to = ["controller.reference.position.x"]
+[objectives]
+peak = "max(abs(plant.position.x) * (time > 1))"
+[criterion]
+good = "peak < 2.5"
+diverged = "abs(plant.position.x) > 100"
+outcomes = ["flies", "falls"]
+[streams]
+"connections.up.noise" = 4
+[operating_point]
+"components.plant.parameters" = { "initial.position.x" = 0.0 }
+"""
+TIMING = """stop_time = 0.2
+[components.controller]
+parameters = { mass = 1.1 }
+sampling = { period = 0.02 }
+[components.plant]
+step = 0.01
+[[connections]]
+name = "up"
+from = "plant"
+to = "controller"
+[[connections]]
+from = ["controller.thrust"]
+to = ["plant.thrust"]
+delay = 0.01
+[sources.wind]
+constant = 1.0
+to = ["plant.external_force.x"]
+[criterion]
+diverged = "abs(plant.position.x) > 100"
 """
 TABLE = "\n".join(
     ",".join(map(str, row)) for row in (("time", *REFERENCE), *([t] + [0.5] * 15 for t in (0.0, 1.0, 2.0)))
@@ -163,6 +231,34 @@ def test_a_study(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "study.toml"
     path.write_bytes(content)
     is_read_or_refused(lambda: load_study(path).system(0, {"plant.mass": 1.0, "controller.mass": 1.0}))
+
+
+@fuzz
+@given(CUTS.map(lambda cuts: damaged(SYSTEM.encode(), cuts)) | with_another_value(SYSTEM))
+def test_a_system(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "system.toml"
+    path.write_bytes(content)
+    is_read_or_refused(lambda: text_of(load_request(path)))
+
+
+@pytest.fixture(scope="module")
+def ssp(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Unpacked, so that it is not opened again for each example."""
+    folder = tmp_path_factory.mktemp("ssp")
+    written = writing.write(Scenario().with_changes(timing={"plant_interval": 0.01}), folder / "loop.ssp")
+    with zipfile.ZipFile(written) as archive:
+        archive.extractall(folder)
+    return folder / "SystemStructure.ssd"
+
+
+@settings(fuzz, max_examples=100)
+@given(CUTS.map(lambda cuts: damaged(TIMING.encode(), cuts)) | with_another_value(TIMING))
+@example(TIMING.encode())
+@example(b"components = 3")
+def test_the_timing_of_an_ssp(tmp_path: Path, ssp: Path, content: bytes) -> None:
+    path = tmp_path / "timing.toml"
+    path.write_bytes(content)
+    is_read_or_refused(lambda: text_of(load_request(ssp, path)))
 
 
 @fuzz

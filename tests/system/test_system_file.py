@@ -85,7 +85,7 @@ def refusal(folder: Path, text: str) -> str:
         ("noise = 0.1", "nois = 0.1", "sources.rain.nois: no such key; expected one of to, constant, file, noise, "),
         ("good =", "god =", "criterion.god: no such key; expected one of good, diverged, outcomes"),
         ("seed = 3", "sead = 3", "sead: no such key; expected one of stop_time, seed, order, components, "),
-        ("step = 0.01", 'step = "fast"', "components.tank.step = fast: input should be a valid number"),
+        ("step = 0.01", 'step = "fast"', "components.tank.step = fast: expected a valid number"),
         ("step = 0.01", "step = -1.0", "components.tank.step = -1.0: expected a positive number"),
         (
             "step = 0.01",
@@ -96,7 +96,7 @@ def refusal(folder: Path, text: str) -> str:
         (
             '"normal"',
             '"gauss"',
-            "components.controller.sampling.jitter_distribution = gauss: input should be 'uniform'",
+            "components.controller.sampling.jitter_distribution = gauss: expected 'uniform'",
         ),
         ("area = 2.0", "area = [1]", "components.tank.parameters.area = [1]: expected a number, true, false or a text"),
         ('"tank.level"]', '"tnk.level"]', "connections.0.from: tnk.level: no such component; expected one of tank, "),
@@ -116,7 +116,7 @@ def refusal(folder: Path, text: str) -> str:
             "quantisation = { lvl = 1.0 }",
             "connections.0.quantisation: lvl is no signal of it; expecte",
         ),
-        ('hold = "first"', 'hold = "last"', "connections.1.hold = last: input should be 'zero' or 'first'"),
+        ('hold = "first"', 'hold = "last"', "connections.1.hold = last: expected 'zero' or 'first'"),
         ("period = 0.5", "", "sources.rain.period = none: expected how long each value is held, in seconds"),
         ("noise = 0.1\n", "", "sources.rain.source = nothing: expected one of constant, file, noise, trajectory"),
         ('"max(tank.level)"', '"max(tank.level"', "objectives.peak: "),

@@ -1,7 +1,7 @@
 """From an SSP, and a file with the timing that SSP has no words for, to the tables of a system file."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from orchestration.exchange.ssp.document import read
 from orchestration.exchange.ssp.package import opened
 from orchestration.exchange.ssp.parameters import Value
 from orchestration.exchange.ssp.structure import Node, Path_, Structure, Wire, said, structure_of
+from orchestration.exchange.ssp.timing import expect_tables
 from orchestration.fmi.model import Model, read_model
 from orchestration.quadrotor.wiring import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.system.conversion import Conversion, OtherQuantity, base_units, between
@@ -37,14 +38,17 @@ def tables_of(path: Path, timing: Mapping[str, Any]) -> dict[str, Any]:
     """The tables of the system file that an SSP and the `timing` on top of it mean.
 
     A component is stepped as `timing` says, else in continuous time with the step that the SSP's annotations name.
-    Raises `UsageError` for what is not read, what does not exist, and a step or end that nobody says.
+    Components that `timing` has come first, in its order, which decides ties. Raises `UsageError` for what is not
+    read, what does not exist, and a step or end that nobody says.
     """
+    expect_tables(timing)
     package = opened(path)
     structure = structure_of(read(package.structure, "ssd"), package)
     names = _names(structure.components)
     models = {place: read_model(fmu) for place, fmu in structure.components.items()}
     tables: dict[str, Any] = {**timing}
-    tables["components"] = _components(structure, names, models, timing.get("components", {}))
+    fed = {end for source in timing.get("sources", {}).values() for end in _ends(source.get("to"))}
+    tables["components"] = _components(structure, names, models, timing.get("components", {}), fed)
     tables["connections"] = _connections(_signals(structure, names, models), timing.get("connections", []))
     if "stop_time" not in tables:
         if structure.stop is None:
@@ -64,9 +68,18 @@ def _names(paths: Sequence[Path_] | Mapping[Path_, Any]) -> dict[Path_, str]:
     return names
 
 
+def _ends(to: object) -> list[str]:
+    return [end for end in to if isinstance(end, str)] if isinstance(to, list) else []
+
+
 def _components(
-    structure: Structure, names: Mapping[Path_, str], models: Mapping[Path_, Model], timing: Mapping[str, Any]
+    structure: Structure,
+    names: Mapping[Path_, str],
+    models: Mapping[Path_, Model],
+    timing: Mapping[str, Any],
+    fed: Set[str],
 ) -> dict[str, Any]:
+    """In the order of `timing`, then in that of the SSP; its values for inputs that sources feed are left out."""
     for name in timing:
         if name not in names.values():
             raise UsageError(
@@ -76,6 +89,7 @@ def _components(
     for place, name in names.items():
         given = dict(timing.get(name, {}))
         parameters = _parameters(structure, place, models[place])
+        parameters = {key: value for key, value in parameters.items() if f"{name}.{key}" not in fed}
         if "sampling" in given:  # which goes before the clock that the SSP gave the component
             parameters = {key: value for key, value in parameters.items() if key not in CLOCK}
         parameters |= dict(given.pop("parameters", {}))
@@ -88,7 +102,7 @@ def _components(
                 )
             table["step"] = structure.step
         found[name] = table
-    return found
+    return {name: found[name] for name in (*timing, *(name for name in found if name not in timing))}
 
 
 def _parameters(structure: Structure, place: Path_, model: Model) -> dict[str, Parameter]:

@@ -14,10 +14,12 @@ from xml.etree.ElementTree import Element
 from fmu_kit.model_description import generation_date
 from fmu_kit.packaging import write_archive
 from orchestration.errors import UsageError
+from orchestration.exchange.ssp import timing
 from orchestration.exchange.ssp.carried import Carried, Part, carried
 from orchestration.exchange.ssp.document import add, document, element
 from orchestration.fmi.model import Kind, Variable
 from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.translation import system_of
 from orchestration.system.model import System, variable_of
 from orchestration.units import BASE
 
@@ -47,6 +49,14 @@ def write(asked: Scenario | System, path: Path, announce: Callable[[str], None] 
     path.parent.mkdir(parents=True, exist_ok=True)
     write_archive(path, files, first="SystemStructure.ssd")
     return path
+
+
+def write_with_timing(
+    asked: Scenario | System, path: Path, announce: Callable[[str], None] | None = None
+) -> tuple[Path, Path]:
+    """As `write`, and beside it the file that makes the system of it again."""
+    write(asked, path, announce)
+    return path, timing.written(system_of(asked) if isinstance(asked, Scenario) else asked, path)
 
 
 def _sources(parts: Iterable[Part]) -> dict[str, Path]:

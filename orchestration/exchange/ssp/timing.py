@@ -1,0 +1,59 @@
+"""The file beside an SSP: what a system says that SSP has no words for."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from orchestration.errors import UsageError, shown
+from orchestration.system.model import System
+from orchestration.system.system_file import to_tables
+
+ENDING = ".timing.toml"
+
+
+def written(system: System, ssp: Path) -> Path:
+    """Write the file that makes `system` of its SSP again, beside it; its path."""
+    import tomli_w
+
+    path = ssp.with_suffix(ENDING)
+    path.write_text(tomli_w.dumps({"ssp": ssp.name, **_left_to_say(system)}), encoding="utf-8")
+    return path
+
+
+def _left_to_say(system: System) -> dict[str, Any]:
+    """The tables of a system without its FMUs, their parameters and the conversions of connections."""
+    tables = to_tables(system)
+    carried = {"components": ("fmu", "parameters"), "connections": ("scale", "offset")}
+    for name, members in (("components", tables["components"].values()), ("connections", tables["connections"])):
+        for table in members:
+            for key in carried[name]:
+                table.pop(key, None)
+    return {key: value for key, value in tables.items() if value not in ({}, [])}
+
+
+def expect_tables(timing: Mapping[str, Any]) -> None:
+    """Raise `UsageError` for a document in which what is to be laid over an SSP has another shape."""
+    for kind in ("components", "sources"):
+        for name, table in _expect(dict, kind, timing.get(kind, {})).items():
+            _expect(dict, f"{kind}.{name}", table)
+            for key in ("parameters",) if kind == "components" else ():
+                _expect(dict, f"{kind}.{name}.{key}", table.get(key, {}))
+    for index, table in enumerate(_expect(list, "connections", timing.get("connections", []))):
+        _expect(dict, f"connections.{index}", table)
+        _expect(str, f"connections.{index}.name", table.get("name", ""))
+        for key in ("from", "to"):
+            for end in (
+                [table[key]]
+                if isinstance(table.get(key), str)
+                else _expect(list, f"connections.{index}.{key}", table.get(key, []))
+            ):
+                _expect(str, f"connections.{index}.{key}", end)
+
+
+_WORDS = {dict: "a table", list: "a list", str: "a text"}
+
+
+def _expect(kind: Any, place: str, value: Any) -> Any:
+    if not isinstance(value, kind):
+        raise UsageError(f"{place} = {shown(value)}: expected {_WORDS[kind]}")
+    return value
