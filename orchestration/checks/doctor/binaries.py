@@ -80,13 +80,16 @@ def joined(first: Binary, second: Binary) -> Binary:
     return replace(first, dependencies=dependencies, python_symbols=second.python_symbols)
 
 
-def read(stream: BinaryIO) -> Binary:
-    """Read a shared library or program; raises `UnreadableError` with the reason."""
+def read(stream: BinaryIO, *, symbols: bool = True) -> Binary:
+    """Read a shared library or program; raises `UnreadableError` with the reason.
+
+    `symbols`: whether the symbols of Python are looked for, which takes long in a library that has many.
+    """
     magic = stream.read(4)
     stream.seek(0)
     try:
         if magic == b"\x7fELF":
-            return _read_elf(stream)
+            return _read_elf(stream, symbols)
         if magic[:2] == b"MZ":
             return _read_pe(stream)
         if magic in _MACH_O or magic in _FAT_MACH_O:
@@ -114,7 +117,7 @@ def newest(versions: Iterable[str], *, unnumbered: bool = False) -> tuple[str, .
     return tuple(version for _, version in highest.values())
 
 
-def _read_elf(stream: BinaryIO) -> Binary:
+def _read_elf(stream: BinaryIO, symbols: bool) -> Binary:
     from elftools.elf.dynamic import DynamicSection
     from elftools.elf.elffile import ELFFile
     from elftools.elf.gnuversions import GNUVerDefSection, GNUVerNeedSection
@@ -137,7 +140,7 @@ def _read_elf(stream: BinaryIO) -> Binary:
                 required[library.name] = tuple(v.name for v in versions if not v["vna_flags"] & _WEAK_VERSION)
         elif isinstance(section, GNUVerDefSection):
             defined = tuple(next(names).name for _, names in section.iter_versions())
-        elif isinstance(section, SymbolTableSection) and section.name == ".dynsym":
+        elif symbols and isinstance(section, SymbolTableSection) and section.name == ".dynsym":
             undefined = tuple(s.name for s in section.iter_symbols() if s["st_shndx"] == "SHN_UNDEF")
     machine, abi = str(elf["e_machine"]), str(elf["e_ident"]["EI_OSABI"])
     return Binary(

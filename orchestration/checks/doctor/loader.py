@@ -44,10 +44,10 @@ class Loader:
 
 
 def read_file(path: Path) -> Binary | None:
-    """What a file says of itself; None if it is not there or no library."""
+    """What a file of this machine says of itself but for its symbols; None if it is not there or no library."""
     try:
         with path.open("rb") as stream:
-            return read(stream)
+            return read(stream, symbols=False)
     except (OSError, UnreadableError):
         return None
 
