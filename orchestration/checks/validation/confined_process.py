@@ -15,7 +15,7 @@ from orchestration.checks.validation import rules, run_rules
 from orchestration.checks.validation.archive_rules import can_be_unpacked
 from orchestration.checks.validation.description import standard
 from orchestration.checks.validation.exercise import Bench
-from orchestration.checks.validation.fmu import read_co_simulation, read_fmu
+from orchestration.checks.validation.fmu import Fmu, read_co_simulation, read_fmu
 from orchestration.checks.validation.instance import RefusedError
 from orchestration.checks.validation.own_description import own_description
 from orchestration.checks.validation.progress import PULSE, REPORT, Pulse, Report
@@ -30,31 +30,33 @@ def main(path: Path, folder: Path, limits: Limits) -> None:
     restrict(limits.size)
     report = Report(folder / REPORT)
     try:
-        report.rule(READABLE)
-        _look(path, folder, limits, report)
-        report.end()
-    except UnreadableFmuError as error:
-        report.rule(READABLE)
-        report.found(str(error))
+        fmu = look(path, limits.size, report)
+        if fmu is not None and can_be_unpacked(fmu.archive):
+            place = folder / "fmu"
+            fmpy.extract(str(path), str(place))
+            expect_readable_place(place)
+            _run(Bench(fmu, place, limits.time, Pulse(folder / PULSE).beat), report)
         report.end()
     except Exception as error:
         report.failed(error)
         raise
 
 
-def _look(path: Path, folder: Path, limits: Limits, report: Report) -> None:
-    archive = read_archive(path, limits.size)
-    report.tried(rules.OF_ARCHIVES, archive, RefusedError)
-    root = read_co_simulation(archive)
-    report.tried((standard,), archive, RefusedError)
-    fmu = read_fmu(archive, root)
+def look(path: Path, size_limit: float, report: Report) -> Fmu | None:
+    """Try the rules that need no instance; None if there is no FMU to be read."""
+    report.rule(READABLE)
+    try:
+        archive = read_archive(path, size_limit)
+        report.tried(rules.OF_ARCHIVES, archive, RefusedError)
+        root = read_co_simulation(archive)
+        report.tried((standard,), archive, RefusedError)
+        fmu = read_fmu(archive, root)
+    except UnreadableFmuError as error:
+        report.rule(READABLE)
+        report.found(str(error))
+        return None
     report.tried((*rules.OF_DESCRIPTIONS, *(rules.OUR_DESCRIPTIONS if fmu.is_ours else ())), fmu, RefusedError)
-    if can_be_unpacked(archive):
-        place = folder / "fmu"
-        fmpy.extract(str(path), str(place))
-        expect_readable_place(place)
-        pulse = Pulse(folder / PULSE)
-        _run(Bench(fmu, place, limits.time, pulse.beat), report)
+    return fmu
 
 
 def _run(bench: Bench, report: Report) -> None:
