@@ -1,4 +1,5 @@
 # make demo: build the FMUs, fly the paper's scenario, draw it. make test: lint and run all tests.
+# make check: lint and the tests that say most in least time, under a minute, for while you work.
 # make bench: time the loop. make figures, make findings, make interop: what docs/ and examples/ show, and the icons of the FMUs.
 # Each makes its own environment first.
 PYTHON ?= python3
@@ -8,19 +9,29 @@ export CI
 # Other people's masters that need an environment of their own are flown where they are: make interop makes it.
 export QUADCOSIM_COFMUPY ?= $(abspath $(wildcard $(COFMUPY)))
 
-.PHONY: demo test bench figures findings interop clean
+.PHONY: demo check test lint bench figures findings interop clean
 
 demo: .venv/.base
 	$(BIN)/quadcosim build
 	$(BIN)/quadcosim run --period 0.01 --out results/demo
 	@echo "figures: results/demo/path.png errors.png commands.png energy.png"
 
-test: .venv/.test
+# Laws, plant, algebra, expressions, agenda, master with stubs, files of systems and scenarios: no FMU is loaded.
+QUICK := $(addprefix tests/,controller_fmu expressions fmu_kit/test_algebra.py fmu_kit/test_trajectory.py fmu_kit/test_units.py \
+	master orchestration/test_master.py orchestration/test_scenario.py orchestration/test_statistics.py \
+	orchestration/test_timing.py plant_fmu studies/test_axes.py studies/test_study_file.py system ssp)
+
+check: lint
+	$(BIN)/pytest --numprocesses 2 --dist load $(QUICK)
+
+test: lint
+	$(BIN)/pytest --numprocesses auto --maxprocesses 4 --dist loadfile
+
+lint: .venv/.test
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest --numprocesses auto --maxprocesses 4 --dist loadfile
 
 bench: .venv/.test
 	$(BIN)/python -m benchmarks.bench

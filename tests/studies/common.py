@@ -28,7 +28,7 @@ SCRIPT = shutil.which("quadcosim", path=str(Path(sys.executable).parent))
 # Everything random is on: a run that took another seed or an order of its own would show in its bits.
 NOISY = """
 [base]
-stop_time = 0.3
+stop_time = 0.2
 [base.timing]
 jitter = 0.002
 delay_jitter = 0.003

@@ -13,7 +13,7 @@ from tests.commands import Done, Main
 from tests.studies.common import GRID, NOISY, RUNS, error_line, kill, quadcosim, start, wait_for_rows
 
 STORE = Path("results") / "study" / "study.sqlite"
-LONG = NOISY.replace("stop_time = 0.3", "stop_time = 5.0")  # is killed before it ends
+LONG = NOISY.replace("stop_time = 0.2", "stop_time = 5.0")  # is killed before it ends
 LIMIT = ("limit", "--plant-interval", "0.01", "--stop-time", "0.05", "--set", "plant.wind.amplitude.x=0")
 
 

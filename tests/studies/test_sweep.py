@@ -395,8 +395,11 @@ GROWN = [
 
 
 @pytest.mark.parametrize(("grown", "flown"), GROWN)
-def test_a_store_grows_and_keeps_the_rows_that_are_there(tmp_path: Path, grown: Study, flown: int) -> None:
-    path = swept(study(PERIODS), tmp_path)
+def test_a_store_grows_and_keeps_the_rows_that_are_there(
+    finished: Path, tmp_path: Path, grown: Study, flown: int
+) -> None:
+    shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
+    path = store_path("study", tmp_path)
     before = {row["key"]: row["duration"] for row in all_rows(path)}
     summary = sweep(grown, folder=tmp_path)
     assert (summary.total, summary.flown) == (len(grown.points), flown)
