@@ -65,11 +65,19 @@ static int fail(Instance *m, int error)
     return error;
 }
 
-/* A message is a printf format: what it says must not be taken for one. */
+/* A message is a printf format, and some hosts fill none in: percent signs are doubled, and there are no arguments. */
 static void tell(const Instance *m, Status status, Text category, Text message)
 {
-    if (m->callbacks && m->callbacks->logger)
-        m->callbacks->logger(m->callbacks->environment, m->name, status, category, "%s", message);
+    char format[2 * LONGEST_TEXT], *to = format;
+    if (!m->callbacks->logger)
+        return;
+    for (Text from = message; *from; from++) {
+        *to++ = *from;
+        if (*from == '%')
+            *to++ = '%';
+    }
+    *to = '\0';
+    m->callbacks->logger(m->callbacks->environment, m->name, status, category, format);
 }
 
 static void warn(Instance *m)
