@@ -77,7 +77,7 @@ class NativeInstance(Instance):
             self.close()
             said, _ = words(self._messages, str(error))
             raise QuadcosimError(f"{path}: expected a co-simulation FMU that loads here: {said}") from error
-        self._component = self._fmu.component
+        self._component = ctypes.c_void_p(self._fmu.component)
 
     # -- what differs between versions ---------------------------------------------------------------------------
 
@@ -230,7 +230,7 @@ class NativeInstance(Instance):
         of = (ctypes.c_uint32 * len(references))(*references)
         at = (np.ctypeslib.as_ctypes_type(values.dtype) * len(values)).from_buffer(values)  # type: ignore[arg-type]
         counts = (ctypes.c_size_t(len(values)),) if self.counts_values else ()
-        arguments = (ctypes.c_void_p(self._component), of, ctypes.c_size_t(len(references)), at, *counts)
+        arguments = (self._component, of, ctypes.c_size_t(len(references)), at, *counts)
         call, failure = self._fmu.dll[function], self._failure  # without the types by which ctypes would convert
 
         def transfer() -> None:

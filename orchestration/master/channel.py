@@ -33,6 +33,7 @@ class Channel:
         self._noisy = bool(self._sigma.any())
         self._rounded = np.flatnonzero(self._quantum)
         self._quantum = self._quantum[self._rounded]
+        self._rounds = len(self._rounded) > 0
         self._noise: Floats = np.zeros(len(connection.start))
         self._stream = noise
         self._scale, self._offset = connection.scale, connection.offset
@@ -41,7 +42,7 @@ class Channel:
         self._in_flight: dict[int, Floats] = {}
         self._applied: list[tuple[int, Floats]] = []  # the last two, with their times, of a first-order hold
         self._sent: Floats | None = None
-        if isinstance(places, slice) and self._plain and not (self._noisy or len(self._rounded) or self._extrapolates):
+        if isinstance(places, slice) and self._plain and not (self._noisy or self._rounds or self._extrapolates):
             self._sent = row[places]  # a view: what is sent at any time, and arrives as it is
 
     def pass_on(self) -> None:
@@ -57,12 +58,12 @@ class Channel:
 
     def take(self) -> Floats:
         """The sender's values as a message carries them."""
-        self.skip()
         value: Floats = self._row[self._places].copy()
         if self._noisy:
+            self.skip()
             self._noise *= self._sigma
             value += self._noise
-        if len(self._rounded):
+        if self._rounds:
             multiples = value[self._rounded] / self._quantum
             np.rint(multiples, out=multiples)
             value[self._rounded] = multiples * self._quantum

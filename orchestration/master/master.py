@@ -362,7 +362,7 @@ class Master:
 
     def _past_and_later(self) -> tuple[Integers, Integers]:
         """The events up to now, and those of messages that go out later."""
-        table = np.array(self._events, dtype=np.int64).reshape(-1, 4)
+        table = np.fromiter(self._events, np.int64, len(self._events)).reshape(-1, 4)
         past = table[:, 0] <= self.now
         return table[past], table[~past]
 
