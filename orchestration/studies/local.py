@@ -68,7 +68,7 @@ def local_limits(varied: Varied, span: Range) -> Local:
         return about_rest(varied.at, span)
     if varied.of in ("jitter", "loss"):
         return Local(reason=f"linear theory has no local limit of {varied.of}")
-    why = "the quantity is neither period nor delay"
+    why = "the loop about hover is for period and delay only"
     try:
         if varied.of in ("period", "delay"):
             return about_hover(scenario, varied.of)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from orchestration import Scenario, Timing, UsageError, fmus
@@ -17,9 +18,10 @@ from orchestration.studies.local import LOOP, TWINS, local_limits
 from orchestration.studies.ranges import Range, Varied
 from orchestration.studies.sampled_loop import growth_of_loop
 from orchestration.studies.twins import Growth, growth_of
-from orchestration.system.model import System
+from orchestration.system.model import Component, Connection, Sampling, System
 from orchestration.system.paths import changed
 from tests.examples.common import example
+from tests.fmi.small import needs_compiler, small
 from tests.studies.common import one_line
 from tests.studies.test_systems import DELAY, PERIOD, theory
 
@@ -81,6 +83,31 @@ def test_the_servo_has_the_spectral_radius_of_theory(instances: Instances) -> No
     """0.9324 at a delay of 2 ms, to its four digits."""
     servo = changed(example("dc_servo"), {"connections.command.delay": 0.002})
     assert math.exp(0.006 * growth_of_loop(servo, instances)) == pytest.approx(0.9324, abs=5e-5)
+
+
+@needs_compiler
+@pytest.mark.parametrize(("fmi", "pairs"), [(2, [""]), (3, ["[1]", "[2]"])])
+def test_fmus_of_others_make_the_loop_that_they_are(
+    instances: Instances, tmp_path: Path, fmi: int, pairs: list[str]
+) -> None:
+    """Two integrators, one of them sampled with the gain -1: y is (1 - T²) y + T u a period later, and u is u - T y."""
+    path, period = str(small(tmp_path, fmi=fmi)), 2.1
+
+    def wire(start: str, end: str) -> Connection:
+        return Connection(
+            name=start, start=tuple(f"{start}.y{i}" for i in pairs), end=tuple(f"{end}.u{i}" for i in pairs)
+        )
+
+    loop = System(
+        stop_time=10.0,
+        components={
+            "plant": Component(fmu=path, step=0.7),
+            "law": Component(fmu=path, sampling=Sampling(period=period), parameters={"gain": -1.0}),
+        },
+        connections=(wire("plant", "law"), wire("law", "plant")),
+    )
+    radius = np.abs(np.linalg.eigvals([[1.0 - period**2, period], [-period, 1.0]])).max()
+    assert growth_of_loop(loop, instances) == pytest.approx(math.log(radius) / period, abs=1e-9)
 
 
 @pytest.mark.parametrize(
