@@ -1,0 +1,82 @@
+"""What the program for cofmupy does, with a Python that has numpy and a few lines in place of cofmupy."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orchestration.exchange.interop import tools
+from orchestration.exchange.interop.assignment import Job
+from orchestration.exchange.interop.catalogue import TOOLS
+from tests.orchestration.exchange.interop.common import LOOP
+
+COORDINATOR = """
+import json
+
+class Coordinator:
+    def start(self, given):
+        self.given, self.master = given, self
+
+    def run_simulation(self, step_size, end_time):
+        self.times = [k * step_size for k in range(round(end_time / step_size))]
+
+    def get_results(self):
+        print(json.dumps([self.given, self.sequence_order]))
+        outputs = {(c["source"]["id"], c["source"]["variable"]) for c in self.given["connections"]}
+        return {"time": self.times, **{output: [7.0] * len(self.times) for output in outputs}}
+"""
+"""As cofmupy's, without a flight: it prints what it was given."""
+
+RUN = "import runpy, sys; sys.path.insert(0, sys.argv.pop(1)); runpy.run_path(sys.argv.pop(1), run_name='__main__')"
+
+
+def flown(name: str, folder: Path) -> tuple[dict[str, Any], list[list[str]], Any]:
+    """The configuration, the order of the FMUs, and the rows."""
+    (folder / "cofmupy.py").write_text(COORDINATOR)
+    job = Job(
+        fmus={name: folder / name for name in LOOP.ports},
+        ssp=folder / "ssp",
+        recorded=folder / "recorded",
+        folder=folder / "folder",
+        connections=LOOP.connections,
+        signals=LOOP.signals,
+        step=0.01,
+        stop=0.1,
+        parameters={"controller": {"gain.eta": 9.0}, "plant": {}},
+    )
+    (folder / "job.json").write_text(job.to_json())
+    script, function = Path(str(tools.__path__[0])) / "cofmupy.py", TOOLS[name].call.partition(":")[2]
+    given = [folder, script, function, folder / "job.json", folder / "rows.npy"]
+    done = subprocess.run(
+        [sys.executable, "-I", "-c", RUN, *map(str, given)], capture_output=True, text=True, check=True
+    )
+    configuration, order = json.loads(done.stdout)
+    return configuration, order, np.load(folder / "rows.npy")
+
+
+@pytest.mark.parametrize(("name", "method"), [("cofmupy", "jacobi"), ("cofmupy gauss_seidel", "gauss_seidel")])
+def test_it_is_given_the_whole_loop_and_steps_the_controller_first(name: str, method: str, tmp_path: Path) -> None:
+    configuration, order, _ = flown(name, tmp_path)
+    assert configuration["cosim_method"] == method
+    assert order == [["controller", "plant"]]
+    assert {fmu["id"]: (fmu["path"], fmu["initialization"]) for fmu in configuration["fmus"]} == {
+        "controller": (str(tmp_path / "controller"), {"gain.eta": 9.0}),
+        "plant": (str(tmp_path / "plant"), {}),
+    }
+    made = {
+        ((connection["source"]["id"], connection["source"]["variable"]), (end["id"], end["variable"]))
+        for connection in configuration["connections"]
+        for end in connection["target"]
+    }
+    assert made == set(LOOP.connections)
+
+
+def test_its_rows_have_the_time_at_the_end_of_each_step(tmp_path: Path) -> None:
+    _, _, rows = flown("cofmupy", tmp_path)
+    assert rows.shape == (10, 1 + len(LOOP.signals))
+    assert rows[:, 0] == pytest.approx(0.01 * np.arange(1, 11))
+    assert (rows[:, 1:] == 7.0).all()

@@ -1,0 +1,134 @@
+"""Other systems than the quadrotor in other people's masters: the examples, without what only this one can say."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from orchestration import UsageError
+from orchestration.exchange.interop.catalogue import TOOLS, chosen
+from orchestration.exchange.interop.compare import agreements
+from orchestration.exchange.interop.flights import Flights
+from orchestration.exchange.interop.table import AIM
+from orchestration.simulation import run
+from orchestration.system.model import System
+from orchestration.system.paths import changed
+from tests.commands import Main
+from tests.examples.common import EXAMPLES, example
+from tests.orchestration.studies.common import one_line
+
+CARRIED: dict[str, dict[str, Any]] = {
+    "double_integrator": {},
+    "water_tank": {"connections.valve.delay": 0.0, "components.tank.step": 0.1},
+    "dc_servo": {
+        "components.servo.step": 0.006,
+        "connections.command.delay": 0.0,
+        "connections.command.delay_jitter": 0.0,
+        "connections.command.loss": 0.0,
+    },
+    "minimum_variance": {
+        "components.plant.step": 1.0,
+        "sources.noise.noise": None,
+        "sources.noise.period": None,
+        "sources.noise.constant": 0.3,
+    },
+    "four_components": {
+        "components.car.step": 0.01,
+        "components.controller.sampling.period": 0.01,
+        "components.engine.sampling.period": 0.01,
+        "components.engine.sampling.offset": 0.0,
+        "connections.wheel.noise": 0.0,
+        "connections.wheel.quantisation": 0.0,
+        "connections.speed.delay": 0.0,
+        "connections.demand.delay": 0.0,
+        "connections.demand.delay_jitter": 0.0,
+        "connections.demand.loss": 0.0,
+        "sources.slope.file": None,
+        "sources.slope.constant": -100.0,
+    },
+}
+"""By example, what takes away all that other masters cannot say: one step for all, nothing late, lost or noisy."""
+ORDERS = {
+    "libcosim": "jacobi",
+    "libcosim, SSP": "jacobi",
+    "ecos": "jacobi",
+    "fmucontainer": "jacobi",
+    "fmucontainer -sequential": "gauss-seidel",
+}
+
+
+STEPS = 40
+
+
+def carried(name: str) -> System:
+    system = changed(example(name), CARRIED[name])
+    (step,) = {component.step for component in system.components.values() if component.step is not None}
+    return changed(system, {"stop_time": STEPS * step})
+
+
+@pytest.mark.parametrize("name", CARRIED)
+def test_an_example_equals_other_masters_in_the_order_that_each_has(name: str) -> None:
+    system = carried(name)
+    heard: list[str] = []
+    found = agreements(system, chosen(list(ORDERS), system.components), announce=heard.append)
+    expected = {tool: order for tool, order in ORDERS.items() if TOOLS[tool].converts or name != "water_tank"}
+    assert {agreement.tool.name: agreement.trace.order for agreement in found} == expected
+    assert any(line.startswith("left out libcosim") for line in heard) == (name == "water_tank")
+    for agreement in found:
+        assert max(agreement.same_start.values()) <= AIM, agreement.tool.name
+        if agreement.tool.name.startswith("libcosim"):  # which exchanges what this master does from the start
+            assert max(agreement.as_it_comes.values()) <= AIM
+
+
+def test_the_rows_that_are_compared_are_those_of_a_run_of_the_system_in_that_order(tmp_path: Path) -> None:
+    system = carried("double_integrator")
+    flights = Flights(system, tmp_path, None)
+    for order in ("jacobi", "gauss-seidel"):
+        orders = {f"connections.{x.name}.order": order for x in system.connections}
+        signals = run(changed(system, orders)).signals
+        compared = flights.rows_of_master(order, {})
+        for i, name in enumerate(flights.loop.signals, start=1):
+            assert compared[:, i].tobytes() == signals[name].tobytes()
+    assert (flights.rows_of_master("jacobi", {}) != flights.rows_of_master("gauss-seidel", {})).any()
+
+
+def test_the_command_takes_any_system_and_leaves_out_tools_for_components_that_it_has_not(
+    main: Main, tmp_path: Path
+) -> None:
+    path = EXAMPLES / "double_integrator" / "system.toml"
+    done = main("interop", path, "--stop-time", "0.5", "--tool", "libcosim", "--json", "--out", tmp_path)
+    (row,) = json.loads(done.stdout)
+    assert (row["agrees"], row["order"], set(row["as_it_comes"])) == (
+        True,
+        "jacobi",
+        {"plant.x", "plant.v", "controller.u"},
+    )
+    assert (tmp_path / "interop.png").is_file()
+    servo = carried("dc_servo").components
+    assert not any(tool.alone == "plant" for tool in chosen(None, servo))
+    assert any(tool.alone == "controller" for tool in chosen(None, servo))
+    with pytest.raises(UsageError, match="--tool fmpy, plant alone: expected a system with a component plant"):
+        chosen(["fmpy, plant alone"], servo)
+
+
+UPHILL = {key: value for key, value in CARRIED["four_components"].items() if not key.startswith("sources")}
+SAMPLING = "components.controller.sampling"
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "said"),
+    [
+        ("water_tank", {}, "connections.valve.delay = 0.25: an SSP cannot say that; expected 0.0"),
+        ("water_tank", CARRIED["water_tank"], "--tool libcosim: no conversion of types, as of controller.valve"),
+        ("double_integrator", {f"{SAMPLING}.period": 0.1}, f"{SAMPLING}.period = 0.1: expected the one step of all"),
+        ("double_integrator", {f"{SAMPLING}.jitter": 0.01}, f"{SAMPLING}.jitter = 0.01: an SSP cannot say that"),
+        ("double_integrator", {"stop_time": 0.33}, "stop_time = 0.33: expected a multiple of the common step of 0.05"),
+        ("double_integrator", {"connections.command.scale": 2.0}, "connections.command: has scale or offset"),
+        ("four_components", UPHILL, "sources.slope.file: an SSP cannot feed one; expected a constant"),
+    ],
+)
+def test_what_other_masters_cannot_say_is_refused_in_one_line(name: str, changes: dict[str, Any], said: str) -> None:
+    with pytest.raises(UsageError) as refused:
+        agreements(changed(example(name), changes), [TOOLS["libcosim"]])
+    assert one_line(refused.value).startswith(said)

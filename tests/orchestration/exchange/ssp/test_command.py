@@ -1,0 +1,186 @@
+"""`quadcosim ssp` as it is called: where the file goes, and which scenarios are refused."""
+
+import shutil
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fmpy.ssp.ssd import read_ssd
+
+from orchestration import ReferenceChoice, Scenario, Timing, UsageError, fmus
+from orchestration.exchange.ssp import writing
+from tests.commands import Main
+from tests.orchestration.exchange.interop.common import OTHER
+from tests.orchestration.studies.common import error_line, one_line, quadcosim
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, built: dict[str, Path]) -> Path:
+    """A folder to start from, and `fmus/` in it instead of the project's."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "fmus").mkdir()
+    for path in built.values():
+        shutil.copyfile(path, tmp_path / "fmus" / path.name)
+    monkeypatch.setattr(fmus, "default_folder", lambda: tmp_path / "fmus")
+    return tmp_path
+
+
+# -- the command ------------------------------------------------------------------------------------------
+
+
+def test_the_paper_s_flight_goes_to_the_folder_of_the_fmus_unless_told(here: Path, main: Main) -> None:
+    done = main("ssp")
+    assert done.stdout == f"{here / 'fmus' / 'QuadrotorLoop.ssp'}\n"
+    assert done.stderr == f"{here / 'fmus' / 'QuadrotorLoop.timing.toml'} has its timing, for quadcosim run\n"
+    assert (here / "fmus" / "QuadrotorLoop.ssp").read_bytes() == written(Scenario(), here)
+
+
+def test_flags_and_out_are_those_of_a_flight(here: Path, main: Main) -> None:
+    settings = [text for name, value in OTHER.items() for text in ("--set", f"{name}={value}")]
+    times = ("--period", "0.02", "--offset", "0.01", "--plant-interval", "0.005", "--stop-time", "2")
+    done = main("ssp", *times, *settings, "--out", Path("new") / "loop.ssp")
+    assert done.stdout == f"{Path('new') / 'loop.ssp'}\n"
+    scenario = Scenario(stop_time=2.0, timing=Timing(period=0.02, offset=0.01, plant_interval=0.005))
+    assert (here / "new" / "loop.ssp").read_bytes() == written(scenario.with_changes(parameters=OTHER), here)
+    assert not (here / "fmus" / "QuadrotorLoop.ssp").exists()
+
+
+def test_a_scenario_file_may_name_fmus_beside_it(here: Path, main: Main) -> None:
+    folder = here / "my flights"
+    folder.mkdir()
+    shutil.copyfile(here / "fmus" / "QuadrotorPlant.fmu", folder / "Größeres Modell.fmu")
+    (folder / "flight.toml").write_text(
+        'stop_time = 2\n[plant]\nfmu = "Größeres Modell.fmu"\nmass = 1.2\n[record]\nplant = ["tilt"]\n',
+        encoding="utf-8",
+    )
+    main("ssp", folder / "flight.toml", "--set", "plant.gravity=9.8", "--out", "loop.ssp")
+    structure = read_ssd(str(here / "loop.ssp"), validate=True)
+    sources = {component.name: component.source for component in structure.system.elements}
+    assert sources == {"controller": "resources/UnifiedController.fmu", "plant": "resources/Größeres Modell.fmu"}
+    with zipfile.ZipFile(here / "loop.ssp") as archive:
+        assert archive.read(sources["plant"]) == (here / "fmus" / "QuadrotorPlant.fmu").read_bytes()
+        values = archive.read("resources/scenario.ssv").decode()
+    assert '<ssv:Parameter name="plant.mass">\n      <ssv:Real value="1.2" unit="kg" />' in values
+    assert '<ssv:Parameter name="plant.gravity">\n      <ssv:Real value="9.8" unit="m/s2" />' in values
+
+
+def test_the_installed_command_writes_it(tmp_path: Path) -> None:
+    done = quadcosim("ssp", "--out", "loop.ssp", cwd=tmp_path)
+    assert done.stdout == "loop.ssp\n"
+    assert read_ssd(str(tmp_path / "loop.ssp"), validate=True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--delay", "0.005"), "timing.delay = 0.005: an SSP cannot say that"),
+        (("--preset", "px4"), "timing."),
+        (("--set", "plant.mas=1"), "plant.mas: QuadrotorPlant has no such variable; did you mean mass?"),
+        (("--set", "plant.mass=true"), "plant.mass = True: expected a number"),
+        (("--set", "controller.sample_period=0.1"), "controller.sample_period: expected --period and --clock instead"),
+        (("nowhere.toml",), "nowhere.toml: expected a readable system or scenario file"),
+    ],
+)
+def test_wrong_usage_is_one_line_and_exit_code_2(here: Path, main: Main, arguments: tuple[str, ...], said: str) -> None:
+    assert error_line(main("ssp", *arguments, "--out", "loop.ssp", code=2)).startswith(said)
+    assert not (here / "loop.ssp").exists()
+
+
+def test_a_place_that_cannot_be_written_is_a_failure_in_one_line(here: Path, main: Main) -> None:
+    assert "fmus" in error_line(main("ssp", "--out", "fmus", code=1))
+
+
+def written(scenario: Scenario, folder: Path) -> bytes:
+    return writing.write(scenario, folder / "expected.ssp").read_bytes()
+
+
+# -- what is refused --------------------------------------------------------------------------------------
+
+
+UNSAYABLE: dict[str, tuple[Any, str]] = {
+    "hold": ("first", "zero"),
+    "delay": (0.005, "0.0"),
+    "delay_jitter": (0.001, "0.0"),
+    "jitter": (0.002, "0.0"),
+    "measurement_loss": (0.1, "0.0"),
+    "command_loss": (0.1, "0.0"),
+    "clock_ratio": (1.001, "1.0"),
+    "noise": ({"position": 0.01}, "none"),
+    "quantisation": ({"position": 0.01}, "none"),
+}
+"""Of all that a timing has, what an SSP has no words for, and what is expected."""
+
+
+@pytest.mark.parametrize("key", UNSAYABLE)
+def test_a_timing_that_an_ssp_cannot_say_is_refused(key: str, short: Scenario, tmp_path: Path) -> None:
+    value, expected = UNSAYABLE[key]
+    given = "" if isinstance(value, dict) else f" = {value}"
+    said = f"timing.{key}{given}: an SSP cannot say that; expected {expected}"
+    assert refusal(short.with_changes(timing={key: value}), tmp_path) == said
+
+
+def test_a_reference_from_a_file_is_refused(short: Scenario, tmp_path: Path) -> None:
+    chosen = short.with_changes(reference=ReferenceChoice(file=tmp_path / "reference.csv"))
+    said = "reference.file: an SSP cannot feed one; expected a constant"
+    assert refusal(chosen, tmp_path) == said
+
+
+UNCONNECTED = "expected a parameter or an input that nothing is connected to"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("plant.mas", 1.0, "QuadrotorPlant has no such variable; did you mean mass?"),
+        ("controller.gain", 1.0, "UnifiedController has no such variable; did you mean gain.eta?"),
+        ("plant.thrust", 1.0, f"is connected; {UNCONNECTED}"),
+        ("controller.position.x", 1.0, f"is connected; {UNCONNECTED}"),
+        ("plant.position.x", 1.0, f"is an output; {UNCONNECTED}"),
+        ("plant.tilt", 1.0, f"is a local; {UNCONNECTED}"),
+    ],
+)
+def test_what_is_no_parameter_and_no_open_input_is_refused(
+    name: str, value: float, said: str, short: Scenario, tmp_path: Path
+) -> None:
+    assert refusal(short.with_changes(parameters={name: value}), tmp_path).startswith(f"{name}: {said}")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        ("plant.mass", True, "a number"),
+        ("plant.mass", float("inf"), "a finite number"),
+        ("plant.mass", float("nan"), "a finite number"),
+        ("controller.use_reference_inputs", 1.0, "true or false"),
+    ],
+)
+def test_a_value_of_another_type_is_refused(
+    name: str, value: float | bool, expected: str, short: Scenario, tmp_path: Path
+) -> None:
+    chosen = short.with_changes(parameters={name: value})
+    assert refusal(chosen, tmp_path) == f"{name} = {value}: expected {expected}"
+
+
+def test_two_fmus_of_one_file_name_are_refused(short: Scenario, built: dict[str, Path], tmp_path: Path) -> None:
+    copies = []
+    for model, path in built.items():
+        copies.append(tmp_path / model / "model.fmu")
+        copies[-1].parent.mkdir()
+        shutil.copyfile(path, copies[-1])
+    controller, plant = copies
+    chosen = short.with_fmus(plant=plant, controller=controller)
+    assert refusal(chosen, tmp_path) == f"{controller} and {plant}: expected FMUs of different file names"
+
+
+def test_fmus_that_do_not_fit_are_refused(short: Scenario, built: dict[str, Path], tmp_path: Path) -> None:
+    swapped = short.with_fmus(plant=built["UnifiedController"], controller=built["QuadrotorPlant"])
+    assert refusal(swapped, tmp_path).startswith("plant.fmu: UnifiedController has no output position.x, ")
+
+
+def refusal(scenario: Scenario, folder: Path) -> str:
+    """The line with which a scenario is refused; no file is left behind."""
+    with pytest.raises(UsageError) as refused:
+        writing.write(scenario, folder / "loop.ssp")
+    assert not (folder / "loop.ssp").exists()
+    return one_line(refused.value)

@@ -1,0 +1,97 @@
+"""What is written as an SSP with its timing beside it is flown back as it was."""
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+
+from orchestration import Scenario, UsageError
+from orchestration.exchange.ssp import package, writing
+from orchestration.quadrotor.translation import system_of
+from orchestration.request import load_request
+from orchestration.results.result import Result
+from orchestration.simulation import run
+from orchestration.system.model import System
+from tests.commands import Main
+from tests.orchestration.exchange.interop.test_systems import CARRIED, carried
+from tests.orchestration.studies.common import error_line, one_line
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(package, "_cache", lambda: tmp_path / "cache")
+
+
+def bits(result: Result) -> dict[str, bytes]:
+    return {name: values.tobytes() for name, values in result.signals.items()}
+
+
+@pytest.mark.parametrize("name", CARRIED)
+def test_an_example_has_the_same_rows_in_the_same_order_as_before(name: str, tmp_path: Path) -> None:
+    system = carried(name)
+    ssp, timing = writing.write_with_timing(system, tmp_path / "out" / "loop.ssp")
+    assert timing == tmp_path / "out" / "loop.timing.toml"
+    read = load_request(ssp, timing)
+    assert isinstance(read, System)
+    assert load_request(timing) == read
+    expected, found = run(system), run(read)
+    assert bits(found) == bits(expected)
+    assert list(found.signals) == list(expected.signals)
+    assert found.metrics == expected.metrics
+    assert read.operating_point == system.operating_point
+
+
+def test_what_the_timing_says_on_top_is_flown(tmp_path: Path) -> None:
+    ssp, timing = writing.write_with_timing(carried("double_integrator"), tmp_path / "loop.ssp")
+    timing.write_text(timing.read_text().replace('name = "command"', 'name = "command"\ndelay = 0.1'))
+    read = load_request(ssp, timing)
+    assert isinstance(read, System)
+    assert [x.delay for x in read.connections] == [0.0, 0.1]
+    with pytest.raises(UsageError, match=r"connections.command.delay = 0.1: an SSP cannot say that"):
+        writing.write(read, ssp)
+
+
+def test_the_quadrotor_is_flown_back_to_the_bit(tmp_path: Path) -> None:
+    scenario = Scenario(stop_time=0.1).with_changes(timing={"period": 0.02, "offset": 0.01, "plant_interval": 0.005})
+    read = load_request(*writing.write_with_timing(scenario, tmp_path / "loop.ssp"))
+    assert isinstance(read, System)
+    flown = run(scenario)
+    assert bits(run(read)) == bits(flown)
+    assert read.criterion == system_of(scenario).criterion
+
+
+def test_the_command_writes_both_and_run_flies_them(tmp_path: Path, main: Main) -> None:
+    system = dataclasses.replace(carried("water_tank"), stop_time=1.0)
+    from orchestration.system.system_file import to_toml
+
+    (tmp_path / "tank.toml").write_text(to_toml(system))
+    done = main("ssp", tmp_path / "tank.toml", "--out", tmp_path / "tank.ssp")
+    assert done.stdout == f"{tmp_path / 'tank.ssp'}\n"
+    assert done.stderr == f"{tmp_path / 'tank.timing.toml'} has its timing, for quadcosim run\n"
+    flown = [main("run", *of, "--out", tmp_path / f"run{i}", "--no-figures") for i, of in enumerate(
+        [(tmp_path / "tank.toml",), (tmp_path / "tank.ssp", tmp_path / "tank.timing.toml")]
+    )]  # fmt: skip
+    assert len({done.stdout.count("peak") for done in flown}) == 1
+    assert (tmp_path / "run0" / "signals.parquet").read_bytes() == (tmp_path / "run1" / "signals.parquet").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("components = 3", "components = 3: expected a table"),
+        ("[components]\nplant = 3", "components.plant = 3: expected a table"),
+        ("[components.plant]\nparameters = 3", "components.plant.parameters = 3: expected a table"),
+        ("sources = [1]", "sources = [1]: expected a table"),
+        ("connections = { a = 1 }", "connections = {'a': 1}: expected a list"),
+        ("connections = [1]", "connections.0 = 1: expected a table"),
+        ("[[connections]]\nfrom = [[1]]\nto = [2]", "connections.0.from = [1]: expected a text"),
+        ('[[connections]]\nfrom = 1\nto = "a"', "connections.0.from = 1: expected a list"),
+    ],
+)
+def test_timing_of_another_shape_is_refused_in_one_line(text: str, said: str, tmp_path: Path, main: Main) -> None:
+    ssp, timing = writing.write_with_timing(carried("double_integrator"), tmp_path / "loop.ssp")
+    timing.write_text(text)
+    with pytest.raises(UsageError) as refused:
+        load_request(ssp, timing)
+    assert one_line(refused.value) == f"{timing}: {said}"
+    assert error_line(main("limit", ssp, timing, "--of", "connections.command.delay", code=2)) == f"{timing}: {said}"

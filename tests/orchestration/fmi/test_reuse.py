@@ -1,0 +1,106 @@
+"""Runs of a reused FMU are those of fresh processes, to the bit, whatever the FMU keeps."""
+
+from pathlib import Path
+
+import pytest
+
+from orchestration.checks.confined import Ending
+from orchestration.fmi import repeatability
+from orchestration.fmi.isolated import IsolatedInstance
+from orchestration.fmi.native import NativeInstance
+from orchestration.fmi.repeatability import Repeatability
+from orchestration.fmi.reuse import Instances
+from orchestration.simulation import prepared
+from tests.orchestration.fmi.small import needs_compiler, small
+from tests.orchestration.fmi.test_foreign_fmus import alone, ran
+
+pytestmark = needs_compiler
+
+HABITS = {
+    "none": Repeatability(reset=True, second_instance=True),
+    "BROKEN_RESET": Repeatability(reset=False, second_instance=True),
+    "STICKY_PARAMETER": Repeatability(reset=False, second_instance=True),
+    "STATICS": Repeatability(reset=True, second_instance=False),
+    "BROKEN_RESET STATICS": Repeatability(reset=False, second_instance=False),
+    "ONCE": Repeatability(reset=True, second_instance=False),
+    "REFUSES": Repeatability(reset=False, second_instance=False),
+    "CRASHES": Repeatability(reset=False, second_instance=False),
+}
+SETTINGS = ({"gain": 3.0, "mode": "backward"}, {}, {"gain": 3.0})
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Nothing is known of any FMU."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def made(habits: str, folder: Path, fmi: int = 2) -> Path:
+    return small(folder, *habits.split(), fmi=fmi, once="ONCE" in habits)
+
+
+@pytest.mark.parametrize("habits", HABITS)
+def test_what_is_shown_of_an_fmu_is_what_it_does(habits: str, tmp_path: Path) -> None:
+    assert repeatability.of(made(habits, tmp_path)) == HABITS[habits]
+
+
+def test_fmi_3_is_shown_likewise(tmp_path: Path) -> None:
+    assert repeatability.of(made("none", tmp_path / "a", fmi=3)) == HABITS["none"]
+    assert repeatability.of(made("BROKEN_RESET", tmp_path / "b", fmi=3)) == HABITS["BROKEN_RESET"]
+
+
+@pytest.mark.parametrize("habits", ["none", "STICKY_PARAMETER", "STATICS", "BROKEN_RESET STATICS"])
+def test_runs_one_after_another_are_those_of_fresh_processes(habits: str, tmp_path: Path) -> None:
+    path = made(habits, tmp_path)
+    systems = [alone(path, parameters=setting) for setting in SETTINGS]
+    instances = Instances()
+    kinds, rows = [], []
+    for system in systems:
+        with prepared(system, load=instances.load) as simulation:
+            kinds.append(type(simulation.instances["it"]) is IsolatedInstance)
+            simulation.master.initialise()
+            simulation.master.run()
+            rows.append(simulation.result().rows.tobytes())
+    instances.close()
+    assert rows == [ran(system, load=IsolatedInstance).rows.tobytes() for system in systems]
+    needs_a_process = not HABITS[habits].reset and not HABITS[habits].second_instance
+    assert kinds == [False] + [needs_a_process] * (len(SETTINGS) - 1)
+
+
+def test_an_instance_is_kept_only_where_its_reset_is_one(tmp_path: Path) -> None:
+    for habits, kept in (("none", True), ("BROKEN_RESET", False)):
+        path, instances = made(habits, tmp_path / habits), Instances()
+        with instances.load(path, "it") as first:
+            pass
+        with instances.load(path, "it") as second:
+            assert (second is first) == kept
+            assert isinstance(second, NativeInstance)
+        instances.close()
+
+
+def test_it_is_shown_once_on_a_machine(tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = made("BROKEN_RESET", tmp_path)
+    first = repeatability.of(path)
+    monkeypatch.setattr(repeatability, "_known", {})
+    monkeypatch.setattr(repeatability.confined, "run", lambda *_: pytest.fail("shown again"))
+    assert repeatability.of(path) == first
+    (stored,) = cache.rglob("*.json")
+    stored.write_text("damaged")
+    monkeypatch.setattr(repeatability, "_known", {})
+    with pytest.raises(pytest.fail.Exception, match="shown again"):
+        repeatability.of(path)
+
+
+def test_what_could_not_be_tried_to_the_end_is_not_relied_on_nor_kept(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stopped = Ending(code=None, reached="it takes longer than the limit of 60 s", out_of_time=True, said="")
+    monkeypatch.setattr(repeatability.confined, "run", lambda *_: stopped)
+    assert repeatability.of(made("none", tmp_path)) == Repeatability(reset=False, second_instance=False)
+    assert not list(cache.rglob("*.json"))
+
+
+def test_the_fmus_of_this_project_are_reused(built: dict[str, Path]) -> None:
+    for path in built.values():
+        assert repeatability.of(path) == Repeatability(reset=True, second_instance=True)

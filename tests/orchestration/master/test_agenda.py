@@ -1,0 +1,107 @@
+"""What happens when, of any system."""
+
+import pytest
+
+from orchestration.errors import UsageError
+from orchestration.master.agenda import Agenda, FixedStep
+from orchestration.master.streams import Streams
+from orchestration.system.times import Grid, exact_nanoseconds
+from tests.orchestration.master.stubs import continuous, sampled, system, wire
+
+MS = 1_000_000
+
+
+def instants(what, fixed=None):
+    return list(Agenda(what, Streams(what.seed), fixed))
+
+
+def loop(sampling, **keys):
+    return system(
+        {"plant": continuous(0.1), "controller": sampling},
+        [wire("plant.y", "controller.y", "measurement", **keys.pop("measurement", {})),
+         wire("controller.u", "plant.u", "command", **keys.pop("command", {}))],
+        **keys,
+    )  # fmt: skip
+
+
+def test_instants_are_points_samples_arrivals_and_the_end():
+    found = instants(loop(sampled(0.25), command={"delay": 0.03}, stop_time=0.5))
+    assert [i.time // MS for i in found] == [0, 30, 100, 200, 250, 280, 300, 400, 500]
+    assert [i.time // MS for i in found if i.due] == [0, 250]  # none at the end
+    assert [i.time // MS for i in found if i.arrivals] == [30, 280]
+
+
+def test_a_component_halts_only_where_something_happens_to_it():
+    what = system(
+        {"fast": continuous(0.1), "slow": continuous(0.5), "reader": sampled(0.25)},
+        [wire("fast.y", "reader.y")],
+        stop_time=1.0,
+    )
+    halts = {i.time // MS: i.halts for i in instants(what)}
+    assert halts[250] == (0,)
+    assert [time for time, which in halts.items() if 1 in which] == [0, 500, 1000]
+
+
+def test_what_is_measured_late_is_measured_before_its_sample():
+    found = instants(loop(sampled(0.2), measurement={"delay": 0.03}, stop_time=0.5))
+    taken = [(i.time // MS, [m.arrival // MS for m in i.measured]) for i in found if i.measured]
+    assert taken == [(0, [0]), (170, [200]), (370, [400])]
+
+
+def test_a_delay_of_measurements_longer_than_periods_is_the_same():
+    found = instants(loop(sampled(0.1), measurement={"delay": 0.25}, stop_time=1.0))
+    taken = [(m.sent // MS, m.arrival // MS) for i in found for m in i.measured]
+    assert taken[:3] == [(0, 0), (0, 100), (0, 200)]
+    assert taken[3:] == [(50 + 100 * k, 300 + 100 * k) for k in range(10)]  # also for samples beyond the end
+    received = [[m.sent // MS for m in due.received] for i in found for due in i.due]
+    assert received[:4] == [[0], [0], [0], [50]]
+
+
+def test_messages_never_overtake():
+    found = instants(loop(sampled(0.01), command={"delay_jitter": 0.1}, stop_time=2.0, seed=4))
+    arrivals = [m.arrival for i in found for due in i.due for m in due.sent]
+    assert arrivals == sorted(arrivals)
+    assert len(set(arrivals)) < len(arrivals)  # some wait for the one before
+
+
+def test_in_jacobi_order_a_command_goes_out_with_the_next_sample():
+    found = instants(loop(sampled(0.2), command={"order": "jacobi"}, stop_time=0.5))
+    assert [(due.time // MS, m.sent // MS) for i in found for due in i.due for m in due.sent] == [
+        (0, 200), (200, 400), (400, 600),
+    ]  # fmt: skip
+
+
+def test_components_that_are_due_together_follow_what_feeds_what():
+    what = system({"controller": sampled(), "sensor": sampled()}, [wire("sensor.y", "controller.y")], stop_time=0.15)
+    assert [[due.component for due in i.due] for i in instants(what) if i.due] == [[1, 0], [1, 0]]
+
+
+def fixed_plant(moves):
+    return {"plant": FixedStep(name="plant", grid=Grid(0, exact_nanoseconds(0.1)), moves=moves)}
+
+
+def test_between_two_points_of_a_fixed_step_is_an_error_that_names_them():
+    with pytest.raises(UsageError, match=r"t = 0.25 s .*components.plant.* 0.1 s only: expected 0.2 s or 0.3 s"):
+        instants(loop(sampled(0.25)), fixed_plant(False))
+    with pytest.raises(UsageError, match=r"arrival over connections\.command"):
+        instants(loop(sampled(0.2), command={"delay": 0.03}), fixed_plant(False))
+
+
+def test_or_moves_to_the_next_point():
+    found = instants(loop(sampled(0.25), command={"delay": 0.03}, stop_time=0.8), fixed_plant(True))
+    assert [due.time // MS for i in found for due in i.due] == [0, 300, 500]
+    assert [m.arrival // MS for i in found for m in i.arrivals] == [100, 400, 600]
+    assert {i.time // MS % 100 for i in found} == {0}
+
+
+def test_a_message_between_components_in_continuous_time_leaves_at_the_senders_points():
+    what = system(
+        {"plant": continuous(0.1), "filter": continuous(0.25)},
+        [wire("plant.y", "filter.u", delay=0.03)],
+        stop_time=0.3,
+    )
+    found = instants(what)
+    assert [(m.sent // MS, m.arrival // MS) for i in found for m in i.posted] == [
+        (0, 30), (100, 130), (200, 230), (300, 330),
+    ]  # fmt: skip
+    assert [i.time // MS for i in found if 1 in i.halts] == [0, 30, 130, 230, 250, 300]

@@ -1,0 +1,37 @@
+"""Who comes first at one instant, and before a run."""
+
+from orchestration.master.initial import groups, is_loop
+from orchestration.master.order import ranked
+from tests.orchestration.master.stubs import wire
+
+
+def test_the_order_of_the_file_holds_where_nothing_feeds_anything():
+    assert ranked(["b", "a", "c"], []) == ("b", "a", "c")
+
+
+def test_who_feeds_another_comes_first():
+    assert ranked(["plant", "filter", "controller"], [("filter", "controller"), ("controller", "plant")]) == (
+        "filter", "controller", "plant",
+    )  # fmt: skip
+
+
+def test_of_a_circle_the_connection_that_closes_it_gives_way():
+    assert ranked(["a", "b"], [("b", "a"), ("a", "b")]) == ("b", "a")
+
+
+def test_the_first_exchange_follows_the_dependencies():
+    measurement, command = wire("plant.y", "controller.y"), wire("controller.u", "plant.u")
+    depends = lambda component, output: frozenset({"y"}) if component == "controller" else frozenset()  # noqa: E731
+    assert groups([command, measurement], depends) == ((1,), (0,))
+
+
+def test_outputs_that_depend_on_each_other_are_one_group():
+    there, back = wire("a.y", "b.u"), wire("b.y", "a.u")
+    everything = lambda component, output: None  # noqa: E731
+    assert groups([there, back], everything) == ((0, 1),)
+    assert is_loop((0, 1), [there, back], everything)
+
+
+def test_a_chain_of_many_needs_no_deep_stack():
+    chain = [wire(f"c{i}.y", f"c{i + 1}.u") for i in range(3000)]
+    assert groups(chain[::-1], lambda component, output: None) == tuple((i,) for i in reversed(range(3000)))

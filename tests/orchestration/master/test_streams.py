@@ -1,0 +1,77 @@
+"""Random numbers belong to names: nothing that is added changes another's."""
+
+import hashlib
+
+import numpy as np
+from hypothesis import given, settings
+
+from orchestration.master.agenda import Agenda
+from orchestration.master.master import Master
+from orchestration.master.recording import InMemory
+from orchestration.master.streams import Streams
+from tests.orchestration.master.random_systems import systems_with_more
+from tests.orchestration.master.stubs import Stub
+
+
+def test_a_stream_is_made_as_the_documents_say():
+    words = [
+        int.from_bytes(hashlib.sha256(b"connections.valve.loss").digest()[4 * i : 4 * i + 4], "big") for i in range(4)
+    ]
+    expected = np.random.Generator(np.random.PCG64(np.random.SeedSequence(7, spawn_key=tuple(words))))
+    assert Streams(7).of("connections.valve", "loss").random(5).tolist() == expected.random(5).tolist()
+
+
+def test_a_stream_with_a_number_is_the_spawned_child_of_that_number():
+    child = np.random.SeedSequence(7).spawn(4)[3]
+    expected = np.random.Generator(np.random.PCG64(child)).random(5).tolist()
+    assert Streams(7, {"connections.valve.loss": 3}).of("connections.valve", "loss").random(5).tolist() == expected
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(systems_with_more())
+def test_adding_a_component_and_lossy_connections_changes_no_number_of_the_others(pair):
+    """When whom samples, what becomes of whose messages, and with which noise: outputs are constant."""
+    before, after = pair
+    assert all(history(after, name) == history(before, name) for name in before.components)
+    (rows, steps), (more_rows, more_steps) = noisy(before), noisy(after)
+    for few, many in ((rows, more_rows), *((steps[name], more_steps[name]) for name in steps)):
+        assert set(few) <= set(many)
+        assert all(many[t].items() >= few[t].items() for t in few)
+
+
+def history(what, name):
+    """When a component samples, and what becomes of the messages that it reads and sends."""
+    place, found = list(what.components).index(name), []
+    for instant in Agenda(what, Streams(what.seed)):
+        for due in (due for due in instant.due if due.component == place):
+            messages = [
+                (what.connections[m.connection].name, m.k, m.sent, m.arrival) for m in (*due.received, *due.sent)
+            ]
+            found.append((due.time, {m for m in messages if len(m[0]) < len("c100")}))
+        found += [message for message in posted(what, instant, name) if len(message[0]) < len("c100")]
+    return found
+
+
+def posted(what, instant, name):
+    """What a component in continuous time sends."""
+    wires = what.connections
+    return [
+        (wires[m.connection].name, m.k, m.sent, m.arrival) for m in instant.posted if wires[m.connection].sender == name
+    ]
+
+
+def noisy(what):
+    """Rows by time, and by component the inputs of its steps by their time, where no output ever changes."""
+    inputs = {name: [end.partition(".")[2] for x in what.connections for end in x.end if x.receiver == name]
+              for name in what.components}  # fmt: skip
+    stubs = {name: Stub(y=1.0, z=2.0, **dict.fromkeys(names, 0.0)) for name, names in inputs.items()}
+    streams = Streams(what.seed)
+    master = Master(what, stubs, agenda=Agenda(what, streams), streams=streams, recorded=dict.fromkeys(stubs, ()),
+                    recorder=InMemory())  # fmt: skip
+    master.initialise()
+    master.run()
+    rows = [dict(zip(master.board.columns, row)) for chunk in master.recorder.chunks() for row in chunk.rows.tolist()]
+    tasks = {name for name, component in what.components.items() if component.sampling is not None}
+    return {row["time"]: row for row in rows}, {
+        name: {t: {key: seen[key] for key in inputs[name]} for t, _, seen in stubs[name].steps} for name in tasks
+    }

@@ -1,0 +1,282 @@
+"""Figures of studies: there, not empty, and what is drawn is what was flown."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import matplotlib.figure
+import numpy as np
+import pandas as pd
+import pytest
+
+from orchestration import UsageError
+from orchestration.studies import figures
+from orchestration.studies.axes import Axis
+from orchestration.studies.drawing import draw_limit, draw_study
+from orchestration.studies.limit import Limit
+from orchestration.studies.sensitivity import Index
+from orchestration.studies.store import open_for_writing
+from orchestration.studies.study import Study
+from orchestration.studies.sweep import store_path
+from tests.orchestration.studies.common import OBJECTIVES, axis, row, short, study
+
+PERIODS = axis("timing.period", 0.01, 0.02, 0.03, 0.04)
+WORDS = ("settled", "bounded")
+DELAYS = axis("timing.delay", 0.0, 0.005, 0.01)
+
+
+def invented(folder: Path, chosen: Study) -> Study:
+    """Fills a store with runs that fly below an edge, fail at one place and else diverge."""
+    names = [each.name for each in chosen.axes]
+    rows = []
+    for index, point in enumerate(chosen.points):
+        size = sum(float(value) for value in point.values() if isinstance(value, (int, float)))
+        outcome = "diverged" if size > 0.2 else "settled" if 0.5 * size < 0.05 else "bounded"
+        metrics = {
+            "outcome": outcome,
+            "good": outcome == "settled",
+            "ultimate_bound": 0.5 * size,
+            "position_rmse": 0.1 + size,
+        }
+        failed = index == 2
+        rows.append(row(index, settings=point, metrics=None if failed else metrics, message="no" if failed else None))
+    with open_for_writing(store_path(chosen.name, folder), OBJECTIVES) as store:
+        about: dict[str, Any] = {"axes": names, "grid": None, "guids": {}, "versions": {}}
+        store.describe({name: json.dumps(value) for name, value in about.items()})
+        store.add(rows)
+    return chosen
+
+
+def expect_picture(path: Path) -> None:
+    """Expect a PNG with more on it than its background."""
+    import matplotlib.image
+
+    pixels = matplotlib.image.imread(path)
+    assert min(pixels.shape[:2]) > 100
+    assert len(np.unique(pixels.reshape(-1, pixels.shape[2]), axis=0)) > 10
+
+
+def table(number: int = 5) -> pd.DataFrame:
+    """A study of one axis in which the last run does not fly."""
+    bounds = [0.01 * (i + 1) for i in range(number)]
+    return pd.DataFrame(
+        {
+            "timing.period": [0.01 * (i + 1) for i in reversed(range(number))],
+            "status": "done",
+            "outcome": ["settled" if bound < 0.05 else "bounded" for bound in bounds[::-1]],
+            "ultimate_bound": bounds[::-1],
+        }
+    )
+
+
+def judged(runs: pd.DataFrame) -> pd.DataFrame:
+    """With what a run's metrics say beside its outcome."""
+    return runs.assign(good=(runs["outcome"] == "settled").astype("boolean").where(runs["outcome"].notna()))
+
+
+def lines_of(figure: matplotlib.figure.Figure) -> list[Any]:
+    return list(figure.axes[0].get_lines())
+
+
+# -- of a store -------------------------------------------------------------------------------------------
+
+
+def test_one_axis_is_drawn_as_a_line(tmp_path: Path) -> None:
+    (picture,) = draw_study(invented(tmp_path, study(PERIODS)), tmp_path, "ultimate_bound")
+    assert picture == tmp_path / "ultimate_bound.png"
+    expect_picture(picture)
+
+
+def test_two_axes_are_drawn_as_lines_and_as_a_map(tmp_path: Path) -> None:
+    wide = axis("timing.period", 0.01, 0.05, 0.1, 0.2)  # has runs that fly and runs that do not
+    pictures = draw_study(invented(tmp_path, study(wide, DELAYS)), tmp_path, "position_rmse")
+    assert [picture.name for picture in pictures] == ["position_rmse.png", "position_rmse_map.png"]
+    for picture in pictures:
+        expect_picture(picture)
+
+
+def test_sampled_axes_are_drawn_without_a_map(tmp_path: Path) -> None:
+    sampled = Axis(name="mass", targets=("plant.mass",), low=0.01, high=0.05)
+    chosen = invented(tmp_path, study(sampled, method="random", samples=6))
+    (picture,) = draw_study(chosen, tmp_path, "ultimate_bound")
+    expect_picture(picture)
+
+
+def test_more_axes_are_drawn_as_dots_over_each(tmp_path: Path) -> None:
+    chosen = invented(tmp_path, study(PERIODS, DELAYS, axis("plant.mass", 0.01, 0.02)))
+    (picture,) = draw_study(chosen, tmp_path, "ultimate_bound")
+    assert picture == tmp_path / "ultimate_bound.png"
+    expect_picture(picture)
+
+
+def test_a_metric_that_does_not_exist_is_told_with_those_that_do(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="--metric beauty: expected one of good, horizon, position_rmse"):
+        draw_study(invented(tmp_path, study(PERIODS)), tmp_path, "beauty")
+
+
+@pytest.mark.parametrize(
+    "axes",
+    [(axis("timing.order", "jacobi", "gauss-seidel", "jacobi"),),
+     (PERIODS, axis("controller.use_reference_inputs", True, False))],
+)  # fmt: skip
+def test_axes_that_no_figure_is_for_are_told(tmp_path: Path, axes: tuple[Axis, ...]) -> None:
+    with pytest.raises(UsageError, match="study: expected axes of numbers to draw"):
+        draw_study(invented(tmp_path, study(*axes)), tmp_path, "ultimate_bound")
+
+
+def test_a_study_that_was_never_flown_is_told(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="there is no such file"):
+        draw_study(study(PERIODS), tmp_path, "ultimate_bound")
+
+
+# -- what is drawn ----------------------------------------------------------------------------------------
+
+
+def test_what_flies_has_settled() -> None:
+    runs = table(4)
+    runs["outcome"] = ["settled", "bounded", "diverged", None]  # the last of a run that failed
+    assert figures.flew(judged(runs)).tolist() == [True, False, False, False]
+
+
+def test_a_line_goes_through_what_flies_in_order_and_the_rest_is_crossed() -> None:
+    line, crosses, *_ = lines_of(figures.lines(judged(table()), (axis("timing.period", 1),), "ultimate_bound", WORDS))
+    assert line.get_xdata().tolist() == pytest.approx([0.01, 0.02, 0.03, 0.04, 0.05])
+    assert np.isnan(line.get_ydata()).tolist() == [False] * 4 + [True]
+    assert crosses.get_xdata().tolist() == pytest.approx([0.05])
+    assert crosses.get_marker() == "x"
+
+
+def test_there_is_a_line_for_each_value_of_the_second_axis() -> None:
+    runs = pd.concat([table().assign(delay=delay) for delay in (0.0, 0.01, 0.02)])
+    second = axis("timing.delay", 0.0, 0.01, 0.02)
+    runs = runs.rename(columns={"delay": "timing.delay"})
+    figure = figures.lines(judged(runs), (axis("timing.period", 1), second), "ultimate_bound", WORDS)
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()][:3] == ["0", "0.01", "0.02"]
+    assert legend.get_title().get_text() == "timing.delay"
+
+
+def test_the_axes_of_time_have_their_unit_and_the_others_none() -> None:
+    for target, label in (("timing.period", "timing.period [s]"), ("plant.mass", "plant.mass"),
+                          ("timing.loss", "timing.loss")):  # fmt: skip
+        runs = table().rename(columns={"timing.period": target})
+        figure = figures.lines(judged(runs), (axis(target, 1),), "ultimate_bound", WORDS)
+        assert figure.axes[0].get_xlabel() == label
+
+
+def test_a_metric_has_its_unit_wherever_it_is_drawn() -> None:
+    runs = judged(pd.concat([table().assign(**{"timing.delay": delay}) for delay in (0.0, 0.01)]))
+    axes = (axis("timing.period", 1), axis("timing.delay", 1))
+    drawn = figures.lines(runs, axes[:1], "ultimate_bound", WORDS, unit="m")
+    assert drawn.axes[0].get_ylabel() == "ultimate_bound [m]"
+    assert figures.heat_map(runs, axes, "ultimate_bound", WORDS, unit="m").axes[1].get_ylabel() == (
+        f"ultimate_bound [m], where {WORDS[0]}"
+    )
+    scattered = figures.scatter(runs, axes, "ultimate_bound", WORDS, unit="m")
+    assert scattered.get_supylabel() == "ultimate_bound [m]"
+
+
+def test_a_map_has_a_cell_for_each_run_and_the_boundary_of_what_flies() -> None:
+    runs = pd.concat([table().assign(**{"timing.delay": delay}) for delay in (0.0, 0.01, 0.02)])
+    figure = figures.heat_map(
+        judged(runs), (axis("timing.period", 1), axis("timing.delay", 1)), "ultimate_bound", WORDS
+    )
+    _, mesh, boundary = figure.axes[0].collections
+    values = np.ma.filled(mesh.get_array(), np.nan).reshape(3, 5)
+    assert np.isnan(values).tolist() == [[False] * 4 + [True]] * 3
+    assert values[0, :4] == pytest.approx([0.01, 0.02, 0.03, 0.04])
+    crossings = np.concatenate([path.vertices for path in boundary.get_paths()])
+    assert crossings[:, 0] == pytest.approx(0.045)
+
+
+def test_a_map_tells_bounded_from_diverged_with_the_horizon_beside_them() -> None:
+    runs = pd.concat([table().assign(**{"timing.delay": delay}) for delay in (0.0, 0.01)])
+    runs["outcome"] = ["settled", "bounded", "diverged", None, "settled"] * 2  # periods from 0.05 down
+    runs.loc[runs["outcome"] == "diverged", "ultimate_bound"] = np.nan
+    runs["horizon"] = 30.0
+    figure = figures.heat_map(
+        judged(runs), (axis("timing.period", 1), axis("timing.delay", 1)), "ultimate_bound", WORDS
+    )
+    fell = np.ma.filled(figure.axes[0].collections[0].get_array(), np.nan).reshape(2, 5)[0]
+    assert fell == pytest.approx([np.nan, np.nan, 2.0, 1.0, np.nan], nan_ok=True)
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["bounded", "diverged"]
+    assert figure.axes[0].get_title().endswith("by 30 s")
+
+
+def test_a_line_marks_what_diverged_where_it_has_no_value() -> None:
+    runs = table()
+    runs["outcome"] = ["diverged", *runs["outcome"][1:]]
+    runs.loc[runs["outcome"] == "diverged", "ultimate_bound"] = np.nan
+    _, _, down, *_ = lines_of(figures.lines(judged(runs), (axis("timing.period", 1),), "ultimate_bound", WORDS))
+    assert (down.get_marker(), down.get_xdata().tolist()) == ("v", pytest.approx([0.05]))
+
+
+def test_where_everything_flies_a_map_has_no_boundary() -> None:
+    runs = pd.concat([table(4).assign(**{"timing.delay": delay}) for delay in (0.0, 0.01)])
+    figure = figures.heat_map(
+        judged(runs), (axis("timing.period", 1), axis("timing.delay", 1)), "ultimate_bound", WORDS
+    )
+    assert len(figure.axes[0].collections) == 2, "what fell, and what flies"
+
+
+@pytest.mark.parametrize(("local", "large", "marks"), [(0.08, 0.05, 2), (None, 0.05, 1), (0.08, None, 1)])
+def test_the_spectral_radius_is_drawn_with_the_limits_that_there_are(
+    tmp_path: Path, local: float | None, large: float | None, marks: int
+) -> None:
+    periods = np.linspace(0.001, 0.1, 50)
+    figure = figures.spectral_radius("period", periods, 10.0 * periods, local_limit=local, large_signal_limit=large)
+    curve, unit, *limits = lines_of(figure)
+    assert curve.get_xdata() == pytest.approx(periods * 1e3)
+    assert unit.get_ydata() == [1.0, 1.0]
+    assert [line.get_xdata()[0] for line in limits] == [1e3 * limit for limit in (local, large) if limit is not None]
+    assert len(limits) == marks
+    expect_picture(figures.save(lambda: figure, tmp_path / "new" / "radius.png"))
+
+
+def limit(of: str) -> Limit:
+    return Limit(
+        of=of, local_limit=0.08, local_limit_outside=0.08, large_signal_limit=0.05, refuted_limit=None, horizon=30.0,
+        tolerance=0.001, scan=0.005, confidence=None, seeds=1, flies_above=(), continuous=None, tried=(), note="",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("of", ["period", "delay"])
+def test_a_limit_is_drawn_with_the_radius_that_crosses_one_there(tmp_path: Path, of: str) -> None:
+    picture = draw_limit(short(), limit(of), tmp_path)
+    assert picture == tmp_path / f"spectral_radius_{of}.png"
+    expect_picture(picture)
+
+
+def test_a_limit_that_linear_theory_does_not_have_is_not_drawn(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="expected --of period or delay to draw the spectral radius over, got loss"):
+        draw_limit(short(), limit("loss"), tmp_path)
+
+
+def test_dots_of_many_axes_are_apart_by_what_flies() -> None:
+    runs = table().assign(**{"plant.mass": 1.0, "timing.delay": 0.0})
+    axes = (axis("timing.period", 1), axis("plant.mass", 1), axis("timing.delay", 1))
+    figure = figures.scatter(judged(runs), axes, "ultimate_bound", WORDS)
+    for panel in figure.axes[:3]:
+        dots, crosses, _ = panel.get_lines()
+        assert (len(dots.get_xdata()), len(crosses.get_xdata())) == (4, 1)
+    assert not figure.axes[3].get_visible()
+    assert "share that is settled 80%, 95 % interval 38% to 96%" in figure.get_suptitle()
+
+
+def test_sensitivity_is_drawn_as_bars_with_their_confidence(tmp_path: Path) -> None:
+    indices = [
+        Index(axis=name, kind=kind, value=value, confidence=0.1)
+        for kind, values in (("first", (0.3, 0.4)), ("total", (0.5, 0.6)))
+        for name, value in zip(("a", "b"), values, strict=True)
+    ]
+    figure = figures.sensitivity_bars(indices, "position_rmse")
+    panel = figure.axes[0]
+    assert [bar.get_width() for bar in panel.patches] == [0.3, 0.4, 0.5, 0.6]
+    assert [label.get_text() for label in panel.get_yticklabels()] == ["a", "b"]
+    expect_picture(figures.save(lambda: figure, tmp_path / "bars.png"))
+
+
+def test_figures_are_the_same_bytes_each_time(tmp_path: Path) -> None:
+    chosen = invented(tmp_path, study(PERIODS))
+    pictures = [draw_study(chosen, tmp_path, "ultimate_bound")[0].read_bytes() for _ in range(2)]
+    assert pictures[0] == pictures[1]

@@ -1,0 +1,689 @@
+"""Sweeps of the real FMUs: the same bits whoever flies, whatever is killed, and nothing flown twice."""
+
+import dataclasses
+import json
+import os
+import shutil
+import signal
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+import orchestration
+from orchestration import QuadcosimError, UsageError, fmus
+from orchestration.fmi.fmi2 import Fmi2Instance
+from orchestration.quadrotor.scenario import FmuChoice, Record, Scenario
+from orchestration.quadrotor.translation import system_of
+from orchestration.quadrotor.wiring import DEFAULT_PLANT
+from orchestration.studies import engine
+from orchestration.studies.axes import Axis
+from orchestration.studies.crew import Crew
+from orchestration.studies.files import Files, files_of, with_files
+from orchestration.studies.identity import machine, versions
+from orchestration.studies.store import open_for_reading
+from orchestration.studies.study import Study
+from orchestration.studies.study_file import load_study
+from orchestration.studies.sweep import store_path, sweep
+from orchestration.studies.worker import BrokenPlaceError, Hangar, Outcome, Task
+from tests.orchestration.studies.common import (
+    GRID,
+    NOISY,
+    RUNS,
+    SCRIPT,
+    Cluster,
+    axis,
+    bits,
+    files_in,
+    is_running,
+    kill,
+    one_line,
+    quadcosim,
+    reference_store,
+    rows_in,
+    short,
+    start,
+    starts,
+    study,
+    swept,
+    wait_for_rows,
+    wait_until,
+    workers_of,
+)
+from tests.orchestration.studies.kills import disturbed
+from tests.orchestration.studies.sick import ABORTS, KILLED, SPENT, sick_plant
+
+STORE = Path("results") / "study" / "study.sqlite"
+PERIODS = axis("timing.period", 0.01, 0.02)
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
+    """The rows of the noisy study, flown by one worker without interruption."""
+    found = bits(reference_store(tmp_path_factory.mktemp("reference")))
+    assert len(found) == RUNS
+    return found
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with the noisy study."""
+    (tmp_path / "study.toml").write_text(NOISY)
+    return tmp_path
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[Callable[[int], Cluster]]:
+    """Starts a dask scheduler with a number of workers."""
+    made: list[Cluster] = []
+
+    def make(workers: int) -> Cluster:
+        made.append(Cluster(tmp_path, workers))
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.close()
+
+
+# -- the same bits ----------------------------------------------------------------------------------------
+
+
+def test_the_runs_of_the_reference_differ_from_each_other(reference: list[dict[str, Any]]) -> None:
+    assert len({found["position_rmse"] for found in reference}) == RUNS
+    assert len({found["seed"] for found in reference}) == RUNS
+    assert {found["status"] for found in reference} == {"done"}
+
+
+def test_two_workers_make_the_same_rows_as_one(folder: Path, reference: list[dict[str, Any]]) -> None:
+    done = quadcosim("sweep", "study.toml", "--workers", "2", cwd=folder)
+    assert done.stdout == f"{STORE}: {RUNS} runs, {RUNS} flown now\n"
+    assert bits(folder / STORE) == reference
+
+
+def test_the_order_of_runs_does_not_change_them(folder: Path, reference: list[dict[str, Any]]) -> None:
+    chosen, hangar = load_study(folder / "study.toml"), Hangar()
+    files = chosen.files()
+    for index in (15, 3, 8, 0):
+        system = with_files(chosen.system(index, starts()), files.fmus)
+        metrics = hangar.fly(Task(index=0, key="", settings={}, system=system, keep_signals=False)).row.metrics
+        assert metrics is not None
+        assert metrics["position_rmse"].hex() == reference[index]["position_rmse"]
+        assert metrics["control_effort.torque"].hex() == reference[index]["control_effort.torque"]
+
+
+def test_a_row_has_the_metrics_of_a_direct_run(folder: Path, reference: list[dict[str, Any]]) -> None:
+    direct = orchestration.run(load_study(folder / "study.toml").system(9, starts())).metrics
+    for name, value in direct.items():
+        expected = value if value is None or isinstance(value, str) else float(value).hex()
+        assert reference[9][name] == expected, name
+
+
+def test_a_dask_cluster_makes_the_same_rows(
+    folder: Path, reference: list[dict[str, Any]], cluster: Callable[[int], Cluster]
+) -> None:
+    quadcosim("sweep", "study.toml", "--dask", cluster(1).address, cwd=folder)
+    assert bits(folder / STORE) == reference
+
+
+def test_the_death_of_a_dask_worker_loses_nothing(
+    folder: Path, reference: list[dict[str, Any]], cluster: Callable[[int], Cluster]
+) -> None:
+    made = cluster(2)
+    with start("sweep", "study.toml", "--dask", made.address, cwd=folder) as coordinator:
+        wait_for_rows(folder / STORE, 1)
+        made.workers[0].kill()
+        assert rows_in(folder / STORE) < RUNS
+        out, err = coordinator.communicate(timeout=60)
+    assert coordinator.returncode == 0, out + err
+    assert bits(folder / STORE) == reference
+
+
+# -- killed -----------------------------------------------------------------------------------------------
+
+
+def test_a_killed_sweep_flies_only_what_is_missing_and_ends_with_the_same_rows(
+    folder: Path, reference: list[dict[str, Any]]
+) -> None:
+    with start("sweep", "study.toml", cwd=folder) as coordinator:
+        wait_for_rows(folder / STORE, 2)
+        coordinator.kill()
+    there = rows_in(folder / STORE)
+    assert 2 <= there < RUNS
+    with open_for_reading(folder / STORE) as store:
+        before = {found["design_index"]: found["duration"] for found in store.rows()}
+    done = quadcosim("sweep", "study.toml", "--workers", "2", cwd=folder)
+    assert done.stdout == f"{STORE}: {RUNS} runs, {RUNS - there} flown now\n"
+    assert bits(folder / STORE) == reference
+    with open_for_reading(folder / STORE) as store:
+        after = {found["design_index"]: found["duration"] for found in store.rows()}
+    assert {index: after[index] for index in before} == before, "expected no run flown twice"
+
+
+def test_workers_end_when_the_coordinator_is_killed(folder: Path) -> None:
+    with start("sweep", "study.toml", "--workers", "2", cwd=folder) as coordinator:
+        wait_for_rows(folder / STORE, 1)
+        workers = workers_of(coordinator.pid)
+        coordinator.kill()
+    assert len(workers) == 2
+    wait_until(lambda: not any(map(is_running, workers)), seconds=10.0)
+
+
+def test_the_death_of_a_worker_loses_nothing(folder: Path, reference: list[dict[str, Any]]) -> None:
+    with start("sweep", "study.toml", "--workers", "2", cwd=folder) as coordinator:
+        wait_for_rows(folder / STORE, 1)
+        kill(workers_of(coordinator.pid)[0])
+        assert rows_in(folder / STORE) < RUNS
+        out, err = coordinator.communicate(timeout=60)
+    assert coordinator.returncode == 0, out + err
+    assert bits(folder / STORE) == reference
+
+
+def test_a_run_whose_worker_is_killed_from_outside_stops_the_sweep_and_has_no_row(tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text('[base]\nstop_time = 2.0\n[[axes]]\nname = "seed"\nvalues = [1]\n')
+    with start("sweep", "study.toml", cwd=tmp_path) as coordinator:
+        while coordinator.poll() is None:
+            for process in workers_of(coordinator.pid):
+                kill(process)
+        _, err = coordinator.communicate()
+    assert coordinator.returncode == 1
+    assert len(err.splitlines()) == 1, err
+    assert rows_in(tmp_path / STORE) == 0
+    assert quadcosim("sweep", "study.toml", cwd=tmp_path).stdout == f"{STORE}: 1 runs, 1 flown now\n"
+
+
+@pytest.mark.parametrize(("workers", "kills"), [(1, 1), (2, 3)])
+def test_whatever_is_killed_the_table_is_that_of_an_undisturbed_sweep(
+    tmp_path: Path, reference: list[dict[str, Any]], workers: int, kills: int
+) -> None:
+    tally = disturbed(tmp_path, reference, workers=workers, kills=kills, seed=workers)
+    assert tally.kills == kills
+
+
+@pytest.mark.parametrize("whom", ["the coordinator", "a worker"])
+def test_an_interrupt_is_one_line_that_says_how_far_the_sweep_is(
+    folder: Path, reference: list[dict[str, Any]], whom: str
+) -> None:
+    with start("sweep", "study.toml", cwd=folder) as coordinator:
+        wait_for_rows(folder / STORE, 1)
+        os.kill(coordinator.pid if whom == "the coordinator" else workers_of(coordinator.pid)[0], signal.SIGINT)
+        out, err = coordinator.communicate(timeout=60)
+    assert (coordinator.returncode, out) == (130, "")
+    assert err == f"quadcosim: interrupted with {rows_in(folder / STORE)} of {RUNS} runs done\n"
+    assert all(row in reference for row in bits(folder / STORE))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_run_that_ends_its_process_fails_and_no_other_run_does(tmp_path: Path, workers: int) -> None:
+    base = dataclasses.replace(short(), plant=FmuChoice(fmu=str(sick_plant(tmp_path))))
+    masses = axis("plant.mass", 1.0, ABORTS, 1.01, SPENT, 1.02)
+    told: list[str] = []
+    summary = sweep(study(masses, base=base), folder=tmp_path, workers=workers, announce=told.append)
+    rows = bits(summary.path)
+    assert [row["design_index"] for row in rows if row["status"] == "failed"] == [1]
+    assert [row["message"].partition(",")[0] for row in rows if row["status"] == "failed"] == [
+        "its worker process ended by SIGABRT"
+    ]  # fmt: skip
+    assert (summary.failed, len(told)) == (1, 1)
+    assert told[0].startswith("run 1 (plant.mass = 1.11) failed: its worker process ended by SIGABRT, 3 times")
+
+
+def test_a_run_that_is_killed_over_and_over_stops_the_sweep_without_a_row(tmp_path: Path) -> None:
+    base = dataclasses.replace(short(), plant=FmuChoice(fmu=str(sick_plant(tmp_path))))
+    with pytest.raises(QuadcosimError, match=r"run 1 ended by SIGKILL 3 times: not the run's doing") as caught:
+        sweep(study(axis("plant.mass", 1.0, KILLED), base=base), folder=tmp_path)
+    one_line(caught.value)
+    assert rows_in(store_path("study", tmp_path)) == 1
+
+
+# -- the place, not the run -------------------------------------------------------------------------------
+
+
+def test_an_fmu_that_is_moved_away_meanwhile_changes_nothing(folder: Path, reference: list[dict[str, Any]]) -> None:
+    plant = folder / "plant.fmu"
+    shutil.copy(fmus.locate(DEFAULT_PLANT), plant)
+    text = NOISY.replace("[base.timing]", '[base.plant]\nfmu = "plant.fmu"\n[base.timing]')
+    (folder / "study.toml").write_text(text)
+    with start("sweep", "study.toml", cwd=folder) as coordinator:
+        wait_for_rows(folder / STORE, 1)
+        plant.unlink()
+        kill(workers_of(coordinator.pid)[0])
+        out, err = coordinator.communicate(timeout=60)
+    assert coordinator.returncode == 0, out + err
+    assert bits(folder / STORE) == reference
+
+
+@pytest.mark.parametrize("what", ["no space", "no file"])
+def test_a_place_where_nothing_can_be_flown_stops_the_sweep_without_a_row(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str
+) -> None:
+    genuine = Crew._unpack
+
+    def unpack(crew: Crew, number: int, name: str) -> Path:
+        path = genuine(crew, number, name)
+        if what == "no file":
+            path.unlink()
+        else:
+            path.write_bytes(path.read_bytes()[:-2000])  # as much as there was room for
+        return path
+
+    monkeypatch.setattr(Crew, "_unpack", unpack)
+    with pytest.raises(QuadcosimError, match="no run's own failure: ") as caught:
+        sweep(study(PERIODS), folder=tmp_path, workers=2)
+    one_line(caught.value)
+    monkeypatch.undo()
+    assert rows_in(store_path("study", tmp_path)) == 0
+    assert sweep(study(PERIODS), folder=tmp_path).flown == 2
+
+
+@pytest.mark.parametrize(
+    "error", [OSError(28, "No space left on device"), MemoryError(), QuadcosimError("does not load")]
+)
+def test_what_is_not_the_runs_own_failure_is_no_row(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
+    def load(path: Path, instance_name: str) -> Any:
+        raise error
+
+    hangar = Hangar()
+    monkeypatch.setattr(hangar._fleet, "load", load)
+    with pytest.raises(BrokenPlaceError):
+        hangar.fly(task(short()))
+
+
+def test_an_fmu_that_cannot_be_reset_is_made_anew_for_the_next_run(instantiated: list[str]) -> None:
+    hangar = Hangar()
+    before = rmse(hangar.fly(task(short())))
+    next(iter(hangar._fleet._kept.values())).failed = True  # it refuses the reset
+    assert rmse(hangar.fly(task(short()))) == before
+    assert len(instantiated) == 3
+
+
+def test_other_software_where_it_is_flown_stops_the_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    other = {**versions(), "sources": "other"}
+    monkeypatch.setattr("orchestration.studies.crew.versions", lambda: other)
+    with pytest.raises(QuadcosimError, match="has another version of sources than the coordinator; expected the same"):
+        sweep(study(PERIODS), folder=tmp_path)
+    assert rows_in(store_path("study", tmp_path)) == 0
+
+
+# -- what a store holds -----------------------------------------------------------------------------------
+
+
+def test_a_finished_study_is_not_flown_again(tmp_path: Path) -> None:
+    chosen = study(PERIODS)
+    first, second = sweep(chosen, folder=tmp_path), sweep(chosen, folder=tmp_path)
+    assert (first.total, first.flown, first.failed) == (2, 2, 0)
+    assert (second.total, second.flown, second.failed) == (2, 0, 0)
+
+
+def test_progress_counts_from_what_is_there_to_all(tmp_path: Path) -> None:
+    heard: list[tuple[int, int]] = []
+    sweep(study(PERIODS), folder=tmp_path, progress=lambda done, total: heard.append((done, total)))
+    sweep(study(PERIODS), folder=tmp_path, progress=lambda done, total: heard.append((done, total)))
+    assert heard == [(0, 2), (1, 2), (2, 2), (2, 2)]
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a study that is done."""
+    folder = tmp_path_factory.mktemp("finished")
+    swept(study(PERIODS), folder)
+    return folder
+
+
+HEAVY = short().with_changes(parameters={"plant.mass": 1.1})
+CHANGES: list[tuple[Study, str]] = [
+    (study(PERIODS, base=short(delay=0.001)), r"timing.delay was 0.0, is 0.001"),
+    (study(PERIODS, base=short(noise={"position": 0.1})), r"timing.noise was \{\}, is \{\"position\": 0.1\}"),
+    (study(PERIODS, base=short(stop_time=0.2)), r"stop_time was 0.1, is 0.2"),
+    (study(PERIODS, base=dataclasses.replace(short(), seed=3)), r"seed was 0, is 3"),
+    (study(PERIODS, base=HEAVY), r"plant.mass was absent, is 1.1"),
+    (
+        study(PERIODS, base=short(delay=0.1, offset=0.1, jitter=0.001, clock_ratio=1.1, hold="first")),
+        r"timing.clock_ratio was 1.0, is 1.1; timing.delay was 0.0, is 0.1; timing.hold was .*; and 2 more\)",
+    ),
+]
+
+
+@pytest.mark.parametrize(("changed", "said"), CHANGES, ids=[said.partition(" was")[0] for _, said in CHANGES])
+def test_a_changed_study_is_refused_and_says_what_changed(finished: Path, changed: Study, said: str) -> None:
+    before = bits(store_path("study", finished))
+    with pytest.raises(UsageError, match=rf"holds another study \({said}") as caught:
+        sweep(changed, folder=finished)
+    assert "expected the same one: take another --out, or remove the store" in one_line(caught.value)
+    assert bits(store_path("study", finished)) == before
+
+
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [("hashes", "FMU of the plant was .*, is other"), ("machine", "machine was Python .*, is a Z80"),
+     ("versions", "version of sources was .*, is edited")],
+)  # fmt: skip
+def test_other_fmus_machines_and_sources_are_a_changed_study(
+    finished: Path, monkeypatch: pytest.MonkeyPatch, place: str, said: str
+) -> None:
+    def other(chosen: Study) -> Files:
+        files = files_of(chosen.origin)
+        files.__dict__["hashes"] = {**files.hashes, DEFAULT_PLANT: "other"}
+        return files
+
+    edited = {**versions(), "sources": "edited"}
+    if place == "hashes":
+        monkeypatch.setattr(Study, "files", other)
+    elif place == "machine":
+        monkeypatch.setattr("orchestration.studies.identity.machine", lambda: "a Z80")
+    else:
+        monkeypatch.setattr("orchestration.studies.identity.versions", lambda: edited)
+    with pytest.raises(UsageError, match=said):
+        sweep(study(PERIODS), folder=finished)
+
+
+def all_rows(path: Path) -> list[dict[str, Any]]:
+    with open_for_reading(path) as store:
+        return list(store.rows())
+
+
+GROWN = [
+    (study(axis("timing.period", 0.005, 0.01, 0.015, 0.02)), 2),
+    (study(axis("timing.period", 0.02)), 0),
+    (study(PERIODS, axis("plant.mass", 1.0, 1.1)), 2),  # the first is the mass that the FMU has
+    (study(axis("timing.delay", 0.0, 0.001), PERIODS), 2),
+]
+
+
+@pytest.mark.parametrize(("grown", "flown"), GROWN)
+def test_a_store_grows_and_keeps_the_rows_that_are_there(
+    finished: Path, tmp_path: Path, grown: Study, flown: int
+) -> None:
+    shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
+    path = store_path("study", tmp_path)
+    before = {row["key"]: row["duration"] for row in all_rows(path)}
+    summary = sweep(grown, folder=tmp_path)
+    assert (summary.total, summary.flown) == (len(grown.points), flown)
+    after = all_rows(path)
+    assert [row["settings"] for row in after] == list(grown.points)
+    kept = [row for row in after if row["key"] in before]
+    assert len(kept) == len(after) - flown
+    assert all(row["duration"] == before[row["key"]] for row in kept), "expected none to be flown again"
+    for row, index in zip(after, range(len(after)), strict=True):
+        direct = orchestration.run(grown.system(index, starts())).metrics
+        assert row["position_rmse"] == direct["position_rmse"]
+    assert sweep(study(PERIODS), folder=tmp_path).flown == 0, "expected what was taken out to be kept"
+
+
+def test_more_samples_keep_those_that_are_there_also_where_each_has_its_seed(tmp_path: Path) -> None:
+    mass = Axis(name="mass", targets=("plant.mass",), low=0.9, high=1.1)
+    for samples, flown in ((2, 2), (4, 2)):
+        chosen = study(mass, base=short(noise={"position": 0.01}), samples=samples, vary_seed=True)
+        assert sweep(chosen, folder=tmp_path).flown == flown
+
+
+def test_the_name_of_a_study_and_the_signals_that_it_keeps_may_change(finished: Path) -> None:
+    renamed = dataclasses.replace(study(PERIODS, keep_signals=(1,)), name="renamed")
+    assert sweep(renamed, folder=finished).total == 2
+
+
+def test_axes_of_seeds_fly_those_seeds(tmp_path: Path) -> None:
+    noisy = short(noise={"position": 0.01})
+    rows = bits(swept(study(axis("seed", 4, 9, 4), base=noisy), tmp_path))
+    assert [row["seed"] for row in rows] == [4, 9, 4]
+    assert rows[0]["position_rmse"] == rows[2]["position_rmse"] != rows[1]["position_rmse"]
+    assert rows[0]["key"] == rows[2]["key"] != rows[1]["key"]
+
+
+# -- runs that fail and runs that diverge -----------------------------------------------------------------
+
+
+FAILS = 0.0
+"""a mass that the description of the plant allows and the plant does not"""
+
+
+def test_a_run_that_fails_is_a_row_with_its_message_and_is_flown_again_on_request_only(tmp_path: Path) -> None:
+    chosen = study(axis("plant.mass", 1.0, FAILS, 2.0))
+    path = swept(chosen, tmp_path)
+    rows = bits(path)
+    assert [row["status"] for row in rows] == ["done", "failed", "done"]
+    assert rows[1]["message"].endswith("mass = 0.0: expected a finite value > 0")
+    assert sweep(chosen, folder=tmp_path).flown == 0
+    again = sweep(chosen, folder=tmp_path, retry_failed=True)
+    assert (again.flown, again.failed) == (1, 1)
+    assert bits(path) == rows
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_runs_that_fail_and_diverge_among_others_are_the_same_with_any_number_of_workers(
+    tmp_path: Path, workers: int
+) -> None:
+    base = short(stop_time=20.0, plant_interval=0.1)
+    chosen = study(axis("plant.mass", 1.0, FAILS, 1.1), axis("timing.period", 0.05, 0.2), base=base)
+    rows = bits(swept(chosen, tmp_path, workers=workers))
+    assert "diverged" in {row["outcome"] for row in rows}
+    assert [row["status"] for row in rows] == ["done"] * 2 + ["failed"] * 2 + ["done"] * 2
+    for row, index in zip(rows, range(6), strict=True):
+        if row["status"] == "done":
+            direct = orchestration.run(chosen.system(index, starts())).metrics
+            assert row["outcome"] == direct["outcome"]
+            assert row["steps"] == float(direct["steps"]).hex()
+
+
+@pytest.mark.parametrize(
+    ("chosen", "said"),
+    [
+        (study(axis("plant.weight", 1.0)), "(plant.weight = 1.0): plant.weight: QuadrotorPlant has no"),
+        (study(axis("plant.mas", 1.0, 2.0)), "QuadrotorPlant has no such variable; did you mean mass? its"),
+        (study(axis("plant.mass", 1.0, -1.0)), "run 1 (plant.mass = -1.0): plant.mass = -1.0: expected at least 0"),
+        (study(axis("plant.mass", "heavy")), "plant.mass = heavy: expected a number"),
+        (study(axis("plant.mass", True)), "plant.mass = True: expected a number"),
+        (study(axis("plant.position.x", 1.0)), "plant.position.x: is an output; expected a parameter"),
+        (study(axis("plant.tilt", 1.0)), "plant.tilt: is a local; expected a parameter or an input"),
+        (study(axis("timing.period", 0.01, -0.01)), "timing.period = -0.01: expected a positive number"),
+        (study(axis("timing.jitter", 0.001, 0.02), base=short(period=0.01)), "run 1 (timing.jitter = 0.02): timing."),
+        (study(axis("timing.noise.posit", 0.1)), "timing.noise: posit is no signal"),
+        (study(axis("stop_time", 1.0, -1.0)), "stop_time = -1.0: expected a positive number"),
+        (study(PERIODS, base=dataclasses.replace(short(), record=Record(plant=("speed",)))), "record.plant: Quadrotor"),
+    ],
+)  # fmt: skip
+def test_a_design_with_a_run_that_cannot_be_is_refused_before_anything_is_flown(
+    tmp_path: Path, chosen: Study, said: str
+) -> None:
+    with pytest.raises(UsageError) as caught:
+        sweep(chosen, folder=tmp_path)
+    assert said in one_line(caught.value)
+    assert len(one_line(caught.value)) < 500
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_that_diverges_is_done(tmp_path: Path) -> None:
+    wild = short(stop_time=20.0, plant_interval=0.1, period=0.2)
+    (row,) = bits(swept(study(axis("seed", 1), base=wild), tmp_path))
+    assert row["status"] == "done"
+    assert row["diverged"] == (1.0).hex()
+    assert 0.0 < float.fromhex(row["divergence_time"]) < 20.0
+    assert row["message"] is not None
+
+
+# -- signals ----------------------------------------------------------------------------------------------
+
+
+def test_signals_of_the_chosen_runs_are_kept_and_are_those_of_a_direct_run(tmp_path: Path) -> None:
+    chosen = study(axis("timing.period", 0.01, 0.02, 0.03), base=short(noise={"velocity": 0.1}), keep_signals=(1, 2))
+    swept(chosen, tmp_path)
+    keys = [row["key"] for row in all_rows(store_path("study", tmp_path))]
+    kept = [tmp_path / "signals" / f"{key[:16]}.parquet" for key in keys[1:]]
+    assert sorted((tmp_path / "signals").iterdir()) == sorted(kept)
+    for index, path in zip((1, 2), kept, strict=True):
+        table = pq.read_table(path)
+        direct = orchestration.run(chosen.system(index, starts()))
+        assert tuple(table.column_names) == direct.columns
+        kept_rows = np.column_stack([table[name].to_numpy() for name in table.column_names])
+        assert np.array_equal(kept_rows, direct.rows)
+
+
+def test_no_signals_are_kept_unless_told(tmp_path: Path) -> None:
+    swept(study(axis("timing.period", 0.01)), tmp_path)
+    assert not (tmp_path / "signals").exists()
+
+
+def test_signals_that_are_asked_for_later_are_flown_for(tmp_path: Path) -> None:
+    chosen = study(axis("timing.period", 0.01, 0.02))
+    swept(chosen, tmp_path)
+    summary = sweep(dataclasses.replace(chosen, keep_signals=(1,)), folder=tmp_path)
+    assert summary.flown == 1
+    assert len(list((tmp_path / "signals").iterdir())) == 1
+
+
+def test_workers_leave_no_files_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    file = tmp_path / "study.toml"
+    file.write_text(GRID)
+    environment = {**os.environ, "TMPDIR": str(temporary)}
+    subprocess.run(
+        [str(SCRIPT), "sweep", file, "--workers", "2", "--out", tmp_path / "out"], env=environment, check=True
+    )
+    assert list(temporary.iterdir()) == []
+
+
+# -- dask -------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A client that waits less than ten seconds for what is not there."""
+    import distributed
+
+    class Impatient(distributed.Client):  # type: ignore[misc]
+        def __init__(self, address: str, **options: Any) -> None:
+            super().__init__(address, **{**options, "timeout": 0.5})
+
+        def wait_for_workers(self, n_workers: int, timeout: float | None = None) -> None:
+            super().wait_for_workers(n_workers, timeout=0.5)
+
+    monkeypatch.setattr(distributed, "Client", Impatient)
+
+
+@pytest.mark.usefixtures("impatient")
+@pytest.mark.parametrize(
+    ("address", "said"),
+    [("tcp://127.0.0.1:1", "expected a dask scheduler with workers there: .*refused"),
+     *((wrong, r"expected the address of a scheduler, as in tcp://host:8786")
+       for wrong in ("nonsense://127.0.0.1:1", "nonsense", "tcp://host", "host:99999", ""))],
+)  # fmt: skip
+def test_a_scheduler_that_is_not_there_is_one_line(tmp_path: Path, address: str, said: str) -> None:
+    with pytest.raises(QuadcosimError, match=rf"--dask {address}: {said}") as caught:
+        sweep(study(PERIODS), folder=tmp_path, dask=address)
+    one_line(caught.value)
+    assert sweep(study(PERIODS), folder=tmp_path).flown == 2, "expected the store to be of use still"
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_scheduler_without_workers_is_one_line(tmp_path: Path, cluster: Callable[[int], Cluster]) -> None:
+    with pytest.raises(QuadcosimError, match="expected a dask scheduler with workers there") as caught:
+        sweep(study(PERIODS), folder=tmp_path / "out", dask=cluster(0).address)
+    one_line(caught.value)
+
+
+# -- FMUs in a process ------------------------------------------------------------------------------------
+
+
+def task(scenario: Scenario, index: int = 0) -> Task:
+    system = with_files(system_of(scenario), files_in(scenario).fmus)
+    return Task(index=index, key="", settings={}, system=system, keep_signals=False)
+
+
+@pytest.fixture
+def instantiated(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of the instances that are made, in order."""
+    names: list[str] = []
+
+    class Counted(Fmi2Instance):
+        def __init__(self, path: Path, instance_name: str) -> None:
+            names.append(instance_name)
+            super().__init__(path, instance_name)
+
+    monkeypatch.setattr("orchestration.fmi.reuse.open_instance", Counted)
+    return names
+
+
+def rmse(outcome: Outcome) -> str:
+    assert outcome.row.metrics is not None, outcome.row.message
+    return str(outcome.row.metrics["position_rmse"].hex())
+
+
+def test_each_fmu_is_instantiated_once_in_a_process(instantiated: list[str]) -> None:
+    hangar = Hangar()
+    for period in (0.01, 0.02, 0.03, 0.01):
+        hangar.fly(task(short(period=period)))
+    assert sorted(instantiated) == ["controller", "plant"]
+
+
+def test_an_fmu_that_failed_is_made_anew_and_the_next_run_is_as_if_nothing_had_been(instantiated: list[str]) -> None:
+    hangar = Hangar()
+    before = rmse(hangar.fly(task(short())))
+    assert hangar.fly(task(short().with_changes(parameters={"plant.mass": FAILS}))).row.metrics is None
+    assert rmse(hangar.fly(task(short()))) == before
+    assert instantiated.count("plant") == 2
+
+
+def test_nothing_of_a_run_is_left_in_the_next() -> None:
+    hangar, plain = Hangar(), short(period=0.02)
+    odd = short(order="jacobi", hold="first", delay=0.03, noise={"position": 0.1}).with_changes(
+        parameters={"plant.mass": 3.0, "controller.coupling": 5.0, "plant.initial.position.z": 1.0}
+    )
+    before = rmse(hangar.fly(task(plain)))
+    assert rmse(hangar.fly(task(odd))) != before
+    assert rmse(hangar.fly(task(plain))) == before
+
+
+# -- a few runs at a time ---------------------------------------------------------------------------------
+
+
+def test_a_pool_flies_in_order_up_to_the_first_that_stops_it() -> None:
+    periods = (0.01, 0.02, 0.03)
+    scenarios = [system_of(short(period=period)) for period in periods]
+    with engine.Pool(files_in(), 1) as pool:
+        everything = pool.fly(scenarios, stop=lambda metrics: False)
+        first = pool.fly(scenarios, stop=lambda metrics: True)
+    assert [metrics["position_rmse"] for metrics in everything] == [
+        orchestration.run(scenario).metrics["position_rmse"] for scenario in scenarios
+    ]
+    assert [metrics["position_rmse"] for metrics in first] == [everything[0]["position_rmse"]]
+
+
+def test_a_pool_of_two_workers_has_the_same_results_in_some_order() -> None:
+    scenarios = [system_of(short(period=period)) for period in (0.01, 0.02, 0.03)]
+    found = []
+    for workers in (1, 2):
+        with engine.Pool(files_in(), workers) as pool:
+            found.append(sorted(m["position_rmse"] for m in pool.fly(scenarios, stop=lambda metrics: False)))
+    assert found[0] == found[1]
+
+
+def test_a_pool_raises_what_a_run_failed_with() -> None:
+    bad = system_of(short().with_changes(parameters={"plant.mass": -1.0}))
+    with engine.Pool(files_in(), 1) as pool, pytest.raises(QuadcosimError, match=r"mass = -1.0: expected"):
+        pool.fly([bad], stop=lambda metrics: False)
+
+
+# -- usage ------------------------------------------------------------------------------------------------
+
+
+def test_without_a_worker_nothing_is_flown(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="--workers 0: expected at least 1"):
+        sweep(study(PERIODS), folder=tmp_path, workers=0)
+
+
+def test_the_store_says_what_it_is_about(finished: Path) -> None:
+    models = files_in().models_of(system_of(Scenario()))
+    with open_for_reading(store_path("study", finished)) as store:
+        about = store.about()
+    assert about["total"] == "2"
+    assert json.loads(about["axes"]) == ["timing.period"]
+    assert json.loads(about["grid"]) == {"timing.period": [0.01, 0.02]}
+    assert json.loads(about["guids"]) == {name: model.description.guid for name, model in models.items()}
+    assert json.loads(about["place"])["machine"] == machine()
+    assert {row["machine"] for row in all_rows(store_path("study", finished))} == {machine()}
+    assert {"quadcosim", "numpy", "fmpy"} <= json.loads(about["versions"]).keys()

@@ -1,0 +1,103 @@
+"""A system against what its FMUs say of themselves: one line for each thing that cannot be, before any is loaded."""
+
+from pathlib import Path
+
+import pytest
+
+from orchestration.errors import UsageError
+from orchestration.fmi.model import read_model
+from orchestration.results import objectives
+from orchestration.system.check import check, recorded
+from orchestration.system.system_file import load_system
+from tests.orchestration.system.described import described
+
+TANK = """\
+stop_time = 1.0
+
+[components.tank]
+fmu = "Tank.fmu"
+step = 0.01
+parameters = { area = 2.0, rough = true }
+
+[components.controller]
+fmu = "Controller.fmu"
+sampling = { period = 0.1 }
+record = ["valve"]
+
+[[connections]]
+name = "level"
+from = ["tank.level"]
+to = ["controller.level"]
+
+[[connections]]
+name = "valve"
+from = ["controller.valve"]
+to = ["tank.valve"]
+
+[sources.rain]
+to = ["tank.inflow"]
+constant = 1.0
+
+[objectives]
+peak = "max(tank.level)"
+"""
+
+
+def checked(folder: Path, text: str) -> None:
+    described(
+        folder, "Tank", inputs={"valve": "Real", "inflow": "Real"},
+        outputs={"level": "Real m", "name": "String", "count": "Integer"},
+        parameters={"area": "Real", "rough": "Boolean", "pipes": "Integer"},
+    )  # fmt: skip
+    described(
+        folder, "Controller", inputs={"level": "Real m", "height": "Real mm", "on": "Boolean"},
+        outputs={"valve": "Boolean"},
+    )  # fmt: skip
+    (folder / "system.toml").write_text(text)
+    system = load_system(folder / "system.toml")
+    models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
+    check(system, models)
+    signals = {f"{name}.{variable}" for name, variables in recorded(system, models).items() for variable in variables}
+    objectives.known(system, signals, set())
+
+
+def test_what_is_right_is_not_refused(tmp_path: Path) -> None:
+    checked(tmp_path, TANK)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "place", "valid"),
+    [
+        ("area =", "aria =", "components.tank.parameters.aria: ", "area"),
+        ("area = 2.0", "level = 2.0", "components.tank.parameters.level: ", "expected a parameter"),
+        ("area = 2.0", "valve = 2.0", "components.tank.parameters.valve: is connected; ", "expected a parameter or"),
+        ("area = 2.0", 'area = "big"', "components.tank.parameters.area = big: ", "expected a number"),
+        ("rough = true", "rough = 1.5", "components.tank.parameters.rough = 1.5: ", "expected true or false"),
+        ("rough = true", "pipes = 1.5", "components.tank.parameters.pipes = 1.5: ", "expected a whole number"),
+        ('["valve"]\n', '["vale"]\n', "components.controller.record: ", "did you mean valve?"),
+        ('["tank.level"]', '["tank.leval"]', "connections.level.from: Tank has no output leval; ", "level"),
+        ('["tank.level"]', '["tank.inflow"]', "connections.level.from: tank.inflow is an input; ", "an output: level"),
+        ('["tank.level"]', '["tank.name"]', "connections.level.from: tank.name is a String; ", "can be connected"),
+        ('["controller.level"]', '["controller.levl"]', "connections.level.to: Controller has no input levl; ",
+         "level"),
+        ('["controller.level"]', '["controller.valve"]', "connections.level.to: controller.valve is an output; ",
+         "expected an input: level"),
+        ('["controller.level"]', '["controller.on"]', "connections.level: tank.level is a Real, controller.on a ",
+         "expected Real"),
+        ('["controller.level"]', '["controller.height"]', "connections.level: tank.level is in m, controller.height in "
+         "mm; ", "scale = 1000"),
+        ('["tank.inflow"]', '["tank.inflw"]', "sources.rain.to: Tank has no input inflw; ", "inflow"),
+        ('["tank.inflow"]', '["tank.level"]', "sources.rain.to: tank.level is an output; ", "an input: valve, inflow"),
+        ("max(tank.level)", "max(tank.levl)", "objectives.peak: there is no tank.levl; ", "did you mean tank.level"),
+    ],
+)  # fmt: skip
+def test_one_error_is_one_line_with_its_place_and_what_is_valid(
+    right: str, wrong: str, place: str, valid: str, tmp_path: Path
+) -> None:
+    assert right in TANK
+    with pytest.raises(UsageError) as refused:
+        checked(tmp_path, TANK.replace(right, wrong, 1))
+    line = str(refused.value)
+    assert line.startswith(place)
+    assert valid in line
+    assert line.isprintable()
