@@ -13,9 +13,9 @@ HEADER = Path(__file__).parent.parent / "fmu_kit" / "native" / "mathematics.h"
 
 SERIES: dict[str, tuple[str, str, Callable[[int], mpf], tuple[float, float], int]] = {
     # name: what it is, its variable, its Taylor coefficients, range, number of coefficients
-    "exp": ("(exp(r) - 1 - r) / r^2", "r", lambda k: 1 / factorial(k + 2), (-0.3472, 0.3472), 11),
+    "exp": ("(exp(r) - 1 - r - r^2 / 2) / r^3", "r", lambda k: 1 / factorial(k + 3), (-0.3472, 0.3472), 10),
     "log": ("(2 atanh(s) / s - 2) / s^2, z = s^2", "z", lambda k: mpf(2) / (2 * k + 3), (0.0, 0.02944), 7),
-    "log7": ("1/7 + z/9 + z^2/11 + ...", "z", lambda k: mpf(1) / (2 * k + 7), (0.0, 0.02944), 7),
+    "log5": ("1/5 + z/7 + z^2/9 + ...", "z", lambda k: mpf(1) / (2 * k + 5), (0.0, 0.02944), 8),
     "sin": ("(sin(r) / r - 1) / r^2, z = r^2", "z", lambda k: -((-1) ** k) / factorial(2 * k + 3), (0.0, 0.6174), 7),
     "cos": ("(cos(r) - 1 + z / 2) / z^2, z = r^2", "z", lambda k: (-1) ** k / factorial(2 * k + 4), (0.0, 0.6174), 6),
     "asin": (

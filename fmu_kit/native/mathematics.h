@@ -1,8 +1,9 @@
 /* The elementary functions that slaves compute with, without libm, without tables and almost without branches: the
    same bits from every compiler, on every machine, in one lane and in many (lanes.h).
 
-   Largest error found, in units of the last place of the exact result (docs/native.md says how it is found):
-   sqrt 0.5; exp, expm1, log, sin, cos, tan, tanh, asin, acos, atan, atan2, pow, hypot below 1; all others are exact.
+   No error is larger, in units of the last place of the result, than: sqrt 0.5; tanh 0.6; asin, acos 0.7; expm1 0.75;
+   exp, pow, hypot 0.8; log, sin, cos 0.85; atan, atan2 0.9; tan 0.95, each for all its arguments, as far as
+   samples tell (docs/native.md). All other functions are exact.
    Infinities, signed zeros, subnormal numbers and what is not a number are as annex F of the C standard has them,
    flags apart. The bits of what is not a number are the machine's.
 
@@ -53,7 +54,7 @@ Q_ONE q_real q_ceil(q_real x) { return -q_floor(-x); }
 
 Q_ONE q_real q_trunc(q_real x) { return q_copysign(q_floor(q_fabs(x)), x); }
 
-/* -- pairs: a sum of two doubles, the second below the last place of the first ----------------------------------- */
+/* -- pairs: a sum of two doubles, the second much smaller than the first ------------------------------------------ */
 
 typedef struct {
     q_real high, low;
@@ -71,7 +72,7 @@ Q_ONE q_pair q_exact_sum(q_real a, q_real b) {
     return (q_pair){high, (a - (high - b_part)) + (b - b_part)};
 }
 
-/* The first 26 bits of a number. */
+/* The first 26 bits of a number: the product of two such is exact. */
 Q_ONE q_real q_head(q_real x) { return q_from_bits(q_to_bits(x) & 0xfffffffff8000000u); }
 
 /* a * b, to a last place of `low`. */
@@ -80,22 +81,25 @@ Q_ONE q_pair q_exact_product(q_real a, q_real b) {
     return (q_pair){high, ((a1 * b1 - high) + a1 * b2 + a2 * b1) + a2 * b2};
 }
 
+/* Short pairs have a first number of 26 bits, so they hold a number to about 79 bits, and multiply in few operations.
+   a + b as a short pair, where a is not the smaller one. */
+Q_ONE q_pair q_short_sum(q_real a, q_real b, q_real b_low) {
+    const q_real high = q_head(a + b);
+    return (q_pair){high, ((a - high) + b) + b_low};
+}
+
+/* Of short pairs, exact but for the last bits of `low`, and not short. */
 Q_ONE q_pair q_product(q_pair a, q_pair b) {
-    const q_pair product = q_exact_product(a.high, b.high);
-    return (q_pair){product.high, product.low + (a.high * b.low + a.low * b.high)};
+    return (q_pair){a.high * b.high, a.high * b.low + a.low * (b.high + b.low)};
 }
 
-/* number + b, where |number| >= |b.high|. */
-Q_ONE q_pair q_plus(q_pair number, q_pair b) {
-    const q_pair sum = q_fast_sum(number.high, b.high);
-    return (q_pair){sum.high, sum.low + (number.low + b.low)};
-}
+Q_ONE q_pair q_short(q_pair a) { return q_short_sum(a.high, a.low, q_all(0.0)); }
 
-/* a / b. */
+/* a / b as a short pair. */
 Q_ONE q_pair q_quotient(q_pair a, q_pair b) {
-    const q_real inverse = 1.0 / b.high, high = a.high * inverse;
-    const q_pair back = q_exact_product(high, b.high);
-    return (q_pair){high, (((a.high - back.high) - back.low) + (a.low - high * b.low)) * inverse};
+    const q_real inverse = 1.0 / b.high, high = q_head(a.high * inverse), b_head = q_head(b.high);
+    const q_real rest = ((a.high - high * b_head) - high * (b.high - b_head)) + (a.low - high * b.low);
+    return (q_pair){high, rest * inverse};
 }
 
 /* -- series, odd and even terms apart: they need not wait for each other ------------------------------------------
@@ -103,13 +107,13 @@ Q_ONE q_pair q_quotient(q_pair a, q_pair b) {
 
 /* series */
 
-/* (exp(r) - 1 - r) / r^2. */
+/* (exp(r) - 1 - r - r^2 / 2) / r^3. */
 Q_ONE q_real q_exp_series(q_real r) {
     const q_real w = r * r;
-    const q_real even = 0x1.0000000000000p-1 + w * (0x1.5555555555556p-5 + w * (0x1.6c16c16c162b3p-10 + w *
-        (0x1.a01a01a6ea4eap-16 + w * (0x1.27e4db2c2ae81p-22 + w * (0x1.1f737824fc73cp-29)))));
-    const q_real odd = 0x1.5555555555557p-3 + w * (0x1.11111111100a3p-7 + w * (0x1.a01a01ac0718ap-13 + w *
-        (0x1.71de01cf1f783p-19 + w * (0x1.af4eb609d24a2p-26))));
+    const q_real even = 0x1.5555555555556p-3 + w * (0x1.1111111110999p-7 + w * (0x1.a01a01a7d84f0p-13 + w *
+        (0x1.71de0d6013f59p-19 + w * (0x1.af39639ed0cfcp-26))));
+    const q_real odd = 0x1.5555555555555p-5 + w * (0x1.6c16c16c167d2p-10 + w * (0x1.a01a01a4868ecp-16 + w *
+        (0x1.27e4e1c7c7f96p-22 + w * (0x1.1f6749b841540p-29))));
     return even + r * odd;
 }
 
@@ -122,12 +126,13 @@ Q_ONE q_real q_log_series(q_real z) {
     return even + z * odd;
 }
 
-/* 1/7 + z/9 + z^2/11 + .... */
-Q_ONE q_real q_log7_series(q_real z) {
+/* 1/5 + z/7 + z^2/9 + .... */
+Q_ONE q_real q_log5_series(q_real z) {
     const q_real w = z * z;
-    const q_real even = 0x1.2492492492497p-3 + w * (0x1.745d175506af4p-4 + w * (0x1.11159f036fbf5p-4 + w *
-        (0x1.d9c200b917ca6p-5)));
-    const q_real odd = 0x1.c71c71c715455p-4 + w * (0x1.3b13a5284fdbbp-4 + w * (0x1.e0201d0e0f32fp-5));
+    const q_real even = 0x1.999999999999ap-3 + w * (0x1.c71c71c6eaa18p-4 + w * (0x1.3b1395d249ed7p-4 + w *
+        (0x1.df7ccb122450bp-5)));
+    const q_real odd = 0x1.2492492492521p-3 + w * (0x1.745d177a95904p-4 + w * (0x1.1118c7da4e209p-4 + w *
+        (0x1.e02e59475f3c5p-5)));
     return even + z * odd;
 }
 
@@ -204,7 +209,7 @@ Q_ONE q_real q_exp_of_sum(q_real x, q_real x_low) {
     const q_octaves part = q_in_octaves(bounded, q_select(Q_TEST(bounded == x), x_low, q_all(0.0)));
     const q_real r = part.r.high, half = q_round(0.5 * part.n);
     const q_pair sum = q_fast_sum(q_all(1.0), r);
-    const q_real mantissa = sum.high + (sum.low + (part.r.low * sum.high + r * r * q_exp_series(r)));
+    const q_real mantissa = sum.high + (sum.low + (part.r.low * sum.high + r * r * (0.5 + r * q_exp_series(r))));
     /* In two steps, so that the result may be subnormal, or infinite. */
     return mantissa * q_power_of_two(half) * q_power_of_two(part.n - half);
 }
@@ -213,9 +218,12 @@ Q_ONE q_real q_exp_of_sum(q_real x, q_real x_low) {
 Q_ONE q_pair q_expm1_pair(q_real x, double halvings) {
     const q_octaves part = q_in_octaves(x, q_all(0.0));
     const q_real r = part.r.high, scale = q_power_of_two(part.n - halvings), unit = q_power_of_two(q_all(-halvings));
-    const q_pair mantissa = q_fast_sum(r, part.r.low * (1.0 + r) + r * r * q_exp_series(r));
-    const q_pair sum = q_fast_sum(scale - unit, scale * mantissa.high);
-    return (q_pair){sum.high, sum.low + scale * mantissa.low};
+    const q_real head = q_head(r), square = 0.5 * (r - head) * (r + head) + part.r.low * (1.0 + r);
+    const q_pair first = q_fast_sum(r, 0.5 * head * head); /* exactly so far: near 0.4 much of it cancels */
+    const q_real less = scale - unit, lost = (scale - less) - unit;
+    const q_pair sum = q_fast_sum(less, scale * first.high);
+    const q_real rest = first.low + (square + r * r * r * q_exp_series(r));
+    return q_fast_sum(sum.high, sum.low + (lost + scale * rest));
 }
 
 Q_ONE q_real q_own_exp(q_real x) { return q_exp_of_sum(x, q_all(0.0)); }
@@ -230,8 +238,8 @@ Q_ONE q_real q_own_tanh(q_real x) {
     const q_real size = q_fabs(x);
     const q_pair t = q_expm1_pair(2.0 * q_select(Q_TEST(size > 22.0), q_all(22.0), size), 0.0); /* 1 from there on */
     const q_pair sum = q_exact_sum(t.high, q_all(2.0));
-    const q_pair tanh = q_quotient(t, (q_pair){sum.high, sum.low + t.low});
-    return q_copysign(tanh.high + tanh.low, x);
+    const q_pair ratio = q_quotient(t, (q_pair){sum.high, sum.low + t.low});
+    return q_copysign(ratio.high + ratio.low, x);
 }
 
 /* -- logarithms and powers ---------------------------------------------------------------------------------------- */
@@ -260,28 +268,26 @@ Q_ONE q_real q_own_log(q_real x) {
     return q_select(Q_TEST(x > 0.0) & Q_TEST(x <= DBL_MAX), log, limit);
 }
 
-/* The logarithm of a positive finite number, to 2^-68 of it:
-   log m = 2 s (1 + s^2 (1/3 + s^2 (1/5 + s^2 (1/7 + ...)))), s = (m - 1) / (m + 1). */
+/* The logarithm of a positive finite number as a short pair, to 2^-64 of it:
+   log m = 2 s (1 + z (1/3 + z (1/5 + z/7 + ...))), s = (m - 1) / (m + 1), z = s^2. */
 Q_ONE q_pair q_log_pair(q_real x) {
-    const q_pair third = {q_all(0x1.5555555555555p-2), q_all(0x1.5555555555555p-56)};
-    const q_pair fifth = {q_all(0x1.999999999999ap-3), q_all(-0x1.999999999999ap-57)};
     const q_parts part = q_in_parts(x);
-    const q_real sum = part.m + 1.0, zero = q_all(0.0);
+    const q_real sum = part.m + 1.0, zero = q_all(0.0), third = q_all(0x1.5555555555555p-2);
+    const q_real rough = (part.m - 1.0) * (1.0 / sum), square = rough * rough;
     const q_pair s = q_quotient((q_pair){part.m - 1.0, zero}, (q_pair){sum, part.m - (sum - 1.0)});
-    const q_pair z = q_product(s, s);
-    const q_pair inner = q_plus(fifth, (q_pair){z.high * q_log7_series(z.high), zero});
-    const q_pair outer = q_plus(third, q_product(z, inner));
-    const q_pair log = q_plus(s, q_product(s, q_product(z, outer)));
-    const q_pair octaves = {part.n * Q_LN2_HIGH, part.n * Q_LN2_LOW};
-    const q_pair all = q_plus(octaves, (q_pair){2.0 * log.high, 2.0 * log.low});
-    return q_fast_sum(all.high, all.low);
+    const q_pair from_third = q_short_sum(third, square * q_log5_series(square), q_all(0x1.5555555555555p-56));
+    const q_pair more = q_product(s, q_short(q_product(q_short(q_product(s, s)), from_third)));
+    const q_pair log = q_fast_sum(2.0 * s.high, 2.0 * more.high);
+    const q_real low = log.low + 2.0 * (s.low + more.low);
+    return q_short_sum(part.n * Q_LN2_HIGH, log.high, low + part.n * Q_LN2_LOW);
 }
 
 Q_ONE q_real q_own_pow(q_real x, q_real y) {
     const q_real one = q_all(1.0), size = q_fabs(x), y_size = q_fabs(y);
     const q_real exponent = q_copysign(q_min(y_size, q_all(0x1p66)), y); /* enough for any number but 1 */
-    const q_pair log = q_log_pair(size), power = q_exact_product(exponent, log.high);
-    const q_real regular = q_exp_of_sum(power.high, power.low + exponent * log.low);
+    const q_real head = q_head(exponent);
+    const q_pair log = q_log_pair(size);
+    const q_real regular = q_exp_of_sum(head * log.high, (exponent - head) * log.high + exponent * log.low);
     const q_real limit = q_select(Q_TEST(y > 0.0), size, 1.0 / size); /* of zero and infinity */
     const q_mask whole = Q_TEST(q_round(y) == y), odd = whole & Q_TEST(q_round(0.5 * y) != 0.5 * y);
     const q_mask inner = Q_TEST(size > 0.0) & Q_TEST(size <= DBL_MAX);
@@ -346,8 +352,8 @@ static q_turn q_far_turn(q_real x, q_turn turn) {
             high = sum;
         }
         const q_pair fraction = q_fast_sum(q_all(sign * 0x1p-30 * high), q_all(sign * 0x1p-30 * low));
-        const q_pair quarter = {q_all(0x1.921fb54442d18p+0), q_all(0x1.1a62633145c07p-54)};
-        const q_pair angle = q_product(fraction, quarter), r = q_fast_sum(angle.high, angle.low);
+        const q_pair quarter = {q_all(0x1.921fb50000000p+0), q_all(0x1.110b4611a6263p-26)};
+        const q_pair angle = q_product(q_short(fraction), quarter), r = q_fast_sum(angle.high, angle.low);
         turn.r.high = q_with_lane(turn.r.high, lane, q_lane(r.high, 0));
         turn.r.low = q_with_lane(turn.r.low, lane, q_lane(r.low, 0));
         const double count = sign * (quadrant & 3) + Q_INTEGER;
@@ -383,28 +389,31 @@ Q_ONE q_pair q_cos_pair(q_pair r) {
 Q_ONE q_mask q_is_odd(q_bits quadrant) { return Q_TEST((quadrant & 1u) != 0u); }
 Q_ONE q_real q_signed_by(q_real x, q_bits bit_one) { return q_from_bits(q_to_bits(x) ^ ((bit_one & 2u) << 62)); }
 
-Q_ONE q_real q_own_sin(q_real x) {
+typedef struct {
+    q_real sin, cos;
+} q_sines;
+
+Q_ONE q_sines q_own_sin_cos(q_real x) {
     const q_turn turn = q_in_quadrants(x);
-    const q_pair sin = q_sin_pair(turn.r), cos = q_cos_pair(turn.r);
-    const q_real value = q_select(q_is_odd(turn.quadrant), cos.high + cos.low, sin.high + sin.low);
-    return q_select(Q_TEST(x == 0.0), x, q_signed_by(value, turn.quadrant));
+    const q_pair sin_pair = q_sin_pair(turn.r), cos_pair = q_cos_pair(turn.r);
+    const q_real near_zero = sin_pair.high + sin_pair.low, near_one = cos_pair.high + cos_pair.low;
+    const q_mask odd = q_is_odd(turn.quadrant);
+    const q_real sine = q_signed_by(q_select(odd, near_one, near_zero), turn.quadrant);
+    const q_real cosine = q_signed_by(q_select(odd, near_zero, near_one), turn.quadrant + 1u);
+    return (q_sines){q_select(Q_TEST(x == 0.0), x, sine), cosine};
 }
 
-Q_ONE q_real q_own_cos(q_real x) {
-    const q_turn turn = q_in_quadrants(x);
-    const q_pair sin = q_sin_pair(turn.r), cos = q_cos_pair(turn.r);
-    const q_real value = q_select(q_is_odd(turn.quadrant), sin.high + sin.low, cos.high + cos.low);
-    return q_signed_by(value, turn.quadrant + 1u);
-}
+Q_ONE q_real q_own_sin(q_real x) { return q_own_sin_cos(x).sin; }
+Q_ONE q_real q_own_cos(q_real x) { return q_own_sin_cos(x).cos; }
 
 Q_ONE q_real q_own_tan(q_real x) {
     const q_turn turn = q_in_quadrants(x);
-    const q_pair sin = q_sin_pair(turn.r), cos = q_cos_pair(turn.r);
+    const q_pair sine = q_sin_pair(turn.r), cosine = q_cos_pair(turn.r);
     const q_mask odd = q_is_odd(turn.quadrant);
-    const q_pair above = {q_select(odd, -cos.high, sin.high), q_select(odd, -cos.low, sin.low)};
-    const q_pair below = {q_select(odd, sin.high, cos.high), q_select(odd, sin.low, cos.low)};
-    const q_pair tan = q_quotient(above, below);
-    return q_select(Q_TEST(q_fabs(x) < 0x1p-27), x, tan.high + tan.low);
+    const q_pair above = {q_select(odd, -cosine.high, sine.high), q_select(odd, -cosine.low, sine.low)};
+    const q_pair below = {q_select(odd, sine.high, cosine.high), q_select(odd, sine.low, cosine.low)};
+    const q_pair ratio = q_quotient(above, below);
+    return q_select(Q_TEST(q_fabs(x) < 0x1p-27), x, ratio.high + ratio.low);
 }
 
 /* asin s = s + s^3 series(s^2) below 1/2; from there on asin x = pi/2 - 2 asin sqrt((1 - x) / 2). */
@@ -460,8 +469,8 @@ Q_ONE q_real q_own_atan2(q_real y, q_real x) {
     const q_pair above = {q_select(diagonal, difference.high, a), q_select(diagonal, difference.low, zero)};
     const q_pair below = {q_select(diagonal, sum.high, b), q_select(diagonal, sum.low, zero)};
     const q_real t = above.high / below.high, z = t * t;
-    const q_pair back_again = q_exact_product(t, below.high);
-    const q_real missing = ((above.high - back_again.high) - back_again.low) + (above.low - t * below.low);
+    const q_pair again = q_exact_product(t, below.high);
+    const q_real missing = ((above.high - again.high) - again.low) + (above.low - t * below.low);
     const q_real t_low = q_select(Q_TEST(q_fabs(t) > 0x1p-900), missing / below.high, zero);
     const q_real rest = t_low + t * z * q_atan_series(z);
     /* angle = sign (t + rest) + eighths pi/4 */
@@ -482,10 +491,10 @@ Q_ONE q_real q_hypot(q_real x, q_real y) {
     const q_real smaller = q_select(Q_TEST(y_size > x_size), x_size, y_size);
     const q_real unit = q_unit_for(larger), a = larger * unit, b = smaller * unit;
     const q_pair a_square = q_exact_product(a, a), b_square = q_exact_product(b, b);
-    const q_pair square = q_plus(a_square, b_square);
+    const q_pair square = q_fast_sum(a_square.high, b_square.high);
     const q_real root = q_sqrt(square.high);
     const q_pair again = q_exact_product(root, root);
-    const q_real missing = ((square.high - again.high) - again.low) + square.low;
+    const q_real missing = ((square.high - again.high) - again.low) + (square.low + (a_square.low + b_square.low));
     const q_real length = (root + missing / (root + root)) / unit;
     const q_real regular = q_select(Q_TEST(larger > 0.0) & Q_TEST(larger <= DBL_MAX), length, larger);
     const q_real number = q_select(q_isnan(x) | q_isnan(y), x + y, regular);
@@ -589,5 +598,12 @@ Q_FUNCTION(acos)
 Q_FUNCTION(atan)
 Q_FUNCTION2(atan2)
 Q_FUNCTION2(pow)
+
+/* Both for little more than one. */
+#ifdef QUADCOSIM_LIBM
+Q_ONE q_sines q_sin_cos(q_real x) { return (q_sines){q_sin(x), q_cos(x)}; }
+#else
+Q_ONE q_sines q_sin_cos(q_real x) { return q_own_sin_cos(x); }
+#endif
 
 #endif

@@ -18,7 +18,7 @@ from tests.fmu_kit.native.accuracy import STATED, Samples, arguments, largest_er
 from tests.fmu_kit.native.compiled import Floats, compiled, library, results
 
 SAMPLES = 700  # of each set of arguments
-HASH = "5497d2acdec66180"  # of all results of hash.c
+HASH = "e55b276ac5433a03"  # of all results of hash.c
 FROM_LIBM = ["exp", "expm1", "log", "tanh", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "pow"]
 TINY, LEAST, HUGE = 5e-324, 2.2250738585072014e-308, 1.7976931348623157e308
 SPECIAL = [
