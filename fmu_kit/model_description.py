@@ -50,6 +50,8 @@ def to_xml(slave: Any, sources: Sequence[str] | None = None) -> Element:
         canSerializeFMUstate="true",
     )
     if sources is not None:
+        kind.set("providesDirectionalDerivative", "true")
+    if sources is not None:
         files = SubElement(kind, "SourceFiles")
         for name in sources:
             SubElement(files, "File", name=name)

@@ -15,6 +15,7 @@ from fmu_kit.documentation import Making
 from fmu_kit.model_description import GUID_PLACEHOLDER, to_xml
 from fmu_kit.native.c_code import c_code
 from fmu_kit.native.compiler import compiled, host_platform
+from fmu_kit.native.derivatives import with_tangents
 from fmu_kit.native.freshness import source_hash
 from fmu_kit.native.symbols import TraceError
 from fmu_kit.native.tables import tables
@@ -59,7 +60,9 @@ def build(target: Target, folder: Path) -> Path:
 def c_sources(program: Program, guid: str) -> dict[str, bytes]:
     """The sources of an FMU, by the names of their files."""
     fixed = {name: (_HERE / name).read_bytes() for name in (MAIN, *HEADERS)}
-    return {**fixed, "tables.h": tables(program, guid).encode(), "functions.h": c_code(program).encode()}
+    derivatives = with_tangents(program, program.initialise)
+    functions = f"{c_code(program)}\n{c_code(derivatives)}"
+    return {**fixed, "tables.h": tables(program, guid).encode(), "functions.h": functions.encode()}
 
 
 def modules_of(target: Target) -> list[types.ModuleType]:

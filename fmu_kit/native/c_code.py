@@ -24,6 +24,10 @@ ERRORS = ("FmuError", "DivergenceError", "ZeroDivisionError", "OverflowError", "
 """What a function may end with; the place here, from 1 on, is what it returns."""
 
 
+TANGENT = "tangent of "
+"""Before the name of a place, in that of the place of its tangent."""
+
+
 def c_code(program: Program) -> str:
     """The functions of a program, each after those that it calls."""
     names = place_names(program.places)
@@ -72,6 +76,9 @@ class _Writer:
         head = f"static int {c_name(f.name)}({', '.join(parameters)})\n{{\n"
         doc = f"/* {f.doc.replace('*/', '* /')} */\n" if f.doc else ""
         before = ["    q_real *const v = m->state.memory;"]
+        read = {symbol.data[0] for symbol in self.used.values() if symbol.op == "load"}
+        if any(name.startswith(TANGENT) for name in read | f.stores):
+            before.append("    q_real *const d = m->tangents;")
         unused = [name for symbol, name in zip(f.parameters, self.parameters) if id(symbol) not in self.used]
         before.append("    " + ", ".join(f"(void){name}" for name in ("v", *unused)) + ";")
         return doc + head + "\n".join([*before, *(f"    {line}" for line in self.declared), *self.lines[0]]) + "\n}"
@@ -97,8 +104,12 @@ class _Writer:
             self.declared.append(f"{_type(symbol)} {name} = {'Q_TEST(0)' if symbol.kind == 'bool' else 'q_all(0.0)'};")
         return self.pinned[id(symbol)]
 
+    def _place(self, name: str) -> str:
+        of = name.removeprefix(TANGENT)
+        return f"v[{self.places[of]}]" if of == name else f"d[{self.places[of]}]"
+
     def _load(self, symbol: Symbol) -> str:
-        value = f"v[{self.places[symbol.data[0]]}]"
+        value = self._place(symbol.data[0])
         return f"Q_TEST({value} != 0.0)" if symbol.kind == "bool" else value
 
     # -- values ----------------------------------------------------------------------------------------------
@@ -216,7 +227,7 @@ class _Writer:
         self._line(f"{self._pin(target)} = {given};")
 
     def _store(self, each: Statement, rest: Block) -> None:
-        self._line(f"v[{self.places[each.data]}] = {self._real(each.symbols[0])};")
+        self._line(f"{self._place(each.data)} = {self._real(each.symbols[0])};")
 
     def _return(self, each: Statement, rest: Block) -> None:
         for k, symbol in enumerate(each.symbols):

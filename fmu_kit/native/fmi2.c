@@ -49,6 +49,7 @@ typedef struct {
     char name[LONGEST_NAME];
     const Callbacks *callbacks;
     int logs, filtered, wants_warnings;
+    double *tangents; /* of the memory, while derivatives are computed */
 } Instance;
 
 /* -- messages --------------------------------------------------------------------------------------------------- */
@@ -425,14 +426,35 @@ CALL(DeSerializeFMUstate, const char *bytes, size_t size, void **state)
     return OK;
 }
 
-/* -- what FMI asks for and this FMU does not offer ---------------------------------------------------------------- */
+/* -- derivatives -------------------------------------------------------------------------------------------------- */
 
+/* While initialising, outputs are computed from what was set; between steps they stay as they are, whatever is set. */
 CALL(GetDirectionalDerivative, References z, size_t nz, References v, size_t nv, const double *dv, double *dz)
 {
+    double tangents[PLACES] = {0.0};
+    Instance copy;
+    int error;
     INSTANCE;
-    (void)z, (void)nz, (void)v, (void)nv, (void)dv, (void)dz;
-    return refuse_with(m, "fmi2GetDirectionalDerivative: not offered by this FMU", "", "");
+    if (!are_of(z, nz, REAL))
+        return refuse_references(m, z, nz, REAL);
+    if (!are_of(v, nv, REAL))
+        return refuse_references(m, v, nv, REAL);
+    if (m->state.phase == INITIALIZATION) {
+        copy = *m;
+        copy.tangents = tangents;
+        for (size_t i = 0; i < nv; i++)
+            tangents[v[i]] = dv[i];
+        if ((error = enter_stepping_with_tangents(&copy))) {
+            memcpy(m->failure, copy.failure, sizeof m->failure);
+            return refuse(m, error);
+        }
+    }
+    for (size_t i = 0; i < nz; i++)
+        dz[i] = tangents[z[i]];
+    return OK;
 }
+
+/* -- what FMI asks for and this FMU does not offer ---------------------------------------------------------------- */
 
 CALL(SetRealInputDerivatives, References vr, size_t n, const int *order, const double *value)
 {
