@@ -139,10 +139,11 @@ class Tangent:
     def _find_coordinates(self) -> None:
         """As many points of the ladder as show states, and so many of these as have coordinates of their own."""
         made, before, rank = [self._struck()], 0, 0
+        fewest = max([FEWEST, *(self._dead_points(i) + 2 for i in range(len(self._inputs)))])
         for shown in range(1, len(self._ladder) + 1):
             self._shown = shown
             columns = [self._futures(pairs) for pairs in made]
-            while not _is_spanned(columns) and len(made) < len(self._ladder):
+            while (len(made) < fewest or not _is_spanned(columns)) and len(made) < len(self._ladder):
                 later = self._coasted(made[-1], self._ladder[len(made)])
                 if later is None:
                     break
@@ -198,6 +199,15 @@ class Tangent:
             for i, h in enumerate([self._ladder[0]] * len(self._inputs))
         ]
 
+    def _dead_points(self, i: int) -> int:
+        """How many points of the ladder pass before an input is answered; 0 for one that never is."""
+        for most in (FEWEST, len(self._ladder)):
+            up, down = (self._outputs_after(self._rest, self._pulses(i, s), self._ladder[:most]) for s in (1, -1))
+            answered = (np.abs(up - down) / self._weight > NOISE).any(axis=1)
+            if answered.any():
+                return int(np.argmax(answered))
+        return 0
+
     def _coasted(self, pairs: Sequence[_Pair], h: float) -> list[_Pair] | None:
         """The states `h` [s] later, the inputs at rest; None if one has become large."""
         later = []
@@ -241,7 +251,7 @@ class Tangent:
 
 def _is_spanned(columns: Sequence[Floats]) -> bool:
     """Whether the last states have not added a coordinate."""
-    return len(columns) >= FEWEST and _rank(np.column_stack(columns)) == _rank(np.column_stack(columns[:-2]))
+    return _rank(np.column_stack(columns)) == _rank(np.column_stack(columns[:-2]))
 
 
 def _rank(futures: Floats) -> int:

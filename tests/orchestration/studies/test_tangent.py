@@ -1,0 +1,80 @@
+"""A component measured through saved states, with stubs whose states are known."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orchestration import UsageError
+from orchestration.simulator import Floats, Transfer
+from orchestration.studies.tangent import Rest, Tangent
+
+
+class Line:
+    """An FMU in spirit: what goes in comes out some samples later, and decays on the way."""
+
+    name = "line"
+
+    def __init__(self, samples: int) -> None:
+        self.kept: Floats = np.zeros(samples)
+        self.u = 0.0
+
+    def writer(self, names: Any, source: Floats) -> Transfer:
+        def write() -> None:
+            self.u = float(source[0])
+
+        return write
+
+    def reader(self, names: Any, into: Floats) -> Transfer:
+        def read() -> None:
+            into[0] = self.kept[-1]
+
+        return read
+
+    def step(self, t: float, h: float) -> None:
+        self.kept = np.concatenate([[self.u], 0.9 * self.kept[:-1]])
+
+    def save(self) -> bytes:
+        return self.kept.tobytes()
+
+    def restore(self, state: bytes) -> None:
+        self.kept = np.frombuffer(state).copy()
+
+
+def tangent(fmu: Any, points: int) -> Tangent:
+    return Tangent(Rest(fmu=fmu, inputs=("u",), held=np.zeros(1), outputs=("y",), time=0.0), [1.0] * points)
+
+
+def answers(simulator: Any, samples: int) -> list[float]:
+    """What comes out after each step of a pulse of 1 over the first."""
+    given, found, heard = np.zeros(1), np.zeros(1), []
+    write, read = simulator.writer(("u",), given), simulator.reader(("y",), found)
+    for k in range(samples):
+        given[0] = k == 0
+        write()
+        simulator.step(float(k), 1.0)
+        read()
+        heard.append(float(found[0]))
+    return heard
+
+
+@pytest.mark.parametrize("samples", [1, 2, 5, 8, 20])
+def test_a_dead_time_within_the_ladder_is_a_state_for_each_sample(samples: int) -> None:
+    measured = tangent(Line(samples), 32)
+    assert len(measured.state) == samples - 1
+    assert answers(measured, samples + 3) == pytest.approx(answers(Line(samples), samples + 3), abs=1e-8)
+
+
+def test_more_states_than_the_ladder_tells_apart_are_refused_by_name() -> None:
+    with pytest.raises(UsageError, match="line: has more states than"):
+        tangent(Line(6), 5)
+
+
+def test_states_are_saved_and_put_back() -> None:
+    measured = tangent(Line(3), 8)
+    answers(measured, 1)
+    kept = measured.save()
+    later = answers(measured, 4)
+    measured.restore(kept)
+    assert answers(measured, 4) == later
+    assert np.any(np.array(later) != 0.0)
