@@ -7,7 +7,6 @@ from typing import Any, TypeAlias
 
 from orchestration.documents import read_toml
 from orchestration.errors import UsageError
-from orchestration.exchange.ssp.reading import ENDINGS, tables_of
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.scenario_file import scenario_from_tables
 from orchestration.quadrotor.translation import in_its_own_words, system_of
@@ -17,6 +16,7 @@ from orchestration.system.system_file import is_system, system_from_tables, to_t
 Request: TypeAlias = Scenario | System
 
 
+SSP_ENDINGS = (".ssp", ".ssd")
 SSP = "ssp"
 """Key of a file with timing: the SSP that it is for"""
 
@@ -28,7 +28,7 @@ def load_request(path: str | Path, timing: str | Path | None = None) -> Request:
     key that does not exist (naming those that do) or a value of the wrong kind.
     """
     path = Path(path)
-    if path.suffix.lower() in ENDINGS:
+    if path.suffix.lower() in SSP_ENDINGS:
         on_top = {} if timing is None else read_toml(Path(timing), "file with timing")
         if SSP in on_top and (Path(timing or "").parent / str(on_top.pop(SSP))).resolve() != path.resolve():
             raise UsageError(f"{timing}: ssp: names another file than {path}")
@@ -49,6 +49,8 @@ def request_from_tables(tables: dict[str, Any], folder: Path) -> Request:
 
 
 def _from_ssp(path: Path, timing: dict[str, Any], folder: Path) -> System:
+    from orchestration.exchange.ssp.reading import tables_of  # with it comes XML, which no other file needs
+
     return system_from_tables(tables_of(path, timing), folder)
 
 

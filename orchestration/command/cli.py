@@ -110,9 +110,7 @@ def run(
     flags: FlightFlags,
 ) -> None:
     """Fly a scenario and print its metrics. FMUs that are missing or out of date are built first."""
-    from orchestration.results import pause
-    from orchestration.results.run_directory import keep_flight
-    from orchestration.simulation import run as fly
+    from orchestration.simulation import run as fly  # what reads and writes files is loaded where there are any
 
     if resume is not None and (scenario is not None or pause_at is not None or flags != FlightFlags()):
         raise UsageError("--resume: expected no scenario and no flags of the flight; the paused run has its own")
@@ -120,11 +118,17 @@ def run(
         raise UsageError("--pause-at: expected --out DIR for the state")
     with progress_bar("flying") as progress:
         if resume is not None:
+            from orchestration.results import pause
+
             result: Result | None = pause.resume(resume, out, figures=figures, progress=progress, announce=say)
         elif pause_at is not None and out is not None:
+            from orchestration.results import pause
+
             chosen = request_from(scenario, flags, timing)
             result = pause.fly_until(chosen, pause_at, out, figures=figures, progress=progress, announce=say)
         elif out is not None:
+            from orchestration.results.run_directory import keep_flight
+
             chosen = request_from(scenario, flags, timing)
             result = keep_flight(
                 out, lambda to: fly(chosen, recorder=to, progress=progress, announce=say), figures=figures

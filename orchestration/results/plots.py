@@ -20,7 +20,7 @@ from orchestration.quadrotor.wiring import (
     POSITION_REFERENCE,
     components,
 )
-from orchestration.results.result import Result
+from orchestration.results.result import FIGURES, SYSTEM_FIGURE, Result
 from orchestration.simulator import Floats
 from orchestration.system.model import component_of
 
@@ -37,13 +37,8 @@ STYLE = {
 }
 BLUE, ORANGE, GREEN, RED, GREY = "#1f6f9f", "#e0812b", "#2f8f5b", "#b5323e", "#8a8a8a"
 
-FIGURES = ("path", "errors", "commands", "energy")
-"""The figures of a run, in the order in which they are drawn; the last where the controller has an energy."""
-
 MOST_LINES = 8
 """In one panel"""
-SYSTEM_FIGURE = "signals"
-"""The figure of any other system"""
 
 _ERRORS = (
     (r"velocity  [m/s]", ORANGE, components("velocity_error")),

@@ -10,9 +10,9 @@ from typing import Any
 from orchestration.documents import read_json
 from orchestration.errors import UsageError, shown
 from orchestration.request import load_request, system_meant, text_of
-from orchestration.results import plots, tables
+from orchestration.results import tables
 from orchestration.results.folder import NewFolder, new_folder
-from orchestration.results.result import Result
+from orchestration.results.result import FIGURES, SYSTEM_FIGURE, Result
 from orchestration.results.tables import ToFolder
 from orchestration.simulation import RunInterrupted, columns_of
 
@@ -46,6 +46,8 @@ def _write(result: Result, folder: Path, *, figures: bool) -> None:
     (folder / SCENARIO).write_text(text_of(result.asked), encoding="utf-8")
     (folder / PROVENANCE).write_text(json.dumps(notes, indent=2) + "\n", encoding="utf-8")
     if figures:
+        from orchestration.results import plots  # with it comes matplotlib, which takes longer than a short run
+
         plots.draw(result, folder)
 
 
@@ -145,5 +147,5 @@ _KNOWN = {
     SCENARIO,
     PROVENANCE,
     STATE,
-    *(f"{name}.png" for name in (*plots.FIGURES, plots.SYSTEM_FIGURE)),
+    *(f"{name}.png" for name in (*FIGURES, SYSTEM_FIGURE)),
 }

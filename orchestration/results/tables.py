@@ -1,16 +1,16 @@
 """Signals and events as Parquet files, a row group for each chunk."""
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
+import numpy.typing as npt
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from orchestration.errors import UsageError
-from orchestration.master.recording import KINDS, Chunk, Events, Recording
+from orchestration.master.recording import KINDS, Chunk, Events, Integers, Recording
 from orchestration.simulator import Floats
 
 SIGNALS, EVENTS = "signals.parquet", "events.parquet"
@@ -98,7 +98,7 @@ def _group(path: Path, file: Any, group: int, names: Collection[str]) -> Any:
         raise UsageError(f"{path}: expected a Parquet file, as it was written: {error}") from error
     if any(column.null_count for column in table.columns):
         raise UsageError(f"{path}: expected columns without gaps")
-    if "time" in names and not np.isfinite(table["time"].to_numpy()).all():
+    if "time" in names and not np.isfinite(_values(table["time"])).all():
         raise UsageError(f"{path}: expected finite times")
     return table
 
@@ -130,25 +130,52 @@ def _signals_schema(columns: Iterable[str]) -> Any:
 
 
 def _signals_table(chunk: Chunk) -> Any:
-    return pa.table(chunk.signals)
+    columns = [_numbers(values) for values in chunk.signals.values()]
+    return pa.Table.from_arrays(columns, schema=_signals_schema(chunk.columns))
 
 
 def _matrix(table: Any, names: tuple[str, ...]) -> Floats:
-    return np.column_stack([table[name].to_numpy() for name in names])
+    return np.column_stack([_values(table[name]) for name in names])
 
 
 def _events_table(events: Events) -> Any:
     """`time` [s], `event`, `what` and `sample`, in order of time."""
-    time, kind, what, sample = map(pa.array, np.ascontiguousarray(events.table.T))
-    kinds, names = pa.array(KINDS), pa.array(events.names, pa.string())
-    return pa.table([pc.divide(time, 1e9), kinds.take(kind), names.take(what), sample], schema=_EVENT)
+    time, kind, what, sample = events.table.T
+    columns = (_numbers(time / 1e9), _texts(KINDS, kind), _texts(events.names, what), _numbers(sample))
+    return pa.Table.from_arrays(list(columns), schema=_EVENT)
+
+
+def _numbers(values: npt.NDArray[Any]) -> Any:
+    """An array of Arrow's over the same memory; `pa.array` would load pandas, to ask whether it is of it."""
+    values = np.ascontiguousarray(values)
+    return pa.Array.from_buffers(pa.from_numpy_dtype(values.dtype), len(values), [None, pa.py_buffer(values)])
+
+
+def _texts(words: Sequence[str], places: Integers) -> Any:
+    """An array of Arrow's with the words at `places`."""
+    encoded = [word.encode() for word in words]
+    ends = np.cumsum(np.array([0, *map(len, encoded)])[places + 1], dtype=np.int32)
+    content = b"".join([encoded[place] for place in places.tolist()])
+    offsets = np.concatenate([np.zeros(1, np.int32), ends])
+    return pa.Array.from_buffers(pa.string(), len(places), [None, pa.py_buffer(offsets), pa.py_buffer(content)])
 
 
 def _events(path: Path, table: Any) -> Events:
-    kind = pc.index_in(table["event"], value_set=pa.array(KINDS))
-    if kind.null_count:
+    kinds, kind = _places(table["event"])
+    if not set(kinds) <= set(KINDS):
         raise UsageError(f"{path}: expected events that are one of {', '.join(KINDS)}")
-    what = table["what"].combine_chunks().dictionary_encode()
-    time = np.round(table["time"].to_numpy() * 1e9)
-    columns = (time, kind.to_numpy(), what.indices.to_numpy(), table["sample"].to_numpy())
-    return Events(tuple(what.dictionary.to_pylist()), np.column_stack([x.astype(np.int64) for x in columns]))
+    names, what = _places(table["what"])
+    time = np.round(_values(table["time"]) * 1e9).astype(np.int64)
+    kind = np.array([KINDS.index(word) for word in kinds], dtype=np.int64)[kind]
+    return Events(names, np.column_stack([time, kind, what, _values(table["sample"])]))
+
+
+def _values(column: Any) -> npt.NDArray[Any]:
+    """The numbers of a column without gaps; its own `to_numpy` would load pandas."""
+    return np.from_dlpack(column.combine_chunks())
+
+
+def _places(texts: Any) -> tuple[tuple[str, ...], Integers]:
+    """The different texts of a column, and which of them each is."""
+    encoded = texts.combine_chunks().dictionary_encode()
+    return tuple(encoded.dictionary.to_pylist()), np.from_dlpack(encoded.indices).astype(np.int64)

@@ -18,7 +18,6 @@ from orchestration.system.conversion import Conversion, OtherQuantity, base_unit
 from orchestration.system.model import Parameter, component_of
 from orchestration.units import BaseUnits
 
-ENDINGS = (".ssp", ".ssd")
 TAKEN = frozenset(("rows", "time", "stop_time", "sampled"))
 """Names that no component can have"""
 CLOCK = (SAMPLE_PERIOD, SAMPLE_OFFSET)

@@ -1,0 +1,36 @@
+"""Commands load what they use: of the large packages none that the command at hand does without."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+LARGE = {"dask", "distributed", "fmpy.ssp", "matplotlib", "pandas", "pyarrow", "scipy", "xarray"}
+RUN_AND_TELL = """
+import json, sys
+from orchestration.command.start import main
+try:
+    main()
+finally:
+    print(json.dumps(list(sys.modules)), file=sys.stderr)
+"""
+
+
+def loaded(*arguments: str) -> set[str]:
+    """The modules of a fresh process after a command."""
+    done = subprocess.run([sys.executable, "-c", RUN_AND_TELL, *arguments], capture_output=True, text=True, check=True)
+    return set(json.loads(done.stderr.splitlines()[-1]))
+
+
+def test_a_run_that_keeps_nothing_loads_no_large_package() -> None:
+    assert not LARGE & loaded("run", "--stop-time", "0.01", "--json")
+
+
+def test_a_run_without_figures_loads_of_them_what_writes_its_files(tmp_path: Path) -> None:
+    kept = loaded("run", "--stop-time", "0.01", "--out", str(tmp_path / "run"), "--no-figures")
+    assert LARGE & kept == {"pyarrow"}
+    assert "signals.parquet" in {path.name for path in (tmp_path / "run").iterdir()}
+
+
+def test_a_system_is_shown_as_text_without_any_large_package() -> None:
+    assert not LARGE & loaded("show")
