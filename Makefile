@@ -6,6 +6,8 @@ PYTHON ?= python3
 BIN := .venv/bin
 COFMUPY := .venv-cofmupy/bin/python
 export CI
+# Tests start many processes: each finds the modules compiled that another has compiled.
+unexport PYTHONDONTWRITEBYTECODE
 # Other people's masters that need an environment of their own are flown where they are: make interop makes it.
 export QUADCOSIM_COFMUPY ?= $(abspath $(wildcard $(COFMUPY)))
 
@@ -17,9 +19,10 @@ demo: .venv/.base
 	@echo "figures: results/demo/path.png errors.png commands.png energy.png"
 
 # Laws, plant, algebra, expressions, agenda, master with stubs, files of systems and scenarios: no FMU is loaded.
-QUICK := $(addprefix tests/,controller_fmu expressions fmu_kit/test_algebra.py fmu_kit/test_trajectory.py fmu_kit/test_units.py \
-	master orchestration/test_master.py orchestration/test_scenario.py orchestration/test_statistics.py \
-	orchestration/test_timing.py plant_fmu studies/test_axes.py studies/test_study_file.py system ssp)
+QUICK := $(addprefix tests/,controller_fmu plant_fmu fmu_kit/test_algebra.py fmu_kit/test_trajectory.py fmu_kit/test_units.py) \
+	$(addprefix tests/orchestration/,expressions master/test_agenda.py master/test_master.py master/test_order.py \
+	master/test_streams.py quadrotor/test_loop.py quadrotor/test_scenario.py quadrotor/test_timing.py \
+	studies/test_axes.py studies/test_study_file.py system exchange/ssp/test_reading.py test_statistics.py)
 
 check: lint
 	$(BIN)/pytest --numprocesses 2 --dist load $(QUICK)
