@@ -40,6 +40,7 @@ bench: .venv/.test
 	$(BIN)/python -m benchmarks.bench
 	$(BIN)/python -m benchmarks.scaling
 	$(BIN)/python -m benchmarks.bench_studies
+	$(BIN)/python -m benchmarks.mathematics
 
 figures: .venv/.base
 	$(BIN)/python docs/make_figures.py

@@ -485,7 +485,7 @@ Q_ONE q_real q_own_atan(q_real x) { return q_own_atan2(x, q_all(1.0)); }
 
 /* -- lengths and remainders ------------------------------------------------------------------------------------------ */
 
-/* Correctly rounded but for ties to 1e-9 of a last place, in both modes: CPython's is not libm's either. */
+/* As CPython's, which is its own and not libm's, so in both modes. (Of a subnormal length, as from CPython 3.12.) */
 Q_ONE q_real q_hypot(q_real x, q_real y) {
     const q_real x_size = q_fabs(x), y_size = q_fabs(y), larger = q_select(Q_TEST(y_size > x_size), y_size, x_size);
     const q_real smaller = q_select(Q_TEST(y_size > x_size), x_size, y_size);

@@ -45,3 +45,9 @@ def results(loops: ctypes.CDLL, name: str, *arguments: Floats) -> Floats:
     pointers = [array.ctypes.data_as(ctypes.c_void_p) for array in (*arrays, out)]
     getattr(loops, f"{name}_loop")(*pointers, ctypes.c_size_t(len(out)))
     return out
+
+
+def processor() -> set[str]:
+    """What Linux says that the processor can do; nothing elsewhere."""
+    listed = Path("/proc/cpuinfo")
+    return set(listed.read_text().split()) if listed.exists() else set()

@@ -15,7 +15,7 @@ import pytest
 from elftools.elf.elffile import ELFFile
 
 from tests.fmu_kit.native.accuracy import STATED, Samples, arguments, largest_error
-from tests.fmu_kit.native.compiled import Floats, compiled, library, results
+from tests.fmu_kit.native.compiled import Floats, compiled, library, processor, results
 
 SAMPLES = 700  # of each set of arguments
 HASH = "e55b276ac5433a03"  # of all results of hash.c
@@ -152,13 +152,6 @@ def test_exact_functions_are_pythons(own: ctypes.CDLL, name: str) -> None:
 
 # -- the same bits from everyone -----------------------------------------------------------------------------------
 
-
-def cpu() -> set[str]:
-    """What Linux says that the processor can do."""
-    listed = Path("/proc/cpuinfo")
-    return set(listed.read_text().split()) if listed.exists() else set()
-
-
 BUILDS = {
     "gcc without flags": ("gcc", ()),
     "gcc that contracts": ("gcc", ("-O1", "-march=native", "-ffp-contract=fast")),
@@ -178,7 +171,7 @@ BUILDS = {
 def test_the_bits_are_the_same_from_every_compiler_in_any_lane_on_every_machine(folder: Path, build: str) -> None:
     name, flags = BUILDS[build]
     for flag in flags:
-        if flag.startswith("-mavx") and flag.removeprefix("-m") not in cpu():
+        if flag.startswith("-mavx") and flag.removeprefix("-m") not in processor():
             pytest.skip(f"the processor has no {flag.removeprefix('-m')}")
     program = compiled("hash.c", folder / build.replace(" ", "_"), *flags, with_compiler=name)
     emulator = f"qemu-{build}" if "-static" in flags else None

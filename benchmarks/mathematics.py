@@ -1,0 +1,88 @@
+"""How exact and how fast the functions of native slaves are: `python -m benchmarks.mathematics [--page PAGE]`.
+
+Errors are the largest of many samples, found with numbers of 150 bits; times are CPU time for each number of an array
+that stays in the cache, the smallest of several repetitions, all in one run. With `--page` the tables are put there.
+"""
+
+import argparse
+import ctypes
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from docs.pages import fill
+from tests.fmu_kit.native.accuracy import STATED, largest_error
+from tests.fmu_kit.native.compiled import Floats, library, processor, results
+
+SAMPLES = 20_000  # of each set of arguments
+NUMBERS = 4096
+REPETITIONS = 9
+NAMES = ("tanh", "exp", "expm1", "log", "pow", "sin", "cos", "tan", "asin", "atan2", "hypot", "sqrt")
+BUILDS = {
+    "libm": ("-DQUADCOSIM_LIBM", "-lm"),
+    "own": (),
+    "4 lanes, AVX2": ("-mavx2", "-DQUADCOSIM_LANES=4"),
+    "8 lanes, AVX-512": ("-mavx512f", "-mavx512dq", "-DQUADCOSIM_LANES=8"),
+}
+
+
+def nanoseconds(loops: ctypes.CDLL, name: str, arguments: tuple[Floats, ...]) -> float:
+    """CPU time for one number [ns]."""
+    shortest = float("inf")
+    for _ in range(REPETITIONS):
+        start = time.process_time()
+        for _ in range(20):
+            results(loops, name, *arguments)
+        shortest = min(shortest, time.process_time() - start)
+    return shortest / 20 / NUMBERS * 1e9
+
+
+def table(heads: list[str], rows: list[list[str]]) -> str:
+    """A table of Markdown."""
+    return "\n".join("| " + " | ".join(row) + " |" for row in [heads, ["---"] * len(heads), *rows])
+
+
+def errors(folder: Path) -> str:
+    """The largest errors, beside those of this machine's libm."""
+    own, libm = library("loops.c", folder), library("loops.c", folder, *BUILDS["libm"])
+    rows = []
+    for name, stated in STATED.items():
+        ours, where = largest_error(own, name, SAMPLES)
+        theirs = "" if name in ("sqrt", "hypot") else f"{largest_error(libm, name, SAMPLES)[0]:.3f}"
+        rows.append([f"`{name}`", f"{stated:g}", f"{ours:.3f}", ", ".join(f"{x:.4g}" for x in where), theirs])
+    return table(["function", "stated", "found", "at about", "libm"], rows)
+
+
+def speeds(folder: Path) -> str:
+    """Time a number by build, of those builds whose instructions the processor has."""
+    able = {
+        name: library("loops.c", folder, *flags)
+        for name, flags in BUILDS.items()
+        if all(flag[2:] in processor() for flag in flags if flag.startswith("-mavx"))
+    }
+    random = np.random.default_rng(11)
+    x, y = random.uniform(0.05, 0.95, NUMBERS), random.uniform(0.1, 3.0, NUMBERS)
+    rows = []
+    for name in NAMES:
+        arguments = (x, y) if name in ("pow", "atan2", "hypot") else (x,) if name == "asin" else (4.0 * x,)
+        rows.append([f"`{name}`", *(f"{nanoseconds(loops, name, arguments):.1f}" for loops in able.values())])
+    return table(["ns a number", *able], rows)
+
+
+def main() -> None:
+    """Print both tables, or put them into a page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--page", type=Path, help="put the tables there")
+    page = parser.parse_args().page
+    with tempfile.TemporaryDirectory() as scratch:
+        tables = {"errors": errors(Path(scratch)), "speeds": speeds(Path(scratch))}
+    if page:
+        fill(page, tables)
+    else:
+        print(*tables.values(), sep="\n\n")
+
+
+if __name__ == "__main__":
+    main()
