@@ -8,7 +8,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from fmu_kit.syntax_trees import parsed
+from fmu_kit.syntax_trees import parsed, statements
 
 SHARED_PACKAGES = ("fmu_kit", "pythonfmu")
 """What every FMU bundles; else only what lies beside its slave, and the standard library, may be imported."""
@@ -129,7 +129,7 @@ def tree_of(text: str, path: Path) -> ast.Module:
 def _imported_modules(text: str, package: str, path: Path, target: Target) -> tuple[str, ...]:
     """The bundled modules that a source imports; only the forms that renaming understands are allowed."""
     found = []
-    for node in ast.walk(tree_of(text, path)):
+    for node in statements(tree_of(text, path)):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
             if any(target.bundles(name) for name in names):
