@@ -24,6 +24,7 @@ from orchestration.simulation import prepared
 from orchestration.simulator import Floats
 from orchestration.statistics import wilson
 from orchestration.studies import limit as limits
+from orchestration.studies import local
 from orchestration.studies.limit import Continuous, find
 from orchestration.studies.linear import COORDINATES, HoverLoop, hover_of
 from orchestration.studies.local import Local, local_limit, local_limits
@@ -368,6 +369,7 @@ class StubPool:
 def stubbed(monkeypatch: pytest.MonkeyPatch) -> type[StubPool]:
     monkeypatch.setattr(limits, "Pool", StubPool)
     monkeypatch.setattr(limits, "local_limits", known_local_limits)
+    monkeypatch.setattr(local, "about_rest", lambda at, span: Local(reason="not looked for"))
     return StubPool
 
 
