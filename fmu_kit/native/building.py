@@ -17,6 +17,7 @@ from fmu_kit.native.c_code import c_code
 from fmu_kit.native.compiler import compiled, host_platform
 from fmu_kit.native.derivatives import with_tangents
 from fmu_kit.native.freshness import source_hash
+from fmu_kit.native.precomputing import precomputed
 from fmu_kit.native.symbols import TraceError
 from fmu_kit.native.tables import tables
 from fmu_kit.native.tracing import Program, trace
@@ -34,7 +35,7 @@ _PYTHON = "python"
 def build(target: Target, folder: Path) -> Path:
     """Write `folder`/Model.fmu, replacing it in one go, and return its path."""
     try:
-        program = trace(slave_class(target), modules_of(target))
+        program = precomputed(trace(slave_class(target), modules_of(target)))
         sources = c_sources(program, GUID_PLACEHOLDER)
     except TraceError as error:
         raise PackagingError(f"{target.model}: {error}") from error
@@ -53,7 +54,9 @@ def build(target: Target, folder: Path) -> Path:
     files |= {f"sources/{name}": text for name, text in sources.items()}
     platform = host_platform()
     if platform is not None:
-        files[f"binaries/{platform}/{target.model}.so"] = compiled(sources, MAIN)
+        files[f"binaries/{platform}/{target.model}.so"] = compiled(
+            sources, MAIN, *__import__("os").environ.get("NX", "").split()
+        )
     return written(files, target, folder)
 
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable
 
 from fmu_kit.native.statements import Block, Call, Function, Place, Statement, ends, symbols_of
-from fmu_kit.native.symbols import Symbol, TraceError, value_of
+from fmu_kit.native.symbols import Symbol, TraceError, closure, value_of
 from fmu_kit.native.tracing import Program
 
 _BINARY = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
@@ -188,7 +188,7 @@ class _Writer:
 
     def _hoist(self, then: Block, otherwise: Block, rest: Block) -> None:
         """Compute before a branch what is needed in more than one of its ways, or in one and after it."""
-        a, b, after = (_closure(symbols_of(block)) for block in (then, otherwise, rest))
+        a, b, after = (closure(symbols_of(block)) for block in (then, otherwise, rest))
         for key, symbol in {**a, **b}.items():
             if (key in a) + (key in b) + (key in after) > 1:
                 self._compute_unless_given_in(symbol, (*then, *otherwise))
@@ -196,7 +196,7 @@ class _Writer:
     def _compute_unless_given_in(self, symbol: Symbol, block: Block, depth: int = -1) -> None:
         """Compute a value now, if nothing that it depends on gets its own in a block, or in the loop of a depth."""
         if symbol.args and not self._is_known(symbol):
-            below = _closure([symbol]).values()
+            below = closure([symbol]).values()
             if not any(_is_of_loop(each, depth) or self._is_given(each, block) for each in below):
                 self.value(symbol)
 
@@ -269,7 +269,7 @@ class _Writer:
         depth, (body,) = each.data, each.blocks
         size = (len(each.symbols) - 1) // 2
         count, starts, nexts = each.symbols[0], each.symbols[1 : 1 + size], each.symbols[1 + size :]
-        needed = _closure([*symbols_of(body), *nexts])
+        needed = closure([*symbols_of(body), *nexts])
         for symbol in needed.values():
             self._compute_unless_given_in(symbol, body, depth)
         states = []
@@ -384,22 +384,6 @@ def _constant(symbol: Symbol) -> str:
     return f"({value!r})" if value < 0 or repr(value).startswith("-") else repr(value)
 
 
-def _closure(symbols: Iterable[Symbol]) -> dict[int, Symbol]:
-    """All symbols that some are computed from, each after its operands."""
-    found: dict[int, Symbol] = {}
-    for start in symbols:
-        stack: list[tuple[Symbol, bool]] = [(start, False)]
-        while stack:
-            symbol, visited = stack.pop()
-            if visited:
-                found[id(symbol)] = symbol
-            elif id(symbol) not in found:
-                stack.append((symbol, True))
-                if symbol.op != "phi":
-                    stack += [(arg, False) for arg in symbol.args]
-    return found
-
-
 def _used(block: Block) -> dict[int, Symbol]:
     """The symbols that a block makes use of, other than to choose between values that nobody asks for."""
     assigned: dict[int, list[Symbol]] = {}
@@ -417,7 +401,7 @@ def _used(block: Block) -> dict[int, Symbol]:
     note(block)
     found: dict[int, Symbol] = {}
     while named:
-        new = {key: symbol for key, symbol in _closure(named).items() if key not in found}
+        new = {key: symbol for key, symbol in closure(named).items() if key not in found}
         found |= new
         named = [value for key in new for value in assigned.get(key, ())]
     return found

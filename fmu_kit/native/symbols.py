@@ -8,7 +8,7 @@ simplified: every one is the operation of Python floats, in their order, so that
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Literal
 
 Kind = Literal["real", "int", "bool"]
@@ -337,6 +337,25 @@ def _comparison(op: str, a: Any, b: Any) -> Any:
     if not (isinstance(a, Symbol | float | int) and isinstance(b, Symbol | float | int)):
         return NotImplemented
     return node(op, (lifted(a), lifted(b)), "bool")
+
+
+def closure(symbols: Iterable[Symbol]) -> dict[int, Symbol]:
+    """All symbols that some are computed from where they are, by identity, each after its operands.
+
+    Not so what is either of two values: the statement that makes the choice names them.
+    """
+    found: dict[int, Symbol] = {}
+    for start in symbols:
+        stack: list[tuple[Symbol, bool]] = [(start, False)]
+        while stack:
+            symbol, visited = stack.pop()
+            if visited:
+                found[id(symbol)] = symbol
+            elif id(symbol) not in found:
+                stack.append((symbol, True))
+                if symbol.op != "phi":
+                    stack += [(arg, False) for arg in symbol.args]
+    return found
 
 
 # -- text: where a value stands in a message ---------------------------------------------------------------------

@@ -1,0 +1,182 @@
+"""What follows from parameters alone is computed when they are taken over, not in every step.
+
+The same operations on the same numbers, so the same bits; only when they are done is another matter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from fmu_kit.native.statements import Block, Call, Function, Place, Statement, statement, symbols_of
+from fmu_kit.native.symbols import Symbol, closure, node
+from fmu_kit.native.tracing import Program
+
+TAKING = "take_parameters"
+"""The function in which parameters are taken over."""
+_CHEAP = frozenset(
+    {"add", "sub", "mul", "neg", "abs", "lt", "le", "gt", "ge", "eq", "ne", "and", "or", "not", "select"}
+)
+
+
+def precomputed(program: Program) -> Program:
+    """The program with a place for each costly value that follows from parameters alone."""
+    (taking,) = (f for f in program.functions if f.name == TAKING)
+    before = _called_by(taking) | {taking}
+    later = [f for f in program.functions if f not in before]
+    changed = {name for f in later for name in _stored_directly(f.body)}
+    parameters = {v.name for v in program.slave.variables if v.causality == "parameter"}
+    fixed = (taking.stores | parameters) - changed
+    whole = _Precomputing(program, frozenset(fixed))
+    whole.made.update({f: f for f in before})
+    for f in later:
+        if f not in (program.initialise, program.do_step):  # in these, the parameters are taken over
+            whole.function(f)
+    if not whole.places:
+        return program
+    *rest, last = taking.body
+    call = next(each for each in reversed(rest) if each.op == "call")
+    version = program.versions[call.data.memory, call]
+    computed = tuple(
+        statement("store", (_as_read(value, version),), place.name) for place, value in whole.places.values()
+    )
+    stores = taking.stores | {place.name for place, _ in whole.places.values()}
+    whole.made[taking] = replace(taking, body=(*rest, *computed, last), stores=stores)
+    functions = tuple(whole.function(f) for f in program.functions)
+    return replace(
+        program,
+        places=(*program.places, *(place for place, _ in whole.places.values())),
+        functions=functions,
+        initialise=whole.function(program.initialise),
+        do_step=whole.function(program.do_step),
+        versions={**program.versions, **whole.versions},
+    )
+
+
+def _called_by(function: Function) -> set[Function]:
+    found: set[Function] = set()
+
+    def look(block: Block) -> None:
+        for each in block:
+            if each.op == "call" and each.data.function not in found:
+                found.add(each.data.function)
+                look(each.data.function.body)
+            for inner in each.blocks:
+                look(inner)
+
+    look(function.body)
+    return found
+
+
+def _stored_directly(block: Block) -> set[str]:
+    found = {each.data for each in block if each.op == "store"}
+    return found.union(*(_stored_directly(inner) for each in block for inner in each.blocks)) if block else found
+
+
+class _Precomputing:
+    """The functions that read what was computed before, as far as they are made."""
+
+    def __init__(self, program: Program, fixed: frozenset[str]) -> None:
+        self.program = program
+        self.fixed = fixed
+        self.places: dict[Symbol, tuple[Place, Symbol]] = {}
+        """by a value, as it is at the end of the taking: its place, and the value"""
+        self.versions: dict[tuple[int, Statement], int] = {}
+        self.made: dict[Function, Function] = {}
+        self._kinds: dict[int, tuple[bool, bool]] = {}
+
+    def function(self, f: Function) -> Function:
+        """`f`, with what it calls, reading what was computed before."""
+        if f not in self.made:
+            for symbol in closure(symbols_of(f.body)).values():
+                self._know(symbol)
+            block = _Body(self, f).block(f.body)
+            stores = f.stores | {name for made in _calls(block) for name in made.stores}
+            self.made[f] = replace(f, body=block, stores=stores)
+        return self.made[f]
+
+    def place_of(self, value: Symbol) -> Place:
+        """Where a value is kept."""
+        if value not in self.places:
+            self.places[value] = (Place(f"self.computed.{len(self.places) + 1}", value.kind, None), value)
+        return self.places[value][0]
+
+    def is_worth_it(self, symbol: Symbol) -> bool:
+        """Whether a value follows from parameters alone, with more than a few sums and products in it."""
+        return self._kinds.get(id(symbol)) == (True, True)
+
+    def _know(self, symbol: Symbol) -> None:
+        """Note whether a value follows from parameters alone, and whether it is costly; of its operands it is noted."""
+        below = [self._kinds[id(arg)] for arg in symbol.args] if symbol.op != "phi" else [(False, False)]
+        fixed = all(of for of, _ in below)
+        costly = bool(below) and (symbol.op not in _CHEAP or any(of for _, of in below))
+        if not below:
+            fixed = symbol.op == "constant" or (symbol.op == "load" and symbol.data[0] in self.fixed)
+        self._kinds[id(symbol)] = fixed, costly
+
+
+def _calls(block: Block) -> list[Function]:
+    found = [each.data.function for each in block if each.op == "call"]
+    return found + [function for each in block for inner in each.blocks for function in _calls(inner)]
+
+
+class _Body:
+    """One function, its symbols anew."""
+
+    def __init__(self, whole: _Precomputing, function: Function) -> None:
+        self.whole = whole
+        self._after_taking = function not in (whole.program.initialise, whole.program.do_step)
+        self._known: dict[int, Symbol] = {}
+        self._loops: dict[Statement, Statement] = {}
+
+    def block(self, block: Block) -> Block:
+        """The statements of a block."""
+        return tuple(self._made(each) for each in block)
+
+    def _made(self, each: Statement) -> Statement:
+        if each.op == "call":
+            call: Call = each.data
+            made = statement(
+                "call", [self.value(s) for s in each.symbols], Call(self.whole.function(call.function), call.memory)
+            )
+            self.whole.versions[call.memory, made] = self.whole.program.versions[call.memory, each]
+            return made
+        blocks = tuple(self.block(inner) for inner in each.blocks)
+        made = statement(each.op, [self.value(s) for s in each.symbols], each.data, blocks)
+        if each.op == "loop":
+            self._loops[each] = made
+        return made
+
+    def value(self, symbol: Symbol) -> Symbol:
+        """A symbol in the function as it is made."""
+        waiting = [symbol]
+        while waiting:  # not by recursion: the graph is deep
+            one = waiting[-1]
+            found = self._at_once(one)
+            before = [] if found is not None else [arg for arg in one.args if id(arg) not in self._known]
+            if before:
+                waiting += before
+                continue
+            waiting.pop()
+            if found is None:
+                found = node(one.op, [self._known[id(arg)] for arg in one.args], one.kind, one.data)
+            self._known[id(one)] = found
+        return self._known[id(symbol)]
+
+    def _at_once(self, symbol: Symbol) -> Symbol | None:
+        if id(symbol) in self._known:
+            return self._known[id(symbol)]
+        if symbol.op == "outcome":
+            return node("outcome", (), symbol.kind, (symbol.data[0], self._loops[symbol.data[1]]))
+        if not symbol.args:
+            return symbol
+        if self._after_taking and self.whole.is_worth_it(symbol):
+            return node("load", (), symbol.kind, (self.whole.place_of(_as_read(symbol, 0)).name, 0))
+        return None
+
+
+def _as_read(symbol: Symbol, version: int) -> Symbol:
+    """A value that follows from parameters alone, computed from this version of the memory."""
+    if symbol.op == "load":
+        return node("load", (), symbol.kind, (symbol.data[0], version))
+    args = [_as_read(arg, version) for arg in symbol.args]
+    return node(symbol.op, args, symbol.kind, symbol.data) if args else symbol
