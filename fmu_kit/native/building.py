@@ -54,9 +54,7 @@ def build(target: Target, folder: Path) -> Path:
     files |= {f"sources/{name}": text for name, text in sources.items()}
     platform = host_platform()
     if platform is not None:
-        files[f"binaries/{platform}/{target.model}.so"] = compiled(
-            sources, MAIN, *__import__("os").environ.get("NX", "").split()
-        )
+        files[f"binaries/{platform}/{target.model}.so"] = compiled(sources, MAIN)
     return written(files, target, folder)
 
 
