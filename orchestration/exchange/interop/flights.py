@@ -11,7 +11,8 @@ from orchestration import subprocesses
 from orchestration.errors import QuadcosimError, UsageError
 from orchestration.exchange.interop.assignment import Job, loop_of
 from orchestration.exchange.interop.catalogue import Tool
-from orchestration.exchange.interop.trace import Trace, read_trace, traced_copy
+from orchestration.exchange.interop.copies import expect_traceable, traced_copy
+from orchestration.exchange.interop.trace import Trace, read_trace
 from orchestration.exchange.ssp import writing
 from orchestration.exchange.ssp.carried import carried, has_clock
 from orchestration.fmi.fmi2 import Fmi2Instance
@@ -47,6 +48,8 @@ class Flights:
             self.step = given.step
             """[s]"""
             _expect_common_grid(system, given.step)
+            for fmu in self._fmus.values():
+                expect_traceable(fmu)
         self.steps = round(system.stop_time / self.step)
         self._own: dict[tuple[str, str], Floats] = {}
         np.save(folder / "recorded.npy", self.rows_of_master("gauss-seidel", {})[:-1])

@@ -1,80 +1,17 @@
-"""What a tool does with the FMUs, step by step: flown with copies of them that write down what they are given.
-
-A copy differs from its FMU in the entry script alone; the law and the dynamics are the same files.
-"""
+"""What a tool does with the FMUs, step by step: from what copies of them have written down."""
 
 import json
-import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from fmu_kit.packaging import read_source_hash, write_archive
-from orchestration.errors import QuadcosimError, UsageError
-from orchestration.exchange.interop.assignment import Loop, Ports
-from orchestration.fmi.model import Variable, read_model
+from orchestration.errors import QuadcosimError
+from orchestration.exchange.interop.assignment import Loop
+from orchestration.exchange.interop.copies import log_of
+from orchestration.fmi.model import read_model
 from orchestration.fmi.values import number_of
-
-_LAYER = """
-
-# -- a copy that writes down what it is given ------------------------------------------------------------
-
-import json as _json
-
-_log = open({log!r}, "a", buffering=1, encoding="utf-8")
-
-
-def _values(self, variables):
-    return [float(getattr(self, get)([reference])[0]) for get, reference in variables]
-
-
-def _do_step(self, t, h):
-    inputs = _values(self, {inputs})
-    done = _Model.do_step(self, t, h)
-    _log.write(_json.dumps({{"t": t, "h": h, "inputs": inputs, "outputs": _values(self, {outputs})}}) + "\\n")
-    return done
-
-
-def _exit_initialization_mode(self):
-    _Model.exit_initialization_mode(self)
-    _log.write(_json.dumps({{"inputs": _values(self, {inputs}), "outputs": _values(self, {outputs})}}) + "\\n")
-
-
-_Model = {model}.__mro__[1]
-{model}.do_step = _do_step
-{model}.exit_initialization_mode = _exit_initialization_mode
-"""
-
-
-def traced_copy(fmu: Path, component: str, ports: Ports, folder: Path) -> Path:
-    """A copy of `fmu` in `folder` that writes its steps to `log_of(component, folder)`.
-
-    Raises `UsageError` for an FMU that was not packed by this project.
-    """
-    if read_source_hash(fmu) is None:
-        raise UsageError(f"{fmu}: expected an FMU packed by fmu_kit; what others are given cannot be seen")
-    with zipfile.ZipFile(fmu) as archive:
-        files = {name: archive.read(name) for name in archive.namelist()}
-    model = read_model(fmu)
-    inputs, outputs = ([_getter(model.variables[name]) for name in names] for names in (ports.inputs, ports.outputs))
-    entry = f"resources/{files['resources/slavemodule.txt'].decode().strip()}.py"
-    log = str(log_of(component, folder))
-    layer = _LAYER.format(log=log, inputs=inputs, outputs=outputs, model=model.name)
-    copy = folder / f"{component}.fmu"
-    write_archive(copy, {**files, entry: files[entry] + layer.encode()}, first="modelDescription.xml")
-    return copy
-
-
-def _getter(variable: Variable) -> tuple[str, int]:
-    """The method of the slave that reads a variable, and its reference."""
-    return f"get_{'integer' if variable.kind == 'Enumeration' else variable.kind.lower()}", variable.reference
-
-
-def log_of(component: str, folder: Path) -> Path:
-    """Where a traced copy writes: one JSON object for the end of initialisation, one for each step."""
-    return folder / f"{component}.jsonl"
 
 
 @dataclass(frozen=True, kw_only=True)

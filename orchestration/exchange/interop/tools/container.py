@@ -43,4 +43,4 @@ def _fly(job: Job, *, sequential: bool) -> Rows:
     table = simulate_fmu(
         str(folder / "loop.fmu"), stop_time=job.stop, step_size=job.step, output_interval=job.step, output=job.signals
     )
-    return [list(row) for row in table][1:]
+    return [[float(row[name]) for name in ("time", *job.signals)] for row in table[1:]]

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestration import QuadcosimError, Result, Scenario, UsageError, load_run, run
-from orchestration.exchange.interop.trace import Trace, log_of, read_trace, traced_copy
+from orchestration import QuadcosimError, Result, Scenario, load_run, run
+from orchestration.exchange.interop.copies import log_of, traced_copy
+from orchestration.exchange.interop.trace import Trace, read_trace
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
 from tests.orchestration.exchange.interop.common import LOOP
 from tests.orchestration.studies.common import quadcosim
@@ -178,10 +179,3 @@ def test_a_traced_copy_writes_down_what_it_is_given_and_what_it_gives(traced: tu
         assert np.array([step["inputs"] for step in steps]).tobytes() == inputs.tobytes()
         assert np.array([step["outputs"] for step in steps]).tobytes() == outputs.tobytes()
         assert start["inputs"] == inputs[0].tolist()
-
-
-def test_an_fmu_of_others_cannot_be_looked_into(tmp_path: Path) -> None:
-    foreign = tmp_path / "Foreign.fmu"
-    foreign.write_bytes(b"no archive of ours")
-    with pytest.raises(UsageError, match=r"Foreign.fmu: expected an FMU packed by fmu_kit"):
-        traced_copy(foreign, "plant", LOOP.ports["plant"], tmp_path)
