@@ -75,7 +75,11 @@ class Unit:
 
     def agrees(self, other: "Unit") -> bool | None:
         """Whether values in the one can be added to values in the other; None if that is not known."""
-        if self.has_number or other.has_number:
+        return True if self.has_number or other.has_number else self.is_same(other)
+
+    def is_same(self, other: "Unit") -> bool | None:
+        """Whether they are one unit, numbers apart; None if that is not known."""
+        if self is other:
             return True
         same_name = self.symbols == other.symbols
         if self.base is None or other.base is None:
@@ -107,12 +111,11 @@ def common(units: Sequence[Unit]) -> Unit | None:
     """
     decisive = [u for u in units if not u.has_number] or [u for u in units if u.symbols] or list(units)
     chosen = next((u for u in decisive if u.symbols), decisive[0])
-    same = all(replace(u, has_number=False).agrees(replace(chosen, has_number=False)) for u in decisive)
-    return chosen if same else None
+    return chosen if all(u.is_same(chosen) for u in decisive) else None
 
 
 def _is_same(one: BaseUnits, other: BaseUnits) -> bool:
-    return one.exponents[:-1] == other.exponents[:-1] and math.isclose(one.factor, other.factor, rel_tol=1e-9)
+    return math.isclose(one.factor, other.factor, rel_tol=1e-9) and one.exponents[:-1] == other.exponents[:-1]
 
 
 def _factors(name: str) -> dict[str, Fraction]:

@@ -7,6 +7,7 @@ import math
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from typing import Literal
@@ -16,6 +17,7 @@ from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmu_kit.packaging import read_source_hash
 from orchestration.errors import UsageError
+from orchestration.units import BASE, BaseUnits, Unit, named
 
 Kind = Literal["Real", "Integer", "Boolean", "Enumeration", "String", "Binary", "Clock"]
 """Types by their FMI 2.0 names; FMI 3.0's Float64 is a Real, its Int32 an Integer"""
@@ -100,6 +102,22 @@ class Model:
         hint = f"did you mean {' or '.join(near)}? " if near else ""
         settable = [v.name for v in self.variables.values() if v.causality == "parameter"]
         raise UsageError(f"{place}: {self.name} has no such variable; {hint}its parameters are {_listed(settable)}")
+
+    def base_units(self, unit: str | None) -> BaseUnits | None:
+        """What a unit is by the FMU's definitions; None if they do not say."""
+        found = next((u for u in self.description.unitDefinitions if u.name == unit), None)
+        base = getattr(found, "baseUnit", None)
+        if base is None:
+            return None
+        exponents = tuple(Fraction(getattr(base, key)) for key in BASE)
+        return BaseUnits(exponents=exponents, factor=float(base.factor), offset=float(base.offset))
+
+    @cached_property
+    def units(self) -> dict[str, Unit]:
+        """By variable, of those that have one."""
+        declared = {name: v.unit for name, v in self.variables.items() if v.unit}
+        made = {unit: named(unit, self.base_units(unit)) for unit in dict.fromkeys(declared.values())}
+        return {name: made[unit] for name, unit in declared.items()}
 
     def names(self, *causalities: str, kinds: tuple[Kind, ...] = NUMERIC) -> tuple[str, ...]:
         """Variables of these causalities and types, in the order of the description."""

@@ -6,10 +6,9 @@ from orchestration.errors import UsageError
 from orchestration.expressions.syntax import names, parse
 from orchestration.expressions.units import unit_of
 from orchestration.fmi.model import Model
-from orchestration.system.conversion import base_units
 from orchestration.system.model import System, component_of, variable_of
 from orchestration.system.system_file import expressions
-from orchestration.units import METRE, SECOND, Unit, named
+from orchestration.units import METRE, SECOND, Unit
 
 OF_EVERY_RUN = dict.fromkeys(("horizon", "divergence_time"), str(SECOND))
 """Units of what every run comes to beside its objectives"""
@@ -44,14 +43,9 @@ def _of_signals(system: System, models: Mapping[str, Model]) -> dict[str, Unit |
         for variable in model.variables:
             signal = f"{name}.{variable}"
             if signal in wanted or signal.rpartition(".")[0] in wanted:
-                found[signal] = _declared(model, variable)
+                found[signal] = model.units.get(variable)
     for name, source in system.sources.items():
-        fed = [_declared(models[component_of(end)], variable_of(end)) for end in source.to]
+        fed = [models[component_of(end)].units.get(variable_of(end)) for end in source.to]
         signals = source.signals(name)
         found |= zip(signals, fed if source.trajectory is None else [METRE] * len(signals), strict=True)
     return found
-
-
-def _declared(model: Model, variable: str) -> Unit | None:
-    unit = model.variables[variable].unit
-    return named(unit, base_units(model, unit)) if unit else None

@@ -1,10 +1,9 @@
 """What becomes what at the end of a connection: types by rule, units by a factor that the file states."""
 
 from dataclasses import dataclass
-from fractions import Fraction
 
 from orchestration.fmi.model import Kind, Model, Variable
-from orchestration.units import BASE, BaseUnits
+from orchestration.units import BaseUnits
 
 BECOMES: dict[Kind, tuple[Kind, ...]] = {
     "Real": ("Real",),
@@ -50,16 +49,6 @@ def between(one: BaseUnits, other: BaseUnits) -> Conversion:
     return Conversion(scale=one.factor / other.factor, offset=(one.offset - other.offset) / other.factor)
 
 
-def base_units(model: Model, name: str | None) -> BaseUnits | None:
-    """What a unit is by an FMU's definitions; None if they do not say."""
-    unit = next((u for u in model.description.unitDefinitions if u.name == name), None)
-    base = getattr(unit, "baseUnit", None)
-    if base is None:
-        return None
-    exponents = tuple(Fraction(getattr(base, key)) for key in BASE)
-    return BaseUnits(exponents=exponents, factor=float(base.factor), offset=float(base.offset))
-
-
 def conversion(sender: Model, output: Variable, receiver: Model, into: Variable) -> Conversion | None:
     """How the unit of an output becomes that of an input; None if an FMU does not define a unit that differs.
 
@@ -67,5 +56,5 @@ def conversion(sender: Model, output: Variable, receiver: Model, into: Variable)
     """
     if not (output.unit and into.unit) or output.unit == into.unit:
         return Conversion()
-    one, other = base_units(sender, output.unit), base_units(receiver, into.unit)
+    one, other = sender.base_units(output.unit), receiver.base_units(into.unit)
     return None if one is None or other is None else between(one, other)

@@ -14,7 +14,7 @@ from orchestration.exchange.ssp.structure import Node, Path_, Structure, Wire, s
 from orchestration.exchange.ssp.timing import expect_tables
 from orchestration.fmi.model import Model, read_model
 from orchestration.quadrotor.wiring import SAMPLE_OFFSET, SAMPLE_PERIOD
-from orchestration.system.conversion import Conversion, OtherQuantity, base_units, between
+from orchestration.system.conversion import Conversion, OtherQuantity, between
 from orchestration.system.model import Parameter, component_of
 from orchestration.units import BaseUnits
 
@@ -142,7 +142,7 @@ def _in_own_unit(structure: Structure, node: Node, value: Value, model: Model | 
     if not own or not value.unit or own == value.unit or isinstance(number, (bool, str)):
         return number
     one = value.definition or structure.definitions.get(value.unit)
-    other = structure.definitions.get(own) or (base_units(model, own) if model is not None else None)
+    other = structure.definitions.get(own) or (model.base_units(own) if model is not None else None)
     return _conversion(one, other, f"{said(node)} in {value.unit}, expected {own}")(number)
 
 
@@ -176,7 +176,7 @@ def _of_units(wire: Wire, structure: Structure, models: Mapping[Path_, Model]) -
         name = structure.units.get(node) or (variable.unit if variable is not None else None)
         named.append(name)
         own = structure.definitions.get(name) if name else None
-        defined.append(own or (base_units(model, name) if model is not None else None))
+        defined.append(own or (model.base_units(name) if model is not None else None))
     if not all(named) or named[0] == named[1]:
         return Conversion()
     return _conversion(defined[0], defined[1], f"connection {wire.said}, from {named[0]} to {named[1]}")
