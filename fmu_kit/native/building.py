@@ -14,7 +14,7 @@ from fmu_kit.bundle import PackagingError, Target, bundled_sources, place
 from fmu_kit.documentation import Making
 from fmu_kit.model_description import GUID_PLACEHOLDER, to_xml
 from fmu_kit.native.c_code import c_code
-from fmu_kit.native.compiler import compiled, host_platform
+from fmu_kit.native.compiler import Mathematics, compiled, host_platform
 from fmu_kit.native.derivatives import with_tangents
 from fmu_kit.native.freshness import source_hash
 from fmu_kit.native.precomputing import precomputed
@@ -32,8 +32,11 @@ _PYTHON = "python"
 """Where in the documentation the Python is from which the C was written."""
 
 
-def build(target: Target, folder: Path) -> Path:
-    """Write `folder`/Model.fmu, replacing it in one go, and return its path."""
+def build(target: Target, folder: Path, *, mathematics: Mathematics = "own") -> Path:
+    """Write `folder`/Model.fmu, replacing it in one go, and return its path.
+
+    With the mathematics of libm it has, on this machine, the bits of the slave in Python: for comparing the two.
+    """
     try:
         program = precomputed(trace(slave_class(target), modules_of(target)))
         sources = c_sources(program, GUID_PLACEHOLDER)
@@ -54,7 +57,7 @@ def build(target: Target, folder: Path) -> Path:
     files |= {f"sources/{name}": text for name, text in sources.items()}
     platform = host_platform()
     if platform is not None:
-        files[f"binaries/{platform}/{target.model}.so"] = compiled(sources, MAIN)
+        files[f"binaries/{platform}/{target.model}.so"] = compiled(sources, MAIN, mathematics=mathematics)
     return written(files, target, folder)
 
 

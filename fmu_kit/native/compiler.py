@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Literal
 
 from fmu_kit.bundle import PackagingError
 
@@ -16,6 +17,10 @@ OPTIONS = (
     *("-std=gnu11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno"),
     *("-s", "-Wl,--build-id=none"),  # nothing that differs from one build to the next
 )
+
+Mathematics = Literal["own", "libm"]
+"""Where the elementary functions come from: the same bits everywhere, or those of CPython on this machine."""
+_MATHEMATICS: dict[Mathematics, tuple[str, ...]] = {"own": (), "libm": ("-DQUADCOSIM_LIBM", "-lm")}
 
 
 def host_platform() -> str | None:
@@ -44,14 +49,18 @@ def compiler_version() -> str:
     return subprocess.run([found, "--version"], capture_output=True, text=True, check=False).stdout
 
 
-def compiled(sources: dict[str, bytes], main: str, *extra: str) -> bytes:
+def compiled(sources: dict[str, bytes], main: str, *, mathematics: Mathematics = "own") -> bytes:
     """The library that the file `main` among the sources is compiled to; raises `PackagingError` if it cannot be."""
     cc = compiler()
     with tempfile.TemporaryDirectory() as folder:
         for name, content in sources.items():
             Path(folder, name).write_bytes(content)
         done = subprocess.run(
-            [cc, main, "-o", "library", *OPTIONS, *extra], cwd=folder, capture_output=True, text=True, check=False
+            [cc, main, "-o", "library", *OPTIONS, *_MATHEMATICS[mathematics]],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            check=False,
         )
         if done.returncode != 0:
             lines = [line for line in done.stderr.splitlines() if "error" in line] or ["no output"]

@@ -16,6 +16,7 @@ import numpy as np
 
 import orchestration
 from orchestration import Result
+from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.scenario_file import scenario_from_tables
 
 TABLE = Path(__file__).parents[2] / "data" / "quadrotor_signals.json"
@@ -36,9 +37,14 @@ def fingerprint() -> str:
     return hashlib.sha256(np.array(values).tobytes()).hexdigest()
 
 
+def scenario_of(tables: dict[str, Any]) -> Scenario:
+    """A scenario of the table."""
+    return scenario_from_tables(tables, Path())
+
+
 def flown(tables: dict[str, Any]) -> Result:
-    """The flight of a scenario of the table."""
-    return orchestration.run(scenario_from_tables(tables, Path()))
+    """Its flight."""
+    return orchestration.run(scenario_of(tables))
 
 
 def entry(result: Result) -> dict[str, Any]:

@@ -1,21 +1,62 @@
-"""The quadrotor's signals are those that it had before there were systems, to the bit."""
+"""The quadrotor's signals are those that it had before there were systems, to the bit; native FMUs have them too."""
 
+import functools
 import json
-from typing import Any
+from collections.abc import Mapping
+from pathlib import Path
 
 import pytest
 
-from tests.orchestration.quadrotor.signals_table import TABLE, entry, fingerprint, flights, flown
+import orchestration
+from fmu_kit.bundle import Target
+from orchestration import Result
+from orchestration.quadrotor.wiring import MODELS
+from tests.native import assert_near, assert_the_same, natives
+from tests.orchestration.quadrotor.signals_table import TABLE, entry, fingerprint, flights, flown, scenario_of
 
 SAME_MATHEMATICS = json.loads(TABLE.read_text(encoding="utf-8"))["fingerprint"] == fingerprint()
+FLIGHTS = dict(flights())
 
 
-@pytest.mark.parametrize("expected", [expected for _, expected in flights()], ids=[name for name, _ in flights()])
-def test_a_flight_is_that_of_the_table(expected: dict[str, Any]) -> None:
-    found = entry(flown(expected["scenario"]))
+@functools.cache
+def in_python(name: str) -> Result:
+    """The flight of a scenario of the table, by the slaves in Python."""
+    return flown(FLIGHTS[name]["scenario"])
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_a_flight_is_that_of_the_table(name: str) -> None:
+    expected = FLIGHTS[name]
+    found = entry(in_python(name))
     assert found["columns"] == expected["columns"]
     if SAME_MATHEMATICS:
         assert found == {key: value for key, value in expected.items() if key != "scenario"}
     else:  # another libm, another last digit
         assert found["number_of_rows"] == expected["number_of_rows"]
         assert found["last"] == pytest.approx(expected["last"], rel=1e-9, abs=1e-9)
+
+
+# -- the same slaves, written out as C -----------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def on_libm(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Both FMUs by name, with the elementary functions that CPython takes."""
+    targets = [Target.parse(text) for text in MODELS.values()]
+    return natives(targets, tmp_path_factory.mktemp("native"), "libm")
+
+
+def flown_by(fmus: Mapping[str, str | Path], name: str) -> Result:
+    """The flight of a scenario of the table, by these FMUs."""
+    scenario = scenario_of(FLIGHTS[name]["scenario"])
+    return orchestration.run(scenario.with_fmus(plant=fmus["QuadrotorPlant"], controller=fmus["UnifiedController"]))
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_a_native_flight_on_the_same_libm_is_that_of_the_slaves_in_python(name: str, on_libm: dict[str, Path]) -> None:
+    assert_the_same(flown_by(on_libm, name), in_python(name))
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_a_native_flight_on_its_own_mathematics_is_near(name: str) -> None:
+    assert_near(flown_by({model: f"native/{model}" for model in MODELS}, name), in_python(name), 1e-9)

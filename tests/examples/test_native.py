@@ -1,0 +1,41 @@
+"""The slaves of the examples, written out as C, make the runs that they make in Python."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from fmu_kit.native.compiler import Mathematics
+from orchestration import fmus
+from orchestration.results.result import Result
+from orchestration.simulation import run
+from orchestration.system.model import System
+from tests.examples.common import EXAMPLES, NAMES, example
+from tests.native import assert_near, assert_the_same, natives
+
+SHORTER = {"minimum_variance": 100.0, "double_integrator": 30.0, "four_components": 25.0}
+"""[s]; of runs that are long for the sake of their statistics"""
+
+
+def system(name: str) -> System:
+    """Of an example, with slaves in Python."""
+    return example(name, {"stop_time": SHORTER[name]} if name in SHORTER else {})
+
+
+def on_native(name: str, folder: Path, mathematics: Mathematics) -> Result:
+    """Its run with the same slaves written out as C."""
+    built = natives(fmus.slaves_of(EXAMPLES / name), folder, mathematics)
+    asked = system(name)
+    components = {key: replace(each, fmu=str(built[Path(each.fmu).stem])) for key, each in asked.components.items()}
+    return run(replace(asked, components=components))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_example_on_the_same_libm_is_the_same_to_the_byte_without_python_inside(name: str, tmp_path: Path) -> None:
+    found = on_native(name, tmp_path, "libm")
+    assert len(found.rows) > 100
+    assert_the_same(found, run(system(name)))
+
+
+def test_an_example_on_its_own_mathematics_is_near(tmp_path: Path) -> None:
+    assert_near(on_native("dc_servo", tmp_path, "own"), run(system("dc_servo")), 1e-9)

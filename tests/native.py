@@ -1,0 +1,45 @@
+"""The same slaves twice, in Python and written out as C, and what two flights of them have in common."""
+
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from fmu_kit.bundle import Target
+from fmu_kit.native.compiler import Mathematics
+from orchestration.results.result import Result
+from tests.fmus.process import run
+
+
+def natives(targets: Iterable[Target], folder: Path, mathematics: Mathematics) -> dict[str, Path]:
+    """FMUs of slaves without Python inside, by model name; the slaves are of one place."""
+    known = list(targets)
+    root = known[0].root
+    place = () if root is None else ("--root", str(root))
+    names = [f"{target.module}:{target.model}" for target in known]
+    done = run(sys.executable, "-m", "tests.fmus.scripts.build_native", mathematics, str(folder), *place, *names)
+    assert done.returncode == 0, done.stderr
+    return {Path(line).stem: Path(line) for line in done.stdout.splitlines()}
+
+
+def assert_the_same(one: Result, other: Result) -> None:
+    """Everything that two flights have come to, to the last bit and letter."""
+    assert one.columns == other.columns
+    assert one.rows.shape == other.rows.shape
+    differing = [name for name in one.columns if one.signals[name].tobytes() != other.signals[name].tobytes()]
+    assert differing == []
+    assert one.events == other.events
+    assert repr(one.metrics) == repr(other.metrics)
+    assert (one.divergence, one.warnings) == (other.divergence, other.warnings)
+
+
+def assert_near(one: Result, other: Result, tolerance: float) -> None:
+    """All values within a tolerance [1], relative to the largest of their signal; the same events."""
+    assert one.columns == other.columns
+    assert one.rows.shape == other.rows.shape
+    largest = np.abs(one.rows).max(axis=0)
+    furthest = np.abs(one.rows - other.rows).max(axis=0)
+    far = {name: far for name, far, size in zip(one.columns, furthest, largest) if far > tolerance * max(size, 1.0)}
+    assert far == {}
+    assert one.events == other.events
