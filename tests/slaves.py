@@ -7,6 +7,19 @@ import pytest
 from fmu_kit.failure import Failure
 from fmu_kit.slave import Slave
 
+BODY_OUT_OF_RANGE = [
+    ("mass", 0.0, "> 0"),
+    ("mass", -1.0, "> 0"),
+    ("gravity", -9.81, ">= 0"),
+    ("inertia.xx", -1.0, "a positive definite matrix"),
+    ("inertia.yy", 0.0, "a positive definite matrix"),
+    ("inertia.zz", -0.5, "a positive definite matrix"),
+    ("inertia.xy", 1.5, "a positive definite matrix"),
+    ("inertia.xz", -1.0, "a positive definite matrix"),
+    ("inertia.yz", 2.0, "a positive definite matrix"),
+]
+"""Parameters of a rigid body, real or nominal, that are none, and what is expected of them"""
+
 
 def put(slave: Slave, values: Mapping[str, float]) -> None:
     for name, value in values.items():
@@ -22,6 +35,13 @@ def assert_fails(call: Callable[[], object], *words: str) -> None:
         call()
     for word in words:
         assert word in repr(caught.value)
+
+
+def assert_initialisation_fails(slave: Slave, *words: str) -> None:
+    """When it ends, where what belongs together has been set."""
+    slave.setup_experiment(0.0)
+    slave.enter_initialization_mode()
+    assert_fails(slave.exit_initialization_mode, *words)
 
 
 def named(name: str, value: float) -> tuple[str, str]:

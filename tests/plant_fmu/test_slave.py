@@ -18,7 +18,7 @@ from plant_fmu.interface import QUADROTOR
 from plant_fmu.slave import QuadrotorPlant
 from tests.reference.flight import Q0, integrated, quaternion
 from tests.reference.law import Parameters, rotation
-from tests.slaves import assert_fails, get, named, put
+from tests.slaves import BODY_OUT_OF_RANGE, assert_fails, assert_initialisation_fails, get, named, put
 
 POSITION = ("position.x", "position.y", "position.z")
 VELOCITY = ("velocity.x", "velocity.y", "velocity.z")
@@ -313,15 +313,7 @@ def test_time_constant_much_smaller_than_the_step_stays_stable(time_constant: fl
 # -- parameters and misuse ------------------------------------------------------------------------------------
 
 OUT_OF_RANGE = [
-    ("mass", 0.0, "> 0"),
-    ("mass", -1.3, "> 0"),
-    ("gravity", -9.81, ">= 0"),
-    ("inertia.xx", -1.0, "a positive definite matrix"),
-    ("inertia.yy", 0.0, "a positive definite matrix"),
-    ("inertia.zz", -0.5, "a positive definite matrix"),
-    ("inertia.xy", 1.5, "a positive definite matrix"),
-    ("inertia.xz", -1.0, "a positive definite matrix"),
-    ("inertia.yz", 2.0, "a positive definite matrix"),
+    *BODY_OUT_OF_RANGE,
     ("thrust_max", -1.0, ">= 0"),
     ("torque_max", -0.1, ">= 0"),
     ("actuator_time_constant", -0.01, ">= 0"),
@@ -332,17 +324,12 @@ OUT_OF_RANGE = [
 
 @pytest.mark.parametrize(("name", "value", "expected"), OUT_OF_RANGE)
 def test_parameter_out_of_range_is_refused_when_initialisation_ends(name: str, value: float, expected: str) -> None:
-    slave = instance({name: value})
-    slave.setup_experiment(0.0)
-    slave.enter_initialization_mode()
-    assert_fails(slave.exit_initialization_mode, *named(name, value), "expected", expected)
+    assert_initialisation_fails(instance({name: value}), *named(name, value), "expected", expected)
 
 
 def test_zero_initial_quaternion_is_refused() -> None:
     slave = instance({**LEVEL, "initial.quaternion.w": 0.0})
-    slave.setup_experiment(0.0)
-    slave.enter_initialization_mode()
-    assert_fails(slave.exit_initialization_mode, "initial.quaternion = (0.0, 0.0, 0.0, 0.0)", "expected", "not zero")
+    assert_initialisation_fails(slave, "initial.quaternion = (0.0, 0.0, 0.0, 0.0)", "expected", "not zero")
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])

@@ -18,7 +18,7 @@ from controller_fmu.vehicle import Measurement, Model
 from fmu_kit.algebra import ZERO, Inertia, Quaternion, Vec3
 from fmu_kit.failure import Failure
 from fmu_kit.trajectory import Reference, Trajectory
-from tests.slaves import assert_fails, get, named, put
+from tests.slaves import BODY_OUT_OF_RANGE, assert_fails, assert_initialisation_fails, get, named, put
 
 COMMAND = ("thrust", "torque.x", "torque.y", "torque.z")
 PAPER_ATTITUDE = Quaternion.from_xyzw(0.1699, 0.3058, 0.1699, 0.9212).normalised()
@@ -351,15 +351,7 @@ def test_parameters_of_the_trajectory_move_the_reference() -> None:
 
 
 OUT_OF_RANGE = [
-    ("mass", 0.0, "> 0"),
-    ("mass", -1.0, "> 0"),
-    ("gravity", -9.81, ">= 0"),
-    ("inertia.xx", -1.0, "a positive definite matrix"),
-    ("inertia.yy", 0.0, "a positive definite matrix"),
-    ("inertia.zz", -0.5, "a positive definite matrix"),
-    ("inertia.xy", 1.5, "a positive definite matrix"),
-    ("inertia.xz", -1.0, "a positive definite matrix"),
-    ("inertia.yz", 2.0, "a positive definite matrix"),
+    *BODY_OUT_OF_RANGE,
     ("sample_period", -0.01, ">= 0"),
     ("sample_offset", -0.001, ">= 0"),
     ("gain.translation.x", -2.0, ">= 0"),
@@ -381,10 +373,7 @@ OUT_OF_RANGE = [
 
 @pytest.mark.parametrize(("name", "value", "expected"), OUT_OF_RANGE)
 def test_parameter_out_of_range_is_refused_when_initialisation_ends(name: str, value: float, expected: str) -> None:
-    slave = instance({name: value})
-    slave.setup_experiment(0.0)
-    slave.enter_initialization_mode()
-    assert_fails(slave.exit_initialization_mode, *named(name, value), "expected", expected)
+    assert_initialisation_fails(instance({name: value}), *named(name, value), "expected", expected)
 
 
 TUNABLE = [v.name for v in UNIFIED if v.variability == "tunable"]
