@@ -26,7 +26,7 @@ from orchestration.simulation import Simulation, fixed_steps, prepared
 from orchestration.simulator import Floats, Transfer
 from orchestration.studies.at_rest import calmed, common_period, exchanged, expect_rest, latest_offset
 from orchestration.studies.tangent import PULSE, Rest, Tangent
-from orchestration.system.model import Criterion, System, component_of, variable_of
+from orchestration.system.model import Component, Criterion, System, component_of, variable_of
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 
 SETTLED = 6
@@ -127,6 +127,10 @@ def _map_of(simulation: Simulation, tangents: dict[str, Tangent], begin: Fractio
     system = replace(
         simulation.system,
         stop_time=float(begin + (LARGEST + 2) * period) / NANOSECONDS,
+        components={
+            name: _in_step(component, period) if simulation.instances[name].model.varies_step else component
+            for name, component in simulation.system.components.items()
+        },
         connections=tuple(replace(x, offset=0.0) for x in simulation.system.connections),
         sources={},
         criterion=Criterion(),
@@ -154,6 +158,14 @@ def _map_of(simulation: Simulation, tangents: dict[str, Tangent], begin: Fractio
             raise UsageError("not as many messages are on their way after a period as before")
         result[:, i] = after
     return result
+
+
+def _in_step(component: Component, period: Fraction) -> Component:
+    """With points of which a whole number makes a period, no farther apart: so every period is like the others."""
+    if component.step is None:
+        return component
+    count = math.ceil(period / exact_nanoseconds(component.step))
+    return replace(component, step=float(period / count) / NANOSECONDS)
 
 
 def _held(master: Master, tangents: dict[str, Tangent]) -> list[Floats]:
