@@ -32,7 +32,10 @@ def watch(
     constants = [name for name in numbers if name in wanted]
     order = ["time", *columns, *(signal for name in used for signal in signals_of[name]), *constants]
     places = {name: i for i, name in enumerate(order)}
-    clauses = [_Clause(clause, places) for clause in _alternatives(node)]
+    try:
+        clauses = [_Clause(clause, places) for clause in _alternatives(node)]
+    except UsageError as error:
+        raise UsageError(f"criterion.diverged: {error}") from None
     where, row = board.places(columns) if columns else slice(0, 0), board.row
     feeds, fixed = [sources[name].at for name in used], [float(numbers[name]) for name in constants]
     conditions = [clause.holds for clause in clauses]

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from orchestration.errors import UsageError
 from orchestration.expressions.over_run import evaluate, expect_names
 from orchestration.expressions.recorded import Marks, Recorded, Spans, vectors
 from orchestration.expressions.syntax import names, parse
@@ -95,11 +96,13 @@ def _arrivals(system: System, time: Floats, events: Events) -> dict[str, Marks]:
 def known(system: System, signals: set[str], numbers: set[str]) -> System:
     """`system` with the objectives that its FMUs have the variables for, where the others may be without a value.
 
-    Raises `UsageError` for an expression that names what is not there.
+    Raises `UsageError` for an expression that names what is not there, and for a name that is taken.
     """
     valid = {"time", "stop_time", *signals, *vectors(dict.fromkeys(signals)), *numbers}
     found = {}
     for name, text in system.objectives.items():
+        if name in FIXED:
+            raise UsageError(f"objectives.{name}: every run has a result of that name, expected another")
         if name in system.optional and not valid.issuperset(names(parse(text))):
             continue
         expect_names(parse(text), valid, f"objectives.{name}")

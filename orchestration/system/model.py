@@ -1,6 +1,6 @@
 """What a system is: frozen values, checked for what they mean by themselves; no FMU is opened here."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -186,7 +186,11 @@ class Source:
             require_not_negative(self, "noise")
             require(self.period is not None, "period", "none", "how long each value is held, in seconds")
             require_positive(self, "period")
+            require(exact_nanoseconds(self.period or 0.0) >= 1, "period", self.period, "at least a nanosecond")
         else:
+            nobody = self.trajectory is None or not self.to
+            require(nobody, "to", ", ".join(self.to), "none: a trajectory is for objectives")
+            require(self.constant is None or is_finite(self.constant), "constant", self.constant, "a finite number")
             require(self.period is None, "period", self.period, "none without noise")
 
 
@@ -200,6 +204,11 @@ class Criterion:
     """over signals, at every instant: ends the run"""
     outcomes: tuple[str, str] = ("good", "bad")
     """what a run is called that is good, and one that is not; one that diverged is called so"""
+
+    def __post_init__(self) -> None:
+        given = ", ".join(self.outcomes)
+        two = len({*self.outcomes, "diverged", ""}) == 4 and given.isprintable()
+        require(two, "outcomes", ascii(given), "two names, and neither is diverged")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -229,11 +238,22 @@ class System:
 
     def __post_init__(self) -> None:
         require_positive(self, "stop_time")
+        require(exact_nanoseconds(self.stop_time) >= 1, "stop_time", self.stop_time, "at least a nanosecond")
         whole = isinstance(self.seed, int) and not isinstance(self.seed, bool)
         require(whole and 0 <= self.seed < 2**63, "seed", self.seed, "a whole number from 0 to 2^63 - 1")
         if "rows" in self.components:
             raise UsageError("components.rows: expected another name; this one is taken")
         require(len(self.components) > 0, "components", "none", "at least one")
+        _require_names("components", self.components, without=".")
+        _require_names("sources", self.sources, without=".")
+        _require_names("connections", (x.name for x in self.connections))
+        _require_names("objectives", self.objectives)
+        for place, number in self.streams.items():
+            known = ", ".join(self._causes()) or "none"
+            require(place in self._causes(), "streams", place, f"one of {known}")
+            require(number >= 0, f"streams.{place}", number, "a number from 0 on")
+        for name in self.sources:
+            require(name not in self.components, f"sources.{name}", name, "another name than a component's")
         fed: dict[str, str] = {}
         for place, start, end in self._feeds():
             for what, given in (("from", start), ("to", end)):
@@ -247,11 +267,27 @@ class System:
         for name in names:
             require(names.count(name) == 1, "connections", name, "a name of its own for each")
 
+    def _causes(self) -> list[str]:
+        """What random numbers are drawn for."""
+        tasks = [f"components.{name}.jitter" for name, c in self.components.items() if c.sampling is not None]
+        sent = [
+            f"connections.{x.name}.{cause}" for x in self.connections for cause in ("delay_jitter", "loss", "noise")
+        ]
+        return [*tasks, *sent, *(f"sources.{name}.value" for name, x in self.sources.items() if x.noise is not None)]
+
     def _feeds(self) -> list[tuple[str, str | None, str]]:
         feeds: list[tuple[str, str | None, str]] = [
             (f"connections.{x.name}", start, end) for x in self.connections for start, end in zip(x.start, x.end)
         ]
         return feeds + [(f"sources.{name}", None, end) for name, source in self.sources.items() for end in source.to]
+
+
+def _require_names(table: str, names: Iterable[str], without: str = "") -> None:
+    """Names are parts of paths and of messages of one line."""
+    expected = "a name in printable characters" + (" without a dot" if without else "")
+    for name in names:
+        fits = name.isprintable() and name == name.strip() != "" and not (without and without in name)
+        require(fits, table, name.encode("unicode_escape").decode(), expected)
 
 
 def component_of(variable: str) -> str:

@@ -30,7 +30,6 @@ from tests.orchestration.master.stubs import Stub, continuous, events, sampled, 
 from tests.orchestration.quadrotor.strategies import Case, cases
 
 PAGE = Path(__file__).parents[3] / "docs" / "timing.md"
-many = partial(settings, derandomize=True, deadline=None)
 
 
 def moved(outputs: Mapping[str, float], t: float, h: float, inputs: Mapping[str, float]) -> dict[str, float]:
@@ -97,13 +96,13 @@ def flight(case: Case) -> System:
     return system_of(Scenario(timing=case.timing, stop_time=case.stop_time, seed=case.seed))
 
 
-@many(max_examples=120)
+@settings(max_examples=120)
 @given(systems())
 def test_steps_rows_and_events_are_the_same_over_random_systems(what: System) -> None:
     same(what)
 
 
-@many(max_examples=40)
+@settings(max_examples=40)
 @given(systems_of_fixed_steps())
 def test_and_with_components_of_one_step_to_whose_points_things_move(drawn: tuple[System, list[str]]) -> None:
     try:
@@ -118,14 +117,14 @@ NAMES = [*MEASUREMENT, "position", "velocity", "quaternion", "angular_velocity"]
 SENSORS = st.dictionaries(st.sampled_from(NAMES), st.just(0.0) | st.floats(1e-3, 1.0), max_size=3)
 
 
-@many(max_examples=60)
+@settings(max_examples=60)
 @given(st.data())
 def test_and_over_random_timings_of_the_quadrotor(data: st.DataObject) -> None:
     sensors: dict[str, Any] = {"noise": data.draw(SENSORS), "quantisation": data.draw(SENSORS)}
     same(flight(data.draw(cases(**sensors, hold=data.draw(st.sampled_from(["zero", "first"]))))))
 
 
-@many(max_examples=20)
+@settings(max_examples=20)
 @given(st.data())
 def test_and_with_the_controllers_own_clock(data: st.DataObject) -> None:
     period = data.draw(st.sampled_from([0.01, 0.025, 0.1]))

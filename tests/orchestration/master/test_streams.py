@@ -27,7 +27,7 @@ def test_a_stream_with_a_number_is_the_spawned_child_of_that_number():
     assert Streams(7, {"connections.valve.loss": 3}).of("connections.valve", "loss").random(5).tolist() == expected
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(systems_with_more())
 def test_adding_a_component_and_lossy_connections_changes_no_number_of_the_others(pair):
     """When whom samples, what becomes of whose messages, and with which noise: outputs are constant."""

@@ -88,6 +88,7 @@ def test_what_is_right_is_not_refused(tmp_path: Path) -> None:
          "mm; ", "scale = 1000"),
         ('["tank.inflow"]', '["tank.inflw"]', "sources.rain.to: Tank has no input inflw; ", "inflow"),
         ('["tank.inflow"]', '["tank.level"]', "sources.rain.to: tank.level is an output; ", "an input: valve, inflow"),
+        ("peak =", "outcome =", "objectives.outcome: every run has a result of that name", "expected another"),
         ("max(tank.level)", "max(tank.levl)", "objectives.peak: there is no tank.levl; ", "did you mean tank.level"),
     ],
 )  # fmt: skip
