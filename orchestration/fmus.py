@@ -104,10 +104,16 @@ def out_of_date(names: Iterable[str], folder: Path, *, native: bool = False) -> 
 
 
 def build(
-    names: Iterable[str], folder: Path, announce: Callable[[str], None] | None = None, *, native: bool = False
+    names: Iterable[str],
+    folder: Path,
+    announce: Callable[[str], None] | None = None,
+    *,
+    native: bool = False,
+    systems: str | None = None,
 ) -> list[Path]:
     """Build FMUs of this project into `folder`; their paths. Else as `build_slaves`."""
-    return build_slaves([Target.parse(MODELS[name]) for name in names], folder, announce, native=native)
+    targets = [Target.parse(MODELS[name]) for name in names]
+    return build_slaves(targets, folder, announce, native=native, systems=systems)
 
 
 def slaves_of(folder: Path) -> list[Target]:
@@ -121,21 +127,26 @@ def slaves_of(folder: Path) -> list[Target]:
 
 
 def build_slaves(
-    targets: Sequence[Target], folder: Path, announce: Callable[[str], None] | None = None, *, native: bool = False
+    targets: Sequence[Target],
+    folder: Path,
+    announce: Callable[[str], None] | None = None,
+    *,
+    native: bool = False,
+    systems: str | None = None,
 ) -> list[Path]:
     """Build slaves whose modules are found in one place into `folder`, in a process of its own; the FMUs' paths.
 
-    `native`: without Python inside, by the C compiler of this machine.
+    `native`: without Python inside, by the C compiler of this machine, or for `systems`, `all` or some with commas.
     `announce` hears, a line each, of what could not be packed. Raises `QuadcosimError` with what the build said if
     it fails.
     """
     named = [f"{target.module}:{target.model}" for target in targets]
     root = targets[0].root if targets else None
     packing = _IN_C if native else _IN_PYTHON
+    options = [] if systems is None else ["--target", systems]
+    roots = [] if root is None else ["--root", root]
     done = subprocess.run(
-        subprocesses.command(
-            packing.module, folder.resolve(), *(() if root is None else ("--root", root)), *named
-        ),
+        subprocesses.command(packing.module, *options, folder.resolve(), *roots, *named),
         capture_output=True, text=True, env=subprocesses.environment(), check=False,
     )  # fmt: skip
     if done.returncode != 0:

@@ -5,23 +5,33 @@ Packing imports the slave, so it runs in a process of its own: `python -m fmu_ki
 
 from __future__ import annotations
 
+import functools
 import importlib
 import sys
 import types
+from collections.abc import Sequence
 from pathlib import Path
 
+from fmu_kit import packaging
 from fmu_kit.bundle import PackagingError, Target, bundled_sources, place
 from fmu_kit.documentation import Making
 from fmu_kit.model_description import GUID_PLACEHOLDER, to_xml
 from fmu_kit.native.c_code import c_code
-from fmu_kit.native.compiler import Mathematics, compiled, host_platform
+from fmu_kit.native.compiler import (
+    Mathematics,
+    compiled_for,
+    compiled_here,
+    host_platform,
+    library_path,
+    targets_of,
+)
 from fmu_kit.native.derivatives import with_tangents
 from fmu_kit.native.freshness import source_hash
 from fmu_kit.native.precomputing import precomputed
 from fmu_kit.native.symbols import TraceError
 from fmu_kit.native.tables import tables
 from fmu_kit.native.tracing import Program, trace
-from fmu_kit.packaging import SOURCE_HASH_FILE, described, licences_and_icon, main, put_guid, slave_class, written
+from fmu_kit.packaging import SOURCE_HASH_FILE, described, licences_and_icon, put_guid, slave_class, written
 
 _HERE = Path(__file__).parent
 MAIN = "fmi2.c"
@@ -32,10 +42,11 @@ _PYTHON = "python"
 """Where in the documentation the Python is from which the C was written."""
 
 
-def build(target: Target, folder: Path, *, mathematics: Mathematics = "own") -> Path:
+def build(target: Target, folder: Path, *, systems: Sequence[str] = (), mathematics: Mathematics = "own") -> Path:
     """Write `folder`/Model.fmu, replacing it in one go, and return its path.
 
-    With the mathematics of libm it has, on this machine, the bits of the slave in Python: for comparing the two.
+    With a library for each of `systems`, by zig; without any, for this machine, by its compiler. That one can have the
+    mathematics of libm: then it has, on this machine, the bits of the slave in Python, for comparing the two.
     """
     try:
         program = precomputed(trace(slave_class(target), modules_of(target)))
@@ -55,9 +66,11 @@ def build(target: Target, folder: Path, *, mathematics: Mathematics = "own") -> 
     described(files, target, making, to_xml(slave_class(target), [MAIN]))
     sources = c_sources(program, put_guid(files))
     files |= {f"sources/{name}": text for name, text in sources.items()}
-    platform = host_platform()
-    if platform is not None:
-        files[f"binaries/{platform}/{target.model}.so"] = compiled(sources, MAIN, mathematics=mathematics)
+    here = host_platform()
+    if not systems and here is not None:
+        files[library_path(here, target.model)] = compiled_here(sources, MAIN, mathematics=mathematics)
+    for system in systems:
+        files[library_path(system, target.model)] = compiled_for(system, sources, MAIN)
     return written(files, target, folder)
 
 
@@ -80,5 +93,18 @@ def _python_sources(target: Target) -> dict[str, str]:
     return {path: text for path, text in bundled_sources(target).items() if not path.startswith("pythonfmu")}
 
 
+def main(arguments: list[str]) -> int:
+    """`python -m fmu_kit.native.building [--target SYSTEM,…] FOLDER …`: as `fmu_kit.packaging`, for these systems."""
+    systems: tuple[str, ...] = ()
+    if arguments[:1] == ["--target"]:
+        _, text, *arguments = arguments
+        try:
+            systems = targets_of(text)
+        except PackagingError as error:
+            print(error, file=sys.stderr)
+            return 1
+    return packaging.main(arguments, functools.partial(build, systems=systems))
+
+
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:], build))
+    sys.exit(main(sys.argv[1:]))

@@ -73,16 +73,27 @@ def build(
         bool,
         typer.Option("--native", help="Without Python inside, by a C compiler; in the folder native/ unless told."),
     ] = False,
+    target: Annotated[
+        str | None,
+        typer.Option(
+            "--target",
+            metavar="all|linux64,win64,darwin64",
+            help="Systems to build --native for, by zig.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Build every slave that the modules of FOLDER define, each as an .fmu. Same sources give the same bytes."""
     from orchestration import fmus
     from orchestration.quadrotor.wiring import MODELS
 
+    if target is not None and not native:
+        raise UsageError("--target: expected --native with it; FMUs with Python inside are the same for all systems")
     where = out or ((folder or fmus.default_folder()) / (fmus.NATIVE if native else ""))
     if folder is None:
-        built = fmus.build(MODELS, where, say, native=native)
+        built = fmus.build(MODELS, where, say, native=native, systems=target)
     else:
-        built = fmus.build_slaves(fmus.slaves_of(folder), where, say, native=native)
+        built = fmus.build_slaves(fmus.slaves_of(folder), where, say, native=native, systems=target)
     for path in built:
         print(path)
 
