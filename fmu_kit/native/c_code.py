@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable
 
 from fmu_kit.native.statements import Block, Call, Function, Place, Statement, ends, symbols_of
-from fmu_kit.native.symbols import Symbol, TraceError, closure, value_of
+from fmu_kit.native.symbols import Symbol, TraceError, closure, node, value_of
 from fmu_kit.native.tracing import Program
 
 _BINARY = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
@@ -164,9 +164,26 @@ class _Writer:
                 c, a, b = map(self.value, args)
                 return f"({c} & {a}) | (q_not({c}) & {b})"
             return f"q_select({self.value(args[0])}, {self._lanes(args[1])}, {self._lanes(args[2])})"
+        if op in ("sin", "cos") and id(self._other_of_the_pair(symbol)) in self.used:
+            return f"{self._pair(args[0])}.{op}"
         if op in _CALLED:
             return f"{_CALLED[op]}({', '.join(map(self._lanes, args))})"
         raise TraceError(f"{op} of computed values cannot be written in C: expected math.floor(a / b) for a // b")
+
+    @staticmethod
+    def _other_of_the_pair(symbol: Symbol) -> Symbol:
+        """The cosine to a sine, the sine to a cosine."""
+        return node("cos" if symbol.op == "sin" else "sin", symbol.args, "real")
+
+    def _pair(self, angle: Symbol) -> str:
+        """The name of sine and cosine of an angle, computed together."""
+        both = node("sin and cos", (angle,), "real")
+        for scope in self.scopes:
+            if id(both) in scope:
+                return scope[id(both)]
+        name = self.scopes[-1][id(both)] = self._name("p")
+        self._line(f"const q_sines {name} = q_sin_cos({self._lanes(angle)});")
+        return name
 
     # -- statements ------------------------------------------------------------------------------------------
 
