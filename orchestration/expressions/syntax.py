@@ -118,6 +118,16 @@ def is_over_run(node: Call) -> bool:
     return node.function in OVER_RUN and not (node.function in ("min", "max") and len(node.arguments) > 1)
 
 
+def is_number(node: Node) -> bool:
+    """Whether an expression is a number by the way it is written, so that it can be no condition."""
+    match node:
+        case Operation(sign):
+            return sign in ("neg", *_BINARY.values())
+        case Call() | Sampled():
+            return True
+    return isinstance(node, Number) and node.value not in (0.0, 1.0)
+
+
 def children(node: Node) -> tuple[Node, ...]:
     """What an expression is made of."""
     if isinstance(node, Operation):

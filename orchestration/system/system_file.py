@@ -10,7 +10,7 @@ import pydantic
 
 from orchestration.documents import read_toml
 from orchestration.errors import UsageError
-from orchestration.expressions.syntax import parse
+from orchestration.expressions.syntax import is_number, parse
 from orchestration.system.model import (
     Align,
     Clock,
@@ -24,7 +24,8 @@ from orchestration.system.model import (
     Source,
     System,
 )
-from orchestration.system.paths import for_each
+from orchestration.system.paths import changed, for_each
+from orchestration.system.requirements import require
 
 
 class _Table(pydantic.BaseModel):
@@ -172,11 +173,22 @@ def system_from_tables(tables: Mapping[str, Any], folder: Path) -> System:
         streams=table.streams,
         operating_point=dict(_flattened(table.operating_point)),
     )
+    for name in system.optional:
+        require(
+            name in system.objectives, "optional", name, f"one of {', '.join(system.objectives) or 'no objectives'}"
+        )
+    try:
+        changed(system, system.operating_point)
+    except UsageError as error:
+        raise UsageError(f"operating_point: {error}") from error
     for place, text in expressions(system):
         try:
-            parse(text)
+            node = parse(text)
         except UsageError as error:
             raise UsageError(f"{place}: {error}") from error
+        if place.startswith("criterion."):
+            meant = parse(system.objectives.get(text.strip(), text))
+            require(not is_number(meant) and not is_number(node), place, text, "a condition, as in peak < 2.5")
     return system
 
 

@@ -139,6 +139,11 @@ def refusal(folder: Path, text: str) -> str:
         ("[sources.rain]", "[sources.tank]", "sources.tank = tank: expected another name than a component's"),
         ("good =", 'outcomes = ["a", "diverged"]\ngood =', "criterion.outcomes = 'a, diverged': expected two names"),
         ("[criterion]", '[streams]\n"connections.valve.los" = 1\n[criterion]', "streams = connections.valve.los: expe"),
+        ('"peak < 2.5"', '"peak"', "criterion.good = peak: expected a condition, as in peak < 2.5"),
+        ('"peak < 2.5"', '"2 * peak"', "criterion.good = 2 * peak: expected a condition"),
+        ('"abs(tank.level) > 100"', '"abs(tank.level)"', "criterion.diverged = abs(tank.level): expected a condition"),
+        ("seed = 3", 'seed = 3\noptional = ["peek"]', "optional = peek: expected one of peak, late"),
+        ("[criterion]", '[operating_point]\n"components.tnk.step" = 1\n[criterion]', "operating_point: components.tnk"),
         ("late =", '"a\\nb" =', "objectives = a\\nb: expected a name in printable characters"),
     ],
 )
