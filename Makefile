@@ -41,6 +41,7 @@ bench: .venv/.test
 	$(BIN)/python -m benchmarks.scaling
 	$(BIN)/python -m benchmarks.bench_studies
 	$(BIN)/python -m benchmarks.mathematics
+	$(BIN)/python -m benchmarks.native
 
 figures: .venv/.base
 	$(BIN)/python docs/make_figures.py
