@@ -23,6 +23,9 @@ from orchestration.interrupt import Interrupt, Interrupted, interrupts_held_back
 from orchestration.master import initial
 from orchestration.master.agenda import Agenda, FixedStep
 from orchestration.master.feeds import Feed
+from orchestration.master.condition import program
+from orchestration.master.engine import Engine
+from orchestration.master.engine import master as master_of
 from orchestration.master.master import Master
 from orchestration.master.recording import InMemory, Recorder
 from orchestration.master.sources import BuiltIn, Constant, Table, Values, WhiteNoise
@@ -95,7 +98,7 @@ class Simulation:
             units=self.units,
             divergence=master.divergence,
             interrupted_at=_seconds(master.interrupted_at),
-            provenance={**provenance(self.instances), "wall_time": time.perf_counter() - self.started},
+            provenance={**provenance(self.instances), "engine": master.engine, "wall_time": time.perf_counter() - self.started},
             warnings=(
                 *(warnings(self.asked, self.parameters) if isinstance(self.asked, Scenario) else ()),
                 *(warning for instance in self.instances.values() for warning in instance.warnings),
@@ -112,15 +115,17 @@ def run(
     recorder: Recorder | None = None,
     progress: Progress | None = None,
     announce: Announce | None = None,
+    engine: Engine | None = None,
 ) -> Result:
     """Run a system, or fly a scenario of the quadrotor, the paper's if none is given; divergence is a result.
 
-    Its rows are kept in memory unless a `recorder` takes them.
+    Its rows are kept in memory unless a `recorder` takes them. By the compiled loop where that can be had, unless an
+    `engine` is named; the result is the same.
 
     Raises `UsageError` for an FMU, variable or value that does not exist, `SimulatorError` if an FMU
     refuses a call for another reason than divergence, `RunInterrupted` after Ctrl-C.
     """
-    with prepared(asked or Scenario(), announce, recorder=recorder) as simulation:
+    with prepared(asked or Scenario(), announce, recorder=recorder, engine=engine) as simulation:
         simulation.master.initialise()
         simulation.master.run(progress=progress)
         return simulation.result()
@@ -133,6 +138,7 @@ def prepared(
     *,
     load: Loader = open_instance,
     recorder: Recorder | None = None,
+    engine: Engine | None = None,
 ) -> Iterator[Simulation]:
     """The FMUs of a system, built if need be, instantiated by `load` and with their parameters.
 
@@ -156,7 +162,9 @@ def prepared(
                 _set_clock(instances[name], component, models[name])
             sources = {name: _source(system, name, parameters, streams) for name in system.sources}
             signals = {name: system.sources[name].signals(name) for name in sources}
-            master = Master(
+            watched = (sources, signals, parameters)
+            master = master_of(
+                engine,
                 system,
                 instances,
                 agenda=Agenda(system, streams, fixed_steps(system, models)),
@@ -166,7 +174,8 @@ def prepared(
                 sources=[(signals[name], values) for name, values in sources.items()],
                 feeds=_feeds(system, sources, instances),
                 interrupted=lambda: interrupt.requested,
-                watch=lambda board: watch(system.criterion.diverged, board, sources, signals, parameters),
+                watch=lambda board: watch(system.criterion.diverged, board, *watched),
+                condition=lambda board: program(system.criterion.diverged, board, *watched),
                 first_exchange=initial.groups(system.connections, lambda name, output: models[name].depends_on(output)),
             )
         yield Simulation(
@@ -309,19 +318,8 @@ def _feeds(system: System, sources: Mapping[str, Values], instances: Mapping[str
             places = [i for i, end in enumerate(ends) if component_of(end) == component]
             into: Floats = np.zeros(len(places))
             write = instances[component].writer([variable_of(ends[i]) for i in places], into)
-            feeds.append(Feed(component, _picked(values, places, len(ends)), into, write))
+            feeds.append(Feed(component, values, places, into, write, count=len(ends)))
     return feeds
-
-
-def _picked(values: Values, places: Sequence[int], count: int) -> Callable[[float], Sequence[float]]:
-    if len(places) == count:
-        return values.at
-
-    def at(t: float) -> list[float]:
-        found = values.at(t)
-        return [found[i] for i in places]
-
-    return at
 
 
 def fixed_steps(system: System, models: Mapping[str, Model]) -> dict[str, FixedStep]:

@@ -40,9 +40,9 @@ class Fmi2Instance(NativeInstance):
     def step(self, t: float, h: float) -> None:
         """Advance from `t` to `t + h` seconds."""
         if self._do_step(self._component, t, h, True) > WARNING:
-            raise self._failure("fmi2DoStep")
+            raise self.failure("fmi2DoStep")
         if self._messages:
-            self._collect_warnings()
+            self.collect_warnings()
 
     def _access(self, action: str, type: str) -> str:
         return f"fmi2{action}{'Integer' if type == 'Enumeration' else type}"

@@ -44,7 +44,8 @@ class Fmi3Instance(NativeInstance):
         self._do_step = fmu.dll.fmi3DoStep
         self._event, self._ends, self._early = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
         self._reached = ctypes.c_double()
-        self._said = [ctypes.byref(x) for x in (self._event, self._ends, self._early, self._reached)]
+        self.said = (self._event, self._ends, self._early, self._reached)
+        self._said = [ctypes.byref(x) for x in self.said]
         return fmu
 
     def _log(self, environment: Any, status: int, category: bytes | None, message: bytes | None) -> None:
@@ -56,16 +57,17 @@ class Fmi3Instance(NativeInstance):
     def step(self, t: float, h: float) -> None:
         """Advance from `t` to `t + h` seconds."""
         if self._do_step(self._component, t, h, True, *self._said) > WARNING:
-            raise self._failure("fmi3DoStep")
+            raise self.failure("fmi3DoStep")
         if self._event or self._ends or self._early:
-            self._expect_whole_step(t + h)
+            self.expect_whole_step(t + h)
         if self._messages:
-            self._collect_warnings()
+            self.collect_warnings()
 
-    def _expect_whole_step(self, end: float) -> None:
+    def expect_whole_step(self, end: float) -> None:
+        """Raise `SimulatorError` if the last step did not come to `end` [s]."""
         what = "ends the run" if self._ends else "asks for event mode" if self._event else "returns early"
         if self._ends.value or self._event.value or self._early.value:
-            raise self._failure("fmi3DoStep", f"the FMU {what} at {self._reached.value:g} s, before {end:g} s")
+            raise self.failure("fmi3DoStep", f"the FMU {what} at {self._reached.value:g} s, before {end:g} s")
 
     def _access(self, action: str, type: str) -> str:
         return f"fmi3{action}{'Int64' if type == 'Enumeration' else type}"

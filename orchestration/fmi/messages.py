@@ -23,6 +23,25 @@ Message: TypeAlias = tuple[int, bytes | None, bytes]
 
 WARNING: int = fmi2.fmi2Warning
 
+
+class Messages(list[Message]):
+    """Those that have not been heard, and how many they are where C sees it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.count = ctypes.c_int64(0)
+
+    def append(self, message: Message) -> None:
+        """One more."""
+        super().append(message)
+        self.count.value = len(self)
+
+    def clear(self) -> None:
+        """They have been heard."""
+        super().clear()
+        self.count.value = 0
+
+
 _environments = itertools.count(1)
 _by_environment: dict[int, list[Message]] = {}
 _by_name: dict[bytes, list[Message]] = {}

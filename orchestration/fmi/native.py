@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
+from weakref import WeakKeyDictionary
 
 import fmpy
 import numpy as np
@@ -19,7 +20,7 @@ from orchestration import scratch
 from orchestration.errors import QuadcosimError, RefusedValueError, SimulatorError, UsageError
 from orchestration.fmi import pythonfmu
 from orchestration.fmi.instance import Instance
-from orchestration.fmi.messages import WARNING, Message, words
+from orchestration.fmi.messages import WARNING, Messages, words
 from orchestration.fmi.model import Variable, read_model
 from orchestration.fmi.values import Value, number_of, same, taken
 from orchestration.scratch import Scratch
@@ -31,7 +32,7 @@ Numbers = npt.NDArray[Any]
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Part:
+class Part:
     """Variables that one call transfers: all scalars of a type, or one array."""
 
     type: str
@@ -42,6 +43,16 @@ class _Part:
     """places in the names that were asked for"""
     places: npt.NDArray[np.int64]
     """of the same in the buffer"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Call:
+    """One call of a transfer, for a loop that makes it without Python."""
+
+    function: str
+    part: Part
+    in_place: bool
+    """whether the buffer is the array of the transfer"""
 
 
 class NativeInstance(Instance):
@@ -57,9 +68,10 @@ class NativeInstance(Instance):
         self.name = instance_name
         self.warnings: list[str] = []
         self.failed = False
-        self._messages: list[Message] = []
+        self._messages = Messages()
         self._given: dict[str, Value] = {}  # until initialisation ends, as then the FMU has taken all of it
         self._arrays: dict[int, Numbers] = {}  # what was last set of arrays, by reference: a call sets a whole one
+        self._calls: WeakKeyDictionary[Transfer, tuple[Call, ...]] = WeakKeyDictionary()
         self._folder: Scratch | None = None
         self.model = read_model(path)
         self._expect_supported()
@@ -85,6 +97,8 @@ class NativeInstance(Instance):
     """by type, what holds its values"""
     counts_values: ClassVar[bool]
     """whether a call says how many values it transfers beside how many references: arrays have more"""
+    said: tuple[Any, ...] = ()
+    """where an FMU of FMI 3.0 says how a step has ended"""
     state_calls: tuple[str, str, str, str, str]
     """fmpy's names of the calls that get, serialise, free, deserialise and set a state"""
 
@@ -131,7 +145,7 @@ class NativeInstance(Instance):
         """End initialisation."""
         self._call("exitInitializationMode")
         self._given.clear()
-        self._collect_warnings()
+        self.collect_warnings()
 
     def reset(self) -> None:
         """Back to the state after instantiation, all parameters at their defaults."""
@@ -176,14 +190,14 @@ class NativeInstance(Instance):
         parts = self._parts(names, into)
         calls = [(self._transfer(self._access("Get", x.type), x.references, x.buffer), x) for x in parts]
         if len(parts) == 1 and parts[0].buffer is into:
-            return calls[0][0]
+            return self._known(calls[0][0], "Get", parts, into)
 
         def read() -> None:
             for call, part in calls:
                 call()
                 into[part.asked] = part.buffer[part.places]
 
-        return read
+        return self._known(read, "Get", parts, into)
 
     def writer(self, names: Sequence[str], source: Floats) -> Transfer:
         """A call that sets the variables `names` from `source`.
@@ -194,7 +208,7 @@ class NativeInstance(Instance):
         parts = self._parts(names, source, shared=self._arrays)
         calls = [(self._transfer(self._access("Set", x.type), x.references, x.buffer), x) for x in parts]
         if len(parts) == 1 and parts[0].buffer is source:
-            return calls[0][0]
+            return self._known(calls[0][0], "Set", parts, source)
         converters = [self._converter([names[i] for i in part.asked], part.buffer.dtype) for part in parts]
 
         def write() -> None:
@@ -202,7 +216,7 @@ class NativeInstance(Instance):
                 part.buffer[part.places] = converted(source[part.asked])
                 call()
 
-        return write
+        return self._known(write, "Set", parts, source)
 
     def set(self, name: str, value: Value) -> None:
         """Set one variable, converted to its type; raises `UsageError` for a value it cannot take."""
@@ -225,13 +239,41 @@ class NativeInstance(Instance):
         self.reader((name,), value)()
         return bool(value[0]) if variable.kind == "Boolean" else float(value[0])
 
+    # -- for a loop that makes the calls without Python ------------------------------------------------------------
+
+    def calls_of(self, transfer: Transfer) -> Sequence[Call]:
+        """What a call of `reader` or `writer` does."""
+        return self._calls[transfer]
+
+    def address(self, function: str) -> int:
+        """Where a function of the FMU is in memory."""
+        return ctypes.cast(self._fmu.dll[function], ctypes.c_void_p).value or 0
+
+    @property
+    def handle(self) -> int:
+        """The instance, as its functions are given it."""
+        return self._component.value or 0
+
+    @property
+    def messages_waiting(self) -> ctypes.c_int64:
+        """How many messages have not been heard."""
+        return self._messages.count
+
+    def _known(self, transfer: Transfer, action: str, parts: Sequence[Part], array: Floats) -> Transfer:
+        self._calls[transfer] = tuple(
+            Call(function=self._access(action, part.type), part=part, in_place=part.buffer is array) for part in parts
+        )
+        return transfer
+
+    # -- inside --------------------------------------------------------------------------------------------------
+
     def _transfer(self, function: str, references: Sequence[int], values: Numbers) -> Transfer:
         """A call of a function of `_access` that transfers `values`."""
         of = (ctypes.c_uint32 * len(references))(*references)
         at = (np.ctypeslib.as_ctypes_type(values.dtype) * len(values)).from_buffer(values)  # type: ignore[arg-type]
         counts = (ctypes.c_size_t(len(values)),) if self.counts_values else ()
         arguments = (self._component, of, ctypes.c_size_t(len(references)), at, *counts)
-        call, failure = self._fmu.dll[function], self._failure  # without the types by which ctypes would convert
+        call, failure = self._fmu.dll[function], self.failure  # without the types by which ctypes would convert
 
         def transfer() -> None:
             if call(*arguments) > WARNING:
@@ -245,7 +287,7 @@ class NativeInstance(Instance):
         else:
             self.writer((variable.name,), np.array([float(value)]))()
 
-    def _parts(self, names: Sequence[str], array: Floats, shared: dict[int, Numbers] | None = None) -> list[_Part]:
+    def _parts(self, names: Sequence[str], array: Floats, shared: dict[int, Numbers] | None = None) -> list[Part]:
         """What is called to transfer `names`; the array itself is transferred where it is as it is to be.
 
         Arrays lie in `shared`, from their start values on, since whoever sets an element sets them all.
@@ -261,7 +303,7 @@ class NativeInstance(Instance):
 
     def _part(
         self, array: Floats, group: list[tuple[int, Variable]], reference: int | None, shared: dict[int, Numbers] | None
-    ) -> _Part:
+    ) -> Part:
         first = group[0][1]
         asked = np.array([i for i, _ in group])
         if reference is None:
@@ -279,7 +321,7 @@ class NativeInstance(Instance):
             buffer = np.zeros(length, dtype=self.stored[first.type])
         else:
             buffer = shared.setdefault(reference, self._start_of(first))
-        return _Part(type=first.type, references=references, buffer=buffer, asked=asked, places=places)
+        return Part(type=first.type, references=references, buffer=buffer, asked=asked, places=places)
 
     def _start_of(self, element: Variable) -> Numbers:
         found = np.zeros(element.length, dtype=self.stored[element.type])
@@ -306,14 +348,12 @@ class NativeInstance(Instance):
 
         return whole
 
-    # -- inside --------------------------------------------------------------------------------------------------
-
     def _call(self, method: str, *args: Any, **kwargs: Any) -> Any:
         self._expect_alive()
         try:
             return getattr(self._fmu, method)(*args, **kwargs)
         except FMICallException as error:
-            raise self._failure(error.function) from None
+            raise self.failure(error.function) from None
 
     def _expect_alive(self) -> None:
         if self.failed:
@@ -326,13 +366,14 @@ class NativeInstance(Instance):
                 "get, set and serialise it"
             )
 
-    def _collect_warnings(self) -> None:
+    def collect_warnings(self) -> None:
+        """Hear what the FMU has logged; of it, keep the warnings."""
         for status, _, message in self._messages:
             if status == WARNING:
                 self.warnings.append(f"{self.name}: {message.decode('utf-8', 'replace')}")
         self._messages.clear()
 
-    def _failure(self, function: str, otherwise: str = "no message") -> SimulatorError:
+    def failure(self, function: str, otherwise: str = "no message") -> SimulatorError:
         """The error for a call that failed, in the words that the FMU logged."""
         self.failed = True
         diverged = [m for m in self._messages if m[0] > WARNING and m[1] == DIVERGENCE_CATEGORY]

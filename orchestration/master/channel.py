@@ -27,20 +27,25 @@ class Channel:
     ) -> None:
         self.received = received
         """what the receiver has been told, in place"""
-        self._row, self._places, self._write = row, places, write
-        self._sigma = _of_each(connection, connection.noise)
-        self._quantum = _of_each(connection, connection.quantisation)
+        self._row, self._places = row, places
+        self.write = write
+        """sets the receiver's inputs"""
+        self._sigma = of_each(connection, connection.noise)
+        self._quantum = of_each(connection, connection.quantisation)
         self._noisy = bool(self._sigma.any())
         self._rounded = np.flatnonzero(self._quantum)
         self._quantum = self._quantum[self._rounded]
         self._rounds = len(self._rounded) > 0
         self._noise: Floats = np.zeros(len(connection.start))
-        self._stream = noise
+        self.stream = noise
+        """of the noise"""
         self._scale, self._offset = connection.scale, connection.offset
         self._plain = connection.scale == 1.0 and connection.offset == 0.0
         self._extrapolates = connection.hold == "first"
-        self._in_flight: dict[int, Floats] = {}
-        self._applied: list[tuple[int, Floats]] = []  # the last two, with their times, of a first-order hold
+        self.in_flight: dict[int, Floats] = {}
+        """messages on their way"""
+        self.applied: list[tuple[int, Floats]] = []
+        """the last two, with their times [ns], of a first-order hold"""
         self._sent: Floats | None = None
         if isinstance(places, slice) and self._plain and not (self._noisy or self._rounds or self._extrapolates):
             self._sent = row[places]  # a view: what is sent at any time, and arrives as it is
@@ -50,11 +55,11 @@ class Channel:
         self.received[:] = self._row[self._places]
         if not self._plain:
             self._convert(self.received)
-        self._write()
+        self.write()
 
     def start(self) -> None:
         """What initialisation exchanged is the first that was applied."""
-        self._applied = [(0, self.received.copy())]
+        self.applied = [(0, self.received.copy())]
 
     def take(self) -> Floats:
         """The sender's values as a message carries them."""
@@ -77,72 +82,72 @@ class Channel:
             self.skip()
         elif self._sent is not None:
             np.copyto(self.received, self._sent)
-            self._write()
+            self.write()
         else:
             self.apply(self.take(), time)
 
     def skip(self) -> None:
         """Noise is drawn for each variable of each message, lost or not, so that nothing shifts another's numbers."""
         if self._noisy:
-            self._stream.standard_normal(out=self._noise)
+            self.stream.standard_normal(out=self._noise)
 
     def send(self, k: int, *, lost: bool) -> None:
         """Keep message `k` until it arrives."""
         if lost:
             self.skip()
         else:
-            self._in_flight[k] = self.take()
+            self.in_flight[k] = self.take()
 
     def deliver(self, k: int, time: int) -> None:
         """Message `k` arrives at `time` [ns]."""
-        self.apply(self._in_flight.pop(k), time)
+        self.apply(self.in_flight.pop(k), time)
 
     def apply(self, value: Floats, time: int) -> None:
         """Set the receiver's inputs; of several messages at one time, the last one stays."""
         if self._extrapolates:
-            before = [past for past in self._applied if past[0] < time]
-            self._applied = [*before[-1:], (time, value)]
+            before = [past for past in self.applied if past[0] < time]
+            self.applied = [*before[-1:], (time, value)]
         self.received[:] = value
-        self._write()
+        self.write()
 
     def extrapolate(self, time: int) -> None:
         """First-order hold: the line through the last two that arrived, held until the next halt of the receiver."""
-        if len(self._applied) < 2:
+        if len(self.applied) < 2:
             return
-        (t0, before), (t1, last) = self._applied
+        (t0, before), (t1, last) = self.applied
         if t0 == t1 or time == t1:
             return
         share = (time - t1) / (t1 - t0)
         self.received[:] = last + share * (last - before)
-        self._write()
+        self.write()
 
     def held(self) -> list[Floats]:
         """The values that what it will pass on depends on, in place: received, on their way, and of the hold."""
-        past = [value for _, value in self._applied] if self._extrapolates else []
-        return [self.received, *self._in_flight.values(), *past]
+        past = [value for _, value in self.applied] if self._extrapolates else []
+        return [self.received, *self.in_flight.values(), *past]
 
     def state(self) -> dict[str, Any]:
         """All that what it will pass on depends on, in JSON types."""
         return {
             "received": self.received.tolist(),
-            "in_flight": [(k, value.tolist()) for k, value in self._in_flight.items()],
-            "applied": [(time, value.tolist()) for time, value in self._applied],
-            "noise": self._stream.bit_generator.state,
+            "in_flight": [(k, value.tolist()) for k, value in self.in_flight.items()],
+            "applied": [(time, value.tolist()) for time, value in self.applied],
+            "noise": self.stream.bit_generator.state,
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Continue where `state` was taken."""
         self.received[:] = state["received"]
-        self._in_flight = {k: np.array(value) for k, value in state["in_flight"]}
-        self._applied = [(time, np.array(value)) for time, value in state["applied"]]
-        self._stream.bit_generator.state = state["noise"]
+        self.in_flight = {k: np.array(value) for k, value in state["in_flight"]}
+        self.applied = [(time, np.array(value)) for time, value in state["applied"]]
+        self.stream.bit_generator.state = state["noise"]
 
     def _convert(self, value: Floats) -> None:
         value *= self._scale
         value += self._offset
 
 
-def _of_each(connection: Connection, values: Mapping[str, float]) -> Floats:
+def of_each(connection: Connection, values: Mapping[str, float]) -> Floats:
     """One value for each variable of a message, 0 where none is given; a vector's name stands for its components."""
     result = np.zeros(len(connection.start))
     for name, value in values.items():

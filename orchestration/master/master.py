@@ -8,7 +8,7 @@ delivered; the row is recorded. So a row is the value just after its instant, an
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -78,6 +78,9 @@ class _Body(_Worked):
 class Master:
     """One run of a system whose components are instantiated and have their parameters."""
 
+    engine: ClassVar[str] = "python"
+    """By what it passes through instants"""
+
     def __init__(
         self,
         system: System,
@@ -139,7 +142,7 @@ class Master:
         So it is at the first instant after an interruption, but not at its end.
         """
         over = self.divergence is not None or self._run(pause_at, progress)
-        if over and (self._rows or self._events or not self._handed_over):
+        if over and (self._is_pending() or not self._handed_over):
             self._hand_over()
         return over
 
@@ -182,7 +185,7 @@ class Master:
 
     def pending(self) -> Chunk:
         """What was recorded since the last chunk was handed over; messages that go out later are left out."""
-        rows = np.frombuffer(bytes(self._rows), dtype=np.float64).reshape(-1, len(self.board.columns))
+        rows = self._pending_rows()
         events, _ = self._past_and_later()
         return Chunk(
             columns=self.columns,
@@ -198,37 +201,37 @@ class Master:
     def state(self) -> dict[str, Any]:
         """All that the rest of the run depends on, and what the recorder does not have yet, but for `saved`."""
         return {
-            "instants": self._agenda.count,
+            "instants": self._passed(),
             "now": self.now,
             "reached": {name: self._bodies[self._names.index(name)].now for name in self._plan.continuous},
             "steps": self.steps,
             "row": self.board.row.tolist(),
             "handed_over": self._handed_over,
             "channels": [channel.state() for channel in self._channels],
-            "events": list(self._events),
+            "events": self._pending_events().ravel().tolist(),
         }
 
     def saved(self) -> dict[str, bytes]:
         """The states of the components, and the rows that the recorder does not have yet, as bytes."""
         return {
             **{name: simulator.save() for name, simulator in self._simulators.items()},
-            ROWS_PENDING: bytes(self._rows),
+            ROWS_PENDING: self._pending_rows().tobytes(),
         }
 
     def restore(self, state: Mapping[str, Any], saved: Mapping[str, bytes]) -> None:
         """Continue where `state` and `saved` were taken, instead of `initialise`."""
         for name, simulator in self._simulators.items():
             simulator.restore(saved[name])
-        for _ in range(state["instants"]):  # the agenda is the same again: it follows from the system and the seed
-            next(self._agenda)
+        self._pass_over(state["instants"])
         self.now, self.steps = state["now"], state["steps"]
         for name, time in state["reached"].items():
             self._bodies[self._names.index(name)].now = time
         self.board.row[:] = state["row"]
-        self._rows, self._handed_over = bytearray(saved[ROWS_PENDING]), state["handed_over"]
+        self._handed_over = state["handed_over"]
+        self._keep_rows(saved[ROWS_PENDING])
         for channel, content in zip(self._channels, state["channels"], strict=True):
             channel.restore(content)
-        self._events = list(state["events"])
+        self._keep_events(np.array(state["events"], dtype=np.int64).reshape(-1, 4))
 
     # -- what happens at an instant ------------------------------------------------------------------------------
 
@@ -356,13 +359,13 @@ class Master:
 
     def _hand_over(self) -> None:
         self.recorder.take(self.pending())
-        self._events = self._past_and_later()[1].ravel().tolist()
-        self._rows.clear()
+        self._keep_events(self._past_and_later()[1])
+        self._keep_rows(b"")
         self._handed_over = True
 
     def _past_and_later(self) -> tuple[Integers, Integers]:
         """The events up to now, and those of messages that go out later."""
-        table = np.fromiter(self._events, np.int64, len(self._events)).reshape(-1, 4)
+        table = self._pending_events()
         past = table[:, 0] <= self.now
         return table[past], table[~past]
 
@@ -372,12 +375,39 @@ class Master:
             raise error
         self.divergence, self.divergence_time = str(error), self.now
         self._drop_later_events()
-        if not self._rows and not self._handed_over:
+        if not len(self._pending_rows()) and not self._handed_over:
             self._record(self.now)
 
     def _drop_later_events(self) -> None:
         """In Jacobi order a message is written down before it goes out; after the end none does."""
-        self._events = self._past_and_later()[0].ravel().tolist()
+        self._keep_events(self._past_and_later()[0])
+
+    # -- what is not handed over yet -----------------------------------------------------------------------------
+
+    def _is_pending(self) -> bool:
+        return bool(self._rows or self._events)
+
+    def _pending_rows(self) -> Floats:
+        """Of the board, shape (n, number of its columns)."""
+        return np.frombuffer(bytes(self._rows), dtype=np.float64).reshape(-1, len(self.board.columns))
+
+    def _pending_events(self) -> Integers:
+        """As the table of `Events`."""
+        return np.fromiter(self._events, np.int64, len(self._events)).reshape(-1, 4)
+
+    def _keep_rows(self, rows: bytes) -> None:
+        self._rows = bytearray(rows)
+
+    def _keep_events(self, events: Integers) -> None:
+        self._events = events.ravel().tolist()
+
+    def _pass_over(self, instants: int) -> None:
+        for _ in range(instants):  # the agenda is the same again: it follows from the system and the seed
+            next(self._agenda)
+
+    def _passed(self) -> int:
+        """How many instants are past."""
+        return self._agenda.count
 
     # -- initialisation ------------------------------------------------------------------------------------------
 

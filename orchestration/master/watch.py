@@ -27,8 +27,8 @@ def watch(
         return lambda t: None
     node = parse(condition)
     wanted = set(names(node))
-    columns = [c for c in board.columns if c != "time" and _is_wanted(c, wanted)]
-    used = [name for name, signals in signals_of.items() if any(_is_wanted(signal, wanted) for signal in signals)]
+    columns = [c for c in board.columns if c != "time" and is_wanted(c, wanted)]
+    used = [name for name, signals in signals_of.items() if any(is_wanted(signal, wanted) for signal in signals)]
     constants = [name for name in numbers if name in wanted]
     order = ["time", *columns, *(signal for name in used for signal in signals_of[name]), *constants]
     places = {name: i for i, name in enumerate(order)}
@@ -53,7 +53,8 @@ def watch(
     return look
 
 
-def _is_wanted(signal: str, wanted: set[str]) -> bool:
+def is_wanted(signal: str, wanted: set[str]) -> bool:
+    """Whether a signal is one of the names of an expression, or a component of a vector of them."""
     return signal in wanted or signal.rpartition(".")[0] in wanted
 
 

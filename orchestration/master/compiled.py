@@ -1,0 +1,323 @@
+"""The master with its loop in C: the same rows, events and ends to the byte, many times as fast.
+
+All that a run needs lies in arrays that C and Python share; what begins, ends, pauses and explains a run is `Master`.
+C passes through some instants at a time, so that an interruption is heard in between.
+"""
+
+import ctypes
+import time as clock
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from orchestration.errors import QuadcosimError, SimulatorError
+from orchestration.fmi.native import NativeInstance
+from orchestration.master import structures as c
+from orchestration.master.board import Board
+from orchestration.master.condition import Step
+from orchestration.master.loop import library
+from orchestration.master.master import Diverged, Master
+from orchestration.master.memory import Memory
+from orchestration.master.recording import EVENTS, ROWS, Integers
+from orchestration.master.schedule import Schedule, Schedules
+from orchestration.master.sources import Values
+from orchestration.simulator import Floats, Simulator
+from orchestration.system.model import System
+from orchestration.system.times import NANOSECONDS
+
+INSTANTS = 2**13
+"""Of one schedule"""
+SLICE = 0.05
+"""[s] that C may be away for, about"""
+AT_END, FULL, PAUSED, FAILED, REFUSED, EARLY, NOT_FINITE, DIVERGED = range(8)
+"""Why it comes back"""
+_EXACT = 2**53
+"""Up to here a float holds every whole number"""
+
+Condition = Callable[[Board], tuple[Sequence[Step] | None, Sequence[Values]]]
+"""The program of what is watched, None if there is none, and the sources in it"""
+
+
+def obstacle(simulators: Mapping[str, Simulator], stop: int) -> str | None:
+    """What stands in the way of the compiled loop for a run up to `stop` [ns], in a line; None: it can be had."""
+    for name, simulator in simulators.items():
+        if not isinstance(simulator, NativeInstance):
+            return f"components.{name} is not called in this process"
+    if stop >= _EXACT:
+        return f"stop_time is longer than {_EXACT / NANOSECONDS:.0f} s"
+    try:
+        library()
+    except QuadcosimError as error:
+        return str(error)
+    return None
+
+
+class CompiledMaster(Master):
+    """One run of a system in whose way there is no `obstacle`."""
+
+    engine = "compiled"
+
+    def __init__(
+        self, system: System, simulators: Mapping[str, NativeInstance], *, condition: Condition, **others: Any
+    ) -> None:
+        super().__init__(system, simulators, **others)
+        self._schedules = Schedules(self._agenda)
+        self._schedule: Schedule | None = None
+        self._before = 0  # instants of schedules that are past
+        self._pace = 64  # instants of a slice
+        self._shared: list[_OnTheirWay] = []
+        self._fly = library()
+        self._failure: BaseException | None = None
+        self._memory = memory = Memory(list(simulators.values()))
+        self._row_table: Floats = np.empty((ROWS, len(self.board.columns)))
+        self._event_table: Integers = np.empty((0, 4), dtype=np.int64)
+        program, watched = condition(self.board)
+        self._watched = list(watched)
+        self._feed_table = (c.Feed * len(self._feeds))(
+            *(memory.feed(self._names.index(feed.component), feed) for feed in self._feeds)
+        )
+        self._channel_table = (c.Channel * len(self._channels))(*map(self._channel_of, range(len(self._channels))))
+        self._components = (c.Component * len(self._names))(*map(self._component_of, range(len(self._names))))
+        self._loop = c.Loop(
+            components=self._components,
+            channels=self._channel_table,
+            feeds=self._feed_table,
+            tasks=memory.indices(list(self._tasks)),
+            some_by_themselves=self._some_by_themselves,
+            settles=self._settling,
+            stop=self._agenda.stop,
+            row=c.address(self.board.row),
+            rows=c.address(self._row_table),
+            width=len(self.board.columns),
+            row_limit=ROWS,
+            event_limit=EVENTS,
+            look=c.Look(self._look_for_c),
+            collect=c.Collect(lambda index: memory.instances[index].collect_warnings()),
+        )
+        if program is not None:
+            self._loop.condition = (c.Operation * len(program))(*(c.Operation(*step) for step in program))
+            self._loop.condition_length = len(program)
+
+    # -- a run ---------------------------------------------------------------------------------------------------
+
+    def _run(self, pause_at: int | None, progress: Callable[[float], None] | None) -> bool:
+        stop = self._agenda.stop
+        self._loop.pause_at = stop if pause_at is None else pause_at
+        self._share()
+        try:
+            while self._has_instants():
+                code = self._slice()
+                if code == FULL:
+                    self._hand_over()
+                elif code not in (AT_END, PAUSED):
+                    self._fail(code)
+                if self._interrupted() and self.now < stop:
+                    self.interrupted_at = self.now
+                    self._drop_later_events()
+                    return True
+                if code == PAUSED:
+                    return False
+                if progress is not None:
+                    progress(self.now / stop)
+        except (Diverged, SimulatorError) as error:
+            self._diverged(error)
+        finally:
+            self._take_back()
+        if progress is not None:
+            progress(1.0)
+        return True
+
+    def _has_instants(self) -> bool:
+        """Whether there is another instant; it is then in the schedule that C has."""
+        if self._schedule is not None:
+            if self._loop.at < len(self._schedule):
+                return True
+            self._take_back()
+            self._before += len(self._schedule)
+        if self._schedules.error is not None:
+            raise self._schedules.error
+        self._schedule, self._loop.at = self._schedules.following(INSTANTS), 0
+        if len(self._schedule) == 0 and self._schedules.error is not None:
+            raise self._schedules.error
+        self._share()
+        return len(self._schedule) > 0
+
+    def _slice(self) -> int:
+        """Have C pass through instants for about `SLICE`; the code says why it has come back."""
+        loop, begin = self._loop, clock.perf_counter()
+        assert self._schedule is not None
+        code = int(self._fly(ctypes.addressof(loop), min(len(self._schedule), loop.at + self._pace)))
+        share = SLICE / max(clock.perf_counter() - begin, 1e-9)
+        self._pace = min(max(1, int(self._pace * min(share, 8.0))), INSTANTS)
+        self.now, self.steps = loop.now, loop.steps
+        return code
+
+    def _fail(self, code: int) -> None:
+        """Raise what C has come back with."""
+        index, part = self._loop.component, self._loop.failed
+        instance = self._memory.instances[index]
+        function, transfer = self._memory.calls[ctypes.addressof(part.contents)] if part else ("", None)
+        if code == FAILED:
+            raise instance.failure(function or f"fmi{instance.model.version}DoStep")
+        if code == REFUSED and transfer is not None:
+            transfer()
+        elif code == EARLY:
+            instance.expect_whole_step(self._loop.end)
+        elif code == NOT_FINITE:
+            worked = self._bodies[index] if index in self._bodies else self._tasks[index]
+            worked.expect_finite(self.now / NANOSECONDS)
+        elif self._failure is not None:
+            raise self._failure
+        raise AssertionError(f"the compiled loop has ended with {code}, and Python sees no reason")
+
+    def _look_for_c(self, t: float) -> int:
+        """Whether the run has diverged; no exception goes through C."""
+        try:
+            self._look(t)
+        except BaseException as error:
+            self._failure = error
+            return 1
+        return 0
+
+    # -- what is not handed over yet -----------------------------------------------------------------------------
+
+    def _is_pending(self) -> bool:
+        return bool(self._loop.row_count or self._loop.event_count)
+
+    def _pending_rows(self) -> Floats:
+        return self._row_table[: self._loop.row_count]
+
+    def _pending_events(self) -> Integers:
+        return self._event_table[: self._loop.event_count]
+
+    def _keep_rows(self, rows: bytes) -> None:
+        table = np.frombuffer(rows, dtype=np.float64).reshape(-1, self._row_table.shape[1])
+        self._row_table[: len(table)] = table
+        self._loop.row_count = len(table)
+
+    def _keep_events(self, events: Integers) -> None:
+        if len(events) > len(self._event_table):
+            self._event_table = events.copy()
+        self._event_table[: len(events)] = events
+        self._loop.event_count = len(events)
+
+    def _record(self, time: int) -> None:
+        self.board.row[0] = time / NANOSECONDS
+        self._keep_rows(self.board.row.tobytes())
+
+    def _pass_over(self, instants: int) -> None:
+        super()._pass_over(instants)
+        self._before = instants
+
+    def _passed(self) -> int:
+        return self._before + (0 if self._schedule is None else self._loop.at)
+
+    # -- between Python and C ------------------------------------------------------------------------------------
+
+    def _share(self) -> None:
+        """All that a schedule needs goes to where C has it, from the next instant on."""
+        loop, schedule = self._loop, self._schedule
+        if schedule is None:
+            return
+        for name in c.SCHEDULE:
+            setattr(loop.schedule, name, c.address(getattr(schedule, name)))
+        self._make_room(schedule)
+        self._share_sources(schedule.times[:-1] / NANOSECONDS)
+        for index, body in self._bodies.items():
+            self._components[index].now = body.now
+        loop.now, loop.steps = self.now, self.steps
+        self._shared = [
+            _OnTheirWay(channel, self._channel_table[i], *schedule.of(i, int(loop.at), self._table(i)))
+            for i, channel in enumerate(self._channels)
+        ]
+
+    def _take_back(self) -> None:
+        """What Python keeps of a run is as C has left it."""
+        for each in self._shared:
+            each.take_back()
+        self._shared = []
+        for index, body in self._bodies.items():
+            body.now = self._components[index].now
+
+    def _make_room(self, schedule: Schedule) -> None:
+        """For the events of any instant beside those that make a chunk whole."""
+        most = schedule.most_events()
+        loop, count = self._loop, self._loop.event_count
+        if len(self._event_table) < max(EVENTS, count) + most:
+            table: Integers = np.empty((max(EVENTS, count) + 2 * most, 4), dtype=np.int64)
+            table[:count] = self._event_table[:count]
+            self._event_table = table
+        self._arrived_table: Integers = np.empty((most, 4), dtype=np.int64)
+        loop.events, loop.arrived = c.address(self._event_table), c.address(self._arrived_table)
+
+    def _share_sources(self, t: Floats) -> None:
+        self._fed = [np.ascontiguousarray(feed.each(t), dtype=np.float64) for feed in self._feeds]
+        for place, values in enumerate(self._fed):
+            self._feed_table[place].values = c.address(values)
+        if self._watched:
+            self._seen = np.ascontiguousarray(np.column_stack([values.over(t) for values in self._watched]))
+            self._loop.watched, self._loop.watched_size = c.address(self._seen), self._seen.shape[1]
+
+    def _table(self, index: int) -> str:
+        """Where a schedule has the messages of a connection, each when it takes its values."""
+        if index in self._plan.posted:
+            return "posted"
+        return "measured" if index in self._read_ahead else "exchanged"
+
+    # -- how it is made ------------------------------------------------------------------------------------------
+
+    def _channel_of(self, index: int) -> c.Channel:
+        x = self._system.connections[index]
+        places = [self.board.place[start] for start in x.start]
+        receiver = self._names.index(x.receiver)
+        made = self._memory.channel(x, self._channels[index], receiver, self.board.row, places)
+        made.read_ahead = index in self._read_ahead
+        return made
+
+    def _component_of(self, index: int) -> c.Component:
+        name, memory = self._names[index], self._memory
+        body, task = self._bodies.get(index), self._tasks.get(index)
+        worked = body or task
+        assert worked is not None
+        made = memory.component(index, worked.read, self._outputs(name), len(worked.outputs))
+        made.feeds = memory.indices([self._feeds.index(feed) for feed in worked.feeds])
+        made.held = memory.indices([self._channels.index(channel) for channel in worked.held])
+        if body is not None:
+            made.ahead = memory.indices([self._channels.index(channel) for channel in body.ahead])
+            made.behind = memory.indices([self._channels.index(channel) for channel in body.behind])
+        if task is not None:
+            made.ratio, made.by_itself = task.ratio, task.by_itself
+        return made
+
+
+class _OnTheirWay:
+    """Messages and noise of one connection while C has them."""
+
+    def __init__(self, channel: Any, into: c.Channel, count: int, keys: list[int]) -> None:
+        """`count` messages take values, of which those with `keys` are kept until they arrive."""
+        self._channel, self._into, self._size = channel, into, into.size
+        self._keys = [*channel.in_flight, *keys]
+        self._flight: Floats = np.empty((len(self._keys), self._size))
+        for i, value in enumerate(channel.in_flight.values()):
+            self._flight[i] = value
+        into.flight, into.first, into.last = c.address(self._flight), 0, len(channel.in_flight)
+        self._applied: Floats = np.zeros((2, self._size))
+        into.applied, into.applied_count = c.address(self._applied), len(channel.applied)
+        for i, (time, value) in enumerate(channel.applied):
+            self._applied[i], into.applied_time[i] = value, time
+        self._before = channel.stream.bit_generator.state if into.noisy else None
+        self._noise: Floats = channel.stream.standard_normal((count if into.noisy else 0, self._size))
+        into.noise = c.address(self._noise)
+
+    def take_back(self) -> None:
+        """As if Python had done it."""
+        channel, into = self._channel, self._into
+        channel.in_flight = {self._keys[i]: self._flight[i].copy() for i in range(into.first, into.last)}
+        if into.extrapolates:
+            channel.applied = [(into.applied_time[i], self._applied[i].copy()) for i in range(into.applied_count)]
+        if self._before is not None:
+            used = (into.noise - c.address(self._noise)) // (self._noise.itemsize * self._size)
+            if used < len(self._noise):
+                channel.stream.bit_generator.state = self._before
+                channel.stream.standard_normal((used, self._size))

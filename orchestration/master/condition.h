@@ -1,0 +1,100 @@
+/* The condition by which a run has diverged, with a bound on how far each number may be from the one that Python finds:
+   0 where both do the same operations of IEEE 754, some rounding where a root or a source is in it. What the bounds do
+   not decide, Python does. */
+
+enum { NUMBER, TIME, SIGNAL, SOURCE, NEG, ABS, ADD, SUB, MUL, DIV, NORM, LESS, LESS_EQUAL, MORE, MORE_EQUAL, EQUAL,
+       NOT_EQUAL, NOT, AND, OR };
+
+typedef struct {
+    int64_t code, operands; /* of SIGNAL and SOURCE the place */
+    double number;
+} Operation;
+
+typedef struct {
+    double value, error;
+} Known;
+
+#define DEEPEST 256
+#define SOURCES_AGREE 1e-9 /* a source over many times with the same at one time */
+
+static Known known(double value, double error) {
+    if (!isfinite(value) || !isfinite(error)) return (Known){0.0, INFINITY};
+    return (Known){value, error > 0.0 ? error * 1.000001 + fabs(value) * 1e-15 : 0.0};
+}
+
+static Known product(Known a, Known b) {
+    return known(a.value * b.value, fabs(a.value) * b.error + fabs(b.value) * a.error + a.error * b.error);
+}
+
+static Known quotient(Known a, Known b) {
+    double q = a.value / b.value;
+    if (fabs(b.value) <= b.error) return (Known){0.0, INFINITY};
+    return known(q, (a.error + fabs(q) * b.error) / (fabs(b.value) - b.error));
+}
+
+static Known norm(const Known *parts, int64_t count) {
+    double sum = 0.0, error = 0.0;
+    for (int64_t i = 0; i < count; i++) sum += parts[i].value * parts[i].value, error += parts[i].error;
+    double value = sqrt(sum);
+    return known(value, error + value * 1e-13 + 1e-150);
+}
+
+static Known truth(int is, int undecided) { return undecided ? (Known){1.0, INFINITY} : (Known){is, 0.0}; }
+
+static Known comparison(int64_t code, Known a, Known b) {
+    double error = a.error + b.error;
+    int undecided = error > 0.0 && !(fabs(a.value - b.value) > error);
+    switch (code) {
+    case LESS: return truth(a.value < b.value, undecided);
+    case LESS_EQUAL: return truth(a.value <= b.value, undecided);
+    case MORE: return truth(a.value > b.value, undecided);
+    case MORE_EQUAL: return truth(a.value >= b.value, undecided);
+    case EQUAL: return truth(a.value == b.value, undecided);
+    default: return truth(a.value != b.value, undecided);
+    }
+}
+
+static int is_undecided(Known a) { return a.error > 0.0 && !(fabs(a.value) > a.error); }
+
+static Known joined(int64_t code, const Known *parts, int64_t count) {
+    int open = 0, ends = code == OR; /* the side that decides by itself */
+    for (int64_t i = 0; i < count; i++) {
+        if (is_undecided(parts[i]))
+            open = 1;
+        else if ((parts[i].value != 0.0) == ends)
+            return truth(ends, 0);
+    }
+    return truth(!ends, open);
+}
+
+/* Whether the condition may hold: it does, or the bounds do not say. */
+static int may_hold(const Operation *program, int64_t length, double t, const double *row, const double *sources) {
+    Known stack[DEEPEST];
+    int64_t top = 0;
+    for (const Operation *o = program; o < program + length; o++) {
+        int64_t n = o->operands;
+        if (o->code <= SOURCE) {
+            stack[top++] = o->code == NUMBER ? known(o->number, 0.0)
+                : o->code == TIME            ? known(t, 0.0)
+                : o->code == SIGNAL          ? known(row[n], 0.0)
+                                             : known(sources[n], SOURCES_AGREE * (1.0 + fabs(sources[n])));
+            continue;
+        }
+        Known *a = stack + top - n;
+        switch (o->code) {
+        case NEG: *a = known(-a->value, a->error); break;
+        case ABS: *a = known(fabs(a->value), a->error); break;
+        case ADD: *a = known(a[0].value + a[1].value, a[0].error + a[1].error); break;
+        case SUB: *a = known(a[0].value - a[1].value, a[0].error + a[1].error); break;
+        case MUL: *a = product(a[0], a[1]); break;
+        case DIV: *a = quotient(a[0], a[1]); break;
+        case NORM: *a = norm(a, n); break;
+        case NOT: *a = truth(a->value == 0.0, is_undecided(*a)); break;
+        case AND:
+        case OR: *a = joined(o->code, a, n); break;
+        default: *a = comparison(o->code, a[0], a[1]);
+        }
+        top += 1 - n;
+    }
+    return is_undecided(stack[0]) || stack[0].value != 0.0;
+}

@@ -1,0 +1,47 @@
+"""The compiled loop as a library: made once by the C compiler of this machine, and kept in the user's cache."""
+
+import ctypes
+import functools
+import hashlib
+import os
+import platform
+from pathlib import Path
+from typing import Any
+
+from fmu_kit.bundle import PackagingError
+from fmu_kit.native.compiler import OPTIONS, compiled, compiler_version
+from orchestration.errors import QuadcosimError
+
+_SOURCES = ("loop.c", "condition.h")
+
+
+@functools.cache
+def library() -> Any:
+    """The function `fly` of loop.c; raises `QuadcosimError` that says what stands in the way."""
+    sources = {name: (Path(__file__).parent / name).read_bytes() for name in _SOURCES}
+    path = _place(sources)
+    try:
+        if not path.is_file():
+            _keep(path, compiled(sources, "loop.c", "-lm"))
+        fly = ctypes.CDLL(str(path)).fly
+    except (PackagingError, OSError) as error:
+        raise QuadcosimError(str(error)) from error
+    fly.restype = ctypes.c_int
+    fly.argtypes = (ctypes.c_void_p, ctypes.c_int64)
+    return fly
+
+
+def _place(sources: dict[str, bytes]) -> Path:
+    """By all that decides what is in it."""
+    import platformdirs
+
+    content = hashlib.sha256(repr((sorted(sources.items()), OPTIONS, compiler_version(), platform.machine())).encode())
+    return Path(platformdirs.user_cache_dir("quadcosim")) / "loop" / f"{content.hexdigest()}.so"
+
+
+def _keep(path: Path, content: bytes) -> None:
+    """Whole or not at all, whoever else makes it at the same time."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    fresh = path.with_name(f"{path.name}.{os.getpid()}")
+    fresh.write_bytes(content)
+    fresh.replace(path)

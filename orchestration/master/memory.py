@@ -1,0 +1,107 @@
+"""Components, connections and sources at work, as loop.c has them: everything that C has an address of is kept here."""
+
+import ctypes
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from orchestration.fmi.native import Call, NativeInstance
+from orchestration.master import structures as c
+from orchestration.master.channel import Channel, of_each
+from orchestration.master.feeds import Feed
+from orchestration.simulator import Floats, Transfer
+from orchestration.system.model import Connection
+
+
+class Memory:
+    """What the structures of one run point at, and what a call in them is in Python."""
+
+    def __init__(self, instances: Sequence[NativeInstance]) -> None:
+        self.instances = list(instances)
+        self.calls: dict[int, tuple[str, Transfer]] = {}
+        """by the address of a `Part`, the name of its function and the transfer that it belongs to"""
+        self._kept: list[Any] = []
+
+    def address(self, array: Any) -> int:
+        """Where the values of an array are; it is kept."""
+        self._kept.append(array)
+        return c.address(array)
+
+    def indices(self, items: Sequence[int]) -> c.List:
+        """Indices for C."""
+        return c.List(items=self.address(np.array(items, dtype=np.int64)), count=len(items))
+
+    def transfer(self, component: int, transfer: Transfer, array: Floats) -> c.Transfer:
+        """The calls of a transfer between a component and an array."""
+        calls = self.instances[component].calls_of(transfer)
+        parts = (c.Part * len(calls))(*(self._part(component, call) for call in calls))
+        self._kept.append(parts)
+        for part, call in zip(parts, calls):
+            self.calls[ctypes.addressof(part)] = (call.function, transfer)
+        return c.Transfer(parts=parts, count=len(calls), array=self.address(array))
+
+    def component(self, index: int, read: Transfer, values: Floats, connected: int) -> c.Component:
+        """A component, but for what its place in the system says."""
+        instance = self.instances[index]
+        version = instance.model.version
+        said = [ctypes.addressof(each) for each in instance.said] or [0, 0, 0, 0]
+        event, ends, early, reached = said
+        return c.Component(
+            fmu=instance.handle,
+            step=instance.address(f"fmi{version}DoStep"),
+            version=version,
+            heard=ctypes.addressof(instance.messages_waiting),
+            read=self.transfer(index, read, values),
+            outputs=self.address(values),
+            connected=connected,
+            event=event,
+            ends=ends,
+            early=early,
+            reached=reached,
+            ratio=1.0,
+        )
+
+    def channel(self, x: Connection, channel: Channel, receiver: int, row: Floats, places: Sequence[int]) -> c.Channel:
+        """A connection, but for what is on its way."""
+        sigma, quantum = of_each(x, x.noise), of_each(x, x.quantisation)
+        return c.Channel(
+            write=self.transfer(receiver, channel.write, channel.received),
+            row=self.address(row),
+            places=self.address(np.array(places, dtype=np.int64)),
+            size=len(places),
+            noisy=bool(sigma.any()),
+            rounds=bool(quantum.any()),
+            converts=x.scale != 1.0 or x.offset != 0.0,
+            extrapolates=x.hold == "first",
+            sigma=self.address(sigma),
+            quantum=self.address(quantum),
+            scale=x.scale,
+            offset=x.offset,
+            value=self.address(np.zeros(len(places))),
+        )
+
+    def feed(self, component: int, feed: Feed) -> c.Feed:
+        """A source at work."""
+        return c.Feed(write=self.transfer(component, feed.transfer, feed.into), size=feed.size)
+
+    def _part(self, component: int, call: Call) -> c.Part:
+        instance, part = self.instances[component], call.part
+        kind = "boolean32" if part.type == "Boolean" and part.buffer.dtype != bool else part.buffer.dtype.name
+        bounds = np.iinfo(part.buffer.dtype) if part.buffer.dtype.kind in "iu" else None
+        return c.Part(
+            function=instance.address(call.function),
+            fmu=instance.handle,
+            references=self.address(np.array(part.references, dtype=np.uint32)),
+            count=len(part.references),
+            buffer=self.address(part.buffer),
+            values=len(part.buffer),
+            asked=None if call.in_place else self.address(part.asked.astype(np.int64)),
+            places=None if call.in_place else self.address(part.places.astype(np.int64)),
+            size=len(part.asked),
+            type=c.TYPES.index(kind),
+            counts_values=instance.counts_values,
+            low=0.0 if bounds is None else float(bounds.min),
+            high=0.0 if bounds is None else float(bounds.max),
+            component=component,
+        )
