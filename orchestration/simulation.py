@@ -4,7 +4,7 @@ import functools
 import importlib.metadata
 import platform
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -22,10 +22,10 @@ from orchestration.fmi.values import number_of
 from orchestration.interrupt import Interrupt, Interrupted, interrupts_held_back
 from orchestration.master import initial
 from orchestration.master.agenda import Agenda, FixedStep
-from orchestration.master.feeds import Feed
 from orchestration.master.condition import program
 from orchestration.master.engine import Engine
 from orchestration.master.engine import master as master_of
+from orchestration.master.feeds import Feed
 from orchestration.master.master import Master
 from orchestration.master.recording import InMemory, Recorder
 from orchestration.master.sources import BuiltIn, Constant, Table, Values, WhiteNoise
@@ -98,7 +98,11 @@ class Simulation:
             units=self.units,
             divergence=master.divergence,
             interrupted_at=_seconds(master.interrupted_at),
-            provenance={**provenance(self.instances), "engine": master.engine, "wall_time": time.perf_counter() - self.started},
+            provenance={
+                **provenance(self.instances),
+                "engine": master.engine,
+                "wall_time": time.perf_counter() - self.started,
+            },
             warnings=(
                 *(warnings(self.asked, self.parameters) if isinstance(self.asked, Scenario) else ()),
                 *(warning for instance in self.instances.values() for warning in instance.warnings),

@@ -12,7 +12,7 @@ import typer
 import typer.core
 
 from orchestration.command import systems as system_commands
-from orchestration.command.flags import FlightFlags, Timing, flies, request_from
+from orchestration.command.flags import EngineFlag, FlightFlags, Timing, flies, request_from
 from orchestration.command.limit_flags import LimitFlags
 from orchestration.command.shared_flags import takes
 from orchestration.command.terminal import progress_bar, say
@@ -117,10 +117,12 @@ def run(
     resume: Annotated[
         Path | None, typer.Option("--resume", help="Go on with the run paused in DIR, to the same bits.", metavar="DIR")
     ] = None,
+    engine: EngineFlag = None,
     *,
     flags: FlightFlags,
 ) -> None:
     """Fly a scenario and print its metrics. FMUs that are missing or out of date are built first."""
+    from orchestration.master.engine import engine_named
     from orchestration.simulation import run as fly  # what reads and writes files is loaded where there are any
 
     if resume is not None and (scenario is not None or pause_at is not None or flags != FlightFlags()):
@@ -128,24 +130,23 @@ def run(
     if pause_at is not None and out is None:
         raise UsageError("--pause-at: expected --out DIR for the state")
     with progress_bar("flying") as progress:
+        how: Any = {"progress": progress, "announce": say, "engine": engine_named(engine)}
         if resume is not None:
             from orchestration.results import pause
 
-            result: Result | None = pause.resume(resume, out, figures=figures, progress=progress, announce=say)
+            result: Result | None = pause.resume(resume, out, figures=figures, **how)
         elif pause_at is not None and out is not None:
             from orchestration.results import pause
 
             chosen = request_from(scenario, flags, timing)
-            result = pause.fly_until(chosen, pause_at, out, figures=figures, progress=progress, announce=say)
+            result = pause.fly_until(chosen, pause_at, out, figures=figures, **how)
         elif out is not None:
             from orchestration.results.run_directory import keep_flight
 
             chosen = request_from(scenario, flags, timing)
-            result = keep_flight(
-                out, lambda to: fly(chosen, recorder=to, progress=progress, announce=say), figures=figures
-            )
+            result = keep_flight(out, lambda to: fly(chosen, recorder=to, **how), figures=figures)
         else:
-            result = fly(request_from(scenario, flags, timing), progress=progress, announce=say)
+            result = fly(request_from(scenario, flags, timing), **how)
     if result is None:
         say(f"paused in {out}; go on with: quadcosim run --resume {out}")
         return
@@ -280,7 +281,7 @@ def _report(result: "Result", as_json: bool) -> None:
         say(f"warning: {warning}")
     printed = {**result.metrics, "wall_time": result.provenance["wall_time"]}
     if as_json:
-        print(json.dumps(printed, indent=2))
+        print(json.dumps({**printed, "engine": result.provenance["engine"]}, indent=2))
         return
     width, units = max(map(len, printed)), {**result.units, "wall_time": "s"}
     for name, value in printed.items():

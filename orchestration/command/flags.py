@@ -187,6 +187,16 @@ class FlightFlags:
         return changed(system, {**top, **{key: _value(key, text) for key, text in _pairs("set", self.set or [])}})
 
 
+EngineFlag = Annotated[
+    str | None,
+    typer.Option(
+        "--engine",
+        help="What passes through the instants, to the same result; compiled where it can be had.",
+        metavar="python|compiled",
+        show_default=False,
+    ),
+]
+
 Timing = Annotated[
     Path | None,
     typer.Argument(help="Of an SSP: the file with the timing that SSP has no words for.", show_default=False),

@@ -29,17 +29,17 @@ class Messages(list[Message]):
 
     def __init__(self) -> None:
         super().__init__()
-        self.count = ctypes.c_int64(0)
+        self.waiting = ctypes.c_int64(0)
 
     def append(self, message: Message) -> None:
         """One more."""
         super().append(message)
-        self.count.value = len(self)
+        self.waiting.value = len(self)
 
     def clear(self) -> None:
         """They have been heard."""
         super().clear()
-        self.count.value = 0
+        self.waiting.value = 0
 
 
 _environments = itertools.count(1)

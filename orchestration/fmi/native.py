@@ -257,7 +257,7 @@ class NativeInstance(Instance):
     @property
     def messages_waiting(self) -> ctypes.c_int64:
         """How many messages have not been heard."""
-        return self._messages.count
+        return self._messages.waiting
 
     def _known(self, transfer: Transfer, action: str, parts: Sequence[Part], array: Floats) -> Transfer:
         self._calls[transfer] = tuple(

@@ -67,10 +67,7 @@ def _parts(node: Node, leaves: Mapping[str, tuple[str, int, float]]) -> list[_Wo
     if isinstance(node, Operation):
         operands = [_parts(operand, leaves) for operand in node.operands]
         size = max(map(len, operands))
-        return [
-            _applied(node.sign, [parts[i if len(parts) > 1 else 0] for parts in operands])
-            for i in range(size)
-        ]
+        return [_applied(node.sign, [parts[i if len(parts) > 1 else 0] for parts in operands]) for i in range(size)]
     function = getattr(node, "function", None)
     arguments = [part for argument in getattr(node, "arguments", ()) for part in _parts(argument, leaves)]
     if function in ("norm", "hypot"):

@@ -1,9 +1,9 @@
 """Which engine flies a run: the compiled loop where it can be had, else Python. Both give the same to the byte."""
 
 from collections.abc import Mapping
-from typing import Any, Literal, cast
+from typing import Any, Literal, cast, get_args
 
-from orchestration.errors import UsageError
+from orchestration.errors import QuadcosimError, UsageError
 from orchestration.fmi.native import NativeInstance
 from orchestration.master.compiled import CompiledMaster, Condition, obstacle
 from orchestration.master.master import Master
@@ -14,17 +14,24 @@ from orchestration.system.times import nanoseconds
 Engine = Literal["python", "compiled"]
 
 
+def engine_named(name: str | None) -> Engine | None:
+    """The engine of that name; raises `UsageError` for another name than those that there are."""
+    if name is not None and name not in get_args(Engine):
+        raise UsageError(f"--engine {name}: expected {' or '.join(get_args(Engine))}")
+    return cast(Engine | None, name)
+
+
 def master(
     engine: Engine | None, system: System, simulators: Mapping[str, Simulator], *, condition: Condition, **others: Any
 ) -> Master:
     """The master of a run, by an engine or, without one, by the compiled loop where it can be had.
 
-    `others` are arguments of `Master`. Raises `UsageError` naming what stands in the way of the compiled loop if that
-    was asked for.
+    `others` are arguments of `Master`. Raises `QuadcosimError` naming what stands in the way of the compiled loop
+    if that was asked for.
     """
     hindered = None if engine == "python" else obstacle(simulators, nanoseconds(system.stop_time))
     if engine == "python" or (engine is None and hindered):
         return Master(system, simulators, **others)
     if hindered:
-        raise UsageError(f"--engine compiled: {hindered}")
+        raise QuadcosimError(f"--engine compiled cannot be had: {hindered}")
     return CompiledMaster(system, cast(Mapping[str, NativeInstance], simulators), condition=condition, **others)

@@ -22,7 +22,7 @@ def library() -> Any:
     path = _place(sources)
     try:
         if not path.is_file():
-            _keep(path, compiled(sources, "loop.c", "-lm"))
+            _keep(path, compiled(sources, "loop.c", mathematics="libm"))
         fly = ctypes.CDLL(str(path)).fly
     except (PackagingError, OSError) as error:
         raise QuadcosimError(str(error)) from error

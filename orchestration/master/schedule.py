@@ -83,7 +83,8 @@ class Schedules:
 
 
 def _of(instants: list[Instant], end: int) -> Schedule:
-    dues, exchanged = [], []
+    dues: list[tuple[int, ...]] = []
+    exchanged: list[Message] = []
     for instant in instants:
         for due in instant.due:
             begin, middle = len(exchanged), len(exchanged) + len(due.received)

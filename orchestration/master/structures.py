@@ -1,14 +1,10 @@
 """The structures of loop.c, field by field."""
 
 import ctypes
-from collections.abc import Sequence
 from ctypes import POINTER, Structure, c_double, c_int32, c_int64, c_size_t, c_void_p
-from typing import Any, TypeAlias
+from typing import Any, ClassVar
 
-import numpy as np
 import numpy.typing as npt
-
-Fields: TypeAlias = list[tuple[str, Any]]
 
 
 def address(array: npt.NDArray[Any]) -> int:
@@ -19,7 +15,7 @@ def address(array: npt.NDArray[Any]) -> int:
 class Part(Structure):
     """One call that moves values of one type between an FMU and a buffer."""
 
-    _fields_: Fields = [
+    _fields_: ClassVar = [
         *((name, c_void_p) for name in ("function", "fmu", "references")),
         ("count", c_size_t), ("buffer", c_void_p), ("values", c_size_t), ("asked", c_void_p), ("places", c_void_p),
         ("size", c_int64), ("type", c_int32), ("counts_values", c_int32), ("low", c_double), ("high", c_double),
@@ -30,19 +26,19 @@ class Part(Structure):
 class Transfer(Structure):
     """The calls that move the values of one array."""
 
-    _fields_: Fields = [("parts", POINTER(Part)), ("count", c_int64), ("array", c_void_p)]
+    _fields_: ClassVar = [("parts", POINTER(Part)), ("count", c_int64), ("array", c_void_p)]
 
 
 class List(Structure):
     """Indices."""
 
-    _fields_: Fields = [("items", c_void_p), ("count", c_int64)]
+    _fields_: ClassVar = [("items", c_void_p), ("count", c_int64)]
 
 
 class Component(Structure):
     """A component at work."""
 
-    _fields_: Fields = [
+    _fields_: ClassVar = [
         ("fmu", c_void_p), ("step", c_void_p), ("version", c_int32), ("by_itself", c_int32),
         *((name, c_void_p) for name in ("event", "ends", "early", "reached", "heard")),
         ("read", Transfer), ("outputs", c_void_p), ("connected", c_int64),
@@ -54,13 +50,13 @@ class Component(Structure):
 class Feed(Structure):
     """A source at work on inputs of one component."""
 
-    _fields_: Fields = [("write", Transfer), ("values", c_void_p), ("size", c_int64)]
+    _fields_: ClassVar = [("write", Transfer), ("values", c_void_p), ("size", c_int64)]
 
 
 class Channel(Structure):
     """A connection at work."""
 
-    _fields_: Fields = [
+    _fields_: ClassVar = [
         ("write", Transfer), ("row", c_void_p), ("places", c_void_p), ("size", c_int64),
         *((name, c_int32) for name in ("noisy", "rounds", "converts", "extrapolates", "read_ahead", "unused")),
         *((name, c_void_p) for name in ("sigma", "noise", "quantum")),
@@ -79,13 +75,13 @@ SCHEDULE = (
 class Schedule(Structure):
     """What happens when."""
 
-    _fields_: Fields = [(name, c_void_p) for name in SCHEDULE]
+    _fields_: ClassVar = [(name, c_void_p) for name in SCHEDULE]
 
 
 class Operation(Structure):
     """One step of a condition."""
 
-    _fields_: Fields = [("code", c_int64), ("operands", c_int64), ("number", c_double)]
+    _fields_: ClassVar = [("code", c_int64), ("operands", c_int64), ("number", c_double)]
 
 
 Look: Any = ctypes.CFUNCTYPE(ctypes.c_int, c_double)
@@ -95,7 +91,7 @@ Collect: Any = ctypes.CFUNCTYPE(None, c_int64)
 class Loop(Structure):
     """A run."""
 
-    _fields_: Fields = [
+    _fields_: ClassVar = [
         ("components", POINTER(Component)), ("channels", POINTER(Channel)), ("feeds", POINTER(Feed)), ("tasks", List),
         ("some_by_themselves", c_int64), ("settles", c_int64), ("schedule", Schedule), ("stop", c_int64),
         ("pause_at", c_int64), ("row", c_void_p), ("rows", c_void_p), ("width", c_int64), ("row_count", c_int64),

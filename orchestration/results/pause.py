@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from orchestration.errors import UsageError
+from orchestration.master.engine import Engine
 from orchestration.master.recording import InMemory, Recorder
 from orchestration.request import Request, load_request, system_meant, text_of
 from orchestration.results.result import Result
@@ -25,6 +26,7 @@ def fly_until(
     figures: bool = True,
     progress: Progress | None = None,
     announce: Announce | None = None,
+    engine: Engine | None = None,
 ) -> Result | None:
     """Fly to the first communication point from `pause_at` [s] and write the state into `folder`, a new one.
 
@@ -35,7 +37,7 @@ def fly_until(
         raise UsageError(f"pause at {pause_at:g} s: expected a time from 0 to before stop_time {stop_time:g} s")
 
     def fly(recorder: ToFolder) -> Result | None:
-        with prepared(asked, announce, recorder=recorder) as flight:
+        with prepared(asked, announce, recorder=recorder, engine=engine) as flight:
             _expect_states(flight)
             flight.master.initialise()
             if flight.master.run(pause_at=nanoseconds(pause_at), progress=progress):
@@ -54,6 +56,7 @@ def resume(
     figures: bool = True,
     progress: Progress | None = None,
     announce: Announce | None = None,
+    engine: Engine | None = None,
 ) -> Result:
     """Go on with the run paused in `folder`, to the end; its directory is then in `out`, which may be `folder`.
 
@@ -67,7 +70,7 @@ def resume(
     state, saved = read_state(folder / STATE)
 
     def fly(recorder: Recorder) -> Result:
-        with prepared(asked, announce, recorder=recorder) as flight:
+        with prepared(asked, announce, recorder=recorder, engine=engine) as flight:
             _expect_same(state.pop("of"), flight, folder)
             for chunk in InFolder(folder).chunks():
                 recorder.take(chunk)

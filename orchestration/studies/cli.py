@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from orchestration.command.flags import FlightFlags, Timing, flies, request_from
+from orchestration.command.flags import EngineFlag, FlightFlags, Timing, flies, request_from
 from orchestration.command.terminal import runs_bar, say
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file.", metavar="STUDY.toml", show_default=False)]
@@ -24,15 +24,17 @@ def sweep(
         str | None, typer.Option("--dask", help="A dask scheduler instead, e.g. tcp://host:8786.", metavar="URL")
     ] = None,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Fly failed runs again.")] = False,
+    engine: EngineFlag = None,
 ) -> None:
     """Fly the runs of a study that are missing; kill it and start it again as you like."""
+    from orchestration.master.engine import engine_named
     from orchestration.studies.study_file import load_study
     from orchestration.studies.sweep import sweep as fly
 
     with runs_bar() as progress:
         summary = fly(
-            load_study(study), folder=out, workers=workers, dask=dask, retry_failed=retry_failed, progress=progress,
-            announce=say,
+            load_study(study), folder=out, workers=workers, dask=dask, retry_failed=retry_failed,
+            engine=engine_named(engine), progress=progress, announce=say,
         )  # fmt: skip
     failed = f", {summary.failed} failed (quadcosim export shows why; --retry-failed)" if summary.failed else ""
     print(f"{summary.path}: {summary.total} runs, {summary.flown} flown now{failed}")
@@ -114,6 +116,7 @@ def limit(
         bool, typer.Option("--continuous", help="Fly near continuous time too (as long as ten flights at 1 ms).")
     ] = False,
     workers: Annotated[int, typer.Option("--workers", help="Processes for the seeds.", metavar="N")] = 1,
+    engine: EngineFlag = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
     out: Annotated[
         Path | None, typer.Option("--out", help="Draw the spectral radius with both limits here.", metavar="DIR")
@@ -122,12 +125,13 @@ def limit(
     flags: FlightFlags,
 ) -> None:
     """Find the largest value that is still good (a period, delay, jitter, loss, any path), and the local limit."""
+    from orchestration.master.engine import engine_named
     from orchestration.studies import limit as limits
 
     chosen = request_from(scenario, flags, timing)
     found = limits.find(
         chosen, of, first=first, last=last, tolerance=tolerance, scan=scan, confidence=confidence,
-        continuous=continuous, workers=workers, announce=say,
+        continuous=continuous, workers=workers, engine=engine_named(engine), announce=say,
     )  # fmt: skip
     if out is not None:
         from orchestration.studies.drawing import draw_limit

@@ -13,6 +13,7 @@ from itertools import islice
 from typing import Any
 
 from orchestration.errors import QuadcosimError, UsageError
+from orchestration.master.engine import Engine
 from orchestration.studies.crew import Crew, InterruptedWorker, Package
 from orchestration.studies.files import Files
 from orchestration.studies.worker import Outcome, Task
@@ -27,10 +28,10 @@ _ADDRESS = re.compile(r"(?:(?:tcp|tls|ws|wss)://)?(\[[0-9a-fA-F:.]+\]|[^\s:/\[\]
 class Pool:
     """Flies a few runs at a time for someone who decides by their metrics what to fly next."""
 
-    def __init__(self, files: Files, workers: int) -> None:
+    def __init__(self, files: Files, workers: int, engine: Engine | None = None) -> None:
         if workers < 1:
             raise UsageError(f"--workers {workers}: expected at least 1")
-        self._files, self._workers = files, workers
+        self._files, self._workers, self._engine = files, workers, engine
         self._stack = ExitStack()
 
     def __enter__(self) -> "Pool":
@@ -46,7 +47,7 @@ class Pool:
         Raises `QuadcosimError` if a run fails.
         """
         futures = [
-            self._submit(Task(index=i, key="", settings={}, system=system, keep_signals=False))
+            self._submit(Task(index=i, key="", settings={}, system=system, keep_signals=False, engine=self._engine))
             for i, system in enumerate(systems)
         ]
         found = []

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from orchestration.errors import UsageError
+from orchestration.master.engine import Engine
 from orchestration.quadrotor.measures import Outcome
 from orchestration.quadrotor.scenario import Record, Scenario
 from orchestration.quadrotor.timing import Timing
@@ -89,6 +90,7 @@ def find(
     confidence: float = 0.95,
     continuous: bool = False,
     workers: int = 1,
+    engine: Engine | None = None,
     announce: Callable[[str], None] | None = None,
 ) -> Limit:
     """The limit of a system or a scenario in one quantity, all else as it is.
@@ -107,7 +109,7 @@ def find(
     random = is_random(varied.at(span.last))
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
     local = local_limits(varied, span)
-    with Pool(files, workers) as pool:
+    with Pool(files, workers, engine) as pool:
         trials = Trials(varied, span, seeds, confidence if random else None, pool, announce or (lambda line: None))
         values = span.values()
         bracket = first_failure(trials.fails, values, span.tolerance, parts=FINER)

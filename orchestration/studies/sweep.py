@@ -9,10 +9,12 @@ from typing import Any
 
 from orchestration.errors import UsageError
 from orchestration.interrupt import Interrupted
+from orchestration.master.engine import Engine
 from orchestration.simulation import checked
-from orchestration.studies import engine, store
+from orchestration.studies import store
 from orchestration.studies.checks import described, expect_flyable
 from orchestration.studies.crew import Package
+from orchestration.studies.engine import expect_scheduler, run_locally, run_on_dask
 from orchestration.studies.files import Files
 from orchestration.studies.identity import (
     design_parts,
@@ -59,6 +61,7 @@ def sweep(
     workers: int = 1,
     dask: str | None = None,
     retry_failed: bool = False,
+    engine: Engine | None = None,
     progress: Progress | None = None,
     announce: Announce | None = None,
 ) -> Summary:
@@ -70,7 +73,7 @@ def sweep(
     if workers < 1:
         raise UsageError(f"--workers {workers}: expected at least 1")
     if dask is not None:
-        engine.expect_scheduler(dask)
+        expect_scheduler(dask)
     path = store_path(study.name, folder)
     files = study.files()
     expect_flyable(study, files)
@@ -79,12 +82,8 @@ def sweep(
         missing = _missing(opened, study, retry_failed)
         counted = _Counted(len(study.points), opened, progress, announce)
         package = Package.of(files)
-        tasks = (_task(study, index, files) for index in missing)
-        outcomes = (
-            engine.run_on_dask(tasks, package, dask)
-            if dask is not None
-            else engine.run_locally(tasks, package, workers)
-        )
+        tasks = (_task(study, index, files, engine) for index in missing)
+        outcomes = run_on_dask(tasks, package, dask) if dask is not None else run_locally(tasks, package, workers)
         try:
             with contextlib.closing(outcomes):
                 for outcome in outcomes if missing else ():
@@ -137,11 +136,11 @@ class _Counted:
             self._progress(self.done, self.total)
 
 
-def _task(study: Study, index: int, files: Files) -> Task:
+def _task(study: Study, index: int, files: Files, engine: Engine | None) -> Task:
     system = study.system(index, files.starts_of(study.origin))
     return Task(
         index=index, key=run_key(system, files), settings=dict(study.points[index]), system=system,
-        keep_signals=study.keeps_signals(index),
+        keep_signals=study.keeps_signals(index), engine=engine,
     )  # fmt: skip
 
 

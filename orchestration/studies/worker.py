@@ -12,6 +12,7 @@ from orchestration.errors import QuadcosimError, SimulatorError, UsageError
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.model import read_model
 from orchestration.fmi.reuse import Instances
+from orchestration.master.engine import Engine
 from orchestration.results.result import Result
 from orchestration.simulation import prepared
 from orchestration.studies.store import Row
@@ -27,6 +28,8 @@ class Task:
     settings: dict[str, Any]
     system: System
     keep_signals: bool
+    engine: Engine | None = None
+    """that flies it; None: the fastest that can be had"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,7 +75,7 @@ class Hangar:
         metrics, message, signals = None, None, None
         _expect_files(task.system)
         try:
-            with prepared(task.system, load=self._load) as flight:
+            with prepared(task.system, load=self._load, engine=task.engine) as flight:
                 flight.master.initialise()
                 flight.master.run()
                 result = flight.result()
