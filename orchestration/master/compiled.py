@@ -19,7 +19,7 @@ from orchestration.master.condition import Step
 from orchestration.master.loop import library
 from orchestration.master.master import Diverged, Master
 from orchestration.master.memory import Memory
-from orchestration.master.recording import EVENTS, ROWS, Integers
+from orchestration.master.recording import Integers
 from orchestration.master.schedule import Schedule, Schedules
 from orchestration.master.sources import Values
 from orchestration.simulator import Floats, Simulator
@@ -70,7 +70,7 @@ class CompiledMaster(Master):
         self._fly = library()
         self._failure: BaseException | None = None
         self._memory = memory = Memory(list(simulators.values()))
-        self._row_table: Floats = np.empty((ROWS, len(self.board.columns)))
+        self._row_table: Floats = np.empty((self._chunk // self.board.row.nbytes, len(self.board.columns)))
         self._event_table: Integers = np.empty((0, 4), dtype=np.int64)
         program, watched = condition(self.board)
         self._watched = list(watched)
@@ -90,8 +90,8 @@ class CompiledMaster(Master):
             row=c.address(self.board.row),
             rows=c.address(self._row_table),
             width=len(self.board.columns),
-            row_limit=ROWS,
-            event_limit=EVENTS,
+            row_limit=len(self._row_table),
+            event_limit=self._most_events,
             look=c.Look(self._look_for_c),
             collect=c.Collect(lambda index: memory.instances[index].collect_warnings()),
         )
@@ -138,10 +138,12 @@ class CompiledMaster(Master):
         if self._schedules.error is not None:
             raise self._schedules.error
         self._schedule, self._loop.at = self._schedules.following(INSTANTS), 0
-        if len(self._schedule) == 0 and self._schedules.error is not None:
+        if len(self._schedule) > 0:
+            self._share()
+            return True
+        if self._schedules.error is not None:
             raise self._schedules.error
-        self._share()
-        return len(self._schedule) > 0
+        return False
 
     def _slice(self) -> int:
         """Have C pass through instants for about `SLICE`; the code says why it has come back."""
@@ -244,8 +246,8 @@ class CompiledMaster(Master):
         """For the events of any instant beside those that make a chunk whole."""
         most = schedule.most_events()
         loop, count = self._loop, self._loop.event_count
-        if len(self._event_table) < max(EVENTS, count) + most:
-            table: Integers = np.empty((max(EVENTS, count) + 2 * most, 4), dtype=np.int64)
+        if len(self._event_table) < max(self._most_events, count) + most:
+            table: Integers = np.empty((max(self._most_events, count) + 2 * most, 4), dtype=np.int64)
             table[:count] = self._event_table[:count]
             self._event_table = table
         self._arrived_table: Integers = np.empty((most, 4), dtype=np.int64)

@@ -113,7 +113,7 @@ class Master:
         """of every row: those of the board, then the signals of the sources"""
         self._row = board.row.data.cast("B")
         self._rows = bytearray()  # not handed over yet, and the times of the events may lie before them
-        self._chunk = ROWS * board.row.nbytes
+        self._chunk, self._most_events = ROWS * board.row.nbytes, EVENTS
         self._handed_over = False
         recorder.begin(self.columns)
         self._watch = watch(board) if watch is not None else lambda t: None
@@ -354,7 +354,7 @@ class Master:
     def _record(self, time: int) -> None:
         self.board.row[0] = time / NANOSECONDS
         self._rows += self._row
-        if len(self._rows) >= self._chunk or len(self._events) >= 4 * EVENTS:
+        if len(self._rows) >= self._chunk or len(self._events) >= 4 * self._most_events:
             self._hand_over()
 
     def _hand_over(self) -> None:

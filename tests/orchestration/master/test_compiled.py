@@ -1,0 +1,278 @@
+"""The compiled loop gives what the master in Python gives: rows, events, ends and words, to the byte."""
+
+import os
+import signal
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fmu_kit.native import compiler
+from orchestration import simulation
+from orchestration.errors import QuadcosimError, SimulatorError
+from orchestration.fmi.instance import Instance
+from orchestration.fmi.instances import open_here
+from orchestration.fmi.native import NativeInstance
+from orchestration.master import compiled, loop
+from orchestration.master.compiled import CompiledMaster
+from orchestration.master.recording import InMemory
+from orchestration.results.pause import fly_until, resume
+from orchestration.results.result import Result
+from orchestration.simulation import RunInterrupted, prepared
+from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
+from orchestration.system.system_file import load_system
+from tests.native import assert_the_same
+from tests.orchestration.fmi.small import needs_compiler, small
+from tests.orchestration.master.moving import moving
+from tests.orchestration.master.random_systems import systems, systems_of_fixed_steps
+from tests.orchestration.quadrotor.signals_table import flights, scenario_of
+
+pytestmark = needs_compiler
+FLIGHTS = dict(flights())
+EXAMPLES = sorted(Path(__file__).parents[3].glob("examples/*/system.toml"))
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return moving(tmp_path_factory.mktemp("moving"))
+
+
+class Kept:
+    """Instances of the FMU by name, reset between runs: its reset is whole."""
+
+    def __init__(self) -> None:
+        self._instances: dict[str, NativeInstance] = {}
+
+    @contextmanager
+    def load(self, path: Path, name: str) -> Iterator[Instance]:
+        if name not in self._instances or self._instances[name].failed:
+            self._instances[name] = open_here(path, name)
+        self._instances[name].reset()
+        yield self._instances[name]
+
+    def close(self) -> None:
+        for instance in self._instances.values():
+            instance.close()
+
+
+@pytest.fixture(scope="module")
+def kept() -> Iterator[Kept]:
+    instances = Kept()
+    yield instances
+    instances.close()
+
+
+def ran(system: System, engine: Any, **keys: Any) -> Result:
+    with prepared(system, engine=engine, **keys) as run:
+        assert run.master.engine == engine
+        run.master.initialise()
+        run.master.run()
+        return run.result()
+
+
+def both(system: System, **keys: Any) -> Result:
+    """The result of both engines, which is the same."""
+    one, other = ran(system, "python", **keys), ran(system, "compiled", **keys)
+    assert_the_same(other, one)
+    return one
+
+
+def of(system: System, fmu: Path, **parameters: Mapping[str, float]) -> System:
+    """A system of stubs with the FMU in their place; `parameters` by component."""
+    parts = {
+        name: replace(part, fmu=str(fmu), parameters={"place": float(i), **parameters.get(name, {})})
+        for i, (name, part) in enumerate(system.components.items())
+    }
+    return replace(system, components=parts)
+
+
+@settings(max_examples=60, derandomize=True, deadline=None)
+@given(systems(), st.sampled_from((1, 7, 2**13)))
+def test_random_systems_run_the_same_in_schedules_of_any_length(
+    fmu: Path, kept: Kept, what: System, instants: int
+) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(compiled, "INSTANTS", instants)
+        both(of(what, fmu), load=kept.load)
+
+
+@settings(max_examples=20, derandomize=True, deadline=None)
+@given(systems_of_fixed_steps())
+def test_components_of_one_step_run_the_same(fmu: Path, kept: Kept, drawn: tuple[System, Sequence[str]]) -> None:
+    what = of(drawn[0], fmu)
+    with suppress(QuadcosimError):
+        both(what, load=kept.load)
+
+
+LOOP = System(
+    stop_time=1.0,
+    components={
+        "plant": Component(fmu="stub", step=0.01),
+        "controller": Component(fmu="stub", sampling=Sampling(period=0.02, jitter=0.01)),
+    },
+    connections=(
+        Connection(name="measured", start=("plant.y",), end=("controller.u0y",), noise={"y": 0.1}, delay=0.003),
+        Connection(name="commanded", start=("controller.y",), end=("plant.u1y",), hold="first", delay=0.03),
+    ),
+)
+
+
+def test_what_sources_feed_is_the_same(fmu: Path, tmp_path: Path) -> None:
+    table = tmp_path / "table.csv"
+    table.write_text("time,u4y,u4z\n0,0.1,0.3\n0.37,1,7\n1,-2,0.7\n", encoding="utf-8")
+    sources = {
+        "table": Source(file=table, to=("plant.u4y", "controller.u4z")),
+        "noise": Source(noise=0.01, period=0.007, to=("plant.u5y", "plant.u5z")),
+        "one": Source(constant=0.3, to=("controller.u6y",)),
+    }
+    both(replace(of(LOOP, fmu), sources=sources))
+
+
+CONDITIONS = {
+    "plant.y > 0.9": True,
+    "abs(plant.y) > 2 or not controller.y < 5": False,
+    "hypot(plant.y, controller.y) / (plant.y - plant.y) > 3": False,
+    "norm(plant.y, controller.y) >= 1.2 and time > 0.1": True,
+    "3 * plant.y**2 + 1 > 3.9": True,
+    "-plant.y * controller.y + 0.5 == 0 or time >= 0.4": True,
+}
+
+
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_a_condition_ends_both_at_the_same_instant_with_the_same_words(condition: str, fmu: Path, kept: Kept) -> None:
+    found = both(replace(of(LOOP, fmu), criterion=Criterion(diverged=condition)), load=kept.load)
+    assert (found.divergence is not None) == CONDITIONS[condition]
+
+
+def test_a_value_on_the_edge_is_left_to_python(fmu: Path, kept: Kept) -> None:
+    """A root may be another in the last digit: what is just not more is not more."""
+    free = ran(of(LOOP, fmu), "python", load=kept.load)
+    largest = max(map(np.hypot, free.signals["plant.y"], free.signals["plant.z"]))
+    for share in (1.0 - 2**-52, 1.0, 1.0 + 2**-52):
+        condition = f"norm(plant.y, plant.z) > {float(largest * share)!r}"
+        both(replace(of(LOOP, fmu), criterion=Criterion(diverged=condition)), load=kept.load)
+
+
+def test_warnings_and_values_that_are_not_finite_are_the_same(fmu: Path, kept: Kept) -> None:
+    found = both(of(LOOP, fmu, plant={"nan_at": 0.5}, controller={"warns_at": 0.4}), load=kept.load)
+    assert (found.divergence or "").startswith("plant.y = nan at t = 0.5")
+    assert found.warnings
+    assert set(found.warnings) == {"controller: this is late"}
+
+
+def test_a_call_that_fails_is_told_in_the_same_words(fmu: Path) -> None:
+    said = []
+    for engine in ("python", "compiled"):
+        with pytest.raises(SimulatorError) as caught:
+            ran(of(LOOP, fmu, controller={"fails_at": 0.3}), engine)
+        said.append(str(caught.value))
+    assert said == ["controller (Moving): fmi2DoStep: there is no more"] * 2
+
+
+def test_a_number_that_an_input_does_not_hold_is_refused_in_the_same_words(tmp_path: Path) -> None:
+    path = small(tmp_path)
+    parts = {name: Component(fmu=str(path), step=0.01) for name in ("first", "second")}
+    # a count that is multiplied until no 32 bits hold it
+    wire = Connection(name="0", start=("first.count",), end=("second.mode",), scale=1e9)
+    said = []
+    for engine in ("python", "compiled"):
+        with pytest.raises(QuadcosimError) as caught:
+            ran(System(stop_time=0.1, components=parts, connections=(wire,)), engine)
+        said.append(str(caught.value))
+    assert said[0] == said[1]
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_flights_of_the_quadrotor_are_the_same(name: str) -> None:
+    scenario = scenario_of(FLIGHTS[name]["scenario"])
+    native = scenario.with_fmus(plant="native/QuadrotorPlant", controller="native/UnifiedController")
+    assert_the_same(simulation.run(native, engine="compiled"), simulation.run(native, engine="python"))
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.parent.name)
+def test_examples_run_the_same(path: Path) -> None:
+    system = load_system(path)
+    both(replace(system, stop_time=min(system.stop_time, 2.0)))
+
+
+@pytest.mark.parametrize(("first", "then"), [("python", "compiled"), ("compiled", "python"), ("compiled", "compiled")])
+def test_a_run_that_one_engine_pauses_another_ends(first: Any, then: Any, fmu: Path, tmp_path: Path) -> None:
+    system = of(LOOP, fmu)
+    assert fly_until(system, 0.4, tmp_path / "paused", engine=first, figures=False) is None
+    assert_the_same(resume(tmp_path / "paused", engine=then), ran(system, "python"))
+
+
+def test_a_run_may_be_stopped_and_go_on_in_the_same_process(fmu: Path) -> None:
+    system = of(LOOP, fmu)
+    with prepared(system, engine="compiled") as run:
+        run.master.initialise()
+        for time in (100_000_000, 250_000_000, 251_000_000):
+            assert not run.master.run(pause_at=time)
+        assert run.master.run()
+        assert_the_same(run.result(), ran(system, "python"))
+
+
+def test_chunks_are_whole_at_the_same_rows_and_events(fmu: Path, kept: Kept, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, most in (("ROWS", 16), ("EVENTS", 30)):
+        with monkeypatch.context() as patch:
+            patch.setattr(f"orchestration.master.master.{name}", most)
+            sizes = []
+            for engine in ("python", "compiled"):
+                recorder = InMemory()
+                ran(of(LOOP, fmu), engine, load=kept.load, recorder=recorder)
+                sizes.append([(len(chunk.rows), len(chunk.events)) for chunk in recorder.chunks()])
+            assert sizes[0] == sizes[1]
+            assert len(sizes[0]) > 3
+
+
+def test_ctrl_c_is_heard_within_a_slice(fmu: Path) -> None:
+    system = replace(of(LOOP, fmu), stop_time=36000.0)
+    timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(RunInterrupted) as caught:
+        simulation.run(system, engine="compiled", recorder=_Nowhere())
+    assert 0.0 < (caught.value.result.interrupted_at or 0.0) < 36000.0
+
+
+class _Nowhere(InMemory):
+    def take(self, chunk: Any) -> None:
+        if not self._chunks:
+            self._chunks.append(chunk)
+
+
+# -- where it cannot be had ------------------------------------------------------------------------------------------
+
+
+def test_what_stands_in_the_way_is_said_in_a_line(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    once = small(tmp_path, once=True)
+    parts = {name: Component(fmu=str(once), step=0.01) for name in ("first", "second")}
+    system = System(stop_time=0.1, components=parts)
+    with pytest.raises(QuadcosimError, match=r"^--engine compiled cannot be had: components.second is not called in "):
+        ran(system, "compiled")
+    with prepared(system) as run:
+        assert run.master.engine == "python"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(compiler.shutil, "which", lambda name: None)
+    loop.library.cache_clear()
+    try:
+        with pytest.raises(QuadcosimError, match=r"^--engine compiled cannot be had: no C compiler that is called cc"):
+            ran(of(LOOP, fmu), "compiled")
+        with prepared(of(LOOP, fmu)) as run:
+            assert run.master.engine == "python"
+    finally:
+        loop.library.cache_clear()
+
+
+def test_it_is_the_default_where_it_can_be_had(fmu: Path) -> None:
+    with prepared(of(LOOP, fmu)) as run:
+        assert isinstance(run.master, CompiledMaster)
+        run.master.initialise()
+        run.master.run()
+        assert run.result().provenance["engine"] == "compiled"
