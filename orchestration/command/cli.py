@@ -279,9 +279,9 @@ interop.register(app)
 def _report(result: "Result", as_json: bool) -> None:
     for warning in result.warnings:
         say(f"warning: {warning}")
-    printed = {**result.metrics, "wall_time": result.provenance["wall_time"]}
+    printed = {**result.metrics, "wall_time": result.provenance["wall_time"], "engine": result.provenance["engine"]}
     if as_json:
-        print(json.dumps({**printed, "engine": result.provenance["engine"]}, indent=2))
+        print(json.dumps(printed, indent=2))
         return
     width, units = max(map(len, printed)), {**result.units, "wall_time": "s"}
     for name, value in printed.items():

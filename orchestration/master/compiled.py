@@ -65,7 +65,7 @@ class CompiledMaster(Master):
         self._schedules = Schedules(self._agenda)
         self._schedule: Schedule | None = None
         self._before = 0  # instants of schedules that are past
-        self._pace = 64  # instants of a slice
+        self._pace = 4  # instants of a slice
         self._shared: list[_OnTheirWay] = []
         self._fly = library()
         self._failure: BaseException | None = None

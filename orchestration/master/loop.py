@@ -5,11 +5,12 @@ import functools
 import hashlib
 import os
 import platform
+import shutil
 from pathlib import Path
 from typing import Any
 
 from fmu_kit.bundle import PackagingError
-from fmu_kit.native.compiler import OPTIONS, compiled, compiler_version
+from fmu_kit.native.compiler import OPTIONS, compiled_here
 from orchestration.errors import QuadcosimError
 
 _SOURCES = ("loop.c", "condition.h")
@@ -22,7 +23,7 @@ def library() -> Any:
     path = _place(sources)
     try:
         if not path.is_file():
-            _keep(path, compiled(sources, "loop.c", mathematics="libm"))
+            _keep(path, compiled_here(sources, "loop.c", mathematics="libm"))
         fly = ctypes.CDLL(str(path)).fly
     except (PackagingError, OSError) as error:
         raise QuadcosimError(str(error)) from error
@@ -35,7 +36,9 @@ def _place(sources: dict[str, bytes]) -> Path:
     """By all that decides what is in it."""
     import platformdirs
 
-    content = hashlib.sha256(repr((sorted(sources.items()), OPTIONS, compiler_version(), platform.machine())).encode())
+    cc = Path(shutil.which("cc") or "").resolve()
+    compiler = (str(cc), cc.stat().st_size, cc.stat().st_mtime_ns)
+    content = hashlib.sha256(repr((sorted(sources.items()), OPTIONS, compiler, platform.machine())).encode())
     return Path(platformdirs.user_cache_dir("quadcosim")) / "loop" / f"{content.hexdigest()}.so"
 
 

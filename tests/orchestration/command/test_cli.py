@@ -21,6 +21,7 @@ SCRIPT = shutil.which("quadcosim", path=str(Path(sys.executable).parent))
 SHORT = ("--stop-time", "0.5")
 
 KEYS = {
+    "engine",
     "outcome",
     "good",
     "horizon",
@@ -68,7 +69,8 @@ def quadcosim(*arguments: str | Path, code: int = 0, environment: dict[str, str]
 
 def flown(**timing: Any) -> dict[str, Any]:
     """The metrics of the same flight by the API."""
-    return {**orchestration.run(Scenario(stop_time=0.5, timing=Timing(**timing))).metrics, "wall_time": None}
+    result = orchestration.run(Scenario(stop_time=0.5, timing=Timing(**timing)))
+    return {**result.metrics, "wall_time": None, "engine": result.provenance["engine"]}
 
 
 def error_line(done: Done) -> str:
@@ -200,7 +202,7 @@ def test_out_keeps_the_run_and_its_figures(here: Path) -> None:
     kept, notes = (
         json.loads((here / "results/first" / name).read_text()) for name in ("metrics.json", "provenance.json")
     )
-    assert printed == {**kept, "wall_time": notes["wall_time"]}
+    assert printed == {**kept, "wall_time": notes["wall_time"], "engine": notes["engine"]}
     assert "wall_time" not in kept, "of two equal flights the metrics are equal"
     names = {path.name for path in (here / "results/first").iterdir()}
     assert names >= {"signals.parquet", "events.parquet", "metrics.json", "scenario.toml", "commands.png", "path.png"}

@@ -444,7 +444,7 @@ def test_an_error_after_ctrl_c_is_ctrl_c(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(Fmi2Instance, "step", fail)
     with pytest.raises(KeyboardInterrupt):
-        orchestration.run(Scenario(stop_time=1.0))
+        orchestration.run(Scenario(stop_time=1.0), engine="python")
 
 
 def test_the_second_ctrl_c_does_not_wait(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -455,4 +455,4 @@ def test_the_second_ctrl_c_does_not_wait(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(Fmi2Instance, "step", hang)
     with pytest.raises(KeyboardInterrupt):
-        orchestration.run(Scenario(stop_time=1.0))
+        orchestration.run(Scenario(stop_time=1.0), engine="python")
