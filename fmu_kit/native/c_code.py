@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import keyword
+import math
 import re
 from collections.abc import Iterable
 
@@ -19,7 +20,9 @@ _CALLED = {
     )},
     "abs": "q_fabs",
     "mod": "q_modulo",
+    "floordiv": "q_floor_divide",
 }  # fmt: skip
+_FORMATS = {"g": "general", "e": "exponential", "f": "fixed"}
 ERRORS = ("FmuError", "DivergenceError", "ZeroDivisionError", "OverflowError", "ValueError")
 """What a function may end with; the place here, from 1 on, is what it returns."""
 
@@ -143,7 +146,7 @@ class _Writer:
     def _lanes(self, symbol: Symbol) -> str:
         """A value as the argument of a function: a constant in all lanes."""
         text = self._real(symbol)
-        return f"q_all({text.strip('()')})" if symbol.op == "constant" and not text.startswith("q_all") else text
+        return f"q_all({text.strip('()')})" if symbol.op == "constant" and text.strip("(-")[0].isdigit() else text
 
     def _expression(self, symbol: Symbol) -> str:
         op, args = symbol.op, symbol.args
@@ -168,7 +171,7 @@ class _Writer:
             return f"{self._pair(args[0])}.{op}"
         if op in _CALLED:
             return f"{_CALLED[op]}({', '.join(map(self._lanes, args))})"
-        raise TraceError(f"{op} of computed values cannot be written in C: expected math.floor(a / b) for a // b")
+        raise TraceError(f"{op} of computed values cannot be written in C")
 
     @staticmethod
     def _other_of_the_pair(symbol: Symbol) -> Symbol:
@@ -210,12 +213,15 @@ class _Writer:
             if (key in a) + (key in b) + (key in after) > 1:
                 self._compute_unless_given_in(symbol, (*then, *otherwise))
 
-    def _compute_unless_given_in(self, symbol: Symbol, block: Block, depth: int = -1) -> None:
-        """Compute a value now, if nothing that it depends on gets its own in a block, or in the loop of a depth."""
+    def _compute_unless_given_in(self, symbol: Symbol, block: Block) -> None:
+        """Compute a value now, if nothing that it depends on gets its own in a block, or in a loop that is to come."""
         if symbol.args and not self._is_known(symbol):
             below = closure([symbol]).values()
-            if not any(_is_of_loop(each, depth) or self._is_given(each, block) for each in below):
+            if not any(self._is_of_loop_to_come(each) or self._is_given(each, block) for each in below):
                 self.value(symbol)
+
+    def _is_of_loop_to_come(self, symbol: Symbol) -> bool:
+        return symbol.op in ("index", "variable") and not any(id(symbol) in scope for scope in self.scopes)
 
     def _is_given(self, symbol: Symbol, block: Block) -> bool:
         """Whether a statement of a block gives a symbol its value."""
@@ -288,7 +294,7 @@ class _Writer:
         count, starts, nexts = each.symbols[0], each.symbols[1 : 1 + size], each.symbols[1 + size :]
         needed = closure([*symbols_of(body), *nexts])
         for symbol in needed.values():
-            self._compute_unless_given_in(symbol, body, depth)
+            self._compute_unless_given_in(symbol, body)
         states = []
         for start in starts:
             states.append(self._name("s"))
@@ -341,12 +347,13 @@ class _Writer:
                 self._line("text_add(m, m->failure);")
             elif symbol.kind == "bool":
                 self._line(f'text_add(m, {self.value(symbol)} ? "True" : "False");')
+            elif symbol.kind == "int":
+                self._line(f"text_integer(m, {self.value(symbol)});")
             elif spec == "":
-                self._line(f"text_{'integer' if symbol.kind == 'int' else 'real'}(m, {self.value(symbol)});")
-            elif spec == "g" and symbol.kind == "real":
-                self._line(f"text_general(m, {self.value(symbol)});")
+                self._line(f"text_real(m, {self.value(symbol)});")
             else:
-                raise TraceError(f"{{value:{spec}}} in a message: expected {{value}} or {{value:g}}")
+                precision = spec[1:-1] or "6"
+                self._line(f"q_text_{_FORMATS[spec[-1]]}(&m->text, {self.value(symbol)}, {precision});")
 
 
 def _identifier(name: str) -> str:
@@ -396,8 +403,10 @@ def _constant(symbol: Symbol) -> str:
     value = value_of(symbol)
     if symbol.kind == "bool":
         return f"Q_TEST({int(value)})"
-    if value != value or value in (float("inf"), float("-inf")):
-        raise TraceError(f"{value} as a constant: expected a finite number")
+    if math.isnan(value):
+        return "Q_NAN"
+    if math.isinf(value):
+        return "Q_INFINITY" if value > 0.0 else "(-Q_INFINITY)"
     return f"({value!r})" if value < 0 or repr(value).startswith("-") else repr(value)
 
 
@@ -436,7 +445,3 @@ def _unknown_below(symbol: Symbol, is_known: object) -> list[Symbol]:
             stack.append((one, True))
             stack += [(arg, False) for arg in reversed(one.args)]
     return list(found.values())
-
-
-def _is_of_loop(symbol: Symbol, depth: int) -> bool:
-    return (symbol.op == "index" and symbol.data == depth) or (symbol.op == "variable" and symbol.data[0] == depth)

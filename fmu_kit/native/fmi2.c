@@ -57,8 +57,7 @@ typedef struct {
 static void text_begin(Instance *m) { m->text = q_text_in(m->draft, sizeof m->draft); }
 static void text_add(Instance *m, Text text) { q_text_string(&m->text, text); }
 static void text_real(Instance *m, double x) { q_text_repr(&m->text, x); }
-static void text_general(Instance *m, double x) { q_text_general(&m->text, x, 6); }
-static void text_integer(Instance *m, double x) { q_text_integer(&m->text, (int64_t)x); }
+static void text_integer(Instance *m, double x) { q_text_fixed(&m->text, x == 0.0 ? 0.0 : x, 0); }
 
 static int fail(Instance *m, int error)
 {
@@ -299,7 +298,12 @@ static Status settle(Instance *m, unsigned vr, Type type)
     return OK;
 }
 
-#define GET(kind, type, ctype) \
+static double as_it_is(double x) { return x; }
+
+/* What a model has computed may be beyond what the interface can pass. */
+static int as_int(double x) { return x >= 2147483647.0 ? 2147483647 : x > -2147483648.0 ? (int)x : -2147483647 - 1; }
+
+#define GET(kind, type, ctype, converted) \
     CALL(Get##kind, References vr, size_t n, ctype *value) \
     { \
         int error; \
@@ -309,7 +313,7 @@ static Status settle(Instance *m, unsigned vr, Type type)
         if (!are_of(vr, n, type)) \
             return refuse_references(m, vr, n, type); \
         for (size_t i = 0; i < n; i++) \
-            value[i] = (ctype)m->state.memory[vr[i]]; \
+            value[i] = converted(m->state.memory[vr[i]]); \
         return OK; \
     }
 
@@ -325,9 +329,9 @@ static Status settle(Instance *m, unsigned vr, Type type)
         return OK; \
     }
 
-GET(Real, REAL, double)
-GET(Integer, INTEGER, int)
-GET(Boolean, BOOLEAN, int)
+GET(Real, REAL, double, as_it_is)
+GET(Integer, INTEGER, int, as_int)
+GET(Boolean, BOOLEAN, int, as_int)
 SET(Integer, INTEGER, int, value[i])
 SET(Boolean, BOOLEAN, int, value[i] != 0)
 

@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from fmu_kit.native.statements import Block, Place, Statement, statement
-from fmu_kit.native.structure import Path, Snapshot, children, is_number, leaves, mapped
+from fmu_kit.native.structure import (
+    Path,
+    Snapshot,
+    children,
+    difference,
+    expect_no_twins,
+    is_number,
+    leaves,
+    mapped,
+    shape,
+)
 from fmu_kit.native.symbols import Kind, Symbol, TraceError, common_kind, lifted, node
+from fmu_kit.slave import Slave
 
 _KINDS: dict[str, Kind] = {"Real": "real", "Integer": "int", "Boolean": "bool"}
+_TYPES: dict[Kind, str] = {"real": "a float", "int": "an integer", "bool": "a truth value"}
 KEPT_BY_THE_BASE = ("_reals", "_others", "_stale", "_start_time")
 
 
@@ -21,9 +33,13 @@ def name_of_kept(path: Path) -> str:
 class Memory:
     """The memory of one slave while it is traced: every number in it has a place with a name."""
 
-    def __init__(self, slave: Any) -> None:
+    def __init__(self, slave: Any, kinds: Mapping[str, Kind]) -> None:
         self.slave = slave
         self.places: dict[str, Place] = {}
+        self._kinds = kinds
+        """of places, as far as they are known from tracing the slave before"""
+        self.first_kinds: dict[str, Kind] = {}
+        """of places, as they were when they were first seen"""
         self.written: dict[str, Symbol] = {}
         """what lies in each place now, as far as it has been written"""
         self.version = 0
@@ -31,7 +47,7 @@ class Memory:
         self.versions: dict[tuple[int, Statement], int] = {}
         """after each call, by the one before it and the call"""
         self._joined: dict[tuple[int, int, int], int] = {}
-        self._base = frozenset(vars(slave)) - set(KEPT_BY_THE_BASE)
+        self._base = _attributes_of_the_base(type(slave)) - set(KEPT_BY_THE_BASE)
 
     # -- the attributes -----------------------------------------------------------------------------------------
 
@@ -44,6 +60,21 @@ class Memory:
             delattr(self.slave, name)
         for name, value in values.items():
             setattr(self.slave, name, value)
+
+    def expect_as_before(self, before: dict[str, Any], now: dict[str, Any], when: str, *, may_add: bool) -> None:
+        """Raise `TraceError` if what is kept is, but for its numbers, not what it was: a trace holds for one form."""
+        for name, value in now.items():
+            if hasattr(type(self.slave), name):
+                raise TraceError(f"self.{name} hides the one of its class: expected another name, set by initialise")
+            if name not in before and not may_add:
+                raise TraceError(f"self.{name} is first set {when}: expected it set by initialise")
+            if name in before and shape(before[name]) != shape(value):
+                raise TraceError(
+                    f"self.{name} changes {when} in more than numbers: {difference(before[name], value)}; "
+                    "expected one form from the beginning on"
+                )
+        for name in before.keys() - now.keys():
+            raise TraceError(f"self.{name} is deleted {when}: expected it to stay")
 
     def snapshot(self, args: Any, kwargs: Any) -> _Held:
         """What is held now, in the memory and in the arguments of a call."""
@@ -77,17 +108,26 @@ class Memory:
         found = self.places.get(name)
         reference = path[1] if path[0] in ("_reals", "_others") else None
         if found is None:
-            kind = symbol.kind if reference is None else _KINDS[self.slave.variables[reference].type]
+            kind = self._kinds.get(name, symbol.kind)
+            if reference is not None:
+                kind = _KINDS[self.slave.variables[reference].type]
             found = self.places[name] = Place(name, kind, reference)
-        elif found.kind != symbol.kind and reference is None:
-            widened = common_kind(node("load", (), found.kind), symbol)
-            found = self.places[name] = Place(name, widened, None)
+            self.first_kinds[name] = kind
+        if reference is None:
+            found = self.places[name] = Place(name, common_kind(node("load", (), found.kind), symbol), None)
+        elif (found.kind, symbol.kind) in (
+            ("int", "real"),
+            ("bool", "real"),
+            ("bool", "int"),
+        ) and symbol.op != "constant":
+            raise TraceError(f"{name}: expected a value of its type, found {_TYPES[symbol.kind]}")
         return found
 
     def enter(self) -> None:
         """Forget all values: at the start of a function the memory holds whatever it holds."""
         self.written = {}
         self.version = 0
+        expect_no_twins(self.attributes())
 
         def load(path: Path, leaf: Any) -> Any:
             if not is_number(leaf):
@@ -140,6 +180,12 @@ class Memory:
 
     def _unused(self) -> int:
         return 1 + len(self.versions) + len(self._joined)
+
+
+def _attributes_of_the_base(cls: type[Slave]) -> frozenset[str]:
+    """What an instance of the base class has of its own; the rest is what the model keeps."""
+    bare = type("Bare", (Slave,), {"variables": cls.variables, "description": "", "step": None})
+    return frozenset(vars(bare(instance_name="bare")))
 
 
 class _Held:

@@ -13,8 +13,9 @@ from typing import Any
 from fmu_kit.errors import DivergenceError, FmuError
 from fmu_kit.native.memory import Memory
 from fmu_kit.native.statements import Block, Call, Function, Statement, branched, statement
-from fmu_kit.native.structure import is_number, leaves, mapped, shape
+from fmu_kit.native.structure import difference, is_number, leaves, mapped, shape
 from fmu_kit.native.symbols import (
+    Kind,
     Piece,
     Symbol,
     TraceError,
@@ -83,6 +84,7 @@ class Recorder:
         """Have the symbols tell this recorder."""
         hooks.decide = self._decide
         hooks.fail_if = self.fail_if
+        hooks.is_running = lambda: self._path is not None
 
     # -- what happens on a path -----------------------------------------------------------------------------
 
@@ -205,15 +207,15 @@ class Recorder:
 
     # -- functions -----------------------------------------------------------------------------------------------
 
-    def call(self, method: Callable[..., Any], name: str, arguments: dict[str, Any]) -> Any:
-        """Call a method of the slave, which becomes a function of its own."""
+    def call(self, method: Callable[..., Any], of: Callable[..., Any], arguments: dict[str, Any]) -> Any:
+        """Call a method of the slave, `of` of its class, which becomes a function of its own."""
         memory = self.memory
         self.add(*memory.flushed())
         given = [lifted(leaf) for _, leaf in leaves(arguments) if is_number(leaf)]
         before = dict(memory.written)
-        key = (name, shape(arguments), shape(memory.attributes()))
+        key = (of, shape(arguments), shape(memory.attributes()))
         if key not in self._traced:
-            self._traced[key] = self.function(method, name, arguments)
+            self._traced[key] = self.function(method, of.__name__.lstrip("_"), arguments)
         function, exit_view, returned = self._traced[key]
         call = statement("call", given, Call(function, memory.version))
         self.add(call)
@@ -298,25 +300,35 @@ class Recorder:
         depth = self._depth
         starts = [lifted(leaf) for _, leaf in leaves(state) if is_number(leaf)]
         kinds = [start.kind for start in starts]
-        variables = iter([node("variable", (), kind, (depth, k)) for k, kind in enumerate(kinds)])
-        inside = mapped(state, lambda _, leaf: next(variables) if is_number(leaf) else leaf)
-        index = node("index", (), "int", depth)
-        before = self.memory.snapshot((), {})
+        while True:
+            block, nexts = self._looped(body, _with_numbers(state, "variable", kinds, depth))
+            widened = [common_kind(node("variable", (), kind, None), next) for kind, next in zip(kinds, nexts)]
+            if widened == kinds:
+                break
+            kinds = widened
+        loop = statement("loop", (lifted(count), *starts, *nexts), depth, (block,))
+        self._now.entries.append(loop)
+        return _with_numbers(state, "outcome", kinds, loop)
+
+    def _looped(self, body: Callable[[Any, Any], Any], state: Any) -> tuple[Block, list[Symbol]]:
+        """The body of a loop, and the numbers that it returns."""
+        index = node("index", (), "int", self._depth)
+        before, version = self.memory.snapshot((), {}), self.memory.version
+        kept, _ = self.memory.view(())
         self._depth += 1
-        outer = self._now
         try:
-            block, leaf, _ = self._explored(lambda: body(index, inside), (), before.restore)
+            block, leaf, _ = self._explored(lambda: body(index, state), (), before.restore)
         finally:
             self._depth -= 1
         if leaf is None:
             raise TraceError("a loop that always fails")
+        if leaf.version != version:
+            raise TraceError("repeat: its body calls a method of the slave, expected functions only")
+        if not _is_same(leaf.view, kept):
+            raise TraceError("repeat: its body changes what the slave keeps, expected to get all by its state")
         if shape(leaf.value) != shape(state):
             raise TraceError("repeat: expected the body to return what it is given, with other numbers")
-        nexts = [lifted(leaf) for _, leaf in leaves(leaf.value) if is_number(leaf)]
-        loop = statement("loop", (lifted(count), *starts, *nexts), depth, (block,))
-        outer.entries.append(loop)
-        results = iter([node("outcome", (), kind, (k, loop)) for k, kind in enumerate(kinds)])
-        return mapped(state, lambda _, leaf: next(results) if is_number(leaf) else leaf)
+        return block, [lifted(leaf) for _, leaf in leaves(leaf.value) if is_number(leaf)]
 
 
 MOST_PATHS = 2000
@@ -346,7 +358,7 @@ class _Merge:
 
     def value(self, a: Any, b: Any, what: str) -> Any:
         if shape(a) != shape(b):
-            raise TraceError(f"{what} differs in more than numbers between two paths: {_difference(a, b)}")
+            raise TraceError(f"{what} differs in more than numbers between two paths: {difference(a, b)}")
         others = iter([leaf for _, leaf in leaves(b)])
 
         def either(_: Any, leaf: Any) -> Any:
@@ -371,17 +383,22 @@ class _Merge:
         return made
 
 
+def _with_numbers(state: Any, op: str, kinds: list[Kind], of: Any) -> Any:
+    """A state with other numbers: those of a loop, by their places."""
+    data = [(of, k) if op == "variable" else (k, of) for k in range(len(kinds))]
+    numbers = iter([node(op, (), kind, where) for kind, where in zip(kinds, data)])
+    return mapped(state, lambda _, leaf: next(numbers) if is_number(leaf) else leaf)
+
+
+def _is_same(a: Any, b: Any) -> bool:
+    """Whether two values hold the same numbers."""
+    if shape(a) != shape(b):
+        return False
+    return all(lifted(x) is lifted(y) for (_, x), (_, y) in zip(leaves(a), leaves(b)) if is_number(x))
+
+
 def _is_cheap(symbol: Symbol) -> bool:
     return not symbol.args or (symbol.op in ("neg", "not") and _is_cheap(symbol.args[0]))
-
-
-def _difference(a: Any, b: Any) -> str:
-    one, other = dict(leaves(a)), dict(leaves(b))
-    for path in [*one, *other]:
-        if path not in one or path not in other or shape(one[path]) != shape(other[path]):
-            name = ".".join(str(part) for part in path) or "the value"
-            return f"{name} is {one.get(path, 'absent')} and {other.get(path, 'absent')}"
-    return "their types"
 
 
 def _statements(entries: list[Statement | _Fork]) -> Block:

@@ -12,15 +12,16 @@ from typing import Any
 
 from fmu_kit import scalar
 from fmu_kit.native.symbols import (
+    PowerErrors,
     Symbol,
     TraceError,
     both,
-    constant,
     either,
     hooks,
     is_known,
     lifted,
     node,
+    power,
     raised,
     select,
     truth,
@@ -78,8 +79,15 @@ def _rounded(name: Any) -> Callable[[Any], Any]:
     return lambda x: getattr(math, name)(x) if is_known(x) else whole(name, x)
 
 
+_POWER_ERRORS = PowerErrors(
+    zero=raised(lambda: math.pow(0.0, -1.0)),
+    negative=raised(lambda: math.pow(-1.0, 0.5)),
+    large=raised(lambda: math.pow(10.0, 400.0)),
+)
+
+
 def _power(a: Any, b: Any) -> Any:
-    return math.pow(a, b) if is_known(a, b) else lifted(a) ** lifted(b)
+    return math.pow(a, b) if is_known(a, b) else power(lifted(a), lifted(b), _POWER_ERRORS)
 
 
 MATH: Mapping[str, Any] = {
@@ -176,16 +184,10 @@ class _Converting(type):
         if cls.kind == "bool":
             return truth(x)
         if cls.kind == "real":
-            return (
-                x
-                if x.kind == "real"
-                else node("select", (x, constant(1.0), constant(0.0)), "real")
-                if x.kind == "bool"
-                else x
-            )
+            return x if x.kind == "real" else x + 0.0
         if x.kind == "real":
             raise TraceError("int() of a computed float: expected math.floor or math.ceil")
-        return x
+        return x if x.kind == "int" else x + 0
 
 
 def _converting(name: str, kind: str) -> type:

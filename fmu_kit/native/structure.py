@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import array
+import collections
 import copy
 import enum
+import random
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -11,6 +14,7 @@ from fmu_kit.native.symbols import Symbol, TraceError
 
 Path = tuple[Any, ...]
 _LEAVES = (Symbol, float, int, bool, str, bytes, type(None), type, enum.Enum)
+_OPAQUE = (set, bytearray, array.array, collections.deque, random.Random, Iterator)
 _DEEPEST = 12
 
 
@@ -20,9 +24,14 @@ def is_number(value: Any) -> bool:
 
 
 def children(value: Any) -> list[tuple[Any, Any]]:
-    """What a value holds, with the key of each; nothing for a leaf."""
+    """What a value holds, with the key of each; nothing for a leaf.
+
+    Raises `TraceError` for what may hold something that is not seen.
+    """
     if isinstance(value, _LEAVES) or callable(value):
         return []
+    if isinstance(value, _OPAQUE):
+        raise TraceError(f"{type(value).__name__}: expected numbers in tuples, lists, dictionaries and objects")
     if isinstance(value, tuple | list):
         names = getattr(value, "_fields", None)
         return list(zip(names, value)) if names else list(enumerate(value))
@@ -63,6 +72,21 @@ def shape(value: Any) -> Any:
     return (type(value), tuple((key, shape(child)) for key, child in inside))
 
 
+def difference(a: Any, b: Any) -> str:
+    """In what two values differ beside their numbers."""
+    one, other = dict(leaves(a)), dict(leaves(b))
+    for path in [*one, *other]:
+        if path not in one or path not in other or shape(one[path]) != shape(other[path]):
+            name = ".".join(str(part) for part in path) or "it"
+            found = (_in_words(each[path]) if path in each else "absent" for each in (one, other))
+            return f"{name} is {' and '.join(found)}"
+    return "their types"
+
+
+def _in_words(leaf: Any) -> str:
+    return "a number" if is_number(leaf) else repr(leaf)
+
+
 def mapped(value: Any, change: Callable[[Path, Any], Any], path: Path = ()) -> Any:
     """A copy of a value with every leaf replaced."""
     inside = children(value)
@@ -92,6 +116,30 @@ def mutable_objects(value: Any, found: dict[int, Any]) -> None:
         found[id(value)] = value
     for _, child in inside:
         mutable_objects(child, found)
+
+
+def expect_no_twins(value: Any) -> None:
+    """Raise `TraceError` if one object that may be changed lies in two places: in C it would be two."""
+    places: dict[int, Path] = {}
+
+    def note(value: Any, path: Path) -> None:
+        if isinstance(value, list | dict) or (
+            children(value) and not isinstance(value, tuple) and not _is_frozen(value)
+        ):
+            if id(value) in places:
+                one, other = (".".join(map(str, each)) for each in (places[id(value)], path))
+                raise TraceError(f"self.{one} and self.{other} are one {type(value).__name__}: expected one of its own")
+            places[id(value)] = path
+        for key, child in children(value):
+            note(child, (*path, key))
+
+    for key, child in children(value):
+        note(child, (key,))
+
+
+def _is_frozen(value: Any) -> bool:
+    parameters = getattr(type(value), "__dataclass_params__", None)
+    return parameters is not None and bool(parameters.frozen)
 
 
 class Snapshot:

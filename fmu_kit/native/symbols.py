@@ -7,15 +7,19 @@ simplified: every one is the operation of Python floats, in their order, so that
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 Kind = Literal["real", "int", "bool"]
 
 
 class TraceError(Exception):
     """The code does what cannot be traced; the text says what, and what to do instead."""
+
+    place: str | None = None
+    """file and line, where it is another than the line that is being run"""
 
 
 class Symbol:
@@ -146,7 +150,9 @@ class Symbol:
         return whole("ceil", self)
 
     def __hash__(self) -> int:
-        return object.__hash__(self)
+        if not hooks.is_running():
+            return object.__hash__(self)
+        raise TraceError("a computed value as the key of a dictionary, in a set or in a cache: expected an if")
 
     def __reduce__(self) -> Any:
         raise TraceError("a computed value cannot be pickled")
@@ -175,6 +181,8 @@ class Hooks:
     """which way the path goes where this condition is asked for"""
     fail_if: Callable[[Any, Exception], None]
     """this error is raised if the condition holds"""
+    is_running: Callable[[], bool] = staticmethod(lambda: False)
+    """whether a path is being run: code of a slave, and none of ours"""
 
 
 hooks = Hooks()
@@ -301,7 +309,9 @@ def _checked(op: str, a: Any, b: Any) -> Any:
     left, right = lifted(a), lifted(b)
     integers = "real" not in (left.kind, right.kind)
     if op == "pow":
-        return _power(left, right, integers)
+        if integers and not (right.op == "constant" and value_of(right) >= 0.0):
+            raise TraceError("** of two integers: expected a float among them")
+        return power(left, right, _POWER_ERRORS, "int" if integers else "real")
     zero: Any = _comparison("eq", right, 0.0)
     hooks.fail_if(zero, raised((lambda: 1 // 0) if integers else _DIVISIONS[op]))
     return node(op, (left, right), "int" if integers and op != "div" else "real")
@@ -314,22 +324,36 @@ _DIVISIONS: dict[str, Callable[[], object]] = {
 }
 
 
-def _power(base: Symbol, exponent: Symbol, integers: bool) -> Symbol:
-    if integers and not (exponent.op == "constant" and value_of(exponent) >= 0.0):
-        raise TraceError("** of two integers: expected a float among them")
+class PowerErrors(NamedTuple):
+    """What is raised for zero to a negative power, a negative number to a broken one, and too large a result."""
+
+    zero: Exception
+    negative: Exception
+    large: Exception
+
+
+_POWER_ERRORS = PowerErrors(
+    raised(lambda: 0.0 ** float("-1")),
+    # Python goes on with a complex number, which no variable takes
+    ValueError("a negative number to a power that is no integer"),
+    raised(lambda: 10.0 ** float("400")),
+)
+
+
+def power(base: Symbol, exponent: Symbol, errors: PowerErrors, kind: Kind = "real") -> Symbol:
+    """`base` to the power of `exponent`."""
     known = value_of(exponent) if exponent.op == "constant" else None
     if known is None or known < 0.0:
         negative: Any = known is not None or exponent < 0.0
-        hooks.fail_if(both(base == 0.0, negative), raised(lambda: 0.0 ** float("-1")))
+        hooks.fail_if(both(base == 0.0, negative), errors.zero)
     if known is None or not known.is_integer():
         broken: Any = known is not None or node("ne", (exponent, node("floor", (exponent,), "real")), "bool")
-        # Python goes on with a complex number, which no variable takes
-        hooks.fail_if(both(base < 0.0, broken), ValueError("a negative number to a power that is no integer"))
-    result = node("pow", (base, exponent), "int" if integers else "real")
+        hooks.fail_if(both(base < 0.0, broken), errors.negative)
+    result = node("pow", (base, exponent), kind)
     finite = both(
         node("isfinite", (base,), "bool"), True if known is not None else node("isfinite", (exponent,), "bool")
     )
-    hooks.fail_if(both(node("isinf", (result,), "bool"), finite), raised(lambda: 10.0 ** float("400")))
+    hooks.fail_if(both(node("isinf", (result,), "bool"), finite), errors.large)
     return result
 
 
@@ -361,6 +385,8 @@ def closure(symbols: Iterable[Symbol]) -> dict[int, Symbol]:
 # -- text: where a value stands in a message ---------------------------------------------------------------------
 
 OPENING, CLOSING = "\x02", "\x03"
+_NAMES: dict[Kind, str] = {"int": "an integer", "real": "a float", "bool": "a truth value"}
+_FORMATS: dict[Kind, str] = {"int": " or {value:d}", "real": " or a format as :g, :.3g, :.3f or :.3e", "bool": ""}
 _tokens: list[tuple[Symbol, str]] = []
 _numbers: dict[tuple[int, str], int] = {}
 
@@ -369,7 +395,12 @@ Piece = str | tuple[Symbol, str]
 
 
 def token(symbol: Symbol, spec: str) -> str:
-    """What stands in a text for a value."""
+    """What stands in a text for a value; raises `TraceError` for a format that C does not know."""
+    known = {"int": r"d?", "real": r"(\.\d+)?g|\.\d+[ef]|", "bool": ""}[symbol.kind]
+    if spec != "failure" and not re.fullmatch(known, spec):
+        raise TraceError(
+            f"{{value:{spec}}} of {_NAMES[symbol.kind]} in a text: expected {{value}}{_FORMATS[symbol.kind]}"
+        )
     key = (id(symbol), spec)
     if key not in _numbers:
         _numbers[key] = len(_tokens)

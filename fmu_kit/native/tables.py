@@ -11,8 +11,9 @@ from collections.abc import Callable, Iterable
 
 from fmu_kit.errors import FmuError
 from fmu_kit.native.c_code import ERRORS, c_string, place_names
-from fmu_kit.native.memory import KEPT_BY_THE_BASE, name_of_kept
+from fmu_kit.native.memory import Memory, name_of_kept
 from fmu_kit.native.statements import Place
+from fmu_kit.native.structure import is_number, leaves
 from fmu_kit.native.symbols import TraceError
 from fmu_kit.native.tracing import Program
 from fmu_kit.slave import Phase, Slave
@@ -64,10 +65,10 @@ def tables(program: Program, guid: str) -> str:
 
 
 def _start(slave: Slave, place: Place) -> float:
-    """What a place holds before initialisation; what a model keeps is not read before it has been written."""
+    """What a place holds before initialisation; what the slave does not have then is not read before it is written."""
     if place.reference is not None:
         return float(slave.variables[place.reference].start)
-    kept = {name_of_kept((name,)): value for name, value in vars(slave).items() if name in KEPT_BY_THE_BASE}
+    kept = {name_of_kept(path): value for path, value in leaves(Memory(slave, {}).attributes()) if is_number(value)}
     return float(kept.get(place.name, 0.0))
 
 

@@ -13,6 +13,7 @@ import inspect
 import textwrap
 import traceback
 import types
+from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,11 +24,15 @@ from fmu_kit.native import stand_ins
 from fmu_kit.native.memory import Memory
 from fmu_kit.native.recorder import Recorder
 from fmu_kit.native.statements import Function, Place, Statement
-from fmu_kit.native.symbols import TraceError
+from fmu_kit.native.symbols import Kind, TraceError
 from fmu_kit.slave import Phase, Slave
 
 _BASE_METHODS = ("_take_parameters", "_check_parameters")
 _UNTRACED = ("internal_state", "restore", "to_xml")
+_OPEN = frozenset({"__init__", "read_parameters", "initialise", "step", "internal_state", "restore", "to_xml"})
+"""What a slave may define of the methods that its base class has."""
+MOST_WARNINGS = 32
+"""Of a slave, by their keys; each is a bit of its state."""
 _OWN = Path(__file__).parent
 
 
@@ -56,8 +61,21 @@ def trace(slave: type[Slave], modules: list[types.ModuleType]) -> Program:
 
     Raises `TraceError` naming the line that does what cannot be traced.
     """
-    instance = slave(instance_name="traced")
-    memory = Memory(instance)
+    kinds: dict[str, Kind] = {}
+    while True:
+        memory = Memory(slave(instance_name="traced"), kinds)
+        try:
+            program = _traced(slave, modules, memory)
+        except Exception as error:
+            raise TraceError(f"{_place(error)}{error}") from error
+        found = {name: place.kind for name, place in memory.places.items() if place.reference is None}
+        if all(kinds.get(name, memory.first_kinds[name]) == kind for name, kind in found.items()):
+            return program
+        kinds = found  # a place that held an integer first and a float later holds a float: once more, with that
+
+
+def _traced(slave: type[Slave], modules: list[types.ModuleType], memory: Memory) -> Program:
+    instance = memory.slave
     recorder = Recorder(memory)
     recorder.listen()
     warnings: list[str] = []
@@ -65,21 +83,26 @@ def trace(slave: type[Slave], modules: list[types.ModuleType]) -> Program:
     def warn_once(self: Slave, key: str, text: str) -> None:
         if key not in warnings:
             warnings.append(key)
+        if len(warnings) > MOST_WARNINGS:
+            raise TraceError(f"more than {MOST_WARNINGS} keys of warnings")
         recorder.warn(key, text)
 
-    try:
-        with _wrapped(slave, modules, recorder, warn_once):
-            initialise, after, _ = recorder.function(
-                lambda: Slave._initialise(instance), "enter_stepping", {}, catches=True
-            )
-            if after is None:
-                raise TraceError(f"{slave.__name__}.initialise fails whatever it is given")
-            memory._set_attributes(after)
-            instance._phase = Phase.STEPPING
-            step = functools.partial(inspect.unwrap(Slave.do_step), instance)
-            do_step, _, _ = recorder.function(lambda t, h: step(t, h), "do_step", {"t": 0.0, "h": 0.0}, catches=True)
-    except Exception as error:
-        raise TraceError(f"{_place(error)}{error}") from error
+    _expect_no_override(slave)
+    with _wrapped(slave, modules, recorder, warn_once):
+        made = memory.attributes()
+        initialise, after, _ = recorder.function(
+            lambda: Slave._initialise(instance), "enter_stepping", {}, catches=True
+        )
+        if after is None:
+            raise TraceError(f"{slave.__name__}.initialise fails whatever it is given")
+        memory.expect_as_before(made, after, "when it is initialised", may_add=True)
+        memory._set_attributes(after)
+        instance._phase = Phase.STEPPING
+        step = functools.partial(inspect.unwrap(Slave.do_step), instance)
+        do_step, stepped, _ = recorder.function(lambda t, h: step(t, h), "do_step", {"t": 0.0, "h": 0.0}, catches=True)
+        if stepped is None:
+            raise TraceError(f"{slave.__name__}.step fails whatever it is given")
+        memory.expect_as_before(after, stepped, "in a step", may_add=False)
     variables = {place.reference: place for place in memory.places.values() if place.reference is not None}
     kept = [place for place in memory.places.values() if place.reference is None]
     return Program(
@@ -94,8 +117,18 @@ def trace(slave: type[Slave], modules: list[types.ModuleType]) -> Program:
     )
 
 
+def _expect_no_override(slave: type[Slave]) -> None:
+    """Raise `TraceError` for a method that answers to FMI itself, which only the base class may."""
+    for cls in slave.__mro__[: slave.__mro__.index(Slave)]:
+        for name in vars(cls):
+            if name in vars(Slave) and name not in _OPEN and (name == "_initialise" or callable(vars(Slave)[name])):
+                raise TraceError(f"{cls.__name__}.{name}: expected {', '.join(sorted(_OPEN - {'__init__'}))} only")
+
+
 def _place(error: Exception) -> str:
     """File and line of the slave's code that an error comes from."""
+    if isinstance(error, TraceError) and error.place is not None:
+        return f"{error.place}: "
     frames = [
         frame
         for frame in traceback.extract_tb(error.__traceback__)
@@ -148,6 +181,7 @@ def _wrapped(
 def _as_region(function: Callable[..., Any], recorder: Recorder) -> Callable[..., Any]:
     @functools.wraps(function)
     def region(*args: Any, **kwargs: Any) -> Any:
+        _expect_traceable(function)
         return recorder.region(function, args, kwargs)
 
     return region
@@ -155,25 +189,65 @@ def _as_region(function: Callable[..., Any], recorder: Recorder) -> Callable[...
 
 def _as_function(method: Callable[..., Any], recorder: Recorder) -> Callable[..., Any]:
     signature = inspect.signature(method)
-    name = method.__name__.lstrip("_")
+
+    own, *_ = signature.parameters
 
     @functools.wraps(method)
     def call(self: Any, *args: Any, **kwargs: Any) -> Any:
+        _expect_traceable(method)
         bound = signature.bind(self, *args, **kwargs)
         bound.apply_defaults()
-        given = {key: value for key, value in bound.arguments.items() if key != "self"}
-        return recorder.call(functools.partial(method, self), name, given)
+        given = {key: value for key, value in bound.arguments.items() if key != own}
+
+        def again(**given: Any) -> Any:
+            whole = inspect.BoundArguments(signature, OrderedDict({own: self, **given}))
+            return method(*whole.args, **whole.kwargs)
+
+        return recorder.call(again, method, given)
 
     return call
 
 
+_UNTRACEABLE: dict[type[ast.stmt | ast.expr], str] = {
+    ast.Try: "try: expected an if before what may fail",
+    ast.With: "with: expected nothing that has to be closed",
+    ast.Global: "global: expected values in the slave",
+    ast.Await: "await: expected a plain function",
+}
+
+
+@functools.cache
+def _untraceable(function: Callable[..., Any]) -> TraceError | None:
+    for each in ast.walk(_tree_of(function)):
+        for kind, words in _UNTRACEABLE.items():
+            if isinstance(each, kind):
+                error = TraceError(words)
+                error.place = f"{inspect.getsourcefile(function)}, line {_first_line(function) + each.lineno - 1}"
+                return error
+    return None
+
+
+def _expect_traceable(function: Callable[..., Any]) -> None:
+    """Raise `TraceError` for a function that does what paths cannot be told from."""
+    error = _untraceable(function)
+    if error is not None:
+        raise error
+
+
+def _first_line(function: Callable[..., Any]) -> int:
+    return inspect.getsourcelines(function)[1]
+
+
+def _tree_of(function: Callable[..., Any]) -> ast.AST:
+    return ast.parse(textwrap.dedent(inspect.getsource(function)))
+
+
 @functools.cache
 def _branches(function: Callable[..., Any]) -> bool:
-    """Whether a function takes one of several ways; raises `TraceError` if it catches errors."""
-    tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
-    for each in ast.walk(tree):
-        if isinstance(each, ast.Try):
-            return True
+    """Whether a function takes one of several ways, or does what cannot be traced."""
+    if _untraceable(function) is not None:
+        return True
+    for each in ast.walk(_tree_of(function)):
         if isinstance(each, ast.If | ast.IfExp | ast.BoolOp | ast.While | ast.Assert):
             return True
         if isinstance(each, ast.Compare) and len(each.ops) > 1:

@@ -1,0 +1,354 @@
+"""Slaves that do what slaves may do and be written out as C, each some of it."""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+from fmu_kit.algebra import Vec3
+from fmu_kit.errors import DivergenceError, FmuError, require
+from fmu_kit.saved_state import State
+from fmu_kit.scalar import repeat
+from fmu_kit.slave import Slave
+from fmu_kit.variables import (
+    Variable,
+    continuous_input,
+    continuous_output,
+    discrete_input,
+    discrete_output,
+    fixed_parameter,
+    tunable_parameter,
+)
+
+
+class Probe(Slave):
+    """What all have: inputs a, b, n, on; parameters p, q; outputs y0 to y7, count, lit."""
+
+    variables: ClassVar[tuple[Variable, ...]] = (
+        continuous_input("a", "A number.", None),
+        continuous_input("b", "A number.", None),
+        tunable_parameter("p", "A parameter.", None, 1.5, minimum=-100.0, maximum=100.0),
+        fixed_parameter("q", "A parameter.", None, 0.25, above=0.0),
+        *(continuous_output(f"y{k}", "A number.", None) for k in range(8)),
+        discrete_input("n", "A whole number.", None, 3),
+        discrete_output("count", "A whole number.", None, 0),
+        discrete_input("on", "A truth value.", None, False),
+        discrete_output("lit", "A truth value.", None, False),
+    )
+
+    def internal_state(self) -> State:
+        """Not what these are about."""
+        return {}
+
+
+# -- branches ----------------------------------------------------------------------------------------------------
+
+
+def _step_of_stairs(x: float) -> float:
+    if x < -1.0:
+        return -1.0
+    elif x < 0.0:
+        return x
+    elif not x < 5.0:
+        return 7.0
+    for edge in (1.0, 2.0, 3.0):
+        if x < edge:
+            return edge
+    return 4.0
+
+
+def _of_two(x: float, y: float, *, most: float = 2.0) -> tuple[float, bool]:
+    low, high = (x, y) if x < y else (y, x)
+    if low <= 0.0 <= high and low != high:
+        return min(high, most), True
+    return low, low > most or high < -most
+
+
+class Branches(Probe):
+    """if, elif, else, early returns, conditions of several parts, functions that branch and call each other."""
+
+    description = "Branches."
+
+    def initialise(self, t: float) -> None:
+        """Outputs of the inputs."""
+        self.step(t, 1.0)
+
+    def step(self, t: float, h: float) -> None:
+        """All kinds of branches, in several methods: paths through one method multiply."""
+        a, b = self.real("a"), self.real("b")
+        self.put("y0", _step_of_stairs(a) + 10.0 * _step_of_stairs(b))
+        value, both = _of_two(a, b)
+        self.put("y1", value)
+        self.put("y2", _of_two(_step_of_stairs(b), a, most=self.real("p"))[0])
+        self._choose(a, b, both)
+        self._leave_early(a, b, t, h)
+        self._combine(a, b, both)
+
+    def _choose(self, a: float, b: float, both: bool) -> None:
+        """if and elif without an else."""
+        if both and (a > 1.0 or b > 1.0) and self.boolean("on"):
+            self.put("y3", a)
+        elif self.count("n") > 2 and a != b:
+            self.put("y3", b)
+
+    def _leave_early(self, a: float, b: float, t: float, h: float) -> None:
+        """From within a branch."""
+        if a > b:
+            self.put("y4", t)
+            if self._is_small(a):
+                self.put("y5", h)
+                return
+            self.put("y5", -h)
+        self.put("y3", self.real("y3") + 1.0)
+
+    def _combine(self, a: float, b: float, both: bool) -> None:
+        """Conditions within values."""
+        self.put("y6", 1.0 if -1.0 < a < b <= 3.0 else 2.0)
+        self.put("y7", (a or b) + (1 if a and b else 0))
+        self.put_boolean("lit", any((a > 3.0, b > 3.0)) and not all(x > 1.0 for x in (a, b)))
+        self.put_count("count", self.count("n") + (2 if self.boolean("on") else -1) + both)
+
+    def _is_small(self, x: float) -> bool:
+        """A method with a truth value of its own."""
+        if x < 0.0:
+            return self._is_small_and_positive(-x)
+        return self._is_small_and_positive(x)
+
+    def _is_small_and_positive(self, x: float) -> bool:
+        return 0.0 <= x < self.real("q")
+
+
+# -- arithmetic ----------------------------------------------------------------------------------------------------
+
+
+class Arithmetic(Probe):
+    """Operations that Python refuses for some numbers."""
+
+    description = "Arithmetic."
+
+    def step(self, t: float, h: float) -> None:
+        """One of them, by the number n."""
+        a, b, n = self.real("a"), self.real("b"), self.count("n")
+        i, k = (math.floor(min(max(x, -1e6), 1e6)) for x in (a, b))  # integers of C are exact up to 2**53
+        if n == 0:
+            self.put("y0", a / b)
+        elif n == 1:
+            self.put("y0", a % b)
+        elif n == 2:
+            self.put("y0", a**b if a >= 0.0 else a**3)
+        elif n == 3:
+            self.put("y0", math.sqrt(a))
+        elif n == 4:
+            self.put("y0", math.exp(a) + math.expm1(b))
+        elif n == 5:
+            self.put("y0", math.log(a))
+        elif n == 6:
+            self.put("y0", math.asin(a) + math.acos(b))
+        elif n == 7:
+            self.put_count("count", math.ceil(b / 1e305) + math.floor(a) % 7)
+        elif n == 8:
+            self.put("y0", math.pow(a, b))
+        elif n == 9:
+            self.put("y0", a // b)
+        elif n == 10:
+            self.put_count("count", i // 3 + k % -5 + 7 // k)
+        elif n == 11:
+            self.put("y0", (a * 1e200) * (b * 1e200))
+            require(math.isfinite(self.real("y0")), "y0", self.real("y0"), "a finite value")
+        self.put("y1", abs(a) + math.fabs(b) - math.copysign(a, b))
+        self.put("y2", math.sin(a) + math.cos(b) + math.tan(a) + math.tanh(b))
+        self.put("y3", math.atan(a) + math.atan2(a, b))
+        self.put("y4", min(a, b, 0.5) + max((a, b)) + sum((a, b, 1.0)))
+        self.put("y5", a**2 - b**-2.0 if b else a**0.5 if a > 0.0 else -a + +b)
+        self.put("y6", float(math.isnan(a / 2.0)) + (a == b) + float(n))
+        self.put("y7", (n * n - n // 2) / 4)
+
+
+# -- what is kept ----------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Filter:
+    """An object that is changed in place."""
+
+    value: float
+    seen: int = 0
+
+    def take(self, x: float, share: float) -> float:
+        """Towards x; far from it in one go."""
+        self.seen += 1
+        if abs(x - self.value) > 50.0:
+            self.value = x
+        else:
+            self.value += share * (x - self.value)
+        return self.value
+
+
+class Pair(NamedTuple):
+    """Of numbers."""
+
+    first: float
+    second: float
+
+
+def _raise_all(values: list[float], by: float) -> None:
+    for k in range(len(values)):
+        if values[k] < by:
+            values[k] = by
+
+
+class Memory(Probe):
+    """Objects, lists, dictionaries and tuples from step to step, changed in place and put anew."""
+
+    description = "Memory."
+
+    def read_parameters(self) -> None:
+        """Only if they are what they have to be together."""
+        self._share = self.real("q") / (1.0 + abs(self.real("p")))
+        require(self.real("p") != 13.0, "p", self.real("p"), "another number")
+
+    def initialise(self, t: float) -> None:
+        """All that is kept has its shape from here on."""
+        self._filters = [Filter(self.real("a")), Filter(0.0, seen=10)]
+        self._named = {"low": math.inf, "high": -math.inf}
+        self._last = Pair(self.real("a"), self.real("b"))
+        self._whole = 0
+        self._delayed = [0.0] * 4
+        self._armed = False
+        self._started = t
+
+    def step(self, t: float, h: float) -> None:
+        """Some of each."""
+        a, b = self.real("a"), self.real("b")
+        chosen = self._filters[0]
+        if self.boolean("on"):
+            chosen = self._filters[1]
+            self._last = Pair(b, self._last.first)
+        self.put("y0", self._filters[0].take(a, self._share))
+        self.put("y1", self._filters[1].take(chosen.value + b, self._share))
+        if a < self._named["low"]:
+            self._named["low"] = a
+        self._named["high"] = max(self._named["high"], b)
+        self.put("y2", self._last.second - self._last.first)
+        self._delayed = [a, *self._delayed[:-1]]
+        _raise_all(self._delayed, -2.0)
+        self._delayed[1] += 0.0
+        self.put("y3", self._delayed[3])
+        self._whole += 0.5 if self._armed else 1
+        self.put("y4", math.floor(self._whole))
+        self._armed = a > b or (self._armed and a > 0.0)
+        self.put_boolean("lit", self._armed)
+        self.put_count("count", self._filters[0].seen + self._filters[1].seen)
+        self.put("y5", t - self._started)
+        if self._named["low"] <= self._named["high"]:
+            self.put("y6", self._named["high"] - self._named["low"])
+
+
+class Kept(Probe):
+    """What is set in `__init__`, methods of its own class and of its base under one name."""
+
+    description = "Kept."
+
+    def __init__(self, **kwargs: object) -> None:
+        super().__init__(**kwargs)
+        self._total = 2.5
+        self._offset = Vec3(1.0, 2.0, 3.0)
+
+    def initialise(self, t: float) -> None:
+        """Not the total: that begins with what it was made with, and goes on."""
+        self._offset = Vec3(self.real("a"), self._total, 3.0)
+
+    def step(self, t: float, h: float) -> None:
+        """Both ways of moving."""
+        self.put("y0", self._moved(self.real("a"), self.real("b")))
+        self.put("y1", self._listed(self.real("a"), self.real("b"), self._total))
+        self._total = self._total + h
+        self.put("y2", self._total + self._offset.x * self._offset.y)
+
+    def _moved(self, x: float, by: float) -> float:
+        return x + by if x > by else x
+
+    def _listed(self, *values: float) -> float:
+        return max(values)
+
+
+class Below(Kept):
+    """A class of a class."""
+
+    description = "Below."
+
+    def step(self, t: float, h: float) -> None:
+        """Its own, and around that of its base."""
+        super().step(t, h)
+        self.put("y3", self._moved(self.real("b"), 1.0))
+        self.put("y4", super()._moved(self.real("b"), 1.0))
+
+    def _moved(self, x: float, by: float) -> float:
+        return 2.0 * super()._moved(x, by) + super()._moved(by, x)
+
+
+# -- loops ---------------------------------------------------------------------------------------------------------
+
+
+def _clipped(x: float) -> float:
+    return 10.0 if x > 10.0 else x
+
+
+class Loops(Probe):
+    """Loops of a computed number of times."""
+
+    description = "Loops."
+
+    def step(self, t: float, h: float) -> None:
+        """A sum, a product that is cut off, one loop in another."""
+        a, b, n = self.real("a"), self.real("b"), self.count("n")
+        times = min(max(n, 0), 20)
+
+        def add(i: int, state: tuple[float, float]) -> tuple[float, float]:
+            total, product = state
+            if i > 2:
+                total = total + a
+            return total + i * b, _clipped(product * a)
+
+        total, product = repeat(times, add, (0.0, 1.0))
+        self.put("y0", total)
+        self.put("y1", product)
+        inner = repeat(times, lambda i, x: x + repeat(i, lambda k, y: y + k * b, 0.0), 0)
+        self.put("y2", inner)
+        half = repeat(times, lambda i, x: x + 0.5, 0)
+        self.put_count("count", math.floor(half))
+
+        def root(i: int, x: float) -> float:
+            require(x > -3.0, "root", x, "more than -3")
+            return x - 1.0
+
+        self.put("y3", repeat(times, root, abs(b)))
+
+
+# -- words ---------------------------------------------------------------------------------------------------------
+
+
+class Words(Probe):
+    """Errors and warnings, with values in them."""
+
+    description = "Words."
+
+    def read_parameters(self) -> None:
+        """Errors of parameters."""
+        if self.real("p") > 50.0:
+            raise FmuError(f'p = {self.real("p"):g}, which is 100 % more than {50:d}: expected "less" \\ µ')
+
+    def step(self, t: float, h: float) -> None:
+        """Warnings once, then errors."""
+        a, b, n = self.real("a"), self.real("b"), self.count("n")
+        if a > 1.0:
+            self.warn_once("a", f"a = {a} and {b:g} at t = {t}: 100 % of {n}, {self.boolean('on')}, {a > b}")
+        if b > 1.0:
+            self.warn_once("b", f"b = {b:.3f}, {b:.2e}, {a:.4g}, {-b!r}, {float(n)}, {math.floor(b)}, {n:d}")
+        if a > 1.0 and b > 1.0:
+            self.warn_once("a", "never")
+        if n == 7:
+            raise DivergenceError(f"at t = {t}: n = {n}, {(a, b)}, {[a]}")
+        require(n != 8, "n", n, f"another number than {n + 0.5}")
+        if n == 9:
+            raise ValueError(f"n is {n}")
+        self.put("y0", a)

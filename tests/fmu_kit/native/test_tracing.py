@@ -1,0 +1,43 @@
+"""What slaves may do: written out as C they answer as they do in Python, to the last bit and letter."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fmu_kit.bundle import Target
+from fmu_kit.packaging import slave_class
+from tests.fmu_kit.native.compiled import compiler
+from tests.fmu_kit.native.twins import InC, InPython, Values, answers, library
+
+PROBES = ("Branches", "Arithmetic", "Memory", "Kept", "Below", "Loops", "Words")
+NUMBERS = st.sampled_from([0.0, -0.0, 0.5, 1.0, -1.0, 2.0, 3.0, 7.25, 100.0, 1e3, 1e200, -1e308]) | st.floats(-8.0, 8.0)
+INPUTS = st.fixed_dictionaries({"a": NUMBERS, "b": NUMBERS, "n": st.integers(-3, 12), "on": st.booleans()})
+TUNED = st.fixed_dictionaries({}, optional={"p": st.sampled_from([0.0, 2.0, -7.5, 13.0, 60.0, 200.0])})
+STEPS = st.lists(st.tuples(INPUTS, TUNED).map(lambda both: both[0] | both[1]), max_size=5)
+FIXED = st.sampled_from([0.25, 2.0, 1e-3])
+
+
+@pytest.fixture(scope="module", params=PROBES)
+def probe(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Target, Path]:
+    """Each slave in turn, and the library that it is compiled to."""
+    compiler("cc")
+    target = Target.parse(f"tests.fmu_kit.native.probes:{request.param}")
+    return target, library(target, tmp_path_factory.mktemp("probe"))
+
+
+def test_a_slave_in_c_answers_as_in_python(probe: tuple[Target, Path]) -> None:
+    target, path = probe
+    slave = slave_class(target)
+    reset = InC.made(slave, path)
+
+    @settings(derandomize=True, max_examples=150, database=None)
+    @given(start=INPUTS, q=FIXED, steps=STEPS)
+    def answer_alike(start: Values, q: float, steps: list[Values]) -> None:
+        given = {**start, "q": q}
+        expected = answers(InPython(slave(instance_name="probe")), given, steps)
+        reset.fmu.reset()
+        assert answers(reset, given, steps) == expected
+
+    answer_alike()
