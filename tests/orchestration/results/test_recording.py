@@ -70,7 +70,8 @@ def test_rows_are_on_disk_before_the_flight_is_over(tmp_path: Path) -> None:
 
     scenario = SCENARIO.with_changes(stop_time=1.5)
     keep_flight(tmp_path / "run", lambda to: orchestration.run(scenario, recorder=to, progress=look), figures=False)
-    assert 0 < sizes[0] < sizes[1] < sizes[2]
+    assert sizes == sorted(sizes)
+    assert len(set(sizes[:-1])) > 1
 
 
 @pytest.mark.parametrize("at", [0.01, 0.2, 0.4])
