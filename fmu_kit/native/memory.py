@@ -11,7 +11,6 @@ from fmu_kit.native.structure import (
     Snapshot,
     children,
     difference,
-    expect_no_twins,
     is_number,
     leaves,
     mapped,
@@ -127,7 +126,6 @@ class Memory:
         """Forget all values: at the start of a function the memory holds whatever it holds."""
         self.written = {}
         self.version = 0
-        expect_no_twins(self.attributes())
 
         def load(path: Path, leaf: Any) -> Any:
             if not is_number(leaf):

@@ -13,7 +13,7 @@ from typing import Any
 from fmu_kit.errors import DivergenceError, FmuError
 from fmu_kit.native.memory import Memory
 from fmu_kit.native.statements import Block, Call, Function, Statement, branched, statement
-from fmu_kit.native.structure import difference, is_number, leaves, mapped, shape
+from fmu_kit.native.structure import difference, expect_no_twins, is_number, leaves, mapped, shape
 from fmu_kit.native.symbols import (
     Kind,
     Piece,
@@ -265,6 +265,7 @@ class Recorder:
             memory.install(leaf.view, leaf.holders, given)
             memory.written, memory.version = dict(leaf.written), leaf.version
             exit_view, value = memory.attributes(), leaf.value
+            expect_no_twins(exit_view)
             results = [lifted(leaf) for _, leaf in leaves(value) if is_number(leaf)]
             block = (*block, *memory.flushed(), statement("return", results))
         held.restore()

@@ -6,6 +6,8 @@ import builtins
 import contextlib
 import dataclasses
 import math
+import random
+import time
 import types
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
@@ -128,16 +130,38 @@ def _condition(value: Any) -> Any:
 
 def _any(values: Iterable[Any]) -> Any:
     found: Any = False
-    for value in values:
+    for value in _of_which_none_fails("any", values):
         found = either(found, _condition(value))
     return found
 
 
 def _all(values: Iterable[Any]) -> Any:
     found: Any = True
-    for value in values:
+    for value in _of_which_none_fails("all", values):
         found = both(found, _condition(value))
     return found
+
+
+def _of_which_none_fails(name: str, values: Iterable[Any]) -> Iterator[Any]:
+    """The values; Python computes none after the one that decides, so only the first of them may fail."""
+
+    def refuse(condition: Any, error: Exception) -> None:
+        if condition is not False:
+            raise TraceError(f"{name}() of values of which a later one may fail: expected an if for each")
+
+    first, may_fail = True, hooks.fail_if
+    rest = iter(values)
+    try:
+        while True:
+            try:
+                value = next(rest)
+            except StopIteration:
+                return
+            yield value
+            hooks.fail_if = refuse if not first or not is_known(value) else may_fail
+            first = first and is_known(value)
+    finally:
+        hooks.fail_if = may_fail
 
 
 def _extreme(name: str, better: Callable[[Any, Any], Any]) -> Callable[..., Any]:
@@ -190,6 +214,22 @@ class _Converting(type):
         return x if x.kind == "int" else x + 0
 
 
+def _refused(name: str, instead: str) -> Callable[..., Any]:
+    """Stands in for a function that does what an FMU in C does not."""
+
+    def refuse(*values: Any, **options: Any) -> Any:
+        raise TraceError(f"{name}(): expected {instead}")
+
+    return refuse
+
+
+class _Outside(types.ModuleType):
+    """Stands in for a module whose answers do not follow from what it is asked."""
+
+    def __getattr__(self, name: str) -> Any:
+        return _refused(f"{self.__name__}.{name}", "what follows from the variables and from time alone")
+
+
 def _converting(name: str, kind: str) -> type:
     return _Converting(name, (), {"kind": kind})
 
@@ -203,6 +243,9 @@ BUILTINS: Mapping[str, Any] = {
     "bool": _converting("bool", "bool"),
     "int": _converting("int", "int"),
     "float": _converting("float", "real"),
+    "print": _refused("print", "self.warn_once"),
+    "open": _refused("open", "no files"),
+    "input": _refused("input", "an input of the FMU"),
 }
 
 # -- the operations of scalars -----------------------------------------------------------------------------------------
@@ -226,7 +269,8 @@ SCALARS: Mapping[str, Any] = {
 def installed(modules: Iterable[types.ModuleType], extra: Mapping[Any, Any]) -> Iterator[None]:
     """Put them into these modules, and `extra`, functions by what they stand in for, wherever one is named there."""
     undone: list[tuple[dict[str, Any], dict[str, Any], list[str]]] = []
-    by_identity = {id(math): _Math(), **{id(getattr(math, name)): f for name, f in MATH.items()}}
+    by_identity: dict[int, Any] = {id(module): _Outside(module.__name__) for module in (random, time)}
+    by_identity |= {id(math): _Math(), **{id(getattr(math, name)): f for name, f in MATH.items()}}
     by_identity.update({id(function): stand_in for function, stand_in in extra.items()})
     kept = {field.name: getattr(scalar.FLOAT, field.name) for field in dataclasses.fields(scalar.FLOAT)}
     try:

@@ -19,6 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pythonfmu.fmi2slave import Fmi2Slave
+
 from fmu_kit import scalar
 from fmu_kit.native import stand_ins
 from fmu_kit.native.memory import Memory
@@ -170,12 +172,17 @@ def _wrapped(
     for name in _BASE_METHODS:
         replace(Slave, name, _as_function(vars(Slave)[name], recorder))
     replace(Slave, "warn_once", warn_once)
+    replace(Fmi2Slave, "log", _refuse_log)
     try:
         with stand_ins.installed(modules, extra):
             yield
     finally:
         for cls, name, value in reversed(changed):
             setattr(cls, name, value)
+
+
+def _refuse_log(*given: Any, **options: Any) -> None:
+    raise TraceError("self.log: expected self.warn_once")
 
 
 def _as_region(function: Callable[..., Any], recorder: Recorder) -> Callable[..., Any]:

@@ -1,0 +1,162 @@
+"""What slaves may not do, if they are to be written out as C: one line says what, where, and what is expected."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from fmu_kit.bundle import PackagingError, Target
+from fmu_kit.native.building import build
+
+SLAVE = """\
+import math
+import random
+import time
+from collections import deque
+
+from fmu_kit.errors import require
+from fmu_kit.scalar import repeat
+from fmu_kit.slave import Slave
+from fmu_kit.variables import continuous_input, continuous_output, discrete_output
+
+
+def careful(x):
+    try:
+        return 1.0 / x
+    except ZeroDivisionError:
+        return 0.0
+
+
+class Helper:
+    def __init__(self, value):
+        self.value = value
+
+
+class Refused(Slave):
+    description = "Refused."
+    variables = (
+        continuous_input("a", "A number.", None),
+        continuous_output("y", "A number.", None),
+        discrete_output("count", "A whole number.", None, 0),
+    )
+    hidden = 0.0
+
+    def initialise(self, t):
+        self._kept = 0.0
+        {initialise}
+
+    def step(self, t, h):
+        a = self.real("a")
+        {step}
+"""
+IN_A_STEP = [
+    ("self.put('y', '{}'.isdigit() + math.hypot(a, 1.0))", "a function that takes floats only was given a computed"),
+    ("self.put('y', round(a))", "round() of a computed value: expected math.floor or math.ceil"),
+    ("self.put('y', int(a))", "int() of a computed float: expected math.floor or math.ceil"),
+    ("for k in range(math.floor(a)): self.put('y', k)", "expected fmu_kit.scalar.repeat for a loop"),
+    ("self.put('y', (1.0, 2.0)[math.floor(a)])", "a computed value where an integer must be known"),
+    ("self.put('y', {1.0: 2.0}.get(a, 3.0))", "as the key of a dictionary, in a set or in a cache: expected an if"),
+    ("require(a > 1.0, 'a', f'{a:>10}', 'more')", "{value:>10} of a float in a text: expected {value} or a format as"),
+    ("self.put_count('count', a)", "count: expected a value of its type, found a float"),
+    ("self.put('y', random.random())", "random.random(): expected what follows from the variables and from time"),
+    ("self.put('y', time.time())", "time.time(): expected what follows from the variables and from time alone"),
+    ("print(a)", "print(): expected self.warn_once"),
+    ("self.log('a')", "self.log: expected self.warn_once"),
+    ("self._new = a", "self._new is first set in a step: expected it set by initialise"),
+    ("self.hidden = a", "self.hidden hides the one of its class: expected another name, set by initialise"),
+    ("self._kept = None", "self._kept changes in a step in more than numbers: it is a number and None"),
+    ("self._kept = [a]", "self._kept changes in a step in more than numbers: "),
+    ("if a > 1.0: self._kept = 'on'", "what is kept differs in more than numbers between two paths: "),
+    ("self.put('y', min([a, t], key=abs))", "min() of computed values with key: expected values only"),
+    ("assert a > 1.0", "AssertionError"),
+    ("self.put('y', repeat(math.floor(a), lambda i, x: (x, x), a))", "repeat: expected the body to return what it is"),
+    (
+        "self.put('y', repeat(math.floor(a), lambda i, x: self.put('y', i * x) or x, a))",
+        "repeat: its body changes what the slave keeps",
+    ),
+    ("self.put('y', any(1.0 / x > 2.0 for x in (a, t, h)))", "any() of values of which a later one may fail"),
+]
+IN_INITIALISE = [
+    ("self._queue = deque([0.0])", "deque: expected numbers in tuples, lists, dictionaries and objects"),
+    ("self._one = self._other = Helper(t)", "self._one and self._other are one Helper: expected one of its own"),
+    ("raise ValueError(t)", "Refused.initialise fails whatever it is given"),
+]
+
+
+def refusal(folder: Path, monkeypatch: pytest.MonkeyPatch, text: str) -> tuple[Path, str]:
+    """What is said of a module of this text, and its path."""
+    monkeypatch.syspath_prepend(folder)
+    module = f"refused_{folder.name}"
+    path = folder / f"{module}.py"
+    path.write_text(text)
+    with pytest.raises(PackagingError) as raised:
+        build(Target(module, "Refused", folder), folder)
+    return path, str(raised.value)
+
+
+def line_of(path: Path, words: str) -> int:
+    """Where words stand in a file."""
+    return 1 + next(k for k, line in enumerate(path.read_text().splitlines()) if words in line)
+
+
+@pytest.mark.parametrize(("statement", "words"), IN_A_STEP)
+def test_what_a_step_may_not_do_is_said_in_a_line(
+    statement: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = SLAVE.replace("{initialise}", "pass").replace("{step}", statement)
+    path, said = refusal(tmp_path, monkeypatch, text)
+    assert words in said
+    assert "\n" not in said
+    if not re.match(
+        "Refused: (self.*(a step|its class)|.*(between two paths|of its type))", said
+    ):  # of the slave as a whole
+        assert said.startswith(f"Refused: {path}, line {line_of(path, statement)}: ")
+
+
+@pytest.mark.parametrize(("statement", "words"), IN_INITIALISE)
+def test_what_may_not_be_kept_is_said_in_a_line(
+    statement: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = SLAVE.replace("{initialise}", statement).replace("{step}", "self.put('y', a)")
+    _, said = refusal(tmp_path, monkeypatch, text)
+    assert words in said
+    assert "\n" not in said
+
+
+@pytest.mark.parametrize(
+    ("called", "where", "words"),
+    [
+        ("self.put('y', careful(a))", "    try:", "try: expected an if before what may fail"),
+        ("self.put('y', self._careful(a))", "        try:  # mine", "try: expected an if before what may fail"),
+    ],
+)
+def test_errors_that_are_caught_are_refused_where_they_are(
+    called: str, where: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    method = """
+    def _careful(self, x):
+        try:  # mine
+            return math.sqrt(x)
+        except ValueError:
+            return 0.0
+"""
+    text = SLAVE.replace("{initialise}", "pass").replace("{step}", called) + method
+    path, said = refusal(tmp_path, monkeypatch, text)
+    assert said == f"Refused: {path}, line {line_of(path, where)}: {words}"
+
+
+@pytest.mark.parametrize("name", ["get_real", "terminate", "_initialise"])
+def test_a_slave_answers_to_fmi_by_its_base_class_only(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = SLAVE.replace("{initialise}", "pass").replace("{step}", "pass")
+    _, said = refusal(tmp_path, monkeypatch, f"{text}\n    def {name}(self, *given):\n        pass\n")
+    assert said == (
+        f"Refused: Refused.{name}: expected initialise, internal_state, read_parameters, restore, step, to_xml only"
+    )
+
+
+def test_numpy_is_refused_where_it_is_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = "import numpy\n" + SLAVE.replace("{initialise}", "pass").replace("{step}", "pass")
+    path, said = refusal(tmp_path, monkeypatch, text)
+    assert said == f"{path}:1: imports numpy, but an FMU has the standard library only"
