@@ -146,14 +146,18 @@ def _add_component(elements: Element, part: Part) -> None:
         type="application/x-fmu-sharedlibrary",
         implementation="CoSimulation",
     )
-    connectors = add(component, "ssd:Connectors")
+    if part.inputs or part.outputs:
+        _add_connectors(add(component, "ssd:Connectors"), part)
+    _bind(component, _parameter_file(part))
+
+
+def _add_connectors(connectors: Element, part: Part) -> None:
     for kind, names in (("input", part.inputs), ("output", part.outputs)):
         for name in names:
             variable = part.variable(name)
             connector = add(connectors, "ssd:Connector", name=name, kind=kind)
             if variable.kind in TYPED:
                 add(connector, f"ssc:{variable.kind}", **_unit(variable))
-    _bind(component, _parameter_file(part))
 
 
 def _bind(parent: Element, source: str) -> None:

@@ -11,7 +11,7 @@ from orchestration.quadrotor.translation import system_of
 from orchestration.request import load_request
 from orchestration.results.result import Result
 from orchestration.simulation import run
-from orchestration.system.model import System
+from orchestration.system.model import Criterion, Source, System
 from tests.commands import Main
 from tests.orchestration.exchange.interop.test_systems import CARRIED, carried
 from tests.orchestration.studies.common import error_line, one_line
@@ -39,6 +39,20 @@ def test_an_example_has_the_same_rows_in_the_same_order_as_before(name: str, tmp
     assert list(found.signals) == list(expected.signals)
     assert found.metrics == expected.metrics
     assert read.operating_point == system.operating_point
+
+
+def test_a_component_that_nothing_is_connected_to_is_flown_back(tmp_path: Path) -> None:
+    system = carried("double_integrator")
+    alone = dataclasses.replace(
+        system,
+        stop_time=1.0,
+        components={"plant": system.components["plant"]},
+        connections=(),
+        objectives={"x": "last(plant.x)"},
+        criterion=Criterion(),
+        sources={"push": Source(constant=1.0, to=("plant.u",))},
+    )
+    assert run(load_request(*writing.write_with_timing(alone, tmp_path / "loop.ssp"))).metrics == run(alone).metrics
 
 
 def test_what_the_timing_says_on_top_is_flown(tmp_path: Path) -> None:
