@@ -137,7 +137,7 @@ class FlightFlags:
             "--set",
             panel=MODEL,
             metavar="SIDE.NAME=V",
-            text="A parameter, as controller.NAME=V, or of a system file any value by its path; may be repeated.",
+            text="A parameter, as controller.NAME=V, or of a system file a value by its path; may be repeated.",
         ),
     ] = None
 
@@ -161,7 +161,7 @@ class FlightFlags:
             for name in ("seed", "stop_time", "model_mismatch")
             if (value := getattr(self, name)) is not None
         }
-        parameters = {key: _value(key, text) for key, text in _pairs("set", self.set or [])}
+        parameters = {key: _value(text) for key, text in _pairs("set", self.set or [])}
         changed = scenario.with_changes(timing=timing, parameters=parameters, **top)
         if not self.native:
             return changed
@@ -184,7 +184,7 @@ class FlightFlags:
             )
         if self.native:
             top |= {f"components.{name}.fmu": native_twin(each.fmu) for name, each in system.components.items()}
-        return changed(system, {**top, **{key: _value(key, text) for key, text in _pairs("set", self.set or [])}})
+        return changed(system, {**top, **{key: _value(text) for key, text in _pairs("set", self.set or [])}})
 
 
 EngineFlag = Annotated[
@@ -251,7 +251,13 @@ def _number(place: str, text: str) -> float:
         raise UsageError(f"{place} {text}: expected a number") from None
 
 
-def _value(name: str, text: str) -> "Parameter":
+def _value(text: str) -> "Parameter":
+    """What somebody means: true or false, a number, else a text; what is in quotes is a text in any case."""
     if text.lower() in ("true", "false"):
         return text.lower() == "true"
-    return _number(f"--set {name} =", text)
+    if len(text) > 1 and text[0] == text[-1] == '"':
+        return text[1:-1]
+    try:
+        return float(text)
+    except ValueError:
+        return text

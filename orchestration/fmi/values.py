@@ -30,6 +30,8 @@ def taken(variable: Variable, value: object, place: str) -> Value:
         return _of_kind(value, bool, place, "true or false")
     if variable.kind == "String":
         return _of_kind(value, str, place, "a text")
+    if variable.kind in ("Integer", "Enumeration") and isinstance(value, float) and value.is_integer():
+        value = int(value)  # as ranges and the command line have it
     if variable.choices:
         return _chosen(variable.choices, value, place)
     if variable.kind in ("Integer", "Enumeration"):

@@ -11,7 +11,7 @@ from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT, SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.system.requirements import is_finite
 
-Parameter = float | bool
+Parameter = float | bool | str
 
 
 @dataclass(frozen=True, kw_only=True)

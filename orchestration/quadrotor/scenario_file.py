@@ -87,8 +87,8 @@ def _choice(side: str, table: dict[str, Any], default: str, folder: Path) -> Fmu
     if not isinstance(fmu, str):
         raise UsageError(f"{side}.fmu = {shown(fmu)}: expected the name of an FMU or a path")
     for name, value in parameters.items():
-        if not isinstance(value, (int, float, bool)):
-            raise UsageError(f"{side}.{name} = {shown(repr(value))}: expected a number, true or false")
+        if not isinstance(value, (int, float, str)):
+            raise UsageError(f"{side}.{name} = {shown(repr(value))}: expected a number, true, false or a text")
     if fmu.endswith(".fmu"):
         fmu = str(folder / fmu)
     return FmuChoice(fmu=fmu, parameters=parameters)

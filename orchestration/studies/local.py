@@ -11,10 +11,10 @@ from orchestration.studies.linear import HoverLoop, at_edge, at_hover
 from orchestration.studies.ranges import Range, Varied, range_of
 from orchestration.studies.sampled_loop import growth_of_loop
 from orchestration.studies.search import first_failure
-from orchestration.studies.study import with_values
 from orchestration.studies.tangent import PULSE
 from orchestration.studies.twins import growth_of
 from orchestration.system.model import System
+from orchestration.system.paths import changed
 
 HOVER = "spectral radius of the sampled loop about hover, by differences through saved states"
 HOVER_ACCURACY = 1e-3
@@ -102,7 +102,7 @@ def _without_hover_loop(scenario: Scenario, varied: Varied, span: Range, why: st
         hover = at_hover(scenario)
     except UsageError as error:
         return Local(reason=f"no local limit: {error}")
-    found = about_rest(lambda value: with_values(hover, dict.fromkeys(varied.paths, value)), span)
+    found = about_rest(lambda value: changed(hover, dict.fromkeys(varied.paths, value)), span)
     if found.method is None:
         return replace(found, reason=f"{found.reason} ({why})")
     return replace(found, method=f"{found.method} ({why})")

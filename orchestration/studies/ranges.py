@@ -10,9 +10,9 @@ from orchestration.fmi.model import Model
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import in_its_own_words
 from orchestration.request import Request, system_meant
-from orchestration.studies.study import paths_in, with_values
+from orchestration.studies.study import paths_in
 from orchestration.system.model import System
-from orchestration.system.paths import value_at
+from orchestration.system.paths import TOP, changed, value_at
 
 Quantity = Literal["period", "delay", "jitter", "loss"]
 """Of the quadrotor, by name; of any system a path"""
@@ -60,19 +60,20 @@ class Varied:
     @property
     def paths(self) -> tuple[str, ...]:
         """What is changed; raises `UsageError` for what is not there."""
-        named = self.of in get_args(Quantity)
-        if named and isinstance(self.request, Scenario):
+        named, quadrotor = self.of in get_args(Quantity), isinstance(self.request, Scenario)
+        if named and quadrotor:
             return paths_in(self.request, f"timing.{self.of}")
         if named:
             raise UsageError(f"--of {self.of}: for the quadrotor only; expected a path, as connections.NAME.delay")
-        if "." not in self.of:
-            raise UsageError(f"--of {self.of}: expected one of {', '.join(get_args(Quantity))}, or a path")
+        if "." not in self.of and self.of not in TOP:
+            words = f"one of {', '.join(get_args(Quantity))}, or " if quadrotor else ""
+            raise UsageError(f"--of {self.of}: expected {words}a path, as connections.NAME.delay")
         return paths_in(self.request, self.of)
 
     def at(self, value: float) -> System:
         """With another value; raises `UsageError` for one that cannot be."""
         with in_its_own_words(self.request):
-            return with_values(self.system, dict.fromkeys(self.paths, value))
+            return changed(self.system, dict.fromkeys(self.paths, value))
 
 
 def range_asked_for(

@@ -6,7 +6,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 from orchestration.errors import UsageError
@@ -17,7 +16,7 @@ from orchestration.studies.axes import Axis, Method, Points, Value
 from orchestration.studies.files import Files, files_of
 from orchestration.studies.store import is_column
 from orchestration.system.model import System
-from orchestration.system.paths import changed, value_at
+from orchestration.system.paths import changed, names_table, value_at
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +81,7 @@ class Study:
                 value = point[axis.name]
                 for path in self._paths[axis.name]:
                     changes[path] = _product(value, path, self.origin, starts) if axis.multiplies else value
-            return with_values(self.origin, changes)
+            return changed(self.origin, changes)
 
     def keeps_signals(self, index: int) -> bool:
         """Whether the signals of a run are kept."""
@@ -112,22 +111,6 @@ def paths_in(base: Request, target: str) -> tuple[str, ...]:
 def names_fmu(path: str) -> bool:
     """Whether the value at a path is that of an FMU."""
     return path.startswith("components.") and path.endswith(".fmu") and ".parameters." not in path
-
-
-def names_table(path: str) -> bool:
-    """Whether the value at a path is the file of a source."""
-    return path.startswith("sources.") and path.endswith(".file")
-
-
-def with_values(system: System, changes: Mapping[str, Any]) -> System:
-    """`system` with other values by path; of a range of seeds, 1.0 is the seed 1."""
-    meant = dict(changes)
-    for path, value in changes.items():
-        if path == "seed" and isinstance(value, float) and value.is_integer():
-            meant[path] = int(value)
-        elif names_table(path):
-            meant[path] = Path(str(value))
-    return changed(system, meant)
 
 
 def _own_seed(seed: int, point: Mapping[str, Value]) -> int:

@@ -12,7 +12,8 @@ from orchestration.errors import UsageError
 from orchestration.quadrotor.scenario_file import first_problem
 from orchestration.request import load_request, request_from_tables
 from orchestration.studies.axes import Axis, Method, Scale, Value, span
-from orchestration.studies.study import Study, names_fmu, names_table
+from orchestration.studies.study import Study, names_fmu
+from orchestration.system.paths import names_table
 
 _FORBID: dict[str, str] = {"extra": "forbid"}
 

@@ -72,6 +72,7 @@ class Component:
     def __post_init__(self) -> None:
         require_choice(self, align=Align)
         require(isinstance(self.fmu, str), "fmu", self.fmu, "a name or the path of an .fmu file")
+        require(self.record is None or isinstance(self.record, tuple), "record", self.record, "a list of variables")
         if self.sampling is None:
             require(self.step is not None, "step", "none", "step (continuous time) or sampling (a digital task)")
             require_positive(self, "step")
@@ -181,6 +182,7 @@ class Source:
     def __post_init__(self) -> None:
         kinds = ("constant", "file", "noise", "trajectory")
         given = [kind for kind in kinds if getattr(self, kind) is not None]
+        require(isinstance(self.to, tuple), "to", self.to, "a list of inputs")
         require(len(given) == 1, "source", " and ".join(given) or "nothing", f"one of {', '.join(kinds)}")
         if self.noise is not None:
             require_not_negative(self, "noise")

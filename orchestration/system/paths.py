@@ -3,6 +3,7 @@
 import dataclasses
 import difflib
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 from orchestration.errors import UsageError
@@ -15,11 +16,12 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
     """`system` with other values, by paths such as `components.tank.step`, `components.controller.sampling.period`,
     `components.controller.parameters.maxlevel`, `connections.valve.delay`, `sources.wind.noise`, `stop_time`.
 
-    Raises `UsageError` for a path that does not exist, naming what does, or a value that cannot be.
+    1.0 is the seed 1. Raises `UsageError` for a path that does not exist, naming what does, or a value that cannot be.
     """
     grouped: dict[tuple[str, str], dict[str, Any]] = {}
     top: dict[str, Any] = {}
-    for path, value in changes.items():
+    for path, given in changes.items():
+        value = _meant(path, given)
         table, _, rest = path.partition(".")
         if path in TOP:
             top[path] = value
@@ -40,6 +42,18 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
         "", system, {**top, "components": components, "connections": tuple(connections.values()), "sources": sources}
     )
     return result
+
+
+def names_table(path: str) -> bool:
+    """Whether the value at a path is the file of a source."""
+    return path.startswith("sources.") and path.endswith(".file")
+
+
+def _meant(path: str, value: Any) -> Any:
+    """A value as the system keeps it: ranges and the command line know neither whole numbers nor paths of files."""
+    if path == "seed" and isinstance(value, float) and value.is_integer():
+        return int(value)
+    return Path(value) if names_table(path) and isinstance(value, str) else value
 
 
 def value_at(system: System, path: str) -> Any:

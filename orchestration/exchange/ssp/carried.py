@@ -165,4 +165,6 @@ def _values(component: Component, model: Model, constants: Mapping[str, Paramete
 def _typed(value: Parameter, variable: Variable) -> Parameter:
     if variable.kind == "Real":
         return float(value)
+    if variable.kind in ("Integer", "Enumeration") and isinstance(value, float):
+        return round(value)  # of a source, or of the command line
     return bool(value) if variable.kind == "Boolean" and not isinstance(value, str) else value

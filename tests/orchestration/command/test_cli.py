@@ -182,6 +182,15 @@ def test_set_reaches_both_fmus(main: Main) -> None:
         assert printed["position_rmse"] != flown()["position_rmse"]
 
 
+def test_set_takes_whatever_a_path_of_a_system_can_be(main: Main) -> None:
+    tank = Path(__file__).parents[3] / "examples" / "water_tank" / "system.toml"
+    shown = main("show", tank, "--set", "connections.valve.hold=first", "--set", "seed=3").stdout
+    assert "hold first" in shown
+    given = {"connections.valve.hold=fist": "fist: expected one of zero, first", "seed=1.5": "expected a whole number"}
+    for setting, text in given.items():
+        assert text in error_line(main("run", tank, "--set", setting, code=2))
+
+
 def test_the_seed_decides_the_random_numbers(main: Main) -> None:
     lossy = ("run", "--json", *SHORT, "--loss", "0.2", "--seed")
     first, again, other = (json.loads(main(*lossy, seed).stdout)["position_rmse"] for seed in ("1", "1", "2"))
@@ -309,7 +318,7 @@ def test_a_run_paused_and_resumed_is_the_same_run(main: Main, here: Path) -> Non
         (["--quantisation", "mass=0.1"], "timing.quantisation: mass is no signal of it; expected one of position"),
         (["--set", "mass=1"], "mass: expected controller.NAME or plant.NAME"),
         (["--set", "plant.mass"], "--set plant.mass: expected NAME=VALUE"),
-        (["--set", "plant.mass=heavy"], "--set plant.mass = heavy: expected a number"),
+        (["--set", "plant.mass=heavy"], "plant.mass = heavy: expected a number"),
         (["--set", "plant.mas=1"], "did you mean mass?"),
         (["--set", "controller.fmu="], 'expected a parameter; a scenario file names the FMU: [controller] fmu = "…"'),
         (["--set", "controller.sample_period=0.1"], "controller.sample_period: expected --period and --clock instead"),

@@ -70,6 +70,7 @@ def test_types_and_enumerations_by_name(tmp_path: Path) -> None:
     result = ran(alone(small(tmp_path), parameters={"mode": "backward", "gain": 2.0}))
     assert last(result, "it.y") == pytest.approx(-0.2)
     assert last(result, "it.count") == 10.0
+    assert last(ran(alone(small(tmp_path), parameters={"mode": 2.0})), "it.y") == last(result, "it.y") / 2.0
     with pytest.raises(UsageError, match=r"components.it.parameters.mode = bakward: did you mean backward\? expected"):
         ran(alone(small(tmp_path), parameters={"mode": "bakward"}))
     with pytest.raises(UsageError, match=r"components.it.parameters.mode = 3: expected one of forward, backward"):

@@ -35,7 +35,7 @@ EVERYTHING: dict[str, Any] = {
 }
 
 
-def fly(stop_time: float, parameters: Mapping[str, float] | None = None, seed: int = 0, **timing: Any) -> Result:
+def fly(stop_time: float, parameters: Mapping[str, float | str] | None = None, seed: int = 0, **timing: Any) -> Result:
     scenario = Scenario(stop_time=stop_time, seed=seed, timing=Timing(**timing))
     return orchestration.run(scenario.with_changes(parameters=parameters))
 
@@ -320,11 +320,12 @@ def test_every_output_and_local_is_recorded_unless_told() -> None:
         ({"controller.position.x": 1.0}, "expected a parameter"),
         ({"plant.thrust": 1.0}, "expected a parameter"),
         ({"plant.mass": True}, "expected a number"),
+        ({"plant.mass": "heavy"}, "expected a number"),
         ({"controller.use_reference_inputs": 1.0}, "expected true or false"),
         ({"controller.use_reference_inputs": True}, "expected [reference] file"),
     ],
 )
-def test_a_parameter_that_cannot_be_set_is_refused_in_one_line(parameters: dict[str, float], text: str) -> None:
+def test_a_parameter_that_cannot_be_set_is_refused_in_one_line(parameters: dict[str, float | str], text: str) -> None:
     with pytest.raises(UsageError) as refused:
         fly(0.05, parameters)
     assert text in str(refused.value)

@@ -252,7 +252,7 @@ def test_without_an_operating_point_there_is_no_local_limit_and_it_is_said(syste
     ("options", "said"),
     [
         ({"of": "period"}, "--of period: for the quadrotor only; expected a path"),
-        ({"of": "mass"}, "--of mass: expected one of period, delay, jitter, loss, or a path"),
+        ({"of": "mass"}, "--of mass: expected a path, as connections.NAME.delay"),
         ({"of": "connections.command.order"}, "--of connections.command.order: expected the path of a number"),
         ({"of": "connections.9.delay"}, "connections.9.delay: expected connections.NAME.KEY"),
         ({"of": DELAY}, f"--of {DELAY}: expected --from and --to"),

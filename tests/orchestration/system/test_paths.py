@@ -1,5 +1,7 @@
 """Values of a system by path, as axes, flags and operating points name them."""
 
+from pathlib import Path
+
 import pytest
 
 from orchestration.errors import UsageError
@@ -63,9 +65,18 @@ def test_a_path_that_does_not_exist_is_refused_in_one_line(path: str, line: str)
         ("components.controller.sampling.period", 0.0),
         ("connections.command.loss", 2.0),
         ("connections.command.hold", "last"),
+        ("components.plant.record", "tilt"),
+        ("sources.reference.to", "plant.mass"),
+        ("seed", 1.5),
         ("stop_time", 0.0),
     ],
 )
 def test_a_value_that_cannot_be_is_refused_with_its_path(path: str, value: object) -> None:
     with pytest.raises(UsageError, match=rf"^{path} = .*: expected"):
         changed(quadrotor(), {path: value})
+
+
+def test_a_range_and_the_command_line_mean_whole_seeds_and_files() -> None:
+    file = {"sources.reference.trajectory": None, "sources.reference.file": "path.csv"}
+    found = changed(quadrotor(), {"seed": 3.0, **file})
+    assert (repr(found.seed), found.sources["reference"].file) == ("3", Path("path.csv"))

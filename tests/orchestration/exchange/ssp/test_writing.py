@@ -226,8 +226,10 @@ def test_whole_numbers_stay_whole_and_only_they_are_taken(odd_plant: Path, short
     assert read_ssv(str(path), "resources/plant.ssv", validate=True)
     without = writing.write(dataclasses.replace(short, plant=FmuChoice(fmu=str(odd_plant))), path)
     assert values_in(without, "resources/plant.ssv")["cargo"] == ("Integer", "0", None)
-    with pytest.raises(UsageError, match=r"^plant.cargo = 3.0: expected a whole number of 32 bits$"):
-        writing.write(chosen.with_changes(parameters={"plant.cargo": 3.0}), path)
+    of_a_range = writing.write(chosen.with_changes(parameters={"plant.cargo": 4.0}), path)
+    assert values_in(of_a_range, "resources/plant.ssv")["cargo"] == ("Integer", "4", None)
+    with pytest.raises(UsageError, match=r"^plant.cargo = 3.5: expected a whole number of 32 bits$"):
+        writing.write(chosen.with_changes(parameters={"plant.cargo": 3.5}), path)
 
 
 DEGREES = '<Unit name="deg"><BaseUnit rad="1" factor="0.017453292519943295"/></Unit><Unit name="box"/>'
