@@ -288,7 +288,7 @@ class Recorder:
                 results=results,
                 stores=frozenset(_stores(block)),
                 raises=frozenset(_raises(block)),
-                doc=(method.__doc__ or "").strip().partition("\n")[0],
+                doc=(getattr(method, "func", method).__doc__ or "").strip().partition("\n")[0],
             )
             self._by_content[key] = made
             self.functions.append(made)
