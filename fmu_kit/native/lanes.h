@@ -54,6 +54,10 @@ double q_llvm_sqrt(double) __asm__("llvm.sqrt.f64") __attribute__((const));
 #define Q_HARDWARE_SQRT(x) __builtin_sqrt(x)
 #endif
 
+#if defined(__arm__) && !(__ARM_FP & 8)
+#undef Q_HARDWARE_SQRT /* no doubles in hardware: the compiler would call libm */
+#endif
+
 #if defined(__SSE2__) || defined(_M_X64)
 #include <immintrin.h>
 #elif defined(__aarch64__)
@@ -87,12 +91,16 @@ Q_ONE double q_sqrt_by_digits(double x) {
 Q_ONE double q_sqrt_of_one(double x) {
 #if defined(QUADCOSIM_SQRT_BY_DIGITS)
     return q_sqrt_by_digits(x);
-#elif defined(Q_HARDWARE_SQRT) && !(defined(__clang__) && defined(__SOFTFP__))
+#elif defined(Q_HARDWARE_SQRT)
     return Q_HARDWARE_SQRT(x);
 #elif defined(__SSE2__) || defined(_M_X64)
     return _mm_cvtsd_f64(_mm_sqrt_pd(_mm_set1_pd(x)));
 #elif defined(__aarch64__)
     return vget_lane_f64(vsqrt_f64(vdup_n_f64(x)), 0);
+#elif defined(__arm__) && (__ARM_FP & 8) && defined(__GNUC__)
+    double root;
+    __asm__("vsqrt.f64 %P0, %P1" : "=w"(root) : "w"(x));
+    return root;
 #elif defined(__riscv_flen) && __riscv_flen >= 64
     double root;
     __asm__("fsqrt.d %0, %1" : "=f"(root) : "f"(x));
