@@ -6,6 +6,7 @@ import keyword
 import math
 import re
 from collections.abc import Iterable
+from typing import ClassVar
 
 from fmu_kit.native.statements import Block, Call, Function, Place, Statement, ends, symbols_of
 from fmu_kit.native.symbols import Symbol, TraceError, closure, node, value_of
@@ -16,7 +17,7 @@ _COMPARED = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!=
 _CALLED = {
     **{name: f"q_{name}" for name in (
         "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "tanh", "exp", "expm1", "log", "pow",
-        "floor", "ceil", "copysign", "isfinite", "isnan",
+        "floor", "ceil", "copysign", "isfinite", "isinf", "isnan",
     )},
     "abs": "q_fabs",
     "mod": "q_modulo",
@@ -34,7 +35,7 @@ TANGENT = "tangent of "
 def c_code(program: Program) -> str:
     """The functions of a program, each after those that it calls."""
     names = place_names(program.places)
-    return "\n\n".join(_Writer(function, program, names).text() for function in program.functions) + "\n"
+    return "\n\n".join(Writer(function, program, names).text() for function in program.functions) + "\n"
 
 
 def place_names(places: Iterable[Place]) -> dict[str, str]:
@@ -48,8 +49,8 @@ def place_names(places: Iterable[Place]) -> dict[str, str]:
     return found
 
 
-class _Writer:
-    """Writes one function."""
+class Writer:
+    """Writes one function, for an FMU: its memory is one array, and its messages are full of numbers."""
 
     def __init__(self, function: Function, program: Program, places: dict[str, str]) -> None:
         self.function = function
@@ -64,6 +65,7 @@ class _Writer:
         self.used = _used(function.body)
 
     def text(self) -> str:
+        """The function."""
         f = self.function
         for symbol, name in zip(f.parameters, self.parameters):
             self.scopes[0][id(symbol)] = name
@@ -78,13 +80,32 @@ class _Writer:
         parameters += [f"q_real *r{k}" for k in range(f.results)]
         head = f"static int {c_name(f.name)}({', '.join(parameters)})\n{{\n"
         doc = f"/* {f.doc.replace('*/', '* /')} */\n" if f.doc else ""
-        before = ["    q_real *const v = m->state.memory;"]
-        read = {symbol.data[0] for symbol in self.used.values() if symbol.op == "load"}
-        if any(name.startswith(TANGENT) for name in read | f.stores):
-            before.append("    q_real *const d = m->tangents;")
+        before = self._memory()
         unused = [name for symbol, name in zip(f.parameters, self.parameters) if id(symbol) not in self.used]
-        before.append("    " + ", ".join(f"(void){name}" for name in ("v", *unused)) + ";")
-        return doc + head + "\n".join([*before, *(f"    {line}" for line in self.declared), *self.lines[0]]) + "\n}"
+        before.append(", ".join(f"(void){name}" for name in (self.memory, *unused)) + ";")
+        return doc + head + "\n".join([*(f"    {line}" for line in (*before, *self.declared)), *self.lines[0]]) + "\n}"
+
+    # -- memory ----------------------------------------------------------------------------------------------
+
+    memory: ClassVar = "v"
+    """what is there even where a function makes no use of it"""
+
+    def _memory(self) -> list[str]:
+        """What the names are, by which a function reaches its memory."""
+        read = {symbol.data[0] for symbol in self.used.values() if symbol.op == "load"}
+        tangents = any(name.startswith(TANGENT) for name in read | self.function.stores)
+        return [
+            "q_real *const v = m->state.memory;",
+            *(["q_real *const d = m->tangents;"] if tangents else []),
+        ]
+
+    def _place(self, name: str) -> str:
+        of = name.removeprefix(TANGENT)
+        return f"v[{self.places[of]}]" if of == name else f"d[{self.places[of]}]"
+
+    def _load(self, symbol: Symbol) -> str:
+        value = self._place(symbol.data[0])
+        return f"Q_TEST({value} != 0.0)" if symbol.kind == "bool" else value
 
     # -- lines and names -------------------------------------------------------------------------------------
 
@@ -106,14 +127,6 @@ class _Writer:
             name = self.pinned[id(symbol)] = self._name("y")
             self.declared.append(f"{_type(symbol)} {name} = {'Q_TEST(0)' if symbol.kind == 'bool' else 'q_all(0.0)'};")
         return self.pinned[id(symbol)]
-
-    def _place(self, name: str) -> str:
-        of = name.removeprefix(TANGENT)
-        return f"v[{self.places[of]}]" if of == name else f"d[{self.places[of]}]"
-
-    def _load(self, symbol: Symbol) -> str:
-        value = self._place(symbol.data[0])
-        return f"Q_TEST({value} != 0.0)" if symbol.kind == "bool" else value
 
     # -- values ----------------------------------------------------------------------------------------------
 
@@ -156,8 +169,6 @@ class _Writer:
             return f"Q_TEST({self._real(args[0])} {_COMPARED[op]} {self._real(args[1])})"
         if op == "neg":
             return f"-{self._real(args[0])}"
-        if op == "isinf":
-            return f"Q_TEST(q_fabs({self._real(args[0])}) > DBL_MAX)"
         if op in ("and", "or"):
             return f"{self.value(args[0])} {'&' if op == 'and' else '|'} {self.value(args[1])}"
         if op == "not":
@@ -365,26 +376,16 @@ def c_name(name: str) -> str:
     return f"{name}_of_the_model" if keyword.iskeyword(name) or name in _TAKEN else name
 
 
-_TAKEN = frozenset(
-    (
-        *("auto", "case", "char", "const", "default", "do", "double", "enum", "extern", "float", "goto", "int", "long"),
-        *(
-            "register",
-            "short",
-            "signed",
-            "sizeof",
-            "static",
-            "struct",
-            "switch",
-            "typedef",
-            "union",
-            "unsigned",
-            "void",
-        ),
-        *("volatile", "write", "read", "open", "close", "signal", "index", "time", "clock", "start", "select"),
-        *("warn", "fail", "tell", "refuse", "expect", "settle"),
-    )
-)
+KEYWORDS = frozenset({
+    "auto", "case", "char", "const", "default", "do", "double", "enum", "extern", "float", "goto", "inline", "int",
+    "long", "register", "restrict", "short", "signed", "sizeof", "static", "struct", "switch", "typedef", "union",
+    "unsigned", "void", "volatile",
+})  # fmt: skip
+"""Words of C that are none of Python."""
+_TAKEN = KEYWORDS | {
+    "write", "read", "open", "close", "signal", "index", "time", "clock", "start", "select",
+    "warn", "fail", "tell", "refuse", "expect", "settle",
+}  # fmt: skip
 
 
 def c_string(text: str) -> str:

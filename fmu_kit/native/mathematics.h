@@ -37,6 +37,7 @@ Q_ONE q_real q_max(q_real a, q_real b) { return q_select(Q_TEST(b > a), b, a); }
 Q_ONE q_real q_min(q_real a, q_real b) { return q_select(Q_TEST(b < a), b, a); }
 
 Q_ONE q_mask q_isfinite(q_real x) { return Q_TEST(q_fabs(x) <= DBL_MAX); }
+Q_ONE q_mask q_isinf(q_real x) { return Q_TEST(q_fabs(x) > DBL_MAX); }
 Q_ONE q_mask q_isnan(q_real x) { return Q_TEST(x != x); }
 
 /* To the nearest integer, ties to the even one, as Python's round. */

@@ -44,7 +44,7 @@ def tables(program: Program, guid: str) -> str:
         f"enum {{ DIVERGENCE = {1 + ERRORS.index('DivergenceError')} }}; /* what a function returns in that case */",
         "typedef enum { REAL, INTEGER, BOOLEAN, STRING } Type;",
         _array("Type types[VARIABLES]", (v.type.upper() for v in variables)),
-        _array("double starts[PLACES]", (repr(_start(slave, place)) for place in program.places)),
+        _array("double starts[PLACES]", (repr(start_of(slave, place)) for place in program.places)),
         "enum { GIVEN = 1, INPUT = 2 }; /* from outside; while the FMU is stepped as well */",
         _array("unsigned char kinds[VARIABLES]", map(str, inputs)),
         _listed("typedef enum", _CALLS) + " Call;",
@@ -64,7 +64,7 @@ def tables(program: Program, guid: str) -> str:
     return "\n".join(parts) + "\n"
 
 
-def _start(slave: Slave, place: Place) -> float:
+def start_of(slave: Slave, place: Place) -> float:
     """What a place holds before initialisation; what the slave does not have then is not read before it is written."""
     if place.reference is not None:
         return float(slave.variables[place.reference].start)
