@@ -126,6 +126,27 @@ def slaves_of(folder: Path) -> list[Target]:
     return found
 
 
+def slaves_named(text: str) -> list[Target]:
+    """One of this project's slaves by its name, those of a folder, or one of them as FOLDER/NAME.
+
+    Raises `UsageError` if there is none.
+    """
+    path = Path(text)
+    if text in MODELS:
+        return [Target.parse(MODELS[text])]
+    if path.is_dir():
+        return slaves_of(path)
+    if not path.parent.is_dir() or len(path.parts) < 2:
+        raise UsageError(
+            f"{text}: expected {' or '.join(MODELS)}, a folder with modules that define slaves, or FOLDER/NAME for one"
+        )
+    found = slaves_of(path.parent)
+    named = [target for target in found if target.model == path.name]
+    if not named:
+        raise UsageError(f"{text}: expected one of {', '.join(target.model for target in found)} in {path.parent}")
+    return named
+
+
 def build_slaves(
     targets: Sequence[Target],
     folder: Path,
@@ -140,13 +161,32 @@ def build_slaves(
     `announce` hears, a line each, of what could not be packed. Raises `QuadcosimError` with what the build said if
     it fails.
     """
-    named = [f"{target.module}:{target.model}" for target in targets]
-    root = targets[0].root if targets else None
     packing = _IN_C if native else _IN_PYTHON
     options = [] if systems is None else ["--target", systems]
+    return _packed(packing.module, options, targets, folder, announce)
+
+
+def export_c(targets: Sequence[Target], folder: Path, *, single: bool = False) -> list[Path]:
+    """Write slaves whose modules are found in one place as NAME.h and NAME.c into `folder`; the paths of the latter.
+
+    `single`: in single precision. Raises `QuadcosimError` saying what could not be written.
+    """
+    return _packed("fmu_kit.native.embedded", ["--single"] if single else [], targets, folder, None)
+
+
+def _packed(
+    module: str,
+    options: Sequence[str],
+    targets: Sequence[Target],
+    folder: Path,
+    announce: Callable[[str], None] | None,
+) -> list[Path]:
+    """What a module of the kit makes of slaves, in a process of its own; the paths that it prints."""
+    named = [f"{target.module}:{target.model}" for target in targets]
+    root = targets[0].root if targets else None
     roots = [] if root is None else ["--root", root]
     done = subprocess.run(
-        subprocesses.command(packing.module, *options, folder.resolve(), *roots, *named),
+        subprocesses.command(module, *options, folder.resolve(), *roots, *named),
         capture_output=True, text=True, env=subprocesses.environment(), check=False,
     )  # fmt: skip
     if done.returncode != 0:

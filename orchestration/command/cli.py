@@ -99,6 +99,27 @@ def build(
 
 
 @app.command()
+def export_c(
+    out: Annotated[Path, typer.Option("--out", help="Folder for NAME.h and NAME.c.", metavar="DIR")],
+    slave: Annotated[
+        str,
+        typer.Argument(
+            help="UnifiedController, QuadrotorPlant, a folder of modules that define slaves, or FOLDER/NAME."
+        ),
+    ] = "UnifiedController",
+    single: Annotated[
+        bool, typer.Option("--single", help="In single precision, with the functions of libm; else double, without.")
+    ] = False,
+) -> None:
+    """Write a controller, or any slave, as two files in C for a microcontroller: no allocation, C99."""
+    from orchestration import fmus
+
+    for path in fmus.export_c(fmus.slaves_named(slave), out, single=single):
+        print(path.with_suffix(".h"))
+        print(path)
+
+
+@app.command()
 @flies
 def run(
     scenario: Annotated[

@@ -1,0 +1,73 @@
+/* $model, written by quadcosim export-c: see $model.h. $precision */
+
+#include "$model.h"
+
+$includes
+/* -- mathematics ------------------------------------------------------------------------------------------------- */
+
+$mathematics
+/* -- the model ---------------------------------------------------------------------------------------------------- */
+
+typedef $model Instance;
+
+Q_ONE int fail(Instance *m, int status, int kind)
+{
+    m->status = status;
+    return kind;
+}
+
+$functions
+/* -- what is called from outside ----------------------------------------------------------------------------------- */
+
+static int refused_input(const Instance *m)
+{
+    (void)m;
+$inputs    return 0;
+}
+
+void ${model}_init($model *c)
+{
+    *c = ($model){
+$starts    };
+}
+
+int ${model}_start($model *c, $real t)
+{
+    if (c->status) return c->status;
+    if (c->started) return c->status = $twice;
+    if (!q_isfinite(t)) return c->status = $never;
+    if ((c->status = refused_input(c))) return c->status;
+    c->$start_time = t;
+    c->started = $initialise(c) == 0;
+    return c->status;
+}
+
+int ${model}_step($model *c, $real t, $real h)
+{
+    q_real done;
+    if (c->status) return c->status;
+    if (!c->started) return c->status = $early;
+    if ((c->status = refused_input(c))) return c->status;
+    $do_step(c, t, h, &done);
+    return c->status;
+}
+
+$changed#ifdef ${guard}_NO_TEXTS
+
+const char *${model}_error(int status)
+{
+    (void)status;
+    return "";
+}
+
+#else
+
+static const char *const texts[] = {
+$texts};
+
+const char *${model}_error(int status)
+{
+    return status >= 0 && status < (int)(sizeof texts / sizeof *texts) ? texts[status] : "no such status";
+}
+
+#endif

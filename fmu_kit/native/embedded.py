@@ -1,0 +1,177 @@
+"""A slave as two files in C for a microcontroller: Model.h and Model.c.
+
+Writing them imports the slave, so it runs in a process of its own: `python -m fmu_kit.native.embedded`.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import sys
+from pathlib import Path
+from string import Template
+
+from fmu_kit import packaging
+from fmu_kit.bundle import PackagingError, Target
+from fmu_kit.native.building import modules_of
+from fmu_kit.native.c_code import c_name, c_string
+from fmu_kit.native.embedded_code import GROUPS, Words, comment, described, fields, functions, single_number
+from fmu_kit.native.excerpt import excerpt
+from fmu_kit.native.memory import name_of_kept
+from fmu_kit.native.precomputing import precomputed
+from fmu_kit.native.symbols import TraceError
+from fmu_kit.native.tables import start_of
+from fmu_kit.native.tracing import Program, trace
+from fmu_kit.packaging import slave_class
+
+_HERE = Path(__file__).parent
+_TITLES = {
+    "in": "Inputs: set them before each step.",
+    "out": "Outputs.",
+    "par": "Parameters: set them between init and start.",
+    "local": "What the model computes on its way, to be looked at.",
+    "kept": "What the model keeps from call to call: not to be touched.",
+}
+_MEMCPY = """#include <float.h>
+#include <stdint.h>
+#if defined(__GNUC__)
+#define memcpy __builtin_memcpy /* of eight bytes: a move, also where -ffreestanding makes a call of it */
+#else
+#include <string.h>
+#endif
+"""
+_INCLUDES = {False: _MEMCPY, True: "#include <float.h>\n#include <math.h>\n"}
+_PRECISION = {False: "In double precision, without libm.", True: "In single precision, with the functions of libm."}
+
+
+def write(target: Target, folder: Path, *, single: bool = False) -> Path:
+    """Write Model.h and Model.c into `folder`; the path of the latter. Raises `PackagingError` saying what cannot be.
+
+    `single`: in single precision, with the functions of libm; else in double precision, with those of its own.
+    """
+    slave = slave_class(target)
+    try:
+        program = precomputed(trace(slave, modules_of(target)))
+        header, source = files(program, single=single)
+    except TraceError as error:
+        raise PackagingError(f"{target.model}: {error}") from error
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / f"{target.model}.h").write_text(header, "utf-8")
+    path = folder / f"{target.model}.c"
+    path.write_text(source, "utf-8")
+    return path
+
+
+def files(program: Program, *, single: bool) -> tuple[str, str]:
+    """The header and the source of a program."""
+    words = Words()
+    early = words.status(f"{program.model}_step before start: expected {program.model}_start first")
+    twice = words.status(f"{program.model}_start after start: expected {program.model}_init first")
+    never = words.status("t = ...: expected a finite start time")
+    inputs = _refusals(program, words)
+    model_functions = functions(program, words, single=single)
+    known: dict[str, str] = {
+        "model": program.model,
+        "guard": program.model.upper(),
+        "description": comment(program.slave.description),
+        "precision": _PRECISION[single],
+        "real": "float" if single else "double",
+        "early": str(early),
+        "twice": str(twice),
+        "never": str(never),
+        "start_time": fields(program)[name_of_kept(("_start_time",))],
+        "initialise": c_name(program.initialise.name),
+        "do_step": c_name(program.do_step.name),
+    }
+    header = {
+        "groups": _groups(program, known["real"]),
+        "warnings": _warnings(program, words),
+        "changed": _changed(program, whole=False),
+    }
+    source = {
+        "includes": _INCLUDES[single],
+        "mathematics": excerpt(f"{model_functions} q_isfinite Q_ONE", single=single),
+        "functions": model_functions,
+        "inputs": inputs,
+        "starts": _starts(program, single),
+        "changed": _changed(program, whole=True),
+        "texts": "".join(f"    {c_string(text)},\n" for text in ("no error", *words.errors)),
+    }
+    return (
+        Template((_HERE / "embedded.h").read_text("utf-8")).substitute(known, **header),
+        Template((_HERE / "embedded.c").read_text("utf-8")).substitute(known, **source),
+    )
+
+
+def _groups(program: Program, precision: str) -> str:
+    """The fields of the struct."""
+    places = fields(program)
+    parts = []
+    for group in GROUPS.values():
+        found = [place for place in program.places if places[place.name].startswith(f"{group}.")]
+        widest = max((len(places[place.name]) for place in found), default=0) - len(group)
+        lines = []
+        for place in found:
+            name = f"{places[place.name].removeprefix(f'{group}.')};"
+            words = "" if place.reference is None else f" /* {described(program.slave.variables[place.reference])} */"
+            lines.append(f"        {precision} {f'{name:<{widest}}{words}'.rstrip()}\n")
+        if lines:
+            parts.append(f"    /* {_TITLES[group]} */\n    struct {{\n{''.join(lines)}    }} {group};\n")
+    return "\n".join(parts)
+
+
+def _starts(program: Program, single: bool) -> str:
+    """The start values that are not zero."""
+    slave = program.slave(instance_name="starts")
+    places = fields(program)
+    lines = []
+    for place in program.places:
+        value = start_of(slave, place)
+        if value or math.copysign(1.0, value) < 0.0:
+            lines.append(f"        .{places[place.name]} = {single_number(value) if single else repr(value)},\n")
+    return "".join(lines)
+
+
+def _refusals(program: Program, words: Words) -> str:
+    """What looks at each input: an FMU refuses what is not finite."""
+    places = fields(program)
+    lines = []
+    for variable in program.slave.variables:
+        if variable.causality == "input" and variable.type == "Real":
+            status = words.status(f"{variable.name} = ...: expected a finite value")
+            lines.append(f"    if (!q_isfinite(m->{places[variable.name]})) return {status};\n")
+    return "".join(lines)
+
+
+def _warnings(program: Program, words: Words) -> str:
+    """The bits of the warnings."""
+    lines = [
+        f"    {program.model.upper()}_{_constant(key)} = {1 << bit}, /* {comment(words.warnings[key])} */\n"
+        for bit, key in enumerate(program.warnings)
+        if key in words.warnings
+    ]
+    return f"/* The bits of `warnings`. */\nenum {{\n{''.join(lines)}}};\n\n" if lines else ""
+
+
+def _constant(key: str) -> str:
+    return "".join(c if c.isalnum() and c.isascii() else "_" for c in key).upper()
+
+
+def _changed(program: Program, *, whole: bool) -> str:
+    """What takes over parameters that were tuned, where there are any."""
+    if not any(variable.variability == "tunable" for variable in program.slave.variables):
+        return ""
+    head = f"void {program.model}_changed({program.model} *c)"
+    if not whole:
+        return f"/* After tunable parameters were set between steps: the next step takes them over. */\n{head};\n\n"
+    return f"{head}\n{{\n    c->{fields(program)[name_of_kept(('_stale',))]} = 1;\n}}\n\n"
+
+
+def main(arguments: list[str]) -> int:
+    """`python -m fmu_kit.native.embedded [--single] FOLDER …`: as `fmu_kit.packaging`, two files each."""
+    single = arguments[:1] == ["--single"]
+    return packaging.main(arguments[single:], functools.partial(write, single=single))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

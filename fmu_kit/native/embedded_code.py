@@ -1,0 +1,123 @@
+"""A program as C for a microcontroller: its memory is a struct with names, its messages are numbers."""
+
+from __future__ import annotations
+
+import keyword
+import math
+import re
+from collections.abc import Iterable
+from ctypes import c_float
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from fmu_kit.native.c_code import ERRORS, KEYWORDS, Writer
+from fmu_kit.native.statements import Block, Statement
+from fmu_kit.native.tracing import Program
+from fmu_kit.variables import Variable
+
+GROUPS = {"input": "in", "output": "out", "parameter": "par", "local": "local", None: "kept"}
+"""The part of the struct that variables lie in, by their causality; None: what the model keeps beside them."""
+_LARGEST, _SMALLEST = 3.4028234663852886e38, 1.1754943508222875e-38
+
+
+@dataclass(kw_only=True)
+class Words:
+    """What may be said, instead of being written while it runs: each text has a number."""
+
+    errors: list[str] = field(default_factory=list)
+    """by status, from 1 on"""
+    warnings: dict[str, str] = field(default_factory=dict)
+    """by key"""
+
+    def status(self, text: str) -> int:
+        """The status that stands for a text."""
+        if text not in self.errors:
+            self.errors.append(text)
+        return 1 + self.errors.index(text)
+
+
+def fields(program: Program) -> dict[str, str]:
+    """Where each place lies in the struct, as `par.mass`."""
+    found: dict[str, str] = {}
+    for place in program.places:
+        group = GROUPS[None if place.reference is None else program.slave.variables[place.reference].causality]
+        name = re.sub(r"\W+", "_", place.name.removeprefix("self."), flags=re.ASCII)
+        name = f"_{name}" if name[0].isdigit() else name
+        while f"{group}.{name}" in found.values() or keyword.iskeyword(name) or name in KEYWORDS:
+            name += "_"
+        found[place.name] = f"{group}.{name}"
+    return found
+
+
+def functions(program: Program, words: Words, *, single: bool) -> str:
+    """The functions of a program; what they may say is noted in `words`."""
+    places = fields(program)
+    written = (_StructWriter(function, program, places, words).text() for function in program.functions)
+    text = "\n\n".join(written) + "\n"
+    return in_single(text) if single else text
+
+
+def in_single(text: str) -> str:
+    """C with its real numbers in single precision; what is larger or smaller than any is the largest or smallest."""
+
+    def rounded(found: re.Match[str]) -> str:
+        return found[0] if found[0].startswith("/*") else single_number(float(found[0]))
+
+    return re.sub(r"/\*.*?\*/|(?<![\w.])\d+(?:\.\d*(?:e[+-]?\d+)?|e[+-]?\d+)(?!\w)", rounded, text, flags=re.DOTALL)
+
+
+def single_number(value: float) -> str:
+    """A number as C writes it in single precision: the nearest one, in the digits that it needs."""
+    size = min(max(abs(value), _SMALLEST), _LARGEST) if value else 0.0
+    nearest = c_float(size).value
+    digits = next(text for n in range(1, 10) if c_float(float(text := f"{nearest:.{n}g}")).value == nearest)
+    shown = digits if re.search(r"[.e]", digits) else f"{digits}.0"
+    return f"{'-' if math.copysign(1.0, value) < 0.0 else ''}{shown}f"
+
+
+class _StructWriter(Writer):
+    """Writes one function, for a microcontroller."""
+
+    memory: ClassVar = "m"
+
+    def __init__(self, function: object, program: Program, places: dict[str, str], words: Words) -> None:
+        super().__init__(function, program, places)  # type: ignore[arg-type]
+        self.words = words
+
+    def _memory(self) -> list[str]:
+        return []
+
+    def _place(self, name: str) -> str:
+        return f"m->{self.places[name]}"
+
+    def _warn(self, each: Statement, rest: Block) -> None:
+        key, words = each.data
+        self.words.warnings[key] = _plain(words)
+        self._line(f"m->warnings |= {1 << self.program.warnings.index(key)}u; /* {comment(key)} */")
+
+    def _raise(self, each: Statement, rest: Block) -> None:
+        kind, words = each.data
+        number = 1 + ERRORS.index(kind)
+        if ("failure",) in words:  # of which the status is known
+            self._line(f"return {number};")
+            return
+        text = _plain(words)
+        self._line(f"return fail(m, {self.words.status(text)}, {number}); /* {comment(text)} */")
+
+
+def _plain(words: Iterable[str | tuple[str]]) -> str:
+    """A text without its numbers."""
+    return "".join(word if isinstance(word, str) else "..." for word in words)
+
+
+def comment(text: str) -> str:
+    """A text as it can stand in a comment."""
+    return " ".join(text.replace("*/", "* /").replace("/*", "/ *").split())
+
+
+def described(variable: Variable) -> str:
+    """What a variable is, by the words of the slave."""
+    unit = f" [{variable.unit}]" if variable.unit else ""
+    kind = {"Real": "", "Integer": "an integer; ", "Boolean": "0 or 1; "}[variable.type]
+    bounds = f"; {variable.bounds.removeprefix('a finite value ')}" if variable.bounds != "a finite value" else ""
+    return comment(f"{variable.name}{unit}: {kind}{variable.description}{bounds}")

@@ -1,0 +1,103 @@
+"""What is used of the headers beside this file, for one lane: the definitions, each after those that it needs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+_HERE = Path(__file__).parent
+_DOUBLE, _SINGLE = ("lanes.h", "mathematics.h"), ("single.h",)
+_NAME = re.compile(r"\b(?:[qQ]_\w+|QUADCOSIM_LANES)\b")
+_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+_KNOWN = {"#if QUADCOSIM_LANES == 1": True, "#ifndef QUADCOSIM_LANES": True, "#ifdef QUADCOSIM_LIBM": False}
+"""Conditions whose answer is known: one lane, no libm; the guard of a header is another one."""
+_GUARD = re.compile(r"#(ifndef|define) QUADCOSIM_\w+_H$")
+_SHORTHAND = {
+    r"^Q_FUNCTION\((\w+)\)$": r"Q_ONE q_real q_\1(q_real x) { return q_own_\1(x); }",
+    r"^Q_FUNCTION2\((\w+)\)$": r"Q_ONE q_real q_\1(q_real x, q_real y) { return q_own_\1(x, y); }",
+}
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A definition, or what stands between an #if and its #endif, with the comment before it."""
+
+    text: str
+    defines: frozenset[str]
+    needs: frozenset[str]
+
+
+def excerpt(text: str, *, single: bool = False) -> str:
+    """What the code in `text` uses, in the order of the headers, which is that of C; includes are left to the reader.
+
+    `single`: in single precision, by the functions of libm.
+    """
+    parts = [part for name in (_SINGLE if single else _DOUBLE) for part in _parts((_HERE / name).read_text("utf-8"))]
+    wanted = set(_NAME.findall(_COMMENT.sub("", text)))
+    kept: list[_Part] = []
+    for part in reversed(parts):
+        if part.defines & wanted or not part.defines:
+            kept.append(part)
+            wanted |= part.needs
+    text = "\n\n".join(part.text for part in reversed(kept)) + "\n"
+    return re.sub(r"(?m)^(#define .*|Q_ONE .*\}|typedef .*;)\n\n(?=#define|Q_ONE .*\}|typedef .*;)", r"\1\n", text)
+
+
+def _parts(header: str) -> list[_Part]:
+    lines: list[str] = []
+    found: list[_Part] = []
+    for line in _one_lane(header.splitlines()):
+        if not line.strip() and not _COMMENT.sub("", "\n".join(lines)).strip():
+            lines = []  # the heading of a section
+            continue
+        lines.append(line)
+        text = "\n".join(lines)
+        if _is_whole(text):
+            lines = []
+            bare = _COMMENT.sub("", text)
+            part = _Part(text, frozenset(_defined(bare.strip())), frozenset(_NAME.findall(bare)))
+            if "#include <" in bare and found:  # of what the definition before it makes use of
+                found[-1] = replace(found[-1], text=f"{found[-1].text}\n\n{text}")
+            elif not bare.startswith("#include"):
+                found.append(part)
+    return found
+
+
+def _defined(text: str) -> list[str]:
+    """The names that a part gives a meaning to."""
+    if text.startswith("#"):
+        return re.findall(r"#define (\w+)", text)
+    return _NAME.findall(text)[-1:] if text.startswith("typedef") else re.findall(r"(q_\w+)\(", text)[:1]
+
+
+def _one_lane(lines: Iterable[str]) -> list[str]:
+    """The lines of a header that are left where there is one lane, and no libm."""
+    found: list[str] = []
+    answers: list[bool | None] = []
+    """of each #if around a line: whether its lines are taken; None: nobody knows here"""
+    for line in lines:
+        if line.startswith("#if"):
+            answers.append(True if _GUARD.match(line) else _KNOWN.get(line))
+        known = answers[-1] is not None if answers else False
+        if line.startswith("#else") and known:
+            answers[-1] = not answers[-1]
+        is_directive = line.startswith(("#if", "#else", "#elif", "#endif"))
+        if False not in answers and not (is_directive and known) and not _GUARD.match(line):
+            for short, long in _SHORTHAND.items():
+                line = re.sub(short, long, line)
+            found.append(line)
+        if line.startswith("#endif"):
+            answers.pop()
+    return found
+
+
+def _is_whole(text: str) -> bool:
+    """Whether a text is a whole definition, not the beginning of one."""
+    bare = _COMMENT.sub("", text).strip()
+    if not bare or "/*" in bare or bare.endswith("\\"):
+        return False
+    if len(re.findall(r"^#if", bare, re.MULTILINE)) != len(re.findall(r"^#endif", bare, re.MULTILINE)):
+        return False
+    return bare.startswith("#") or (bare.count("{") == bare.count("}") and bare[-1] in ";}")
