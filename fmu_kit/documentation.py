@@ -27,6 +27,8 @@ IN_PYTHON = Path(__file__).with_name("needs.html")
 class Making:
     """How an FMU was made: what the page says of it."""
 
+    version: int = 2
+    """of FMI"""
     needs: Path
     """what it needs and where its sources are, as a template like the page"""
     source: str
@@ -53,9 +55,11 @@ def to_html(slave: Any, making: Making, fragment: str = "") -> str:
         "license": escape(slave.license),
         "python": escape(PYTHON_REQUIRED),
         "source": escape(making.source),
+        "fmi": str(making.version),
     }
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
         model=said["model"],
+        fmi=said["fmi"],
         description=escape(slave.description),
         author=escape(slave.author),
         license=said["license"],

@@ -6,7 +6,7 @@ digits only; here every number is written in its shortest exact form.
 
 import datetime
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
@@ -20,23 +20,16 @@ GUID_PLACEHOLDER = "guid-of-the-content"
 """Stands where packaging writes the GUID, once it knows the content."""
 
 
+NATIVE_LOG_CATEGORIES = {"logStatusError": "All other failures."}
+"""Of an FMU without Python inside, beside those of its slave."""
+
+
 def to_xml(slave: Any, sources: Sequence[str] | None = None) -> Element:
     """The FMI 2.0 description of a `Slave` class, its GUID still the placeholder.
 
     With `sources`, the files to compile, it is the one of an FMU without Python inside.
     """
-    root = Element(
-        "fmiModelDescription",
-        fmiVersion="2.0",
-        modelName=slave.__name__,
-        guid=GUID_PLACEHOLDER,
-        description=slave.description,
-        author=slave.author,
-        license=slave.license,
-        generationTool="quadcosim",
-        generationDateAndTime=generation_date(),
-        variableNamingConvention="structured",
-    )
+    root = Element("fmiModelDescription", {"fmiVersion": "2.0", "guid": GUID_PLACEHOLDER, **about(slave)})
     kind = SubElement(
         root,
         "CoSimulation",
@@ -51,32 +44,38 @@ def to_xml(slave: Any, sources: Sequence[str] | None = None) -> Element:
     )
     if sources is not None:
         kind.set("providesDirectionalDerivative", "true")
-    if sources is not None:
         files = SubElement(kind, "SourceFiles")
         for name in sources:
             SubElement(files, "File", name=name)
-    _add_units(root, slave.variables)
-    categories = SubElement(root, "LogCategories")
-    native = {} if sources is None else {"logStatusError": "All other failures."}
-    for name, description in {**slave.log_categories, **native}.items():
-        SubElement(categories, "Category", name=name, description=description)
-    experiment = slave.default_experiment
-    SubElement(
-        root,
-        "DefaultExperiment",
-        startTime=repr(experiment.start_time),
-        stopTime=repr(experiment.stop_time),
-        stepSize=repr(experiment.step_size),
-    )
+    add_units(root, slave.variables)
+    add_log_categories(root, {**slave.log_categories, **({} if sources is None else NATIVE_LOG_CATEGORIES)})
+    add_experiment(root, slave)
     annotations = SubElement(root, "VendorAnnotations")
     tool = SubElement(annotations, "Tool", name="quadcosim")
     if sources is None:
         SubElement(tool, "Python", requires=PYTHON_REQUIRED)
     variables = SubElement(root, "ModelVariables")
     for value_reference, variable in enumerate(slave.variables):
-        variables.append(_scalar_variable(variable, value_reference))
+        scalar = SubElement(variables, "ScalarVariable", attrib=attributes(variable, value_reference))
+        SubElement(scalar, variable.type, attrib=type_attributes(variable))
     _add_structure(root, slave)
     return root
+
+
+# -- of any version of FMI ----------------------------------------------------------------------------------
+
+
+def about(slave: Any) -> dict[str, str]:
+    """What a description says of the model as a whole."""
+    return {
+        "modelName": slave.__name__,
+        "description": slave.description,
+        "author": slave.author,
+        "license": slave.license,
+        "generationTool": "quadcosim",
+        "generationDateAndTime": generation_date(),
+        "variableNamingConvention": "structured",
+    }
 
 
 def generation_date() -> str:
@@ -87,7 +86,8 @@ def generation_date() -> str:
     return datetime.datetime.fromtimestamp(int(epoch), datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
-def _add_units(root: Element, variables: tuple[Variable, ...]) -> None:
+def add_units(root: Element, variables: tuple[Variable, ...]) -> None:
+    """The units of variables, by what they are in base units."""
     definitions = SubElement(root, "UnitDefinitions")
     for name in sorted({v.unit for v in variables if v.unit is not None}):
         unit = SubElement(definitions, "Unit", name=name)
@@ -95,29 +95,60 @@ def _add_units(root: Element, variables: tuple[Variable, ...]) -> None:
         SubElement(unit, "BaseUnit", attrib=exponents)
 
 
-def _scalar_variable(variable: Variable, value_reference: int) -> Element:
-    element = Element(
-        "ScalarVariable",
-        name=variable.name,
-        valueReference=str(value_reference),
-        description=variable.description,
-        causality=variable.causality,
-        variability=variable.variability,
+def add_log_categories(root: Element, descriptions: Mapping[str, str]) -> None:
+    """The categories of messages, by name with what they are for."""
+    categories = SubElement(root, "LogCategories")
+    for name, description in descriptions.items():
+        SubElement(categories, "Category", name=name, description=description)
+
+
+def add_experiment(root: Element, slave: Any) -> None:
+    """The default experiment of a slave."""
+    experiment = slave.default_experiment
+    SubElement(
+        root,
+        "DefaultExperiment",
+        startTime=repr(experiment.start_time),
+        stopTime=repr(experiment.stop_time),
+        stepSize=repr(experiment.step_size),
     )
-    attributes: dict[str, str] = {}
-    if variable.has_start:
-        attributes["start"] = _literal(variable.start)
+
+
+def attributes(variable: Variable, value_reference: int) -> dict[str, str]:
+    """What a variable is, whatever its type."""
+    found = {
+        "name": variable.name,
+        "valueReference": str(value_reference),
+        "description": variable.description,
+        "causality": variable.causality,
+        "variability": variable.variability,
+    }
     if variable.causality != "input":  # an input's initial is exact and must not be written
-        element.set("initial", "exact" if variable.has_start else "calculated")
+        found["initial"] = "exact" if variable.has_start else "calculated"
+    return found
+
+
+def type_attributes(variable: Variable) -> dict[str, str]:
+    """Start, unit and bounds of a variable."""
+    found: dict[str, str] = {}
+    if variable.has_start:
+        found["start"] = _literal(variable.start)
     if variable.unit is not None:
-        attributes["unit"] = variable.unit
+        found["unit"] = variable.unit
     lower = variable.minimum if variable.minimum is not None else variable.above
     if lower is not None:
-        attributes["min"] = _literal(lower)
+        found["min"] = _literal(lower)
     if variable.maximum is not None:
-        attributes["max"] = _literal(variable.maximum)
-    SubElement(element, variable.type, attrib=attributes)
-    return element
+        found["max"] = _literal(variable.maximum)
+    return found
+
+
+def dependencies(slave: Any) -> tuple[list[int], list[int]]:
+    """The value references of the outputs, and of the inputs on which all of them depend when initialisation ends."""
+    outputs, inputs = (
+        [i for i, v in enumerate(slave.variables) if v.causality == causality] for causality in ("output", "input")
+    )
+    return outputs, inputs if slave.initial_outputs_depend_on_inputs else []
 
 
 def _literal(value: float | int | bool) -> str:
@@ -125,15 +156,12 @@ def _literal(value: float | int | bool) -> str:
 
 
 def _add_structure(root: Element, slave: Any) -> None:
+    """FMI 2.0 names variables by their place in the list, from 1."""
     structure = SubElement(root, "ModelStructure")
-    by_causality = {
-        causality: [i for i, v in enumerate(slave.variables, start=1) if v.causality == causality]
-        for causality in ("input", "output")
-    }
-    outputs = SubElement(structure, "Outputs")
-    for index in by_causality["output"]:
-        SubElement(outputs, "Unknown", index=str(index), dependencies="")
-    known = by_causality["input"] if slave.initial_outputs_depend_on_inputs else []
+    outputs, known = dependencies(slave)
+    listed = SubElement(structure, "Outputs")
+    for reference in outputs:
+        SubElement(listed, "Unknown", index=str(reference + 1), dependencies="")
     initial = SubElement(structure, "InitialUnknowns")
-    for index in by_causality["output"]:
-        SubElement(initial, "Unknown", index=str(index), dependencies=" ".join(map(str, known)))
+    for reference in outputs:
+        SubElement(initial, "Unknown", index=str(reference + 1), dependencies=" ".join(str(each + 1) for each in known))

@@ -169,7 +169,7 @@ def content_guid(files: dict[str, bytes]) -> str:
     for name in sorted(name for name in files if name != loader.GUID_FILE and not name.startswith(compiled)):
         content = files[name]
         if name == "modelDescription.xml":
-            content = re.sub(rb'(guid|generationDateAndTime)="[^"]*"', rb"", content)
+            content = re.sub(rb'(guid|instantiationToken|generationDateAndTime)="[^"]*"', rb"", content)
         elif name == NATIVE_TABLES:
             content = re.sub(rb'#define GUID "[^"]*"', rb"", content)
         digest.update(name.encode() + b"\0" + hashlib.sha256(content).digest())

@@ -1,5 +1,6 @@
 """Where FMUs are: finds them by name, builds those that are missing or whose sources have changed."""
 
+import functools
 import os
 import subprocess
 from collections.abc import Callable, Iterable, Sequence
@@ -28,21 +29,34 @@ def default_folder() -> Path:
     return Path(platformdirs.user_cache_dir("quadcosim")) / "fmus"
 
 
-NATIVE = "native"
-"""The folder of the FMUs without Python inside, beside the others; so `native/NAME` is one of this project's."""
-
-
-@dataclass(frozen=True)
-class _Packing:
+@dataclass(frozen=True, kw_only=True)
+class Packing:
     """One way to make an FMU of a slave."""
 
-    module: str
-    """that is run to pack"""
+    folder: str
+    """where such FMUs are, beside the modules of the slaves and in `default_folder`"""
+    command: tuple[str, ...]
+    """the module that is run to pack, and its first arguments"""
     source_hash: Callable[[Target], str]
 
+    def slave_of(self, path: Path) -> Target | None:
+        """The slave that an FMU is made of this way: it is in the folder, and a module beside that defines it."""
+        depth = len(Path(self.folder).parts)
+        if path.parts[-1 - depth : -1] != Path(self.folder).parts:
+            return None
+        return _told(slave_beside, path.parents[depth] / path.name)
 
-_IN_PYTHON = _Packing("fmu_kit.packaging", packaging.source_hash)
-_IN_C = _Packing("fmu_kit.native.building", freshness.source_hash)
+
+IN_PYTHON = Packing(folder="", command=("fmu_kit.packaging",), source_hash=packaging.source_hash)
+NATIVE = Packing(folder="native", command=("fmu_kit.native.building",), source_hash=freshness.source_hash)
+"""Without Python inside, by a C compiler."""
+NATIVE_FMI_3 = Packing(
+    folder="native/fmi3",
+    command=("fmu_kit.native.building", "--fmi", "3"),
+    source_hash=functools.partial(freshness.source_hash, version=3),
+)
+PACKINGS = (NATIVE_FMI_3, NATIVE, IN_PYTHON)
+"""Those with a folder of their own first: `native/NAME` is one of this project's, as NAME is."""
 
 
 def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
@@ -52,20 +66,20 @@ def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
     sources or is none of ours. Raises `UsageError` naming the valid names if there is none; `announce` hears of
     a build.
     """
-    name = fmu.removeprefix(f"{NATIVE}/")
-    if name in MODELS:
-        native = name != fmu
-        folder = default_folder() / NATIVE if native else default_folder()
-        if out_of_date([name], folder, native=native):
-            _announce_build(folder / f"{name}.fmu", announce)
-            build([name], folder, announce, native=native)
-        return folder / f"{name}.fmu"
+    for packing in PACKINGS:
+        name = fmu.rpartition("/")[2]
+        if name in MODELS and fmu == Path(packing.folder, name).as_posix():
+            folder = default_folder() / packing.folder
+            if out_of_date([name], folder, packing):
+                _announce_build(folder / f"{name}.fmu", announce)
+                build([name], folder, announce, packing=packing)
+            return folder / f"{name}.fmu"
     path = Path(fmu)
     if path.suffix == ".fmu":
-        native, target = _slave_of(path)
-        if target is not None and _is_old(path, target, native):
+        packing, target = _slave_of(path)
+        if target is not None and _is_old(path, target, packing):
             _announce_build(path, announce)
-            build_slaves([target], path.parent, announce, native=native)
+            build_slaves([target], path.parent, announce, packing=packing)
         if path.is_file():
             return path
     raise UsageError(
@@ -78,24 +92,23 @@ def native_twin(fmu: str) -> str:
     """What to `locate` for the same slave without Python inside; the FMU itself if it is of no slave that is known."""
     path = Path(fmu)
     if fmu in MODELS:
-        return f"{NATIVE}/{fmu}"
-    if path.suffix == ".fmu" and path.parent.name != NATIVE and _told(slave_beside, path) is not None:
-        return str(path.parent / NATIVE / path.name)
+        return f"{NATIVE.folder}/{fmu}"
+    if path.suffix == ".fmu" and _slave_of(path)[0] is IN_PYTHON and IN_PYTHON.slave_of(path) is not None:
+        return str(path.parent / NATIVE.folder / path.name)
     return fmu
 
 
-def _slave_of(path: Path) -> tuple[bool, Target | None]:
-    """Whether an FMU is one without Python inside, by the name of its folder, and the slave that it is built from."""
-    if path.parent.name == NATIVE:
-        target = _told(slave_beside, path.parent.parent / path.name)
+def _slave_of(path: Path) -> tuple[Packing, Target | None]:
+    """The slave that an FMU is built from, and how, by the names of its folders."""
+    for packing in PACKINGS:
+        target = packing.slave_of(path)
         if target is not None:
-            return True, target
-    return False, _told(slave_beside, path)
+            return packing, target
+    return IN_PYTHON, None
 
 
-def out_of_date(names: Iterable[str], folder: Path, *, native: bool = False) -> list[str]:
+def out_of_date(names: Iterable[str], folder: Path, packing: Packing = IN_PYTHON) -> list[str]:
     """Those of this project's FMUs that are missing in `folder` or carry another hash than the sources."""
-    packing = _IN_C if native else _IN_PYTHON
     return [
         name
         for name in names
@@ -108,12 +121,12 @@ def build(
     folder: Path,
     announce: Callable[[str], None] | None = None,
     *,
-    native: bool = False,
+    packing: Packing = IN_PYTHON,
     systems: str | None = None,
 ) -> list[Path]:
     """Build FMUs of this project into `folder`; their paths. Else as `build_slaves`."""
     targets = [Target.parse(MODELS[name]) for name in names]
-    return build_slaves(targets, folder, announce, native=native, systems=systems)
+    return build_slaves(targets, folder, announce, packing=packing, systems=systems)
 
 
 def slaves_of(folder: Path) -> list[Target]:
@@ -152,18 +165,17 @@ def build_slaves(
     folder: Path,
     announce: Callable[[str], None] | None = None,
     *,
-    native: bool = False,
+    packing: Packing = IN_PYTHON,
     systems: str | None = None,
 ) -> list[Path]:
     """Build slaves whose modules are found in one place into `folder`, in a process of its own; the FMUs' paths.
 
-    `native`: without Python inside, by the C compiler of this machine, or for `systems`, `all` or some with commas.
+    Those without Python inside are for this machine, or for `systems`, `all` or some with commas.
     `announce` hears, a line each, of what could not be packed. Raises `QuadcosimError` with what the build said if
     it fails.
     """
-    packing = _IN_C if native else _IN_PYTHON
     options = [] if systems is None else ["--target", systems]
-    return _packed(packing.module, options, targets, folder, announce)
+    return _packed([*packing.command, *options], targets, folder, announce)
 
 
 def export_c(targets: Sequence[Target], folder: Path, *, single: bool = False) -> list[Path]:
@@ -171,12 +183,11 @@ def export_c(targets: Sequence[Target], folder: Path, *, single: bool = False) -
 
     `single`: in single precision. Raises `QuadcosimError` saying what could not be written.
     """
-    return _packed("fmu_kit.native.embedded", ["--single"] if single else [], targets, folder, None)
+    return _packed(["fmu_kit.native.embedded", *(["--single"] if single else [])], targets, folder, None)
 
 
 def _packed(
-    module: str,
-    options: Sequence[str],
+    command: Sequence[str],
     targets: Sequence[Target],
     folder: Path,
     announce: Callable[[str], None] | None,
@@ -186,7 +197,7 @@ def _packed(
     root = targets[0].root if targets else None
     roots = [] if root is None else ["--root", root]
     done = subprocess.run(
-        subprocesses.command(module, *options, folder.resolve(), *roots, *named),
+        subprocesses.command(*command, folder.resolve(), *roots, *named),
         capture_output=True, text=True, env=subprocesses.environment(), check=False,
     )  # fmt: skip
     if done.returncode != 0:
@@ -198,10 +209,9 @@ def _packed(
     return [Path(line) for line in done.stdout.splitlines()]
 
 
-def _is_old(path: Path, target: Target, native: bool) -> bool:
+def _is_old(path: Path, target: Target, packing: Packing) -> bool:
     """Whether an FMU is missing, or made by packaging from other sources than those of its slave."""
     carried = read_source_hash(path)
-    packing = _IN_C if native else _IN_PYTHON
     return not path.exists() if carried is None else carried != _told(packing.source_hash, target)
 
 

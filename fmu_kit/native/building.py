@@ -5,6 +5,7 @@ Packing imports the slave, so it runs in a process of its own: `python -m fmu_ki
 
 from __future__ import annotations
 
+import argparse
 import functools
 import importlib
 import sys
@@ -15,7 +16,7 @@ from pathlib import Path
 from fmu_kit import packaging
 from fmu_kit.bundle import PackagingError, Target, bundled_sources, place
 from fmu_kit.documentation import Making
-from fmu_kit.model_description import GUID_PLACEHOLDER, to_xml
+from fmu_kit.model_description import GUID_PLACEHOLDER
 from fmu_kit.native.c_code import c_code
 from fmu_kit.native.compiler import (
     Mathematics,
@@ -28,58 +29,69 @@ from fmu_kit.native.compiler import (
 from fmu_kit.native.derivatives import with_tangents
 from fmu_kit.native.freshness import source_hash
 from fmu_kit.native.precomputing import precomputed
+from fmu_kit.native.standards import STANDARDS, Standard
 from fmu_kit.native.symbols import TraceError
 from fmu_kit.native.tables import tables
 from fmu_kit.native.tracing import Program, trace
 from fmu_kit.packaging import SOURCE_HASH_FILE, described, licences_and_icon, put_guid, slave_class, written
 
 _HERE = Path(__file__).parent
-MAIN = "fmi2.c"
-"""The file to compile; it includes the others."""
-HEADERS = ("lanes.h", "mathematics.h", "text.h")
+HEADERS = ("instance.h", "lanes.h", "mathematics.h", "text.h")
 _NEEDS = _HERE / "needs.html"
 _PYTHON = "python"
 """Where in the documentation the Python is from which the C was written."""
 
 
-def build(target: Target, folder: Path, *, systems: Sequence[str] = (), mathematics: Mathematics = "own") -> Path:
-    """Write `folder`/Model.fmu, replacing it in one go, and return its path.
+def build(
+    target: Target,
+    folder: Path,
+    *,
+    version: int = 2,
+    systems: Sequence[str] = (),
+    mathematics: Mathematics = "own",
+) -> Path:
+    """Write `folder`/Model.fmu of FMI 2.0 or 3.0, replacing it in one go, and return its path.
 
     With a library for each of `systems`, by zig; without any, for this machine, by its compiler. That one can have the
     mathematics of libm: then it has, on this machine, the bits of the slave in Python, for comparing the two.
     """
+    standard = STANDARDS[version]
     try:
         program = precomputed(trace(slave_class(target), modules_of(target)))
-        sources = c_sources(program, GUID_PLACEHOLDER)
+        sources = c_sources(program, GUID_PLACEHOLDER, standard)
     except TraceError as error:
         raise PackagingError(f"{target.model}: {error}") from error
     files = {f"sources/{name}": text for name, text in sources.items()}
+    files |= standard.sources(target.model, standard.main)
     files |= {f"documentation/{_PYTHON}/{path}": text.encode() for path, text in _python_sources(target).items()}
     files |= licences_and_icon(target)
-    files[SOURCE_HASH_FILE] = source_hash(target).encode()
+    files[SOURCE_HASH_FILE] = source_hash(target, version).encode()
     making = Making(
+        version=version,
         needs=_NEEDS,
         source=f"{_PYTHON}/{place(target.module, target.root)}",
-        status="fmi2Error",
+        status=f"fmi{version}Error",
         afterwards="After a failure, reset the instance, set it to a state that was saved before, or free it.",
     )
-    described(files, target, making, to_xml(slave_class(target), [MAIN]))
-    sources = c_sources(program, put_guid(files))
+    described(files, target, making, standard.describe(slave_class(target), standard.main))
+    sources = c_sources(program, put_guid(files), standard)
     files |= {f"sources/{name}": text for name, text in sources.items()}
-    here = host_platform()
+    libraries: dict[str, bytes] = {}
+    here = host_platform(version)
     if not systems and here is not None:
-        files[library_path(here, target.model)] = compiled_here(sources, MAIN, mathematics=mathematics)
+        libraries[here] = compiled_here(sources, standard.main, mathematics=mathematics)
     for system in systems:
-        files[library_path(system, target.model)] = compiled_for(system, sources, MAIN)
+        libraries |= compiled_for(system, sources, standard.main, version)
+    files |= {library_path(system, target.model): library for system, library in libraries.items()}
     return written(files, target, folder)
 
 
-def c_sources(program: Program, guid: str) -> dict[str, bytes]:
+def c_sources(program: Program, guid: str, standard: Standard) -> dict[str, bytes]:
     """The sources of an FMU, by the names of their files."""
-    fixed = {name: (_HERE / name).read_bytes() for name in (MAIN, *HEADERS)}
+    fixed = {name: (_HERE / name).read_bytes() for name in (standard.main, *HEADERS)}
     derivatives = with_tangents(program, program.initialise)
     functions = f"{c_code(program)}\n{c_code(derivatives)}"
-    return {**fixed, "tables.h": tables(program, guid).encode(), "functions.h": functions.encode()}
+    return {**fixed, "tables.h": tables(program, guid, standard).encode(), "functions.h": functions.encode()}
 
 
 def modules_of(target: Target) -> list[types.ModuleType]:
@@ -94,16 +106,17 @@ def _python_sources(target: Target) -> dict[str, str]:
 
 
 def main(arguments: list[str]) -> int:
-    """`python -m fmu_kit.native.building [--target SYSTEM,…] FOLDER …`: as `fmu_kit.packaging`, for these systems."""
-    systems: tuple[str, ...] = ()
-    if arguments[:1] == ["--target"]:
-        _, text, *arguments = arguments
-        try:
-            systems = targets_of(text)
-        except PackagingError as error:
-            print(error, file=sys.stderr)
-            return 1
-    return packaging.main(arguments, functools.partial(build, systems=systems))
+    """`python -m fmu_kit.native.building [--fmi VERSION] [--target SYSTEM,…] FOLDER …`: as `fmu_kit.packaging`."""
+    parser = argparse.ArgumentParser(add_help=False)
+    parser.add_argument("--fmi", type=int, choices=STANDARDS, default=2)
+    parser.add_argument("--target")
+    given, others = parser.parse_known_args(arguments)
+    try:
+        systems = () if given.target is None else targets_of(given.target)
+    except PackagingError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return packaging.main(others, functools.partial(build, version=given.fmi, systems=systems))
 
 
 if __name__ == "__main__":

@@ -22,12 +22,12 @@ OPTIONS = (
 _LINUX = ("-Wl,--build-id=none",)  # nothing that differs from one build to the next
 
 TARGETS = {
-    "linux64": ("x86_64-linux-gnu.2.17",),
-    "win64": ("x86_64-windows-gnu",),
-    "darwin64": ("x86_64-macos.11.0", "aarch64-macos.11.0"),
+    "linux64": {"x86_64-linux": "x86_64-linux-gnu.2.17"},
+    "win64": {"x86_64-windows": "x86_64-windows-gnu"},
+    "darwin64": {"x86_64-darwin": "x86_64-macos.11.0", "aarch64-darwin": "aarch64-macos.11.0"},
 }
-"""The systems that zig builds for, by their names in FMI 2.0, and what it calls them; several make one library."""
-_SUFFIXES = {"win64": ".dll", "darwin64": ".dylib"}
+"""The systems that zig builds for, by their names in FMI 2.0: those in FMI 3.0, and what zig calls them."""
+_SUFFIXES = {"windows": ".dll", "win64": ".dll", "darwin": ".dylib", "darwin64": ".dylib"}
 
 
 Mathematics = Literal["own", "libm"]
@@ -35,15 +35,17 @@ Mathematics = Literal["own", "libm"]
 _MATHEMATICS: dict[Mathematics, tuple[str, ...]] = {"own": (), "libm": ("-DQUADCOSIM_LIBM", "-lm")}
 
 
-def host_platform() -> str | None:
-    """The name that FMI 2.0 has for the system of this machine, if an FMU can be compiled for it here."""
-    known = {("linux", "x86_64"): "linux64", ("linux", "aarch64"): "aarch64-linux"}
-    return known.get((sys.platform, platform.machine()))
+def host_platform(version: int = 2) -> str | None:
+    """The name that a version of FMI has for the system of this machine, if an FMU can be compiled for it here."""
+    machine = platform.machine()
+    if sys.platform != "linux" or machine not in ("x86_64", "aarch64"):
+        return None
+    return "linux64" if version == 2 and machine == "x86_64" else f"{machine}-linux"
 
 
-def library_path(target: str, model: str) -> str:
-    """Where the library for a system is in an FMU."""
-    return f"binaries/{target}/{model}{_SUFFIXES.get(target, '.so')}"
+def library_path(system: str, model: str) -> str:
+    """Where the library for a system is in an FMU, by its name in the version of FMI."""
+    return f"binaries/{system}/{model}{_SUFFIXES.get(system.rpartition('-')[2], '.so')}"
 
 
 def targets_of(text: str) -> tuple[str, ...]:
@@ -69,16 +71,23 @@ def compiled_here(sources: dict[str, bytes], main: str, *, mathematics: Mathemat
     return _compiled([cc, *OPTIONS, *_LINUX], sources, main, _MATHEMATICS[mathematics])
 
 
-def compiled_for(target: str, sources: dict[str, bytes], main: str) -> bytes:
-    """The library for a system of `TARGETS`, by zig; raises `PackagingError`, saying what to install without zig."""
+def compiled_for(target: str, sources: dict[str, bytes], main: str, version: int = 2) -> dict[str, bytes]:
+    """The libraries for a system of `TARGETS`, by the names that a version of FMI has for it; zig compiles them.
+
+    In FMI 2.0 they are one for macOS, whatever the processor. Raises `PackagingError`, saying what to install without
+    zig.
+    """
     if importlib.util.find_spec("ziglang") is None:
         raise PackagingError("--target: expected zig, which compiles for all systems: pip install ziglang")
     options = [*OPTIONS, *(_LINUX if target == "linux64" else ())]
-    slices = [
-        _compiled([sys.executable, "-m", "ziglang", "cc", "-target", name, *options], sources, main)
-        for name in TARGETS[target]
-    ]
-    return slices[0] if len(slices) == 1 else universal(slices)
+    slices = {
+        name: _compiled([sys.executable, "-m", "ziglang", "cc", "-target", called, *options], sources, main)
+        for name, called in TARGETS[target].items()
+    }
+    if version > 2:
+        return slices
+    libraries = list(slices.values())
+    return {target: libraries[0] if len(libraries) == 1 else universal(libraries)}
 
 
 def _compiled(command: list[str], sources: dict[str, bytes], main: str, after: Sequence[str] = ()) -> bytes:

@@ -11,10 +11,10 @@ from fmu_kit.packaging import hash_of, licences_and_icon
 _HERE = Path(__file__).parent
 
 
-def source_hash(target: Target) -> str:
-    """The hash of all that decides what the FMU does: its modules, and all that writes C.
+def source_hash(target: Target, version: int = 2) -> str:
+    """The hash of all that decides what the FMU of a version of FMI does: its modules, and all that writes C.
 
     Not of the compiler: every one makes a library that gives the same bits.
     """
     own = sorted(path for path in _HERE.iterdir() if path.suffix in (".py", ".c", ".h", ".html"))
-    return hash_of(target, [*own, TEMPLATE], {}, licences_and_icon(target))
+    return hash_of(target, [*own, TEMPLATE], {"version": str(version)}, licences_and_icon(target))

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable
 from fmu_kit.errors import FmuError
 from fmu_kit.native.c_code import ERRORS, c_string, place_names
 from fmu_kit.native.memory import Memory, name_of_kept
+from fmu_kit.native.standards import Standard
 from fmu_kit.native.statements import Place
 from fmu_kit.native.structure import is_number, leaves
 from fmu_kit.native.symbols import TraceError
@@ -21,17 +22,17 @@ from fmu_kit.slave import Phase, Slave
 _UNUSED = 4_242_424_242
 """A value reference that no variable has."""
 _CALLS = {
-    "SETUP_EXPERIMENT": (Phase.INSTANTIATED, "fmi2SetupExperiment"),
-    "ENTER_INITIALIZATION_MODE": (Phase.INSTANTIATED, "fmi2EnterInitializationMode"),
-    "EXIT_INITIALIZATION_MODE": (Phase.INITIALIZATION, "fmi2ExitInitializationMode"),
-    "DO_STEP": (Phase.STEPPING, "fmi2DoStep"),
+    "SETUP_EXPERIMENT": Phase.INSTANTIATED,
+    "ENTER_INITIALIZATION_MODE": Phase.INSTANTIATED,
+    "EXIT_INITIALIZATION_MODE": Phase.INITIALIZATION,
+    "DO_STEP": Phase.STEPPING,
 }
+"""The phase that each call is for."""
 _SET_REAL, _SET_START = inspect.unwrap(Slave.set_real), inspect.unwrap(Slave.setup_experiment)
-_TYPES = ("Real", "Integer", "Boolean", "String")
 
 
-def tables(program: Program, guid: str) -> str:
-    """The tables of a program, for the FMU of this GUID."""
+def tables(program: Program, guid: str, standard: Standard) -> str:
+    """The tables of a program, for the FMU of this GUID; calls and types are named as the version of FMI does."""
     slave = program.slave(instance_name="tables")
     variables = program.slave.variables
     places = place_names(program.places)
@@ -50,7 +51,8 @@ def tables(program: Program, guid: str) -> str:
         _listed("typedef enum", _CALLS) + " Call;",
         "/* What is answered in each phase; NULL: nothing, the call is carried out. */",
         _array(
-            f"Text refused_call[{len(_CALLS)}][PHASES]", (_refused(slave, slave._expect, *c) for c in _CALLS.values())
+            f"Text refused_call[{len(_CALLS)}][PHASES]",
+            (_refused(slave, slave._expect, phase, standard.calls[call]) for call, phase in _CALLS.items()),
         ),
         _array(
             "Text refused_setting[VARIABLES][PHASES]",
@@ -59,7 +61,7 @@ def tables(program: Program, guid: str) -> str:
         "/* The text before a value that cannot be, and after it. */",
         _array("Text bad_value[VARIABLES][2]", (_refused_value(slave, i) for i in range(len(variables)))),
         f"static const Text bad_start_time[2] = {_around('nan', slave, _SET_START, slave, math.nan)};",
-        _array("Text wrong_type[4][2]", (_around(f"{_UNUSED}", slave, slave._of_type, [_UNUSED], t) for t in _TYPES)),
+        _array("Text wrong_type[4][2]", (_wrong_type(slave, *names) for names in standard.types.items())),
     ]
     return "\n".join(parts) + "\n"
 
@@ -96,6 +98,11 @@ def _refused_value(slave: Slave, reference: int) -> str:
     if variable.type != "Real" or not variable.has_start:
         return _row(("", ""))
     return _around("nan", slave, _SET_REAL, slave, [reference], [math.nan])
+
+
+def _wrong_type(slave: Slave, type: str, called: str) -> str:
+    """What it answers to a value reference that no variable of a type has: before the reference, and after it."""
+    return _around(f"{_UNUSED}", slave, slave._of_type, [_UNUSED], type).replace(f" {type} ", f" {called} ")
 
 
 def _around(value: str, slave: Slave, call: Callable[..., object], *given: object) -> str:

@@ -83,5 +83,8 @@ def read_root(archive: Archive) -> Element:
         raise UnreadableFmuError(f"{DESCRIPTION}: expected well-formed XML: {error}") from error
     version = root.get("fmiVersion")
     if version != "2.0":
-        raise UnreadableFmuError(f"fmiVersion = {version}: expected 2.0; an FMU of FMI {version} is not checked")
+        raise UnreadableFmuError(
+            f"fmiVersion = {version}: expected 2.0; an FMU of FMI {version} is not checked here; "
+            "fmpy validate checks its description"
+        )
     return root

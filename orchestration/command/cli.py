@@ -82,6 +82,9 @@ def build(
             show_default=False,
         ),
     ] = None,
+    fmi: Annotated[
+        int, typer.Option("--fmi", min=2, max=3, help="Version of FMI, 3 with --native only; then in native/fmi3/.")
+    ] = 2,
 ) -> None:
     """Build every slave that the modules of FOLDER define, each as an .fmu. Same sources give the same bytes."""
     from orchestration import fmus
@@ -89,11 +92,14 @@ def build(
 
     if target is not None and not native:
         raise UsageError("--target: expected --native with it; FMUs with Python inside are the same for all systems")
-    where = out or ((folder or fmus.default_folder()) / (fmus.NATIVE if native else ""))
+    if fmi == 3 and not native:
+        raise UsageError("--fmi 3: expected --native with it; FMUs with Python inside are of FMI 2.0")
+    packing = fmus.IN_PYTHON if not native else fmus.NATIVE_FMI_3 if fmi == 3 else fmus.NATIVE
+    where = out or (folder or fmus.default_folder()) / packing.folder
     if folder is None:
-        built = fmus.build(MODELS, where, say, native=native, systems=target)
+        built = fmus.build(MODELS, where, say, packing=packing, systems=target)
     else:
-        built = fmus.build_slaves(fmus.slaves_of(folder), where, say, native=native, systems=target)
+        built = fmus.build_slaves(fmus.slaves_of(folder), where, say, packing=packing, systems=target)
     for path in built:
         print(path)
 

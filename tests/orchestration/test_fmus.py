@@ -9,6 +9,7 @@ import pytest
 
 from orchestration import QuadcosimError, UsageError, fmus
 from orchestration.fmi.fmi2 import Fmi2Instance
+from orchestration.fmi.model import read_model
 from orchestration.quadrotor.wiring import MODELS
 
 
@@ -160,6 +161,19 @@ def test_a_missing_fmu_is_built_from_the_slave_beside_it_and_again_when_that_cha
         instance.set("switch", True)
         instance.step(0.0, 0.1)
         assert instance.get("voltage") == 24.0
+
+
+@pytest.mark.parametrize(("folder", "version"), [("native", "2.0"), ("native/fmi3", "3.0")])
+def test_without_python_inside_it_is_built_into_a_folder_beside_the_slave(
+    folder: str, version: str, lamp: Path
+) -> None:
+    path, heard = lamp / folder / "Lamp.fmu", []
+    for _ in range(2):
+        assert fmus.locate(str(path), heard.append) == path
+    assert heard == [f"building {path}"]
+    assert read_model(path).description.fmiVersion == version
+    assert fmus.native_twin(str(path)) == str(path)
+    assert fmus.native_twin(str(lamp / "Lamp.fmu")) == str(lamp / "native" / "Lamp.fmu")
 
 
 def test_somebody_elses_fmu_is_left_as_it_is_beside_a_slave_of_its_name(lamp: Path) -> None:

@@ -35,7 +35,7 @@ Matrix = npt.NDArray[np.float64]
 @pytest.fixture(scope="module")
 def controller(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The native one."""
-    (path,) = fmus.build(["UnifiedController"], tmp_path_factory.mktemp("native"), native=True)
+    (path,) = fmus.build(["UnifiedController"], tmp_path_factory.mktemp("native"), packing=fmus.NATIVE)
     return path
 
 

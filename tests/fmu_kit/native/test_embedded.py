@@ -38,7 +38,7 @@ def exported(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 def native(name: str) -> Instance:
     """One of this project's FMUs without Python inside."""
-    return Instance(fmus.locate(f"{fmus.NATIVE}/{name}"))
+    return Instance(fmus.locate(f"{fmus.NATIVE.folder}/{name}"))
 
 
 @pytest.fixture(scope="module")

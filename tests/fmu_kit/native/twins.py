@@ -9,9 +9,10 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
 from fmu_kit.bundle import Target
-from fmu_kit.native.building import MAIN, c_sources, modules_of
+from fmu_kit.native.building import c_sources, modules_of
 from fmu_kit.native.compiler import compiled_here
 from fmu_kit.native.precomputing import precomputed
+from fmu_kit.native.standards import STANDARDS
 from fmu_kit.native.tracing import trace
 from fmu_kit.packaging import slave_class
 from fmu_kit.slave import Slave
@@ -25,7 +26,7 @@ def library(target: Target, folder: Path) -> Path:
     """The library of a slave that is written out as C, on the libm that CPython takes."""
     program = precomputed(trace(slave_class(target), modules_of(target)))
     path = folder / f"{target.model}.so"
-    path.write_bytes(compiled_here(c_sources(program, GUID), MAIN, mathematics="libm"))
+    path.write_bytes(compiled_here(c_sources(program, GUID, STANDARDS[2]), STANDARDS[2].main, mathematics="libm"))
     return path
 
 

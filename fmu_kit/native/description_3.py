@@ -1,0 +1,73 @@
+"""`modelDescription.xml` of FMI 3.0, from the declarations of a slave: what that of FMI 2.0 says, in its words."""
+
+from __future__ import annotations
+
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement
+
+from fmu_kit import model_description
+from fmu_kit.model_description import GUID_PLACEHOLDER, NATIVE_LOG_CATEGORIES
+from fmu_kit.variables import Variable
+
+TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
+"""Of variables, by their names in FMI 2.0"""
+
+
+def to_xml(slave: Any) -> Element:
+    """The FMI 3.0 description of a `Slave` class without Python inside, its token still the placeholder.
+
+    Variables have the value references that they have in FMI 2.0; the independent variable comes after them.
+    """
+    root = Element(
+        "fmiModelDescription",
+        {"fmiVersion": "3.0", "instantiationToken": GUID_PLACEHOLDER, **model_description.about(slave)},
+    )
+    SubElement(
+        root,
+        "CoSimulation",
+        modelIdentifier=slave.__name__,
+        needsExecutionTool="false",
+        canBeInstantiatedOnlyOncePerProcess="false",
+        canGetAndSetFMUState="true",
+        canSerializeFMUState="true",
+        providesDirectionalDerivatives="true",
+        canHandleVariableCommunicationStepSize="true",
+        hasEventMode="false",
+    )
+    model_description.add_units(root, slave.variables)
+    model_description.add_log_categories(root, {**slave.log_categories, **NATIVE_LOG_CATEGORIES})
+    model_description.add_experiment(root, slave)
+    variables = SubElement(root, "ModelVariables")
+    for value_reference, variable in enumerate(slave.variables):
+        variables.append(_variable(variable, value_reference))
+    variables.append(_time(len(slave.variables)))
+    _add_structure(root, slave)
+    return root
+
+
+def _variable(variable: Variable, value_reference: int) -> Element:
+    return Element(
+        TYPES[variable.type],
+        {**model_description.attributes(variable, value_reference), **model_description.type_attributes(variable)},
+    )
+
+
+def _time(value_reference: int) -> Element:
+    """The independent variable; without a unit it is in seconds."""
+    return Element(
+        "Float64",
+        name="time",
+        valueReference=str(value_reference),
+        description="The time of the last communication point",
+        causality="independent",
+        variability="continuous",
+    )
+
+
+def _add_structure(root: Element, slave: Any) -> None:
+    structure = SubElement(root, "ModelStructure")
+    outputs, known = model_description.dependencies(slave)
+    for reference in outputs:
+        SubElement(structure, "Output", valueReference=str(reference), dependencies="")
+    for reference in outputs:
+        SubElement(structure, "InitialUnknown", valueReference=str(reference), dependencies=" ".join(map(str, known)))

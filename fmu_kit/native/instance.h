@@ -1,0 +1,381 @@
+/* A slave as any version of FMI for co-simulation asks for it: calls in their order, values, states, messages.
+
+   tables.h and functions.h, which lie beside this file, have what differs from slave to slave: what it says of its
+   variables, and what it computes. Both are written by quadcosim from the slave's Python; nothing here depends on what
+   the model is. An instance is one piece of memory, made by `create` and never grown; nothing is shared between
+   instances.
+
+   The file of a version of FMI includes this one, and has the functions that a host calls. Before that it defines
+   Truth, the type of a Boolean; after it Host, what the host has given to an instance, and `tell`. */
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "mathematics.h"
+#include "text.h"
+
+#if defined(_WIN32)
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+
+typedef enum { OK, WARNING, DISCARD, ERROR, FATAL } Status;
+typedef enum { INSTANTIATED, INITIALIZATION, STEPPING, TERMINATED, FAILED, PHASES } Phase;
+enum { LONGEST_NAME = 256, LONGEST_TEXT = 1024 };
+
+typedef const char *Text;
+typedef const unsigned *References;
+typedef struct Host Host;
+
+#include "tables.h"
+
+/* What is saved as the state: all that a step depends on. */
+typedef struct {
+    char model[sizeof GUID]; /* whose state it is */
+    double memory[PLACES];
+    double time;     /* of the last communication point */
+    unsigned warned; /* bits of the warnings that were given */
+    Phase phase;
+} State;
+
+typedef struct {
+    State state;
+    char failure[LONGEST_TEXT]; /* why the last call failed */
+    char draft[LONGEST_TEXT];   /* a message that is being written */
+    q_text text;                /* the same, as text.h has it */
+    char name[LONGEST_NAME];
+    const Host *host;
+    int logs, filtered, wants_warnings;
+    double *tangents; /* of the memory, while derivatives are computed */
+} Instance;
+
+/* -- messages --------------------------------------------------------------------------------------------------- */
+
+/* Give a message to the host. */
+static void tell(const Instance *m, Status status, Text category, Text message);
+
+static void text_begin(Instance *m) { m->text = q_text_in(m->draft, sizeof m->draft); }
+static void text_add(Instance *m, Text text) { q_text_string(&m->text, text); }
+static void text_real(Instance *m, double x) { q_text_repr(&m->text, x); }
+static void text_integer(Instance *m, double x) { q_text_fixed(&m->text, x == 0.0 ? 0.0 : x, 0); }
+
+static int fail(Instance *m, int error)
+{
+    memcpy(m->failure, m->draft, sizeof m->failure);
+    return error;
+}
+
+Q_ONE void warn(Instance *m)
+{
+    if (m->logs && (!m->filtered || m->wants_warnings))
+        tell(m, WARNING, "logStatusWarning", m->draft);
+}
+
+#include "functions.h"
+
+/* After a failure the instance can be freed, reset, or set to a state that was saved before. */
+static Status refuse(Instance *m, int error)
+{
+    m->state.phase = FAILED;
+    tell(m, ERROR, error == DIVERGENCE ? "divergence" : "logStatusError", m->failure);
+    return ERROR;
+}
+
+static Status refuse_with(Instance *m, Text before, Text middle, Text after)
+{
+    text_begin(m);
+    text_add(m, before);
+    text_add(m, middle);
+    text_add(m, after);
+    fail(m, 0);
+    return refuse(m, 0);
+}
+
+static Status refuse_number(Instance *m, double x, const Text around[2])
+{
+    text_begin(m);
+    text_add(m, around[0]);
+    text_real(m, x);
+    text_add(m, around[1]);
+    fail(m, 0);
+    return refuse(m, 0);
+}
+
+static Status expect(Instance *m, Call call)
+{
+    Text refusal = refused_call[call][m->state.phase];
+    return refusal ? refuse_with(m, refusal, "", "") : OK;
+}
+
+static Status set_logging(Instance *m, int on, size_t n, const Text *categories)
+{
+    m->logs = on;
+    m->filtered = n > 0;
+    m->wants_warnings = 0;
+    for (size_t i = 0; i < n; i++) {
+        if (categories[i] && strcmp(categories[i], "logStatusWarning") == 0)
+            m->wants_warnings = 1;
+    }
+    return OK;
+}
+
+/* -- life ------------------------------------------------------------------------------------------------------- */
+
+static void begin(Instance *m)
+{
+    memset(&m->state, 0, sizeof m->state);
+    memcpy(m->state.model, GUID, sizeof GUID);
+    memcpy(m->state.memory, starts, sizeof starts);
+    m->state.phase = INSTANTIATED;
+}
+
+/* An instance, in memory of a size that may have more behind it; NULL if there is none. */
+static Instance *create(size_t size, Text name, int logs)
+{
+    q_text copy;
+    Instance *m = calloc(1, size);
+    if (!m)
+        return NULL;
+    copy = q_text_in(m->name, sizeof m->name);
+    q_text_string(&copy, name);
+    m->logs = logs;
+    begin(m);
+    return m;
+}
+
+static Status take_start_time(Instance *m, double t)
+{
+    if (expect(m, SETUP_EXPERIMENT) != OK)
+        return ERROR;
+    if (!q_isfinite(t))
+        return refuse_number(m, t, bad_start_time);
+    m->state.memory[SELF_START_TIME] = t;
+    m->state.time = t;
+    return OK;
+}
+
+static Status enter_initialization(Instance *m)
+{
+    if (expect(m, ENTER_INITIALIZATION_MODE) != OK)
+        return ERROR;
+    m->state.phase = INITIALIZATION;
+    return OK;
+}
+
+static Status exit_initialization(Instance *m)
+{
+    int error;
+    if (expect(m, EXIT_INITIALIZATION_MODE) != OK)
+        return ERROR;
+    if ((error = enter_stepping(m)))
+        return refuse(m, error);
+    m->state.phase = STEPPING;
+    return OK;
+}
+
+static Status advance(Instance *m, double t, double h)
+{
+    double done;
+    int error;
+    if (expect(m, DO_STEP) != OK)
+        return ERROR;
+    if ((error = do_step(m, t, h, &done)))
+        return refuse(m, error);
+    m->state.time = t + h;
+    return OK;
+}
+
+static Status end(Instance *m)
+{
+    m->state.phase = TERMINATED;
+    return OK;
+}
+
+/* -- values ----------------------------------------------------------------------------------------------------- */
+
+static Status refuse_references(Instance *m, References vr, size_t n, Type type)
+{
+    int first = 1;
+    text_begin(m);
+    text_add(m, wrong_type[type][0]);
+    for (size_t i = 0; i < n; i++) {
+        if (vr[i] < VARIABLES && types[vr[i]] == type)
+            continue;
+        text_add(m, first ? "" : ", ");
+        text_integer(m, vr[i]);
+        first = 0;
+    }
+    text_add(m, wrong_type[type][1]);
+    fail(m, 0);
+    return refuse(m, 0);
+}
+
+static int are_of(References vr, size_t n, Type type)
+{
+    for (size_t i = 0; i < n; i++)
+        if (vr[i] >= VARIABLES || types[vr[i]] != type)
+            return 0;
+    return 1;
+}
+
+/* In initialisation mode, compute what is asked for anew if values were set that it has not seen. */
+static int bring_up_to_date(Instance *m, References vr, size_t n)
+{
+    if (m->state.phase != INITIALIZATION || m->state.memory[SELF_STALE] == 0.0)
+        return 0;
+    for (size_t i = 0; i < n; i++)
+        if (vr[i] >= VARIABLES || !(kinds[vr[i]] & GIVEN))
+            return enter_stepping(m);
+    return 0;
+}
+
+/* Before a value is set: whether it may be now. */
+static Status settle(Instance *m, unsigned vr, Type type)
+{
+    Text refusal;
+    if (!are_of(&vr, 1, type))
+        return refuse_references(m, &vr, 1, type);
+    if ((refusal = refused_setting[vr][m->state.phase]))
+        return refuse_with(m, refusal, "", "");
+    if (!(kinds[vr] & INPUT) || m->state.phase != STEPPING)
+        m->state.memory[SELF_STALE] = 1.0;
+    return OK;
+}
+
+static double as_it_is(double x) { return x; }
+
+/* What a model has computed may be beyond what the interface can pass. */
+static int as_int(double x) { return x >= 2147483647.0 ? 2147483647 : x > -2147483648.0 ? (int)x : -2147483647 - 1; }
+
+#define GET(name, type, ctype, converted) \
+    static Status get_##name(Instance *m, References vr, size_t n, ctype *value) \
+    { \
+        int error = bring_up_to_date(m, vr, n); \
+        if (error) \
+            return refuse(m, error); \
+        if (!are_of(vr, n, type)) \
+            return refuse_references(m, vr, n, type); \
+        for (size_t i = 0; i < n; i++) \
+            value[i] = (ctype)converted(m->state.memory[vr[i]]); \
+        return OK; \
+    }
+
+#define SET(name, type, ctype, number) \
+    static Status set_##name(Instance *m, References vr, size_t n, const ctype *value) \
+    { \
+        for (size_t i = 0; i < n; i++) { \
+            if (settle(m, vr[i], type) != OK) \
+                return ERROR; \
+            m->state.memory[vr[i]] = number; \
+        } \
+        return OK; \
+    }
+
+GET(reals, REAL, double, as_it_is)
+GET(integers, INTEGER, int, as_int)
+GET(booleans, BOOLEAN, Truth, as_int)
+SET(integers, INTEGER, int, value[i])
+SET(booleans, BOOLEAN, Truth, value[i] != 0)
+
+static Status set_reals(Instance *m, References vr, size_t n, const double *value)
+{
+    for (size_t i = 0; i < n; i++) {
+        if (settle(m, vr[i], REAL) != OK)
+            return ERROR;
+        if (!q_isfinite(value[i]))
+            return refuse_number(m, value[i], bad_value[vr[i]]);
+        m->state.memory[vr[i]] = value[i];
+    }
+    return OK;
+}
+
+/* -- states ------------------------------------------------------------------------------------------------------ */
+
+static Status save(Instance *m, void **state)
+{
+    if (!*state && !(*state = malloc(sizeof(State))))
+        return refuse_with(m, "FMU state: no memory for it", "", "");
+    memcpy(*state, &m->state, sizeof(State));
+    return OK;
+}
+
+static Status restore(Instance *m, const void *state)
+{
+    if (!state || memcmp(state, GUID, sizeof GUID) != 0)
+        return refuse_with(m, "FMU state: expected one of this FMU", "", "");
+    memcpy(&m->state, state, sizeof(State));
+    return OK;
+}
+
+static Status forget(void **state)
+{
+    if (state) {
+        free(*state);
+        *state = NULL;
+    }
+    return OK;
+}
+
+static Status to_bytes(Instance *m, const void *state, void *bytes, size_t size)
+{
+    if (!state || size < sizeof(State))
+        return refuse_with(m, "FMU state: expected one, and room for its bytes", "", "");
+    memcpy(bytes, state, sizeof(State));
+    return OK;
+}
+
+static Status from_bytes(Instance *m, const void *bytes, size_t size, void **state)
+{
+    State found;
+    if (size != sizeof(State) || memcmp(bytes, GUID, sizeof GUID) != 0)
+        return refuse_with(m, "FMU state: expected the bytes of one of this FMU", "", "");
+    memcpy(&found, bytes, sizeof found);
+    if ((unsigned)found.phase >= PHASES)
+        return refuse_with(m, "FMU state (phase): expected one of this FMU", "", "");
+    if (!*state && !(*state = malloc(sizeof(State))))
+        return refuse_with(m, "FMU state: no memory for it", "", "");
+    memcpy(*state, &found, sizeof found);
+    return OK;
+}
+
+/* -- derivatives ------------------------------------------------------------------------------------------------- */
+
+/* While initialising, outputs are computed from what was set; between steps they stay as they are, whatever is set. */
+static Status derive(Instance *m, References z, size_t nz, References v, size_t nv, const double *dv, double *dz)
+{
+    double tangents[PLACES] = {0.0};
+    Instance copy;
+    int error;
+    if (!are_of(z, nz, REAL))
+        return refuse_references(m, z, nz, REAL);
+    if (!are_of(v, nv, REAL))
+        return refuse_references(m, v, nv, REAL);
+    if (m->state.phase == INITIALIZATION) {
+        copy = *m;
+        copy.tangents = tangents;
+        for (size_t i = 0; i < nv; i++)
+            tangents[v[i]] = dv[i];
+        if ((error = enter_stepping_with_tangents(&copy))) {
+            memcpy(m->failure, copy.failure, sizeof m->failure);
+            return refuse(m, error);
+        }
+    }
+    for (size_t i = 0; i < nz; i++)
+        dz[i] = tangents[z[i]];
+    return OK;
+}
+
+/* -- the functions that a host calls ----------------------------------------------------------------------------- */
+
+/* Of a version of FMI that calls its functions FMI(…). */
+#define CALL(name, ...) \
+    EXPORT Status FMI(name)(void *c, __VA_ARGS__); \
+    Status FMI(name)(void *c, __VA_ARGS__)
+#define PLAIN(name) \
+    EXPORT Status FMI(name)(void *c); \
+    Status FMI(name)(void *c)
+#define INSTANCE \
+    Instance *m = c; \
+    if (!m) \
+        return ERROR

@@ -1,0 +1,67 @@
+"""The versions of FMI that a slave is written out for, and what differs between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement, tostring
+
+from fmu_kit import model_description
+from fmu_kit.native import description_3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Standard:
+    """A version of FMI, for co-simulation."""
+
+    version: int
+    main: str
+    """the file to compile; it includes the others"""
+    describe: Callable[[Any, str], Element]
+    """the model description of a slave class, from it and the file to compile"""
+    sources: Callable[[str, str], Mapping[str, bytes]]
+    """files that say how to compile it, from the model's name and the file to compile"""
+    calls: Mapping[str, str]
+    """the functions that a phase may refuse, by what instance.h calls them"""
+    types: Mapping[str, str]
+    """what it calls the types, by what FMI 2.0 does"""
+
+
+def _build_description(model: str, main: str) -> dict[str, bytes]:
+    root = Element("fmiBuildDescription", fmiVersion="3.0")
+    configuration = SubElement(root, "BuildConfiguration", modelIdentifier=model)
+    files = SubElement(configuration, "SourceFileSet", language="C11")
+    SubElement(files, "SourceFile", name=main)
+    return {"sources/buildDescription.xml": tostring(root, encoding="UTF-8", xml_declaration=True)}
+
+
+STANDARDS = {
+    2: Standard(
+        version=2,
+        main="fmi2.c",
+        describe=lambda slave, main: model_description.to_xml(slave, [main]),
+        sources=lambda model, main: {},
+        calls={
+            "SETUP_EXPERIMENT": "fmi2SetupExperiment",
+            "ENTER_INITIALIZATION_MODE": "fmi2EnterInitializationMode",
+            "EXIT_INITIALIZATION_MODE": "fmi2ExitInitializationMode",
+            "DO_STEP": "fmi2DoStep",
+        },
+        types={name: name for name in ("Real", "Integer", "Boolean", "String")},
+    ),
+    3: Standard(
+        version=3,
+        main="fmi3.c",
+        describe=lambda slave, main: description_3.to_xml(slave),
+        sources=_build_description,
+        calls={
+            "SETUP_EXPERIMENT": "fmi3EnterInitializationMode",
+            "ENTER_INITIALIZATION_MODE": "fmi3EnterInitializationMode",
+            "EXIT_INITIALIZATION_MODE": "fmi3ExitInitializationMode",
+            "DO_STEP": "fmi3DoStep",
+        },
+        types={"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String"},
+    ),
+}
+"""By version"""

@@ -1,0 +1,208 @@
+"""Native FMUs of FMI 3.0: they say, answer and fly what those of FMI 2.0 do."""
+
+import ctypes
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi3 import FMU3Slave
+from fmpy.model_description import ModelDescription
+from fmpy.validation import validate_fmu
+
+import orchestration
+from fmu_kit.native import c_code
+from orchestration import fmus
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.wiring import MODELS
+from tests.commands import Main
+from tests.fmus.expected import MEASUREMENT
+from tests.native import assert_the_same
+
+START = 0.5
+"""[s]"""
+TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
+SOURCES = Path(c_code.__file__).parent
+
+
+def read(name: str) -> ModelDescription:
+    return fmpy.read_model_description(str(fmus.locate(name)))
+
+
+class Instance:
+    """Of the controller, its messages kept."""
+
+    def __init__(self, folder: Path) -> None:
+        path = fmus.locate("native/fmi3/UnifiedController")
+        fmpy.extract(str(path), str(folder))
+        description = fmpy.read_model_description(str(path))
+        self.references = {v.name: v.valueReference for v in description.modelVariables}
+        self.messages: list[str] = []
+        self.fmu = FMU3Slave(
+            guid=description.instantiationToken,
+            unzipDirectory=str(folder),
+            modelIdentifier=description.modelName,
+            instanceName="controller",
+        )
+        self.fmu.instantiate(loggingOn=True, logMessage=self._log)
+
+    def _log(self, environment: object, status: int, category: bytes, message: bytes) -> None:
+        self.messages.append(f"{category.decode()}: {message.decode()}")
+
+    def initialise(self) -> None:
+        self.fmu.enterInitializationMode(startTime=START)
+        for name, value in MEASUREMENT.items():
+            self.fmu.setFloat64([self.references[name]], [value])
+        self.fmu.exitInitializationMode()
+
+    def get(self, *names: str) -> list[float]:
+        return list(self.fmu.getFloat64([self.references[name] for name in names]))
+
+
+@pytest.fixture
+def controller(tmp_path: Path) -> Iterator[Instance]:
+    instance = Instance(tmp_path)
+    yield instance
+    instance.fmu.freeInstance()
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_it_has_the_variables_of_the_other(name: str) -> None:
+    two, three = read(f"native/{name}"), read(f"native/fmi3/{name}")
+    common = (
+        "name",
+        "description",
+        "causality",
+        "variability",
+        "initial",
+        "start",
+        "unit",
+        "min",
+        "max",
+        "valueReference",
+    )
+    *variables, time = three.modelVariables
+    for one, other in zip(two.modelVariables, variables, strict=True):
+        assert {key: getattr(one, key) for key in common} == {key: getattr(other, key) for key in common}
+        assert TYPES[one.type] == other.type
+    assert (time.name, time.causality, time.valueReference) == ("time", "independent", len(variables))
+    for structure in ("outputs", "initialUnknowns"):
+        found = [
+            [(each.variable.name, [v.name for v in each.dependencies]) for each in getattr(of, structure)]
+            for of in (two, three)
+        ]
+        assert found[0] == found[1]
+        assert found[0]
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_fmpy_finds_nothing_and_flies_it_as_it_does_the_other(name: str) -> None:
+    three = str(fmus.locate(f"native/fmi3/{name}"))
+    assert validate_fmu(three) == []
+    rows = [
+        fmpy.simulate_fmu(str(path), stop_time=0.2, output_interval=0.01)
+        for path in (three, fmus.locate(f"native/{name}"))
+    ]
+    assert len(rows[0]) == 21
+    assert rows[0].tobytes() == rows[1].tobytes()
+
+
+def test_a_flight_is_that_of_fmi_2_to_the_byte() -> None:
+    flown = [
+        orchestration.run(
+            Scenario(stop_time=2.0).with_fmus(
+                plant=f"{folder}/QuadrotorPlant", controller=f"{folder}/UnifiedController"
+            )
+        )
+        for folder in ("native/fmi3", "native")
+    ]
+    assert_the_same(*flown)
+
+
+def test_a_saved_state_is_put_back_as_bytes(controller: Instance) -> None:
+    outputs = [v.name for v in read("native/fmi3/UnifiedController").modelVariables if v.causality == "output"]
+    controller.initialise()
+    controller.fmu.doStep(START, 0.01)
+    state = controller.fmu.getFMUState()
+    saved = controller.fmu.serializeFMUState(state)
+    controller.fmu.freeFMUState(state)
+
+    def after_one_more() -> list[float]:
+        controller.fmu.setFloat64([controller.references["angular_velocity.x"]], [0.7])
+        controller.fmu.doStep(START + 0.01, 0.02)
+        return controller.get("time", *outputs)
+
+    expected = after_one_more()
+    controller.fmu.reset()
+    state = controller.fmu.deserializeFMUState(saved)
+    controller.fmu.setFMUState(state)
+    assert controller.get("time") == [START + 0.01]
+    assert after_one_more() == expected
+    assert expected[0] == START + 0.03
+
+
+def test_directional_derivatives_are_the_differences_while_it_initialises(controller: Instance) -> None:
+    known, unknown = (controller.references[name] for name in ("angular_velocity.x", "torque.x"))
+    controller.initialise()
+    assert controller.fmu.getDirectionalDerivative([unknown], [known], [1.0]) == [0.0]  # between steps outputs stay
+    controller.fmu.reset()
+    controller.fmu.enterInitializationMode(startTime=START)
+    for name, value in MEASUREMENT.items():
+        controller.fmu.setFloat64([controller.references[name]], [value])
+    (found,) = controller.fmu.getDirectionalDerivative([unknown], [known], [1.0])
+    around = []
+    for change in (1e-6, -1e-6):
+        controller.fmu.setFloat64([known], [MEASUREMENT["angular_velocity.x"] + change])
+        around += controller.get("torque.x")
+    assert found == pytest.approx((around[0] - around[1]) / 2e-6, rel=1e-6)
+    assert found != 0.0
+
+
+def test_what_is_refused_is_named_as_fmi_3_does(controller: Instance) -> None:
+    with pytest.raises(FMICallException):
+        controller.fmu.doStep(0.0, 0.01)
+    with pytest.raises(FMICallException):
+        controller.fmu.getFloat64([9999])
+    two_values = (ctypes.c_double * 2)()
+    with pytest.raises(FMICallException):
+        controller.fmu.fmi3GetFloat64(controller.fmu.component, (ctypes.c_uint * 1)(0), 1, two_values, 2)
+    with pytest.raises(FMICallException):
+        controller.fmu.getInt64([0])
+    assert [message.partition(" (")[0] for message in controller.messages] == [
+        "logStatusError: fmi3DoStep in phase instantiated: expected phase stepping",
+        "logStatusError: value reference [9999]: expected one of a Float64 variable",
+        "logStatusError: nValues: expected as many values as value references, for all variables are scalars",
+        "logStatusError: fmi3GetInt64: this FMU has no such variables",
+    ]
+
+
+def test_two_instances_know_nothing_of_each_other(controller: Instance, tmp_path: Path) -> None:
+    other = Instance(tmp_path / "other")
+    controller.initialise()
+    before = controller.get("torque.x", "time")
+    other.fmu.enterInitializationMode(startTime=7.0)
+    with pytest.raises(FMICallException):
+        other.fmu.setFloat64([other.references["position.x"]], [np.nan])
+    other.fmu.freeInstance()
+    assert controller.get("torque.x", "time") == before
+    assert controller.messages == []
+
+
+def test_the_command_has_none_with_python_inside(main: Main) -> None:
+    assert "--fmi 3: expected --native with it" in main("build", "--fmi", "3", code=2).stderr
+
+
+def test_no_function_of_a_model_takes_the_name_of_one_that_is_there() -> None:
+    defined = {
+        name
+        for source in ("instance.h", "fmi2.c", "fmi3.c")
+        for name in re.findall(
+            r"^(?:static|Q_ONE) \w+ \*?(\w+)\(", (SOURCES / source).read_text(encoding="utf-8"), flags=re.MULTILINE
+        )
+    }
+    macros = {f"{action}_{kind}" for action in ("get", "set") for kind in ("reals", "integers", "booleans")}
+    assert len(defined) > 30
+    assert {name for name in defined | macros if c_code.c_name(name) == name} == set()
