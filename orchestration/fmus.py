@@ -3,7 +3,7 @@
 import functools
 import os
 import subprocess
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -86,6 +86,17 @@ def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
         f"fmu = {fmu}: expected {' or '.join(MODELS)}, or the path of an .fmu file, which may be missing if a module "
         "beside it defines the slave"
     )
+
+
+def of_components(fmus: Mapping[str, str], announce: Callable[[str], None] | None = None) -> dict[str, Path]:
+    """Each component's .fmu, as `locate` finds it; raises `UsageError` that names the component."""
+    found = {}
+    for name, fmu in fmus.items():
+        try:
+            found[name] = locate(fmu, announce)
+        except UsageError as error:
+            raise UsageError(f"components.{name}.{error}") from error
+    return found
 
 
 def native_twin(fmu: str) -> str:

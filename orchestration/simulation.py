@@ -153,7 +153,7 @@ def prepared(
     recorder = InMemory() if recorder is None else recorder
     with in_its_own_words(asked):
         system = system_of(asked) if isinstance(asked, Scenario) else asked
-        paths = {name: fmus.locate(component.fmu, announce) for name, component in system.components.items()}
+        paths = fmus.of_components(system.fmus, announce)
         models = {name: read_model(path) for name, path in paths.items()}
         found = checked(system, models)
         system, parameters = found.system, found.parameters

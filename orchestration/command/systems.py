@@ -82,7 +82,7 @@ def _units_of(system: "System") -> dict[str, str]:
     from orchestration.simulation import checked
 
     try:
-        models = {name: read_model(fmus.locate(c.fmu, say)) for name, c in system.components.items()}
+        models = {name: read_model(path) for name, path in fmus.of_components(system.fmus, say).items()}
         return checked(system, models).units
     except QuadcosimError:
         return {}

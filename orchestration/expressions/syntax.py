@@ -128,6 +128,15 @@ def is_number(node: Node) -> bool:
     return isinstance(node, Number) and node.value not in (0.0, 1.0)
 
 
+def parts(node: Node) -> Iterator[Node]:
+    """What a condition joins by and, or and not; itself if it joins nothing."""
+    if isinstance(node, Operation) and node.sign in ("and", "or", "not"):
+        for operand in node.operands:
+            yield from parts(operand)
+    else:
+        yield node
+
+
 def children(node: Node) -> tuple[Node, ...]:
     """What an expression is made of."""
     if isinstance(node, Operation):

@@ -20,6 +20,8 @@ Metrics = dict[str, float | int | bool | str | None]
 GOOD = "criterion.good"
 FIXED = ("outcome", "good", "horizon", "diverged", "divergence_time", "steps")
 """Names that every run has beside its objectives."""
+PRINTED = ("wall_time", "engine")
+"""Names of what `run` prints beside them."""
 
 
 def compute(system: System, spans: Spans, *, end: float, divergence_time: float | None, steps: int) -> Metrics:
@@ -101,8 +103,10 @@ def known(system: System, signals: set[str], numbers: set[str]) -> System:
     valid = {"time", "stop_time", *signals, *vectors(dict.fromkeys(signals)), *numbers}
     found = {}
     for name, text in system.objectives.items():
-        if name in FIXED:
+        if name in (*FIXED, *PRINTED):
             raise UsageError(f"objectives.{name}: every run has a result of that name, expected another")
+        if name in valid:
+            raise UsageError(f"objectives.{name}: expressions know something else by that name, expected another")
         if name in system.optional and not valid.issuperset(names(parse(text))):
             continue
         expect_names(parse(text), valid, f"objectives.{name}")

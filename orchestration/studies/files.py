@@ -62,9 +62,9 @@ class Files:
 
 def files_of(system: System, fmus_too: Iterable[str] = (), tables_too: Iterable[str] = ()) -> Files:
     """The files of a system, FMUs built if need be; raises `UsageError` for an FMU that is not there."""
-    named = dict.fromkeys([*(component.fmu for component in system.components.values()), *fmus_too])
+    of_components = {system.fmus[name]: path for name, path in fmus.of_components(system.fmus).items()}
     tables = {**tables_of(system), **{name: Path(name) for name in tables_too}}
-    return Files(fmus={name: fmus.locate(name) for name in named}, tables=tables)
+    return Files(fmus=of_components | {name: fmus.locate(name) for name in fmus_too}, tables=tables)
 
 
 def tables_of(system: System) -> dict[str, Path]:

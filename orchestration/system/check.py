@@ -4,7 +4,7 @@ import difflib
 from collections.abc import Iterable, Mapping
 
 from orchestration.errors import UsageError, expected_name
-from orchestration.expressions.syntax import names, parse
+from orchestration.expressions.syntax import Name, names, parse, parts
 from orchestration.fmi.model import NUMERIC, Model, Variable
 from orchestration.fmi.values import taken
 from orchestration.system.conversion import BECOMES, OtherQuantity, conversion
@@ -44,6 +44,18 @@ def check(system: System, models: Mapping[str, Model]) -> None:
         if source.trajectory is not None and source.trajectory not in system.components:
             known = ", ".join(system.components)
             raise UsageError(f"sources.{name}.trajectory = {source.trajectory}: expected one of the components {known}")
+    if system.criterion.diverged is not None:
+        _check_divergence(system.criterion.diverged, models)
+
+
+def _check_divergence(condition: str, models: Mapping[str, Model]) -> None:
+    """No part of the condition is a Real signal by itself, which would hold wherever it is not zero."""
+    for part in parts(parse(condition)):
+        name = part.text if isinstance(part, Name) else ""
+        model = models.get(component_of(name))
+        variable = None if model is None else model.variables.get(variable_of(name))
+        if variable is not None and variable.kind == "Real":
+            raise UsageError(f"criterion.diverged: {name} is a Real; expected a condition, as in {name} > 1")
 
 
 def recorded(system: System, models: Mapping[str, Model]) -> dict[str, tuple[str, ...]]:

@@ -238,6 +238,11 @@ class System:
     operating_point: Mapping[str, Any] = field(default_factory=dict)
     """what to change, by path, to be at rest: where the local limit is taken"""
 
+    @property
+    def fmus(self) -> dict[str, str]:
+        """The FMU of each component, by its name."""
+        return {name: component.fmu for name, component in self.components.items()}
+
     def __post_init__(self) -> None:
         require_positive(self, "stop_time")
         require(exact_nanoseconds(self.stop_time) >= 1, "stop_time", self.stop_time, "at least a nanosecond")

@@ -70,6 +70,8 @@ def test_a_name_that_there_is_none_of_is_refused_with_the_names_there_are(
     with pytest.raises(UsageError) as refused:
         fmus.locate(name)
     assert str(refused.value).startswith(f"fmu = {name}: expected ")
+    with pytest.raises(UsageError, match=r"^components.tank.fmu = "):
+        fmus.of_components({"tank": name})
     assert all(model in str(refused.value) for model in MODELS)
     assert ".fmu" in str(refused.value)
 

@@ -62,7 +62,7 @@ def carried(asked: Scenario | System, announce: Callable[[str], None] | None = N
             if source.to and source.constant is None:
                 kind = "file" if source.file is not None else "noise" if source.noise is not None else "trajectory"
                 raise UsageError(f"sources.{name}.{kind}: an SSP cannot feed one; expected a constant")
-        located = {name: fmus.locate(component.fmu, announce) for name, component in system.components.items()}
+        located = fmus.of_components(system.fmus, announce)
         models = {name: read_model(path) for name, path in located.items()}
         check(system, models)
         plan = Plan(system)

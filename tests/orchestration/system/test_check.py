@@ -40,6 +40,9 @@ constant = 1.0
 
 [objectives]
 peak = "max(tank.level)"
+
+[criterion]
+diverged = "controller.valve and tank.level > 5"
 """
 
 
@@ -89,6 +92,8 @@ def test_what_is_right_is_not_refused(tmp_path: Path) -> None:
         ('["tank.inflow"]', '["tank.inflw"]', "sources.rain.to: Tank has no input inflw; ", "inflow"),
         ('["tank.inflow"]', '["tank.level"]', "sources.rain.to: tank.level is an output; ", "an input: valve, inflow"),
         ("peak =", "outcome =", "objectives.outcome: every run has a result of that name", "expected another"),
+        ("peak =", "stop_time =", "objectives.stop_time: expressions know something else by that", "expected another"),
+        ("tank.level > 5", "tank.level", "criterion.diverged: tank.level is a Real; ", "as in tank.level > 1"),
         ("max(tank.level)", "max(tank.levl)", "objectives.peak: there is no tank.levl; ", "did you mean tank.level"),
     ],
 )  # fmt: skip
