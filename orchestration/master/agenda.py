@@ -205,6 +205,8 @@ class Agenda(Iterator[Instant]):
         self.stop = nanoseconds(system.stop_time)
         self.count = 0
         """how many instants are past"""
+        self.aligns = bool(fixed)
+        """whether instants have to lie on grids of fixed steps"""
         self._names = list(system.components)
         self._plan = plan = Plan(system)
         self._heap: list[tuple[int, int, int, int, Any]] = []

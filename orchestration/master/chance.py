@@ -2,10 +2,15 @@
 
 import math
 from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from orchestration.master.streams import cut_normal
+
+Integers: TypeAlias = npt.NDArray[np.int64]
+Flags: TypeAlias = npt.NDArray[np.bool_]
 
 Lateness = Callable[[], int]
 """The next random lateness [ns]"""
@@ -43,3 +48,34 @@ def losses(probability: float, burst_length: float | None, stream: Stream) -> Lo
         return in_burst
 
     return lost
+
+
+# -- the same numbers, many at a time ---------------------------------------------------------------------------------
+
+Latenesses = Callable[[int], Integers]
+"""The next so many latenesses [ns]"""
+LossesOfMany = Callable[[int], Flags]
+"""Whether the next so many messages are lost"""
+
+
+def latenesses(largest: int, distribution: str, stream: Stream) -> Latenesses:
+    """As `lateness`; zeros without it."""
+    if largest == 0:
+        return lambda count: np.zeros(count, dtype=np.int64)
+    draw = stream().random
+    if distribution == "normal":
+        return lambda count: np.array(
+            [math.floor(cut_normal(uniform) * largest) for uniform in draw(count).tolist()], dtype=np.int64
+        )
+    return lambda count: np.floor(draw(count) * largest).astype(np.int64)
+
+
+def losses_of_many(probability: float, burst_length: float | None, stream: Stream) -> LossesOfMany:
+    """As `losses`; none without it."""
+    lost = losses(probability, burst_length, stream)
+    if lost is None:
+        return lambda count: np.zeros(count, dtype=np.bool_)
+    if burst_length is None or probability == 1.0:
+        draw = stream().random
+        return lambda count: draw(count) < probability
+    return lambda count: np.array([lost() for _ in range(count)], dtype=np.bool_)

@@ -22,6 +22,8 @@ from orchestration.master.memory import Memory
 from orchestration.master.recording import Integers
 from orchestration.master.schedule import Schedule, Schedules
 from orchestration.master.sources import Values
+from orchestration.master.streams import Streams
+from orchestration.master.timetable import Timetable
 from orchestration.simulator import Floats, Simulator
 from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS
@@ -59,10 +61,16 @@ class CompiledMaster(Master):
     engine = "compiled"
 
     def __init__(
-        self, system: System, simulators: Mapping[str, NativeInstance], *, condition: Condition, **others: Any
+        self,
+        system: System,
+        simulators: Mapping[str, NativeInstance],
+        *,
+        streams: Streams,
+        condition: Condition,
+        **others: Any,
     ) -> None:
-        super().__init__(system, simulators, **others)
-        self._schedules = Schedules(self._agenda)
+        super().__init__(system, simulators, streams=streams, **others)
+        self._schedules = Schedules(self._agenda) if self._agenda.aligns else Timetable(system, streams)
         self._schedule: Schedule | None = None
         self._before = 0  # instants of schedules that are past
         self._pace = 4  # instants of a slice
@@ -70,7 +78,7 @@ class CompiledMaster(Master):
         self._fly = library()
         self._failure: BaseException | None = None
         self._memory = memory = Memory(list(simulators.values()))
-        self._row_table: Floats = np.empty((self._chunk // self.board.row.nbytes, len(self.board.columns)))
+        self._row_table: Floats = self._new_row_table()
         self._event_table: Integers = np.empty((0, 4), dtype=np.int64)
         program, watched = condition(self.board)
         self._watched = list(watched)
@@ -90,6 +98,7 @@ class CompiledMaster(Master):
             row=c.address(self.board.row),
             rows=c.address(self._row_table),
             width=len(self.board.columns),
+            stride=len(self.columns),
             row_limit=len(self._row_table),
             event_limit=self._most_events,
             look=c.Look(self._look_for_c),
@@ -138,12 +147,10 @@ class CompiledMaster(Master):
         if self._schedules.error is not None:
             raise self._schedules.error
         self._schedule, self._loop.at = self._schedules.following(INSTANTS), 0
-        if len(self._schedule) > 0:
-            self._share()
-            return True
-        if self._schedules.error is not None:
+        if self._schedule is None and self._schedules.error is not None:
             raise self._schedules.error
-        return False
+        self._share()
+        return self._schedule is not None
 
     def _slice(self) -> int:
         """Have C pass through instants for about `SLICE`; the code says why it has come back."""
@@ -188,15 +195,27 @@ class CompiledMaster(Master):
         return bool(self._loop.row_count or self._loop.event_count)
 
     def _pending_rows(self) -> Floats:
-        return self._row_table[: self._loop.row_count]
+        return self._row_table[: self._loop.row_count, : len(self.board.columns)]
+
+    def _rows_with_sources(self) -> Floats:
+        rows, first = self._row_table[: self._loop.row_count], len(self.board.columns)
+        for signals, values in self._sources:
+            rows[:, first : first + len(signals)] = values.over(rows[:, 0])
+            first += len(signals)
+        return rows
+
+    def _new_row_table(self) -> Floats:
+        """Room for a chunk, in which the columns of sources are filled in when it is handed over as it is."""
+        return np.empty((self._chunk // self.board.row.nbytes, len(self.columns)))
 
     def _pending_events(self) -> Integers:
         return self._event_table[: self._loop.event_count]
 
     def _keep_rows(self, rows: bytes) -> None:
-        table = np.frombuffer(rows, dtype=np.float64).reshape(-1, self._row_table.shape[1])
-        self._row_table[: len(table)] = table
-        self._loop.row_count = len(table)
+        table = np.frombuffer(rows, dtype=np.float64).reshape(-1, len(self.board.columns))
+        self._row_table = self._new_row_table()
+        self._row_table[: len(table), : table.shape[1]] = table
+        self._loop.rows, self._loop.row_count = c.address(self._row_table), len(table)
 
     def _keep_events(self, events: Integers) -> None:
         if len(events) > len(self._event_table):
@@ -209,8 +228,11 @@ class CompiledMaster(Master):
         self._keep_rows(self.board.row.tobytes())
 
     def _pass_over(self, instants: int) -> None:
-        super()._pass_over(instants)
-        self._before = instants
+        while instants > self._passed():
+            self._before += 0 if self._schedule is None else len(self._schedule)
+            self._schedule = self._schedules.following(INSTANTS)
+            assert self._schedule is not None
+            self._loop.at = min(len(self._schedule), instants - self._before)
 
     def _passed(self) -> int:
         return self._before + (0 if self._schedule is None else self._loop.at)

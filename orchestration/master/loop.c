@@ -101,7 +101,7 @@ typedef struct {
     Schedule schedule;
     int64_t stop, pause_at; /* [ns] */
     double *row, *rows;
-    int64_t width, row_count, row_limit;
+    int64_t width, stride, row_count, row_limit; /* in numbers; after the width come sources, which Python adds */
     int64_t *events, *arrived; /* of `arrived` those of this instant, noted after what was sent at it */
     int64_t event_count, event_limit, arrived_count;
     int64_t at; /* the instant that comes next */
@@ -494,7 +494,7 @@ static void record(Loop *loop, int64_t time) {
     loop->event_count += loop->arrived_count;
     loop->arrived_count = 0;
     loop->row[0] = (double)time / NANOSECONDS;
-    memcpy(loop->rows + loop->row_count++ * loop->width, loop->row, (size_t)loop->width * sizeof(double));
+    memcpy(loop->rows + loop->row_count++ * loop->stride, loop->row, (size_t)loop->width * sizeof(double));
 }
 
 /* Pass through instants of the schedule up to `until`; the code says why it ended. */

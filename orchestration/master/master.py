@@ -185,11 +185,10 @@ class Master:
 
     def pending(self) -> Chunk:
         """What was recorded since the last chunk was handed over; messages that go out later are left out."""
-        rows = self._pending_rows()
         events, _ = self._past_and_later()
         return Chunk(
             columns=self.columns,
-            rows=np.column_stack([rows, *(values.over(rows[:, 0]) for _, values in self._sources)]),
+            rows=self._rows_with_sources(),
             events=Events(self._connections, events[np.argsort(events[:, 0], kind="stable")]),
         )
 
@@ -390,6 +389,11 @@ class Master:
     def _pending_rows(self) -> Floats:
         """Of the board, shape (n, number of its columns)."""
         return np.frombuffer(bytes(self._rows), dtype=np.float64).reshape(-1, len(self.board.columns))
+
+    def _rows_with_sources(self) -> Floats:
+        """The same with what sources say, shape (n, number of `columns`)."""
+        rows = self._pending_rows()
+        return np.column_stack([rows, *(values.over(rows[:, 0]) for _, values in self._sources)])
 
     def _pending_events(self) -> Integers:
         """As the table of `Events`."""

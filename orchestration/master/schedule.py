@@ -69,8 +69,8 @@ class Schedules:
         self.error: UsageError | None = None
         """why there are no more instants before the end; to be raised when those before it are past"""
 
-    def following(self, most: int) -> Schedule:
-        """The next instants, at most so many; none at the end."""
+    def following(self, most: int) -> Schedule | None:
+        """The next instants, at most so many; None at the end."""
         instants: list[Instant] = []
         try:
             for instant in self._agenda:
@@ -79,7 +79,7 @@ class Schedules:
                     break
         except UsageError as error:
             self.error = error
-        return _of(instants, self._agenda.next_time())
+        return _of(instants, self._agenda.next_time()) if instants else None
 
 
 def _of(instants: list[Instant], end: int) -> Schedule:

@@ -5,6 +5,9 @@ import math
 from collections.abc import Iterator
 from fractions import Fraction
 
+import numpy as np
+import numpy.typing as npt
+
 NANOSECONDS = 1_000_000_000
 
 
@@ -38,10 +41,27 @@ class Grid:
 
     def from_(self, time: int) -> int:
         """The first instant of the grid that is not before `time` [ns]."""
+        return self[self.index_from(time)]
+
+    def index_from(self, time: int) -> int:
+        """The index of that instant."""
         k = max(0, (time * self._denominator - self._offset) // self._period - 1)
         while self[k] < time:
             k += 1
-        return self[k]
+        return k
+
+    def between(self, first: int, end: int) -> npt.NDArray[np.int64]:
+        """Instants `first` up to `end` of them, without that one, as an array."""
+        if abs(self._offset + end * self._period) + 1 >= 2**62:
+            return np.array([self[k] for k in range(first, end)], dtype=np.int64)
+        numerators = self._offset + np.arange(first, end, dtype=np.int64) * self._period
+        if self._denominator == 1:
+            return numerators
+        quotients, rests = np.divmod(numerators, self._denominator)
+        twice = 2 * rests
+        up = (twice > self._denominator) | ((twice == self._denominator) & (quotients % 2 == 1))
+        result: npt.NDArray[np.int64] = quotients + up
+        return result
 
 
 def _round_ratio(numerator: int, denominator: int) -> int:

@@ -1,0 +1,315 @@
+"""The schedules of a run made as arrays: what an `Agenda` says instant by instant, for many instants at once.
+
+A window of time after the other: points, samples and messages of each component and connection are drawn up to its
+end, and sorted into instants. Nothing here moves to the grid of a component of fixed steps; an `Agenda` does that.
+"""
+
+from collections.abc import Sequence
+from fractions import Fraction
+from functools import partial
+
+import numpy as np
+
+from orchestration.errors import UsageError
+from orchestration.master.chance import Latenesses, LossesOfMany, latenesses, losses_of_many
+from orchestration.master.plan import Plan
+from orchestration.master.recording import Integers
+from orchestration.master.schedule import Schedule
+from orchestration.master.streams import DELAY_JITTER, JITTER, LOSS, Streams
+from orchestration.system.model import Connection, System
+from orchestration.system.times import Grid, exact_nanoseconds, nanoseconds
+
+
+class _Link:
+    """A connection, and the random numbers that it has not used."""
+
+    def __init__(self, index: int, x: Connection, streams: Streams) -> None:
+        owner, jitter = f"connections.{x.name}", nanoseconds(x.delay_jitter)
+        self.index, self.delay, self.jacobi = index, nanoseconds(x.delay), x.order == "jacobi"
+        self.longest = self.delay + jitter
+        self._late: Latenesses = latenesses(jitter, x.jitter_distribution, partial(streams.of, owner, DELAY_JITTER))
+        self._lost: LossesOfMany = losses_of_many(x.loss, x.burst_length, partial(streams.of, owner, LOSS))
+        self._last = 0
+
+    def messages(self, sent: Integers) -> Integers:
+        """Arrivals of the next messages, sent at these times; -1 for one that is lost."""
+        lost, own = self._lost(len(sent)), sent + self.delay + self._late(len(sent))
+        arrivals = np.maximum.accumulate(np.append(self._last, np.where(lost, 0, own)))[1:]
+        self._last = int(arrivals[-1]) if len(arrivals) else self._last
+        result: Integers = np.where(lost, -1, arrivals)
+        return result
+
+    def measurements(self, samples: Integers) -> tuple[Integers, Integers]:
+        """When the next messages are measured, for samples at these times, and their arrivals as in `messages`."""
+        lost, own = self._lost(len(samples)), samples - self.delay - self._late(len(samples))
+        taken = np.maximum.accumulate(np.append(self._last, own))[1:]
+        self._last = int(taken[-1]) if len(taken) else self._last
+        return taken, np.where(lost, -1, samples)
+
+
+class _Task:
+    """A sampled component: its samples that are drawn and not past, a row each.
+
+    Columns: k, time, time of the next, then for each incoming link when it is measured and arrives, and for each
+    outgoing one when it is sent and arrives.
+    """
+
+    def __init__(self, index: int, rank: int, name: str, plan: Plan, links: Sequence[_Link], streams: Streams) -> None:
+        component = plan.system.components[name]
+        sampling = component.sampling
+        assert sampling is not None
+        connections, ratio = plan.system.connections, Fraction(repr(float(sampling.clock_ratio)))
+        self.index, self.rank = index, rank
+        self.incoming = [links[i] for i in plan.measured if connections[i].receiver == name]
+        self.outgoing = [links[i] for i in plan.commanded if connections[i].sender == name]
+        self._ahead = max((link.longest for link in self.incoming), default=0)
+        self._grid = Grid(exact_nanoseconds(sampling.offset) / ratio, exact_nanoseconds(sampling.period) / ratio)
+        self._late = latenesses(
+            nanoseconds(sampling.jitter), sampling.jitter_distribution,
+            partial(streams.of, f"components.{name}", JITTER),
+        )  # fmt: skip
+        self._k, self._next = 0, self._times(0, 1)
+        self.rows: Integers = np.zeros((0, 3 + 2 * (len(self.incoming) + len(self.outgoing))), dtype=np.int64)
+
+    def _times(self, first: int, end: int) -> Integers:
+        return self._grid.between(first, end) + self._late(end - first)
+
+    def drawn_to(self, end: int) -> None:
+        """Draw until no sample that is still to be drawn has anything to do with what is before `end` [ns]."""
+        while self._next[0] - self._ahead < end:
+            last = max(self._grid.index_from(end + self._ahead), self._k + 1)
+            times = np.append(self._next, self._times(self._k + 1, last + 1))
+            now, then, k = times[:-1], times[1:], np.arange(self._k, last)
+            columns: list[Integers] = [k, now, then]
+            for link in self.incoming:
+                columns += link.measurements(now)
+            for link in self.outgoing:
+                sent = then if link.jacobi else now
+                columns += [sent, link.messages(sent)]
+            self.rows = np.vstack([self.rows, np.column_stack(columns)])
+            self._k, self._next = last, times[-1:]
+
+    def messages(self, rows: Integers) -> Integers:
+        """Of these samples, in the order in which they are exchanged, shape (n, number, 4)."""
+        links = [*self.incoming, *self.outgoing]
+        result = np.empty((len(rows), len(links), 4), dtype=np.int64)
+        for i, link in enumerate(links):
+            result[:, i, 0], result[:, i, 1] = link.index, rows[:, 0]
+            result[:, i, 2:] = rows[:, _MESSAGES + 2 * i : _MESSAGES + 2 * i + 2]
+        return result
+
+
+class _Collected:
+    """Instants of a window, and who halts at them: a component, or nobody (-1)."""
+
+    def __init__(self) -> None:
+        self._times: list[Integers] = []
+        self._who: list[Integers] = []
+
+    def add(self, times: Integers, who: int | Integers = -1) -> None:
+        """Something happens at each of these times, for which each of these halts if it is in continuous time."""
+        self._times.append(times)
+        self._who.append(np.broadcast_to(np.asarray(who, dtype=np.int64), times.shape))
+
+    def instants(self) -> Integers:
+        """In order, each once."""
+        times = np.sort(np.concatenate(self._times), kind="stable")
+        result: Integers = times[np.diff(times, prepend=-1) > 0]
+        return result
+
+    def halts(self, instants: Integers, order: Integers, place: Integers) -> tuple[Integers, Integers]:
+        """Who halts at each instant, by `order`, in which each component has a `place` or -1; and where each begins."""
+        places = place[np.concatenate(self._who)]
+        halting = places >= 0
+        table = np.zeros((len(instants), len(order)), dtype=np.bool_)
+        table[np.searchsorted(instants, np.concatenate(self._times)[halting]), places[halting]] = True
+        _, columns = np.nonzero(table)
+        return order[columns], np.append(0, np.cumsum(table.sum(axis=1)))
+
+
+class Timetable:
+    """Gives the schedules of one run, in order."""
+
+    error: UsageError | None = None
+    """None: there is always a next instant before the end"""
+
+    def __init__(self, system: System, streams: Streams) -> None:
+        self._plan = plan = Plan(system)
+        names = list(system.components)
+        links = [_Link(i, x, streams) for i, x in enumerate(system.connections)]
+        self._stop, self._begin = nanoseconds(system.stop_time), 0
+        self._bodies = np.array([names.index(name) for name in plan.continuous], dtype=np.int64)
+        self._place = np.full(len(names) + 1, -1)  # the last one for nobody
+        self._place[self._bodies] = np.arange(len(self._bodies))
+        self._points = {
+            i: Grid(Fraction(0), exact_nanoseconds(system.components[names[i]].step or 0.0))
+            for i in sorted(self._bodies.tolist())
+        }
+        self._tasks = [
+            _Task(names.index(name), rank, name, plan, links, streams) for rank, name in enumerate(plan.sampled)
+        ]
+        self._sender = np.array([names.index(x.sender) for x in system.connections], dtype=np.int64)
+        self._receiver = np.array([names.index(x.receiver) for x in system.connections], dtype=np.int64)
+        self._posted = {i: [links[j] for j in plan.posted if self._sender[j] == i] for i in self._points}
+        self._changes = [
+            (Grid(Fraction(0), exact_nanoseconds(source.period)), [names.index(end.split(".")[0]) for end in source.to])
+            for source in system.sources.values()
+            if source.period is not None
+        ]
+        self._on_their_way: Integers = np.zeros((0, _ORDER + 4), dtype=np.int64)
+        rates = [1.0 / float(points[1]) for points in self._points.values()]
+        rates += [2.0 / float(exact_nanoseconds(c.sampling.period)) for c in system.components.values() if c.sampling]
+        self._pace = 1.0 / sum(rates)  # from one instant to the next [ns], about
+        self._ahead: Schedule | None = None
+
+    def following(self, most: int) -> Schedule | None:
+        """The next instants, about `most` of them; None at the end."""
+        found = self._ahead or self._window(most)
+        if found is not None:
+            self._ahead = self._window(most)
+            found.times[-1] = self._stop + 1 if self._ahead is None else self._ahead.times[0]
+        return found
+
+    def _window(self, most: int) -> Schedule | None:
+        """The instants of the next window that has any."""
+        while self._begin <= self._stop:
+            begin = self._begin
+            self._begin = min(self._stop + 1, begin + max(int(most * self._pace), 1))
+            schedule = self._between(begin, self._begin)
+            if len(schedule):
+                return schedule
+        return None
+
+    def _between(self, begin: int, end: int) -> Schedule:
+        """The instants from `begin` to before `end` [ns]."""
+        for task in self._tasks:
+            task.drawn_to(end)
+        found = _Collected()
+        posted, later = self._post(begin, end, found)
+        measured = self._measure(begin, end, found)
+        dues, exchanged, sent = self._sample(begin, end, found)
+        arrivals = self._arrive(end, [later, sent], found)
+        self._halt_by_themselves(begin, end, found)
+        for task in self._tasks:
+            task.rows = task.rows[task.rows[:, _TIME] >= end]
+        instants = found.instants()
+        halts, halts_at = found.halts(instants, self._bodies, self._place)
+        times = np.append(instants, end)
+        return Schedule(
+            times=times,
+            halts=halts,
+            halts_at=halts_at,
+            posted=np.ascontiguousarray(posted[:, :4]),
+            posted_at=np.searchsorted(posted[:, 4], times),
+            measured=measured,
+            measured_at=np.searchsorted(measured[:, 2], times),
+            arrivals=arrivals,
+            arrivals_at=np.searchsorted(arrivals[:, 3], times),
+            dues=np.ascontiguousarray(dues[:, 1:]),
+            dues_at=np.searchsorted(dues[:, 0], times),
+            exchanged=exchanged,
+        )
+
+    def _halt_by_themselves(self, begin: int, end: int, found: _Collected) -> None:
+        """The start, changes of sources, and the end, at which everybody halts."""
+        if begin == 0:
+            found.add(np.zeros(1, dtype=np.int64))
+        for grid, receivers in self._changes:  # the value of the start is that of initialisation
+            times = grid.between(max(grid.index_from(begin), 1), max(grid.index_from(end), 1))
+            for receiver in receivers:
+                found.add(times, receiver)
+        if end > self._stop:
+            found.add(np.full(len(self._bodies), self._stop), self._bodies)
+            found.add(np.full(1, self._stop))
+
+    def _post(self, begin: int, end: int, found: _Collected) -> tuple[Integers, Integers]:
+        """Messages of components in continuous time to one another: all in order, and those that arrive later."""
+        tables = [np.zeros((0, _ORDER + 4), dtype=np.int64)]
+        for body, grid in self._points.items():
+            first, last = grid.index_from(begin), grid.index_from(end)
+            points = grid.between(first, last)
+            found.add(points, body)
+            for place, link in enumerate(self._posted[body]):
+                arrivals = link.messages(points)
+                tables.append(_table(link, np.arange(first, last), points, arrivals, points, 0, body, place))
+        table = np.concatenate(tables)
+        table = table[np.lexsort((table[:, 7], table[:, 6], table[:, 4]))]
+        return table, self._under_way(table, found)
+
+    def _measure(self, begin: int, end: int, found: _Collected) -> Integers:
+        """What is measured for samples to come."""
+        tables = [np.zeros((0, 4), dtype=np.int64)]
+        for task in self._tasks:
+            for i, link in enumerate(task.incoming):
+                if link.index in self._plan.read_ahead:
+                    taken = task.rows[:, _MESSAGES + 2 * i]
+                    now = (taken >= begin) & (taken < end)
+                    tables.append(task.messages(task.rows[now])[:, i])
+                    found.add(taken[now], int(self._sender[link.index]))
+        table = np.concatenate(tables)
+        return table[np.argsort(table[:, 2], kind="stable")]
+
+    def _sample(self, begin: int, end: int, found: _Collected) -> tuple[Integers, Integers, Integers]:
+        """Samples with their time before them, what they exchange, and of what they send that which arrives later."""
+        drawn, ranks = [np.zeros((0, 6), dtype=np.int64)], []
+        for task in self._tasks:
+            times = task.rows[:, _TIME]
+            found.add(times[(times >= begin) & (times < end)])
+            rows = task.rows[(times >= begin) & (times < min(end, self._stop))]
+            for link in task.incoming:
+                if link.index not in self._plan.read_ahead:
+                    found.add(rows[:, _TIME], int(self._sender[link.index]))
+            count, middle = len(task.incoming) + len(task.outgoing), len(task.incoming)
+            dues = np.zeros((len(rows), 6), dtype=np.int64)
+            dues[:, 0], dues[:, 1], dues[:, 2] = rows[:, _TIME], task.index, rows[:, _NEXT]
+            dues[:, 4:] = middle, count
+            drawn.append(dues)
+            ranks.append((task, rows))
+        dues = np.concatenate(drawn)
+        rank = np.repeat(np.arange(len(ranks)), [len(rows) for _, rows in ranks])
+        order = np.lexsort((rank, dues[:, 0]))
+        begins = np.empty(len(dues), dtype=np.int64)
+        begins[order] = np.cumsum(dues[order, 5]) - dues[order, 5]
+        dues[:, 3:] += begins[:, None]
+        exchanged = np.empty((int((dues[:, 5] - dues[:, 3]).sum()), 4), dtype=np.int64)
+        later = [np.zeros((0, _ORDER + 4), dtype=np.int64)]
+        for number, (task, rows) in enumerate(ranks):
+            messages = task.messages(rows)
+            places = begins[rank == number][:, None] + np.arange(messages.shape[1])
+            exchanged[places] = messages
+            for place, link in enumerate(task.outgoing):
+                _, k, sent, arrivals = messages[:, len(task.incoming) + place].T
+                table = _table(link, k, sent, arrivals, rows[:, _TIME], 1, task.rank, place)
+                later.append(self._under_way(table, found))
+        return dues[order], exchanged, np.concatenate(later)
+
+    def _under_way(self, table: Integers, found: _Collected) -> Integers:
+        """Messages that arrive later; for those that arrive at once their receivers halt."""
+        at_once = table[table[:, 3] == table[:, 4]]
+        found.add(at_once[:, 4], self._receiver[at_once[:, 0]])
+        return table[table[:, 3] > table[:, 4]]
+
+    def _arrive(self, end: int, more: Sequence[Integers], found: _Collected) -> Integers:
+        """Messages that arrive before `end`; the others stay on their way."""
+        table = np.concatenate([self._on_their_way, *more])
+        now = table[:, 3] < end
+        self._on_their_way, table = table[~now], table[now]
+        found.add(table[:, 3], self._receiver[table[:, 0]])
+        return np.ascontiguousarray(table[np.lexsort(table[:, [1, 7, 6, 5, 4, 3]].T), :4])
+
+
+_TIME, _NEXT, _MESSAGES = 1, 2, 3
+"""Columns of a row of `_Task`"""
+_ORDER = 4
+"""Columns by which messages are put in order: the instant at which they were sent, whether by a sample, by whom, and
+which of those of one sender they are"""
+
+
+def _table(
+    link: _Link, k: Integers, sent: Integers, arrivals: Integers, time: Integers, phase: int, whom: int, place: int
+) -> Integers:
+    columns = np.empty((len(k), _ORDER + 4), dtype=np.int64)
+    given: tuple[int | Integers, ...] = (link.index, k, sent, arrivals, time, phase, whom, place)
+    for i, column in enumerate(given):
+        columns[:, i] = column
+    return columns
