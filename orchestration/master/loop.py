@@ -13,13 +13,14 @@ from fmu_kit.bundle import PackagingError
 from fmu_kit.native.compiler import OPTIONS, compiled_here
 from orchestration.errors import QuadcosimError
 
-_SOURCES = ("loop.c", "condition.h")
+FILES = tuple(Path(__file__).with_name(name) for name in ("loop.c", "condition.h"))
+"""What it is made of"""
 
 
 @functools.cache
 def library() -> Any:
     """The function `fly` of loop.c; raises `QuadcosimError` that says what stands in the way."""
-    sources = {name: (Path(__file__).parent / name).read_bytes() for name in _SOURCES}
+    sources = {path.name: path.read_bytes() for path in FILES}
     path = _place(sources)
     try:
         if not path.is_file():

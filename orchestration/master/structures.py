@@ -95,10 +95,11 @@ class Loop(Structure):
         ("components", POINTER(Component)), ("channels", POINTER(Channel)), ("feeds", POINTER(Feed)), ("tasks", List),
         ("some_by_themselves", c_int64), ("settles", c_int64), ("schedule", Schedule), ("stop", c_int64),
         ("pause_at", c_int64), ("row", c_void_p), ("rows", c_void_p), ("width", c_int64), ("stride", c_int64),
-        ("row_count", c_int64), ("row_limit", c_int64), ("events", c_void_p), ("arrived", c_void_p), ("event_count", c_int64),
-        ("event_limit", c_int64), ("arrived_count", c_int64), ("at", c_int64), ("steps", c_int64), ("now", c_int64),
-        ("failed", POINTER(Part)), ("component", c_int64), ("end", c_double), ("look", Look), ("collect", Collect),
-        ("condition", POINTER(Operation)), ("condition_length", c_int64), ("watched", c_void_p),
+        ("row_count", c_int64), ("row_limit", c_int64), ("events", c_void_p), ("arrived", c_void_p),
+        ("event_count", c_int64), ("event_limit", c_int64), ("arrived_count", c_int64), ("at", c_int64),
+        ("steps", c_int64), ("now", c_int64), ("failed", POINTER(Part)), ("component", c_int64), ("end", c_double),
+        ("look", Look), ("collect", Collect), ("condition", POINTER(Operation)), ("condition_length", c_int64),
+        ("watched", c_void_p),
         ("watched_size", c_int64),
     ]  # fmt: skip
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from fmu_kit.syntax_trees import parsed
+from orchestration.master import loop
 from orchestration.quadrotor import translation
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import in_words_of_a_scenario
@@ -51,8 +52,7 @@ def flight_sources() -> dict[str, Path]:
                 waiting += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
             elif isinstance(node, ast.Import):
                 waiting += [alias.name for alias in node.names]
-    found[QUADROTOR.name] = QUADROTOR
-    return found
+    return found | {path.name: path for path in (QUADROTOR, *loop.FILES)}
 
 
 def sources_hash(sources: Mapping[str, Path]) -> str:
