@@ -10,6 +10,7 @@ from orchestration import fmus
 from orchestration.command import cli
 from orchestration.quadrotor.wiring import MODELS
 from tests.commands import Done, Main
+from tests.fmus.making import MAKINGS, Making
 
 hypothesis.settings.register_profile("ci", derandomize=True, deadline=None)
 hypothesis.settings.register_profile("local", deadline=None)
@@ -25,8 +26,16 @@ def data() -> Path:
 
 
 @pytest.fixture(scope="session")
-def built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Both FMUs by model name, freshly built into a folder of the session."""
+def making(request: pytest.FixtureRequest) -> Making:
+    """How the FMUs are made: with Python inside, unless a test asks for another."""
+    return MAKINGS[getattr(request, "param", "python")]
+
+
+@pytest.fixture(scope="session")
+def built(making: Making, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Both FMUs by model name, freshly built into a folder of the session; those of C in their own folder."""
+    if making.native:
+        return {model: fmus.locate(f"native/{model}") for model in MODELS}
     folder = tmp_path_factory.mktemp("fmus")
     return {path.stem: path for path in fmus.build(MODELS, folder)}
 

@@ -22,7 +22,8 @@
 
 typedef enum { OK, WARNING, DISCARD, ERROR, FATAL } Status;
 typedef enum { INSTANTIATED, INITIALIZATION, STEPPING, TERMINATED, FAILED, PHASES } Phase;
-enum { LONGEST_NAME = 256, LONGEST_TEXT = 1024 };
+typedef enum { LOG_WARNING, LOG_ERROR, LOG_DIVERGENCE, CATEGORIES } Category;
+enum { LONGEST_TEXT = 1024 };
 
 typedef const char *Text;
 typedef const unsigned *References;
@@ -30,9 +31,17 @@ typedef struct Host Host;
 
 #include "tables.h"
 
+static const Text categories[CATEGORIES] = {"logStatusWarning", "logStatusError", "divergence"};
+
+/* Whose state it is. */
+typedef struct {
+    char format[16], guid[48], model[64];
+    int reals;
+} Owner;
+
 /* What is saved as the state: all that a step depends on. */
 typedef struct {
-    char model[sizeof GUID]; /* whose state it is */
+    Owner owner;
     double memory[PLACES];
     double time;     /* of the last communication point */
     unsigned warned; /* bits of the warnings that were given */
@@ -44,9 +53,9 @@ typedef struct {
     char failure[LONGEST_TEXT]; /* why the last call failed */
     char draft[LONGEST_TEXT];   /* a message that is being written */
     q_text text;                /* the same, as text.h has it */
-    char name[LONGEST_NAME];
+    Text name;                  /* behind the instance, in the same piece of memory */
     const Host *host;
-    int logs, filtered, wants_warnings;
+    int logs[CATEGORIES];
     double *tangents; /* of the memory, while derivatives are computed */
 } Instance;
 
@@ -54,6 +63,12 @@ typedef struct {
 
 /* Give a message to the host. */
 static void tell(const Instance *m, Status status, Text category, Text message);
+
+static void log_if_wanted(const Instance *m, Status status, Category category, Text message)
+{
+    if (m->logs[category])
+        tell(m, status, categories[category], message);
+}
 
 static void text_begin(Instance *m) { m->text = q_text_in(m->draft, sizeof m->draft); }
 static void text_add(Instance *m, Text text) { q_text_string(&m->text, text); }
@@ -66,11 +81,7 @@ static int fail(Instance *m, int error)
     return error;
 }
 
-Q_ONE void warn(Instance *m)
-{
-    if (m->logs && (!m->filtered || m->wants_warnings))
-        tell(m, WARNING, "logStatusWarning", m->draft);
-}
+Q_ONE void warn(Instance *m) { log_if_wanted(m, WARNING, LOG_WARNING, m->draft); }
 
 #include "functions.h"
 
@@ -78,7 +89,7 @@ Q_ONE void warn(Instance *m)
 static Status refuse(Instance *m, int error)
 {
     m->state.phase = FAILED;
-    tell(m, ERROR, error == DIVERGENCE ? "divergence" : "logStatusError", m->failure);
+    log_if_wanted(m, ERROR, error == DIVERGENCE ? LOG_DIVERGENCE : LOG_ERROR, m->failure);
     return ERROR;
 }
 
@@ -108,24 +119,33 @@ static Status expect(Instance *m, Call call)
     return refusal ? refuse_with(m, refusal, "", "") : OK;
 }
 
-static Status set_logging(Instance *m, int on, size_t n, const Text *categories)
+/* All categories, or those that are asked for. */
+static Status set_logging(Instance *m, int on, size_t n, const Text *asked)
 {
-    m->logs = on;
-    m->filtered = n > 0;
-    m->wants_warnings = 0;
-    for (size_t i = 0; i < n; i++) {
-        if (categories[i] && strcmp(categories[i], "logStatusWarning") == 0)
-            m->wants_warnings = 1;
+    for (int k = 0; k < CATEGORIES; k++) {
+        m->logs[k] = on && n == 0;
+        for (size_t i = 0; i < n; i++)
+            if (asked[i] && strcmp(asked[i], categories[k]) == 0)
+                m->logs[k] = on;
     }
     return OK;
 }
 
 /* -- life ------------------------------------------------------------------------------------------------------- */
 
+static Owner owner(void)
+{
+    Owner of = {"quadcosim state", "", "", REALS};
+    q_text guid = q_text_in(of.guid, sizeof of.guid), model = q_text_in(of.model, sizeof of.model);
+    q_text_string(&guid, GUID);
+    q_text_string(&model, MODEL);
+    return of;
+}
+
 static void begin(Instance *m)
 {
     memset(&m->state, 0, sizeof m->state);
-    memcpy(m->state.model, GUID, sizeof GUID);
+    m->state.owner = owner();
     memcpy(m->state.memory, starts, sizeof starts);
     m->state.phase = INSTANTIATED;
 }
@@ -133,13 +153,11 @@ static void begin(Instance *m)
 /* An instance, in memory of a size that may have more behind it; NULL if there is none. */
 static Instance *create(size_t size, Text name, int logs)
 {
-    q_text copy;
-    Instance *m = calloc(1, size);
+    Instance *m = calloc(1, size + strlen(name) + 1);
     if (!m)
         return NULL;
-    copy = q_text_in(m->name, sizeof m->name);
-    q_text_string(&copy, name);
-    m->logs = logs;
+    m->name = strcpy((char *)m + size, name);
+    set_logging(m, logs, 0, NULL);
     begin(m);
     return m;
 }
@@ -292,6 +310,40 @@ static Status set_reals(Instance *m, References vr, size_t n, const double *valu
 
 /* -- states ------------------------------------------------------------------------------------------------------ */
 
+/* A text of bytes that may be anything. */
+static void make_printable(char *text, size_t size)
+{
+    text[size - 1] = '\0';
+    for (; *text; text++)
+        if (*text < ' ' || *text > '~')
+            *text = '?';
+}
+
+/* Whether bytes begin as a state of this FMU does; else they are refused in the words of the slave. */
+static Status expect_own(Instance *m, const void *bytes, size_t size)
+{
+    const Owner mine = m->state.owner;
+    Owner found;
+    if (size < sizeof found || memcmp(bytes, mine.format, sizeof mine.format) != 0)
+        return refuse_with(m, foreign_state[0], "None, 0", foreign_state[1]);
+    memcpy(&found, bytes, sizeof found);
+    if (memcmp(&found, &mine, sizeof mine) == 0)
+        return OK;
+    make_printable(found.guid, sizeof found.guid);
+    make_printable(found.model, sizeof found.model);
+    if (strcmp(found.model, mine.model) == 0 && found.reals == mine.reals)
+        return refuse_with(m, "FMU state (GUID) = ", found.guid, ": expected " GUID ", that of this FMU");
+    text_begin(m);
+    text_add(m, foreign_state[0]);
+    text_add(m, "'");
+    text_add(m, found.model);
+    text_add(m, "', ");
+    text_integer(m, found.reals);
+    text_add(m, foreign_state[1]);
+    fail(m, 0);
+    return refuse(m, 0);
+}
+
 static Status save(Instance *m, void **state)
 {
     if (!*state && !(*state = malloc(sizeof(State))))
@@ -302,8 +354,8 @@ static Status save(Instance *m, void **state)
 
 static Status restore(Instance *m, const void *state)
 {
-    if (!state || memcmp(state, GUID, sizeof GUID) != 0)
-        return refuse_with(m, "FMU state: expected one of this FMU", "", "");
+    if (expect_own(m, state, state ? sizeof(State) : 0) != OK)
+        return ERROR;
     memcpy(&m->state, state, sizeof(State));
     return OK;
 }
@@ -328,8 +380,10 @@ static Status to_bytes(Instance *m, const void *state, void *bytes, size_t size)
 static Status from_bytes(Instance *m, const void *bytes, size_t size, void **state)
 {
     State found;
-    if (size != sizeof(State) || memcmp(bytes, GUID, sizeof GUID) != 0)
-        return refuse_with(m, "FMU state: expected the bytes of one of this FMU", "", "");
+    if (expect_own(m, bytes, size) != OK)
+        return ERROR;
+    if (size != sizeof(State))
+        return refuse_with(m, "FMU state (its bytes): expected all of them", "", "");
     memcpy(&found, bytes, sizeof found);
     if ((unsigned)found.phase >= PHASES)
         return refuse_with(m, "FMU state (phase): expected one of this FMU", "", "");

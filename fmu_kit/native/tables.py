@@ -17,6 +17,7 @@ from fmu_kit.native.statements import Place
 from fmu_kit.native.structure import is_number, leaves
 from fmu_kit.native.symbols import TraceError
 from fmu_kit.native.tracing import Program
+from fmu_kit.saved_state import expect_state
 from fmu_kit.slave import Phase, Slave
 
 _UNUSED = 4_242_424_242
@@ -39,7 +40,8 @@ def tables(program: Program, guid: str, standard: Standard) -> str:
     inputs = [(1 if v.has_start else 0) + (2 if v.causality == "input" else 0) for v in variables]
     parts = [
         f"#define GUID {c_string(guid)}",
-        f"enum {{ VARIABLES = {len(variables)} }};",
+        f"#define MODEL {c_string(program.model)}",
+        f"enum {{ VARIABLES = {len(variables)}, REALS = {sum(v.type == 'Real' for v in variables)} }};",
         "/* The memory: the variables by value reference, then what the model keeps. */",
         _listed("enum", [*(places[place.name] for place in program.places), "PLACES"]) + ";",
         f"enum {{ DIVERGENCE = {1 + ERRORS.index('DivergenceError')} }}; /* what a function returns in that case */",
@@ -60,6 +62,9 @@ def tables(program: Program, guid: str, standard: Standard) -> str:
         ),
         "/* The text before a value that cannot be, and after it. */",
         _array("Text bad_value[VARIABLES][2]", (_refused_value(slave, i) for i in range(len(variables)))),
+        "/* The text before the model and the number of Reals of another state, and after them. */",
+        "static const Text foreign_state[2] = "
+        f"{_around('None, 0', slave, expect_state, {}, program.model, variables)};",
         f"static const Text bad_start_time[2] = {_around('nan', slave, _SET_START, slave, math.nan)};",
         _array("Text wrong_type[4][2]", (_wrong_type(slave, *names) for names in standard.types.items())),
     ]

@@ -7,6 +7,23 @@ import pytest
 
 from tests.fmus.flights import FLIGHTS, STEPS, Flight
 from tests.fmus.instance import Instance
+from tests.fmus.making import MAKINGS, Making
+
+OF_BOTH_MAKINGS = ("errors", "instances", "other_masters", "state")
+"""Modules of tests that hold for an FMU with Python inside and for the same slave written out as C."""
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Run them for both, but for what is about the Python inside."""
+    module = metafunc.module.__name__.rpartition(".test_")[2]
+    if "built" in metafunc.fixturenames and module in OF_BOTH_MAKINGS and "python_inside" not in metafunc.fixturenames:
+        metafunc.parametrize("making", MAKINGS, indirect=True, scope="session")
+
+
+@pytest.fixture
+def python_inside(making: Making) -> None:
+    """Of a test that is about the ways of pythonfmu: it is run for that making alone."""
+    assert not making.native
 
 
 @pytest.fixture(scope="session")

@@ -17,6 +17,7 @@ from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.quadrotor.wiring import MODELS
 from tests.fmus.archive import without_loader
 from tests.fmus.instance import Instance
+from tests.fmus.making import Making
 from tests.fmus.process import run, run_script
 
 PLANT, CONTROLLER = "QuadrotorPlant", "UnifiedController"
@@ -64,11 +65,17 @@ def assert_readable(error: SimulatorError, model: str, function: str, message: s
 
 
 def assert_words(error: SimulatorError, start: str, message: str) -> None:
-    """One line in the FMU's words, and its traceback apart from it."""
+    """One line in the FMU's words, and its traceback, of Python, apart from it."""
     assert str(error).startswith(start)
     assert "\n" not in str(error)
-    assert error.details.startswith("Traceback (most recent call last):")
-    assert message in error.details.splitlines()[-1]
+    if error.details:
+        assert error.details.startswith("Traceback (most recent call last):")
+        assert message in error.details.splitlines()[-1]
+
+
+def test_a_failure_has_a_traceback_where_there_is_python_inside(making: Making, make: Make) -> None:
+    error = refusal(lambda: make(PLANT).step(0.0, 0.01))
+    assert bool(error.details) == making.traceback
 
 
 # -- parameters -----------------------------------------------------------------------------------------
@@ -323,7 +330,6 @@ def test_a_plant_state_that_overflows_is_divergence(start: Values, inputs: Value
     assert "expected" in str(error)
     assert "finite value" in str(error)
     assert "\n" not in str(error)
-    assert "Traceback" in error.details
     assert error.divergence
 
 
@@ -350,6 +356,7 @@ def loaded_in(folder: Path, fmu: Path) -> str:
     return done.stderr
 
 
+@pytest.mark.usefixtures("python_inside")
 @pytest.mark.parametrize("name", ["Jürgen", "copy (2)", "a%20b"])
 def test_a_temporary_folder_that_pythonfmu_cannot_find_is_refused(
     name: str, built: dict[str, Path], tmp_path: Path
@@ -361,6 +368,7 @@ def test_a_temporary_folder_that_pythonfmu_cannot_find_is_refused(
     assert said.count("\n") == 1
 
 
+@pytest.mark.usefixtures("python_inside")
 def test_a_temporary_folder_with_spaces_will_do_for_pythonfmu_alone(built: dict[str, Path], tmp_path: Path) -> None:
     assert loaded_in(tmp_path / "with many spaces", without_loader(built[PLANT], tmp_path)) == ""
 
@@ -370,6 +378,7 @@ def test_behind_the_loader_any_temporary_folder_will_do(name: str, built: dict[s
     assert loaded_in(tmp_path / name, built[PLANT]) == ""
 
 
+@pytest.mark.usefixtures("python_inside")
 @pytest.mark.parametrize("name", [b"a%20b", b"J\xfcrgen"])
 def test_but_for_two_that_pythonfmu_cannot_be_given(name: bytes, built: dict[str, Path], tmp_path: Path) -> None:
     said = loaded_in(tmp_path / os.fsdecode(name), built[PLANT])
@@ -380,6 +389,7 @@ def test_but_for_two_that_pythonfmu_cannot_be_given(name: bytes, built: dict[str
 # -- text and aftermath ---------------------------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("python_inside")
 @pytest.mark.parametrize("text", ["\ud800", "a\0b"])
 def test_text_that_utf_8_does_not_hold_is_escaped_in_a_message(text: str, make: Make) -> None:
     plant = make(PLANT)
@@ -387,6 +397,7 @@ def test_text_that_utf_8_does_not_hold_is_escaped_in_a_message(text: str, make: 
     assert f"= ({text!r}, 0): expected" in str(refusal(lambda: plant._call("setFMUstate", handle)))
 
 
+@pytest.mark.usefixtures("python_inside")
 @pytest.mark.parametrize("text", ["100 %", "%s%n%d", "%%", "50%% of %p"])
 def test_percent_signs_in_a_message_survive(text: str, make: Make) -> None:
     plant = make(PLANT)
@@ -397,6 +408,7 @@ def test_percent_signs_in_a_message_survive(text: str, make: Make) -> None:
     assert f"('{text}', 0)" in error.details
 
 
+@pytest.mark.usefixtures("python_inside")
 def test_percent_signs_survive_the_format_of_fmpys_own_logger(
     built: dict[str, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -427,8 +439,8 @@ def test_a_failure_does_not_disturb_another_instance(make: Make) -> None:
 
 @pytest.mark.parametrize("logger", ["own", "default"])
 @pytest.mark.parametrize("model", MODELS)
-def test_calls_after_a_fatal_status_do_not_crash_and_reset_revives(
-    model: str, logger: str, built: dict[str, Path]
+def test_calls_after_a_failure_do_not_crash_and_reset_revives(
+    model: str, logger: str, making: Making, built: dict[str, Path]
 ) -> None:
-    result = run_script("calls_after_failure", built[model], logger)
+    result = run_script("calls_after_failure", built[model], logger, str(making.failure))
     assert result == {"repetitions": 60, "failures as expected": True, "revived as new": True}
