@@ -384,11 +384,12 @@ KEYWORDS = frozenset({
 """Words of C that are none of Python."""
 _TAKEN = KEYWORDS | {
     "write", "read", "open", "close", "signal", "index", "time", "clock", "start", "select",
-    "warn", "fail", "tell", "refuse", "owner", "log_if_wanted", "make_printable", "expect_own", "refuse_with", "refuse_number", "refuse_references", "expect", "settle",
+    "warn", "fail", "tell", "refuse", "refuse_with", "refuse_number", "refuse_references", "expect", "settle",
     "begin", "create", "advance", "end", "save", "restore", "forget", "derive", "to_bytes", "from_bytes",
     "set_logging", "take_start_time", "enter_initialization", "exit_initialization", "are_of", "are_as_many",
     "bring_up_to_date", "get_reals", "get_integers", "get_booleans", "get_reals_and_time", "set_reals", "set_integers",
     "set_booleans", "text_begin", "text_add", "text_real", "text_integer", "as_it_is", "as_int",
+    "owner", "log_if_wanted", "make_printable", "expect_own",
 }  # fmt: skip
 
 
