@@ -20,6 +20,7 @@ from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.wiring import MODELS
 from tests.commands import Main
 from tests.fmus.expected import MEASUREMENT
+from tests.fmus.process import run_script
 from tests.native import assert_the_same
 
 START = 0.5
@@ -120,6 +121,17 @@ def test_a_flight_is_that_of_fmi_2_to_the_byte() -> None:
         for folder in ("native/fmi3", "native")
     ]
     assert_the_same(*flown)
+
+
+def test_ecos_flies_both_as_it_does_those_of_fmi_2() -> None:
+    ends = [
+        run_script(
+            "fly_in_ecos", *(fmus.locate(f"{folder}/{model}") for model in ("QuadrotorPlant", "UnifiedController"))
+        )
+        for folder in ("native/fmi3", "native")
+    ]
+    assert ends[0] == ends[1]
+    assert len(ends[0]) == len(MEASUREMENT)
 
 
 def test_a_saved_state_is_put_back_as_bytes(controller: Instance) -> None:
