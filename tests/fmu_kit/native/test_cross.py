@@ -1,0 +1,119 @@
+"""Libraries for other systems: what the system of each asks of them, and that they are of the same sources."""
+
+import importlib.util
+import struct
+import zipfile
+from pathlib import Path
+
+import fmpy
+import pefile
+import pytest
+
+from fmu_kit.bundle import PackagingError
+from fmu_kit.native.compiler import targets_of, universal
+from orchestration import fmus
+
+needs_zig = pytest.mark.skipif(
+    importlib.util.find_spec("ziglang") is None, reason="no zig: pip install 'quadcosim[cross]'"
+)
+MODEL = "QuadrotorPlant"
+MACH_O, X86_64, ARM64 = 0xFEEDFACF, 0x01000007, 0x0100000C
+LIBRARIES = {
+    2: {f"linux64/{MODEL}.so", f"win64/{MODEL}.dll", f"darwin64/{MODEL}.dylib"},
+    3: {
+        f"x86_64-linux/{MODEL}.so",
+        f"x86_64-windows/{MODEL}.dll",
+        f"x86_64-darwin/{MODEL}.dylib",
+        f"aarch64-darwin/{MODEL}.dylib",
+    },
+}
+PACKINGS = {2: fmus.NATIVE, 3: fmus.NATIVE_FMI_3}
+
+
+def built(folder: Path, version: int) -> Path:
+    (path,) = fmus.build([MODEL], folder, packing=PACKINGS[version], systems="all")
+    return path
+
+
+@pytest.fixture(scope="module")
+def crossed(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
+    """The plant for all systems, by the version of FMI."""
+    return {version: built(tmp_path_factory.mktemp(f"fmi{version}"), version) for version in PACKINGS}
+
+
+def libraries(fmu: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(fmu) as archive:
+        names = [name for name in archive.namelist() if name.startswith("binaries/")]
+        return {name.removeprefix("binaries/"): archive.read(name) for name in names}
+
+
+def slices(library: bytes) -> list[tuple[int, int, bytes]]:
+    """Of a universal library: processor, alignment and content of each."""
+    magic, count = struct.unpack_from(">II", library)
+    assert magic == 0xCAFEBABE
+    found = []
+    for k in range(count):
+        cpu, _, offset, size, alignment = struct.unpack_from(">IIIII", library, 8 + 20 * k)
+        assert offset % (1 << alignment) == 0
+        found.append((cpu, alignment, library[offset : offset + size]))
+    return found
+
+
+def test_a_universal_library_has_each_of_its_slices_whole_and_aligned() -> None:
+    given = [
+        struct.pack("<III", MACH_O, cpu, 0) + bytes([k]) * size for k, cpu, size in [(1, X86_64, 9), (2, ARM64, 99_999)]
+    ]
+    found = slices(universal(given))
+    assert [content for _, _, content in found] == given
+    assert [(cpu, alignment) for cpu, alignment, _ in found] == [(X86_64, 14), (ARM64, 14)]
+
+
+def test_a_system_that_is_not_known_is_refused_with_those_that_are() -> None:
+    assert targets_of("all") == ("linux64", "win64", "darwin64")
+    assert targets_of("win64,linux64") == ("win64", "linux64")
+    with pytest.raises(PackagingError, match=r"^target amiga: expected all, or some of linux64, win64, darwin64 "):
+        targets_of("linux64,amiga")
+
+
+@needs_zig
+@pytest.mark.parametrize("version", PACKINGS)
+def test_there_is_a_library_for_each_system_by_its_name_in_the_version(version: int, crossed: dict[int, Path]) -> None:
+    assert libraries(crossed[version]).keys() == LIBRARIES[version]
+
+
+@needs_zig
+def test_two_builds_are_the_same_bytes(crossed: dict[int, Path], tmp_path: Path) -> None:
+    assert built(tmp_path, 2).read_bytes() == crossed[2].read_bytes()
+
+
+@needs_zig
+@pytest.mark.parametrize("version", PACKINGS)
+def test_on_linux_it_flies_to_the_bytes_of_the_one_that_cc_compiles(version: int, crossed: dict[int, Path]) -> None:
+    here = fmus.locate(f"{PACKINGS[version].folder}/{MODEL}")
+    mine, others = (
+        fmpy.simulate_fmu(str(path), stop_time=1.0, output_interval=0.01) for path in (crossed[version], here)
+    )
+    assert len(mine) == 101
+    assert mine.tobytes() == others.tobytes()
+
+
+@needs_zig
+def test_for_macos_there_are_both_processors(crossed: dict[int, Path]) -> None:
+    found = slices(libraries(crossed[2])[f"darwin64/{MODEL}.dylib"])
+    assert [(cpu, alignment) for cpu, alignment, _ in found] == [(X86_64, 14), (ARM64, 14)]
+    three = libraries(crossed[3])
+    others = [three[f"{system}/{MODEL}.dylib"] for system in ("x86_64-darwin", "aarch64-darwin")]
+    for (cpu, _, content), other in zip(found, others, strict=True):
+        assert struct.unpack_from("<II", content) == struct.unpack_from("<II", other) == (MACH_O, cpu)
+
+
+@needs_zig
+@pytest.mark.parametrize("version", PACKINGS)
+def test_for_windows_it_exports_fmi_and_needs_what_each_has(version: int, crossed: dict[int, Path]) -> None:
+    (content,) = (library for name, library in libraries(crossed[version]).items() if name.endswith(".dll"))
+    library = pefile.PE(data=content)
+    exported = {symbol.name.decode() for symbol in library.DIRECTORY_ENTRY_EXPORT.symbols}
+    assert {f"fmi{version}DoStep", f"fmi{version}FreeInstance"} <= exported
+    assert all(name.startswith(f"fmi{version}") for name in exported)
+    needed = {entry.dll.decode().lower() for entry in library.DIRECTORY_ENTRY_IMPORT}
+    assert all(name == "kernel32.dll" or name.startswith("api-ms-win-crt-") for name in needed)
