@@ -2,6 +2,7 @@
 
    host LIBPYTHON FMU_LIBRARY RESOURCES_URI GUID STEPS STEP_SIZE OUTPUT,OUTPUT,... [INPUT=VALUE ...]
 
+   LIBPYTHON is - for an FMU that needs no Python, or finds one itself.
    Variables are given by value reference. Prints each output after the last step, one a line, to the last
    digit. The log goes to stderr. Ends with 3 if the FMU refuses a call. */
 
@@ -77,7 +78,8 @@ int main(int count, char **arguments)
     const int steps = atoi(arguments[5]);
     const double h = strtod(arguments[6], NULL);
 
-    open_library(arguments[1], RTLD_GLOBAL); /* the FMU finds Python's symbols in the global scope */
+    if (strcmp(arguments[1], "-") != 0)
+        open_library(arguments[1], RTLD_GLOBAL); /* the FMU finds Python's symbols in the global scope */
     void *fmu = open_library(arguments[2], RTLD_LOCAL);
     Instantiate instantiate;
     SetupExperiment setup_experiment;

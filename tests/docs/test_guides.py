@@ -18,7 +18,7 @@ import fmpy
 import numpy as np
 import pytest
 
-from orchestration import run
+from orchestration import fmus, run
 from orchestration.checks.doctor.machine import this_machine
 from orchestration.checks.doctor.verdict import INSTALL_LIBPYTHON, satisfies
 from orchestration.exchange.ssp import writing
@@ -147,22 +147,40 @@ def test_the_ssp_guide_flies_the_same_file_in_three_tools_and_the_container(
         assert np.abs(container[name.removeprefix("plant.")] - at_once[name]).max() < 1e-9, name
 
 
-def test_the_c_guide_compiles_and_flies_the_controller(folder: Path, environment: dict[str, str]) -> None:
+def flown_by_the_c_guide(folder: Path, environment: dict[str, str]) -> list[float]:
+    """What its script prints, with the controller that is in the folder."""
     if shutil.which("cc") is None:
         pytest.skip("no C compiler: install one that is called cc (Debian and Ubuntu: apt install gcc libc6-dev)")
+    shutil.copy(GUIDES / "host.c", folder)
+    (block,) = (block for block in blocks("c_host.md") if block.name == "fly.sh")
+    done = subprocess.run(
+        ["bash", "-c", block.text], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return [float(line) for line in done.stdout.splitlines()]
+
+
+def commanded() -> list[float]:
+    """What the law says at the end of that flight."""
+    measurement = {"position.z": 2.0, "velocity.x": 0.6, "quaternion.w": 1.0}
+    return law_command(0.99, {name: measurement.get(name, 0.0) for name in MEASUREMENT})
+
+
+def test_the_c_guide_compiles_and_flies_the_native_controller_without_any_python(
+    environment: dict[str, str], tmp_path: Path
+) -> None:
+    shutil.copy(fmus.locate("native/UnifiedController"), tmp_path)
+    assert flown_by_the_c_guide(tmp_path, environment) == pytest.approx(commanded(), rel=1e-12)
+
+
+def test_the_c_guide_flies_the_controller_with_python_inside(folder: Path, environment: dict[str, str]) -> None:
     library = next((found for found in this_machine(()).python_libraries if satisfies(found.version, ">=3.10")), None)
     if library is None:
         pytest.skip(f"no shared libpython of 3.10 or later: {INSTALL_LIBPYTHON}")
-    shutil.copy(GUIDES / "host.c", folder)
     host = {**environment, "LIBPYTHON": str(library.path)}
     if library.home is not None:
         host["PYTHONHOME"] = str(library.home)
-    (block,) = (block for block in blocks("c_host.md") if block.name == "fly.sh")
-    done = subprocess.run(["bash", "-c", block.text], cwd=folder, env=host, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    measurement = {"position.z": 2.0, "velocity.x": 0.6, "quaternion.w": 1.0}
-    expected = law_command(0.99, {name: measurement.get(name, 0.0) for name in MEASUREMENT})
-    assert [float(line) for line in done.stdout.splitlines()] == pytest.approx(expected, rel=1e-12)
+    assert flown_by_the_c_guide(folder, host) == pytest.approx(commanded(), rel=1e-12)
 
 
 # -- tools that are not to be had here --------------------------------------------------------------------
