@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 
 from orchestration.errors import QuadcosimError, SimulatorError
+from orchestration.fmi.fmi2 import Fmi2Instance
+from orchestration.fmi.fmi3 import Fmi3Instance
 from orchestration.fmi.native import NativeInstance
 from orchestration.master import structures as c
 from orchestration.master.board import Board
@@ -46,6 +48,8 @@ def obstacle(simulators: Mapping[str, Simulator], stop: int) -> str | None:
     for name, simulator in simulators.items():
         if not isinstance(simulator, NativeInstance):
             return f"components.{name} is not called in this process"
+        if type(simulator) not in (Fmi2Instance, Fmi3Instance):
+            return f"components.{name} does more than call its FMU"
     if stop >= _EXACT:
         return f"stop_time is longer than {_EXACT / NANOSECONDS:.0f} s"
     try:
