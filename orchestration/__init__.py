@@ -5,6 +5,8 @@ import orchestration as quadcosim
 result = quadcosim.run(quadcosim.Scenario(timing=quadcosim.Timing(period=0.02)))
 print(result.metrics["ultimate_bound"])
 quadcosim.save_run(result, "results/20ms")
+
+Any FMUs are a `System`: of `load_system`, or made of `Component`, `Connection` and so on; `run` takes it too.
 """
 
 from importlib import import_module
@@ -19,6 +21,9 @@ if TYPE_CHECKING:
     from orchestration.results.result import Result
     from orchestration.results.run_directory import load_run, save_run
     from orchestration.simulation import RunInterrupted, run
+    from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
+    from orchestration.system.paths import changed
+    from orchestration.system.system_file import load_system
 
 _HOMES = {
     "QuadcosimError": "errors",
@@ -37,22 +42,38 @@ _HOMES = {
     "Scenario": "quadrotor.scenario",
     "load_scenario": "quadrotor.scenario_file",
     "Timing": "quadrotor.timing",
+    "Component": "system.model",
+    "Connection": "system.model",
+    "Criterion": "system.model",
+    "Sampling": "system.model",
+    "Source": "system.model",
+    "System": "system.model",
+    "changed": "system.paths",
+    "load_system": "system.system_file",
 }
 
 __all__ = [
+    "Component",
+    "Connection",
+    "Criterion",
     "FmuChoice",
     "QuadcosimError",
     "Record",
     "ReferenceChoice",
     "Result",
     "RunInterrupted",
+    "Sampling",
     "Scenario",
     "SimulatorError",
+    "Source",
+    "System",
     "Timing",
     "UsageError",
+    "changed",
     "fly_until",
     "load_run",
     "load_scenario",
+    "load_system",
     "resume",
     "run",
     "save_run",

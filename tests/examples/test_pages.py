@@ -52,3 +52,13 @@ def test_every_example_is_on_the_list_and_has_a_figure() -> None:
     for name in NAMES:
         assert f"[{name}]({name}/README.md)" in text
         assert (EXAMPLES / name / "figure.png").is_file()
+
+
+def test_the_python_of_the_page_on_systems_works(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(EXAMPLES.parent)
+    page = (EXAMPLES.parent / "docs" / "systems.md").read_text(encoding="utf-8")
+    (shown,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    exec(shown, {})
+    assert capsys.readouterr().out.startswith("2.49")
