@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from fmu_kit.native import compiler
 from orchestration import simulation
 from orchestration.errors import QuadcosimError, SimulatorError
+from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_here
 from orchestration.fmi.native import NativeInstance
@@ -268,6 +269,21 @@ def test_what_stands_in_the_way_is_said_in_a_line(fmu: Path, tmp_path: Path, mon
             assert run.master.engine == "python"
     finally:
         loop.library.cache_clear()
+
+
+def test_an_instance_that_does_more_than_call_its_fmu_is_stepped_in_python(fmu: Path) -> None:
+    class Stepped(Fmi2Instance):
+        steps = 0
+
+        def step(self, t: float, h: float) -> None:
+            Stepped.steps += 1
+            super().step(t, h)
+
+    with prepared(of(LOOP, fmu), load=Stepped) as run:
+        run.master.initialise()
+        run.master.run()
+        assert run.master.engine == "python"
+        assert Stepped.steps > 0
 
 
 def test_it_is_the_default_where_it_can_be_had(fmu: Path) -> None:
