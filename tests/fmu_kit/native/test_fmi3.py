@@ -19,8 +19,9 @@ from orchestration import fmus
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.wiring import MODELS
 from tests.commands import Main
+from tests.fmu_kit.native.compiled import compiled
 from tests.fmus.expected import MEASUREMENT
-from tests.fmus.process import run_script
+from tests.fmus.process import run, run_script
 from tests.native import assert_the_same
 
 START = 0.5
@@ -201,6 +202,19 @@ def test_two_instances_know_nothing_of_each_other(controller: Instance, tmp_path
     other.fmu.freeInstance()
     assert controller.get("torque.x", "time") == before
     assert controller.messages == []
+
+
+def test_the_whole_life_of_an_instance_is_clean_for_the_sanitizers(tmp_path: Path) -> None:
+    sources = Path(fmpy.extract(str(fmus.locate("native/fmi3/UnifiedController")), str(tmp_path))) / "sources"
+    options = ("-I", str(sources), "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+    done = run(str(compiled("life_of_fmi3.c", tmp_path / "life", *options)))
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout
+    refused, another, *lives = done.stdout.splitlines()
+    assert refused.startswith("3 logStatusError: instantiationToken: expected ")
+    assert another == "3 logStatusError: fmi3InstantiateModelExchange: this FMU is for co-simulation"
+    assert len(lives) == 10
+    assert lives[:5] == lives[5:]
+    assert lives[3] == "3 logStatusError: fmi3EnterEventMode: not offered by this FMU"
 
 
 def test_the_command_has_none_with_python_inside(main: Main) -> None:
