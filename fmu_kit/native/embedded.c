@@ -1,4 +1,4 @@
-/* $model, written by quadcosim export-c: see $model.h. $precision */
+/* $model, written by quadcosim export-c: see $model.h. */
 
 #include "$model.h"
 

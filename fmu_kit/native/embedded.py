@@ -41,7 +41,10 @@ _MEMCPY = """#include <float.h>
 #endif
 """
 _INCLUDES = {False: _MEMCPY, True: "#include <float.h>\n#include <math.h>\n"}
-_PRECISION = {False: "In double precision, without libm.", True: "In single precision, with the functions of libm."}
+_PRECISION = {
+    False: "In double precision, without libm.",
+    True: "In single precision, with libm: times are\n   floats too, so let a timer be the clock, not the model.",
+}
 
 
 def write(target: Target, folder: Path, *, single: bool = False) -> Path:

@@ -3,17 +3,21 @@
 import functools
 import re
 import shutil
+import struct
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from tests.fmu_kit.native.compiled import HERE, compiler
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wdouble-promotion", "-O2", "-fno-math-errno")
-CORTEX_M4F = ("-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
 ARM, QEMU = "arm-none-eabi-gcc", "qemu-system-arm"
-BOARD = ("-M", "mps2-an386", "-display", "none", "-semihosting-config", "enable=on,target=native")
+M4F = ("-mthumb", "-mfloat-abi=hard", "-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16")
+M7 = ("-mthumb", "-mfloat-abi=hard", "-mcpu=cortex-m7", "-mfpu=fpv5-d16")
+BOARDS = {M4F: "mps2-an386", M7: "mps2-an500"}
 _FIELD = re.compile(r" {8}(?:double|float) (\w+); +/\* ([^ :]+)")
 
 
@@ -35,8 +39,7 @@ def made(source: Path, with_compiler: str, *flags: str) -> Path:
     """A source on its own, without a warning; in double precision for a machine that has nothing but itself."""
     path = source.with_name(f"{source.stem}_{'_'.join((with_compiler, *flags))}.o")
     alone = () if "<math.h>" in source.read_text("utf-8") else ("-ffreestanding",)
-    machine = CORTEX_M4F if with_compiler == ARM else ()
-    _succeeds([compiler(with_compiler), *STRICT, *alone, *machine, *flags, "-c", str(source), "-o", str(path)])
+    _succeeds([compiler(with_compiler), *STRICT, *alone, *flags, "-c", str(source), "-o", str(path)])
     return path
 
 
@@ -51,19 +54,33 @@ def on_this_machine(main: str, sources: list[Path], folder: Path, *flags: str) -
     return _printed([str(folder / "here")])
 
 
-def on_cortex_m(main: str, sources: list[Path], folder: Path, *flags: str) -> list[str]:
-    """The lines that a program of this folder prints on a Cortex-M4F under QEMU; skipped by name without the tools."""
+def on_cortex_m(machine: tuple[str, ...], main: str, sources: list[Path], folder: Path, *flags: str) -> list[str]:
+    """The lines that a program of this folder prints on a Cortex-M under QEMU; skipped by name without the tools."""
     if shutil.which(QEMU) is None:
         pytest.skip(f"no {QEMU}")
-    start = (str(HERE / "cortex_m.c"), "-T", str(HERE / "cortex_m.ld"), "--specs=rdimon.specs", *CORTEX_M4F)
-    _succeeds([*_with(main, ARM, sources, folder), *flags, *start, "-o", str(folder / "arm"), "-lm"])
-    return _printed([QEMU, *BOARD, "-kernel", str(folder / "arm")])
+    start = (str(HERE / "cortex_m.c"), "-T", str(HERE / "cortex_m.ld"), "--specs=rdimon.specs")
+    _succeeds([*_with(main, ARM, sources, folder, *machine), *flags, *start, "-o", str(folder / "arm"), "-lm"])
+    board = ("-M", BOARDS[machine], "-display", "none", "-semihosting-config", "enable=on,target=native")
+    return _printed([QEMU, *board, "-kernel", str(folder / "arm")])
 
 
-def _with(main: str, with_compiler: str, sources: list[Path], folder: Path) -> list[str]:
+def to_note(controller: Path, plant: Path, folder: Path) -> list[str]:
+    """Write down for embedded_flight.c which variables to note: all, those of the controller first; their FMI names."""
+    sides = {"c": fields(controller.with_suffix(".h")), "p": fields(plant.with_suffix(".h"))}
+    noted = [f"X({side}.{field})" for side, by_name in sides.items() for field in by_name.values()]
+    (folder / "variables.h").write_text(f"#define EACH(X) {' '.join(noted)}\n")
+    return [f"{side}.{name}" for side, by_name in sides.items() for name in by_name]
+
+
+def rows_of(lines: list[str]) -> NDArray[np.float64]:
+    """The rows that embedded_flight.c printed in full, every hundredth."""
+    return np.array([[struct.unpack(">d", bytes.fromhex(text))[0] for text in line.split()] for line in lines[:-1]])
+
+
+def _with(main: str, with_compiler: str, sources: list[Path], folder: Path, *machine: str) -> list[str]:
     places = [flag for where in (folder, *(source.parent for source in sources)) for flag in ("-I", str(where))]
-    objects = [str(made(source, with_compiler)) for source in sources]
-    return [compiler(with_compiler), "-std=c99", "-O2", *places, str(HERE / main), *objects]
+    objects = [str(made(source, with_compiler, *machine)) for source in sources]
+    return [compiler(with_compiler), "-std=c99", "-O2", *machine, *places, str(HERE / main), *objects]
 
 
 def _printed(command: list[str]) -> list[str]:

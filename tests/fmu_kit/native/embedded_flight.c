@@ -1,4 +1,4 @@
-/* Both sides of the loop as quadcosim export-c writes them, flown for STEPS steps of 10 ms: every hundredth row of all
+/* Both sides of the loop as quadcosim export-c writes them, flown for STEPS steps of H seconds: every hundredth row of all
    variables, as the bits of doubles, and last the CRC-32 of all rows. */
 
 #include <inttypes.h>
@@ -41,7 +41,7 @@ static void command(void)
 
 int main(void)
 {
-    const double h = 0.01;
+    const double h = H;
     int failed;
     UnifiedController_init(&c);
     QuadrotorPlant_init(&p);

@@ -1,12 +1,12 @@
 """Slaves written out for a microcontroller fly as their native FMUs do, there and here."""
 
-import struct
+import functools
+import re
 import zlib
 from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from fmu_kit.bundle import Target
 from fmu_kit.native.embedded import write
@@ -14,7 +14,17 @@ from fmu_kit.native.embedded_code import single_number
 from orchestration import fmus
 from orchestration.quadrotor.wiring import MODELS
 from tests.commands import Main
-from tests.fmu_kit.native.embedded import ARM, calls, fields, made, on_cortex_m, on_this_machine
+from tests.fmu_kit.native.embedded import (
+    ARM,
+    M4F,
+    M7,
+    calls,
+    made,
+    on_cortex_m,
+    on_this_machine,
+    rows_of,
+    to_note,
+)
 from tests.fmus.expected import COMMAND
 from tests.fmus.instance import Instance
 from tests.fmus.loop import MOTION, Loop
@@ -22,9 +32,15 @@ from tests.fmus.loop import MOTION, Loop
 H, STEPS = 0.01, 500
 FLOWN = {"mass": 1.1, "wind.amplitude.x": 0.5, "initial.position.x": 0.3}
 """Of the plant, as embedded_flight.c has it."""
-TOLERANCES = {"position": 1e-5, "velocity": 5e-5, "quaternion": 5e-6, "thrust": 5e-4, "torque": 5e-3}
-"""Of a flight in single precision [m, m/s, 1, N, N.m]."""
-Rows = NDArray[np.float64]
+TOLERANCES = {
+    "position": 1e-5,
+    "velocity": 5e-5,
+    "quaternion": 5e-6,
+    "angular_velocity": 5e-4,
+    "thrust": 5e-4,
+    "torque": 5e-3,
+}
+"""Of a flight in single precision [m, m/s, 1, rad/s, N, N.m]."""
 
 
 @pytest.fixture(scope="module")
@@ -42,10 +58,11 @@ def native(name: str) -> Instance:
 
 
 @pytest.fixture(scope="module")
-def flown() -> Rows:
-    """All variables after each step of the native FMUs, those of the controller first."""
-    rows = []
-    with native("UnifiedController") as controller, native("QuadrotorPlant") as plant:
+def flown() -> dict[str, list[float]]:
+    """All variables after each step of the native FMUs."""
+    sides = {"c": native("UnifiedController"), "p": native("QuadrotorPlant")}
+    rows: dict[str, list[float]] = {f"{side}.{name}": [] for side in sides for name in sides[side].variables}
+    with sides["c"] as controller, sides["p"] as plant:
         loop = Loop(controller, plant)
         plant.initialise(FLOWN)
         controller.initialise(dict(zip(MOTION, plant.get(*MOTION), strict=True)))
@@ -54,54 +71,51 @@ def flown() -> Rows:
             controller.step(k * H, H)
             loop.command()
             plant.step(k * H, H)
-            rows.append([float(each.value(name)) for each in loop.both for name in each.variables])
-    return np.array(rows)
+            for name, column in rows.items():
+                column.append(float(sides[name[0]].value(name[2:])))
+    return rows
 
 
-def prepared(controller: Path, plant: Path, folder: Path) -> tuple[str, ...]:
-    """Write down for embedded_flight.c what to note of both, in the order of the FMUs; the flags to compile it with."""
-    noted = []
-    for side, source in (("c", controller), ("p", plant)):
-        by_name = fields(source.with_suffix(".h"))
-        with native(source.stem) as instance:
-            noted += [f"X({side}.{by_name[name]})" for name in instance.variables]
-    (folder / "variables.h").write_text(f"#define EACH(X) {' '.join(noted)}\n")
-    return f"-DSTEPS={STEPS}", f"-DSAMPLE_PERIOD={H if controller.parent == plant.parent else 0}"
-
-
-def rows_of(lines: list[str]) -> Rows:
-    """The rows that were printed in full, every hundredth."""
-    return np.array([[struct.unpack(">d", bytes.fromhex(text))[0] for text in line.split()] for line in lines[:-1]])
-
-
-RUNS = {"here": on_this_machine, "cortex_m4f": on_cortex_m}
+RUNS = {
+    "here": on_this_machine,
+    "cortex_m4f": functools.partial(on_cortex_m, M4F),
+    "cortex_m7": functools.partial(on_cortex_m, M7),
+}
+FLAGS = (f"-DSTEPS={STEPS}", f"-DH={H}")
 
 
 @pytest.mark.parametrize("where", RUNS)
 def test_in_double_precision_every_variable_is_that_of_the_native_fmu_to_the_bit(
-    where: str, exported: dict[str, Path], flown: Rows, tmp_path: Path
+    where: str, exported: dict[str, Path], flown: dict[str, list[float]], tmp_path: Path
 ) -> None:
     sides = [exported["UnifiedController"], exported["QuadrotorPlant"]]
-    flags = prepared(*sides, tmp_path)
-    lines = RUNS[where]("embedded_flight.c", sides, tmp_path, *flags)
-    assert rows_of(lines).tobytes() == flown[99::100].tobytes()
-    assert int(lines[-1], 16) == zlib.crc32(flown.tobytes())
+    names = to_note(*sides, tmp_path)
+    lines = RUNS[where]("embedded_flight.c", sides, tmp_path, *FLAGS, f"-DSAMPLE_PERIOD={H}")
+    expected = np.array([flown[name] for name in names]).T.copy()
+    assert sorted(names) == sorted(flown)
+    assert rows_of(lines).tobytes() == expected[99::100].tobytes()
+    assert int(lines[-1], 16) == zlib.crc32(expected.tobytes())
 
 
-@pytest.mark.parametrize("where", RUNS)
+@pytest.mark.parametrize("where", ["here", "cortex_m4f"])
 def test_in_single_precision_the_flight_is_near(
-    where: str, exported: dict[str, Path], flown: Rows, tmp_path: Path
+    where: str, exported: dict[str, Path], flown: dict[str, list[float]], tmp_path: Path
 ) -> None:
     sides = [exported["single"], exported["QuadrotorPlant"]]
-    flags = prepared(*sides, tmp_path)
-    rows = rows_of(RUNS[where]("embedded_flight.c", sides, tmp_path, *flags))
-    with native("UnifiedController") as instance:
-        names = list(instance.variables)
-    for name in (*MOTION, *COMMAND):
-        k = names.index(name)
-        tolerance = TOLERANCES.get(name.partition(".")[0], 5e-4)
-        assert np.abs(rows[:, k] - flown[99::100, k]).max() < tolerance, name
-    assert rows[-1, names.index("sample_count")] == STEPS
+    names = to_note(*sides, tmp_path)
+    rows = rows_of(RUNS[where]("embedded_flight.c", sides, tmp_path, *FLAGS, "-DSAMPLE_PERIOD=0"))
+    for name in (*(f"p.{name}" for name in MOTION), *(f"c.{name}" for name in COMMAND)):
+        far = np.abs(rows[:, names.index(name)] - flown[name][99::100]).max()
+        assert far < TOLERANCES[name[2:].partition(".")[0]], name
+    assert rows[-1, names.index("c.sample_count")] == STEPS
+
+
+def test_in_single_precision_a_clock_of_its_own_misses_samples(exported: dict[str, Path], tmp_path: Path) -> None:
+    sides = [exported["single"], exported["QuadrotorPlant"]]
+    names = to_note(*sides, tmp_path)
+    flags = (f"-DSTEPS={STEPS}", "-DH=0.004", "-DSAMPLE_PERIOD=0.004")
+    rows = rows_of(on_this_machine("embedded_flight.c", sides, tmp_path, *flags))
+    assert STEPS / 2 < rows[-1, names.index("c.sample_count")] < 0.8 * STEPS  # as the page says
 
 
 def test_what_cannot_be_is_said_by_a_status_with_words_and_the_outputs_stay(
@@ -135,12 +149,12 @@ def test_what_cannot_be_is_said_by_a_status_with_words_and_the_outputs_stay(
 @pytest.mark.parametrize("name", MODELS)
 def test_in_double_precision_nothing_is_called_but_what_fills_memory(name: str, exported: dict[str, Path]) -> None:
     assert calls(made(exported[name], "cc")) <= {"memset", "memcpy", "_GLOBAL_OFFSET_TABLE_"}
-    there = calls(made(exported[name], ARM), "arm-none-eabi-nm")
+    there = calls(made(exported[name], ARM, *M4F), "arm-none-eabi-nm")
     assert {each for each in there if not each.startswith("__aeabi_")} <= {"memset"}
 
 
 def test_in_single_precision_nothing_is_computed_with_doubles(exported: dict[str, Path]) -> None:
-    there = calls(made(exported["single"], ARM), "arm-none-eabi-nm")
+    there = calls(made(exported["single"], ARM, *M4F), "arm-none-eabi-nm")
     assert there == {"memset", "ceilf", "cosf", "floorf", "powf", "sinf", "tanhf"}
 
 
@@ -175,3 +189,11 @@ def test_the_command_writes_one_slave_of_a_folder_and_says_in_one_line_what_is_n
         refused = main("export-c", asked, "--out", tmp_path, code=2)
         assert refused.stderr.startswith(f"quadcosim: {words}")
         assert refused.stderr.count("\n") == 1
+
+
+def test_the_program_of_the_page_is_good_c(exported: dict[str, Path], tmp_path: Path) -> None:
+    page = Path("docs/embedded.md").read_text("utf-8")
+    (program,) = re.findall(r"```c\n(.*?)```", page, re.DOTALL)
+    source = exported["UnifiedController"].with_name("main.c")
+    source.write_text(program)
+    assert made(source, "cc").is_file()

@@ -1,0 +1,91 @@
+"""What the controller takes on a microcontroller: `python -m benchmarks.embedded [--page PAGE]`.
+
+Sizes are those of the compiler's object; stack and instructions are counted under QEMU, in a flight of 10 s against the
+plant. QEMU counts instructions, not cycles. With `--page` the table is put there.
+"""
+
+import argparse
+import subprocess
+import tempfile
+from pathlib import Path
+
+from benchmarks.mathematics import table
+from docs.pages import fill
+from fmu_kit.bundle import Target
+from fmu_kit.native.embedded import write
+from orchestration.quadrotor.wiring import MODELS
+from tests.fmu_kit.native.compiled import HERE as BOARD_FILES
+from tests.fmu_kit.native.embedded import ARM, BOARDS, M4F, M7, QEMU, on_cortex_m, rows_of, to_note
+
+HERE = Path(__file__).parent
+OPTIONS = ("-std=c99", "-fno-math-errno")
+FLIGHT = ("-DSTEPS=3000", "-DH=0.01", "-DSAMPLE_PERIOD=0")
+WITHOUT_TEXTS = "-DUNIFIEDCONTROLLER_NO_TEXTS"
+MACHINES = {"M4F": M4F, "M7": M7}
+
+
+def text_of(source: Path, folder: Path, *flags: str) -> int:
+    """The code and constants of a source [bytes]."""
+    made = folder / "size.o"
+    subprocess.run([ARM, *OPTIONS, *flags, "-c", str(source), "-o", str(made)], check=True)
+    done = subprocess.run(["arm-none-eabi-size", str(made)], check=True, capture_output=True, text=True)
+    return int(done.stdout.splitlines()[1].split()[0])
+
+
+def flown(sources: list[Path], folder: Path, board: str, *flags: str) -> list[int]:
+    """Bytes of the instance, bytes of stack, and instructions a step: mean and most."""
+    board_files = [str(BOARD_FILES / "cortex_m.c"), "-T", str(BOARD_FILES / "cortex_m.ld"), "--specs=rdimon.specs"]
+    places = [f"-I{source.parent}" for source in sources]
+    program = [str(HERE / "embedded.c"), *map(str, sources), "-lm", "-o", str(folder / "flown")]
+    subprocess.run([ARM, *OPTIONS, *flags, *places, *board_files, *program], check=True)
+    qemu = [QEMU, "-M", board, "-display", "none", "-icount", "shift=6"]
+    given = ["-semihosting-config", "enable=on,target=native", "-kernel", str(folder / "flown")]
+    done = subprocess.run([*qemu, *given], check=True, stdout=subprocess.PIPE, text=True, timeout=300)
+    return [int(word) for word in done.stdout.split()]
+
+
+def differences(double: Path, single: Path, plant: Path) -> str:
+    """How far apart flights of both precisions are, over 30 s of the built-in trajectory at 100 Hz."""
+    names = to_note(double, plant, plant.parent)
+    double_rows, single_rows = (
+        rows_of(on_cortex_m(M4F, "embedded_flight.c", [source, plant], plant.parent, *FLIGHT))
+        for source in (double, single)
+    )
+    far = dict(zip(names, abs(double_rows - single_rows).max(axis=0)))
+    rows = []
+    for group, unit in {"p.position": "m", "p.velocity": "m/s", "c.thrust": "N", "c.torque": "N·m"}.items():
+        largest = max(value for name, value in far.items() if name in (group, *(f"{group}.{axis}" for axis in "xyz")))
+        rows.append([f"{group[2:]} [{unit}]", f"{largest:.1e}"])
+    return table(["", "largest difference"], rows)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--page", type=Path)
+    page = parser.parse_args().page
+    controller, plant = (Target.parse(MODELS[name]) for name in ("UnifiedController", "QuadrotorPlant"))
+    rows = []
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        plant_source = write(plant, folder / "plant")
+        for precision in ("double", "single"):
+            source = write(controller, folder / precision, single=precision == "single")
+            for machine, flags in MACHINES.items():
+                for optimised in ("-O2", "-Os"):
+                    size, stack, mean, most = flown([source, plant_source], folder, BOARDS[flags], *flags, optimised)
+                    text = text_of(source, folder, *flags, optimised)
+                    bare = text_of(source, folder, *flags, optimised, WITHOUT_TEXTS)
+                    numbers = (text, bare, size, stack, mean, most)
+                    rows.append([precision, machine, f"`{optimised}`", *(f"{n:,}" for n in numbers)])
+        controllers = [folder / precision / "UnifiedController.c" for precision in ("double", "single")]
+        far = differences(*controllers, plant_source)
+    heads = ["precision", "machine", "", "text [B]", "without words [B]", "instance [B]", "stack [B]"]
+    found = table([*heads, "instructions a step", "most"], rows)
+    version = subprocess.run([ARM, "--version"], check=True, capture_output=True, text=True).stdout.splitlines()[0]
+    print(found, version, far, sep="\n\n")
+    if page is not None:
+        fill(page, {"sizes": f"{found}\n\n`{version}`", "single": far})
+
+
+if __name__ == "__main__":
+    main()
