@@ -48,9 +48,9 @@ def calls(path: Path, nm: str = "nm") -> set[str]:
     return {line.split()[-1] for line in _succeeds([compiler(nm), "-u", str(path)]).splitlines()}
 
 
-def on_this_machine(main: str, sources: list[Path], folder: Path, *flags: str) -> list[str]:
+def on_this_machine(main: str, sources: list[Path], folder: Path, *flags: str, by: str = "cc") -> list[str]:
     """The lines that a program of this folder prints."""
-    _succeeds([*_with(main, "cc", sources, folder), *flags, "-o", str(folder / "here"), "-lm"])
+    _succeeds([*_with(main, by, sources, folder), *flags, "-o", str(folder / "here"), "-lm"])
     return _printed([str(folder / "here")])
 
 

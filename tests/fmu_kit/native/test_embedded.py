@@ -78,6 +78,7 @@ def flown() -> dict[str, list[float]]:
 
 RUNS = {
     "here": on_this_machine,
+    "by_clang": functools.partial(on_this_machine, by="clang"),
     "cortex_m4f": functools.partial(on_cortex_m, M4F),
     "cortex_m7": functools.partial(on_cortex_m, M7),
 }
