@@ -3,6 +3,7 @@
 import importlib.util
 import struct
 import zipfile
+from collections import defaultdict
 from pathlib import Path
 
 import fmpy
@@ -59,6 +60,17 @@ def slices(library: bytes) -> list[tuple[int, int, bytes]]:
     return found
 
 
+def load_commands(library: bytes) -> dict[int, list[bytes]]:
+    """Of a library for macOS, by the number of their kind."""
+    count = struct.unpack_from("<I", library, 16)[0]
+    found, place = defaultdict[int, list[bytes]](list), 32
+    for _ in range(count):
+        kind, size = struct.unpack_from("<II", library, place)
+        found[kind].append(library[place : place + size])
+        place += size
+    return found
+
+
 def test_a_universal_library_has_each_of_its_slices_whole_and_aligned() -> None:
     given = [
         struct.pack("<III", MACH_O, cpu, 0) + bytes([k]) * size for k, cpu, size in [(1, X86_64, 9), (2, ARM64, 99_999)]
@@ -105,6 +117,16 @@ def test_for_macos_there_are_both_processors(crossed: dict[int, Path]) -> None:
     others = [three[f"{system}/{MODEL}.dylib"] for system in ("x86_64-darwin", "aarch64-darwin")]
     for (cpu, _, content), other in zip(found, others, strict=True):
         assert struct.unpack_from("<II", content) == struct.unpack_from("<II", other) == (MACH_O, cpu)
+
+
+@needs_zig
+def test_for_macos_it_needs_the_systems_library_alone_and_is_signed_where_it_must_be(crossed: dict[int, Path]) -> None:
+    loads, versions, signature = 0xC, 0x32, 0x1D
+    for cpu, _, content in slices(libraries(crossed[2])[f"darwin64/{MODEL}.dylib"]):
+        commands = load_commands(content)
+        assert [b"/usr/lib/libSystem.B.dylib\0" in each for each in commands[loads]] == [True]
+        assert [each[12:16] for each in commands[versions]] == [bytes([0, 0, 11, 0])]  # macOS 11.0
+        assert cpu != ARM64 or signature in commands  # macOS loads nothing else on these processors
 
 
 @needs_zig
