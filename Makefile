@@ -42,6 +42,7 @@ bench: .venv/.test
 	$(BIN)/python -m benchmarks.bench_studies
 	$(BIN)/python -m benchmarks.mathematics
 	$(BIN)/python -m benchmarks.native
+	$(BIN)/python -m benchmarks.engines
 
 figures: .venv/.base
 	$(BIN)/python docs/make_figures.py

@@ -7,11 +7,12 @@ end, and sorted into instants. Nothing here moves to the grid of a component of 
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from orchestration.errors import UsageError
-from orchestration.master.chance import Latenesses, LossesOfMany, latenesses, losses_of_many
+from orchestration.master.chance import Flags, Latenesses, LossesOfMany, latenesses, losses_of_many
 from orchestration.master.plan import Plan
 from orchestration.master.recording import Integers
 from orchestration.master.schedule import Schedule
@@ -158,7 +159,7 @@ class Timetable:
         ]
         self._on_their_way: Integers = np.zeros((0, _ORDER + 4), dtype=np.int64)
         rates = [1.0 / float(points[1]) for points in self._points.values()]
-        rates += [2.0 / float(exact_nanoseconds(c.sampling.period)) for c in system.components.values() if c.sampling]
+        rates += [1.0 / float(exact_nanoseconds(c.sampling.period)) for c in system.components.values() if c.sampling]
         self._pace = 1.0 / sum(rates)  # from one instant to the next [ns], about
         self._ahead: Schedule | None = None
 
@@ -225,16 +226,17 @@ class Timetable:
     def _post(self, begin: int, end: int, found: _Collected) -> tuple[Integers, Integers]:
         """Messages of components in continuous time to one another: all in order, and those that arrive later."""
         tables = [np.zeros((0, _ORDER + 4), dtype=np.int64)]
+        later = [np.zeros((0, _ORDER + 4), dtype=np.int64)]
         for body, grid in self._points.items():
             first, last = grid.index_from(begin), grid.index_from(end)
             points = grid.between(first, last)
             found.add(points, body)
             for place, link in enumerate(self._posted[body]):
-                arrivals = link.messages(points)
-                tables.append(_table(link, np.arange(first, last), points, arrivals, points, 0, body, place))
+                sent = _Sent(link, np.arange(first, last), points, link.messages(points), points, 0, body, place)
+                tables.append(sent.table())
+                later.append(self._under_way(sent, found))
         table = np.concatenate(tables)
-        table = table[np.lexsort((table[:, 7], table[:, 6], table[:, 4]))]
-        return table, self._under_way(table, found)
+        return table[np.lexsort((table[:, 7], table[:, 6], table[:, 4]))], np.concatenate(later)
 
     def _measure(self, begin: int, end: int, found: _Collected) -> Integers:
         """What is measured for samples to come."""
@@ -251,43 +253,30 @@ class Timetable:
 
     def _sample(self, begin: int, end: int, found: _Collected) -> tuple[Integers, Integers, Integers]:
         """Samples with their time before them, what they exchange, and of what they send that which arrives later."""
-        drawn, ranks = [np.zeros((0, 6), dtype=np.int64)], []
-        for task in self._tasks:
+        later = [np.zeros((0, _ORDER + 4), dtype=np.int64)]
+        drawn, exchanged = [np.zeros((0, 6), dtype=np.int64)], [np.zeros((0, 0, 4), dtype=np.int64)]
+        for task in self._tasks:  # those that come first at one instant come first
             times = task.rows[:, _TIME]
             found.add(times[(times >= begin) & (times < end)])
             rows = task.rows[(times >= begin) & (times < min(end, self._stop))]
             for link in task.incoming:
                 if link.index not in self._plan.read_ahead:
                     found.add(rows[:, _TIME], int(self._sender[link.index]))
-            count, middle = len(task.incoming) + len(task.outgoing), len(task.incoming)
-            dues = np.zeros((len(rows), 6), dtype=np.int64)
-            dues[:, 0], dues[:, 1], dues[:, 2] = rows[:, _TIME], task.index, rows[:, _NEXT]
-            dues[:, 4:] = middle, count
+            messages, middle = task.messages(rows), len(task.incoming)
+            dues = np.empty((len(rows), 6), dtype=np.int64)
+            dues[:, 0], dues[:, 1], dues[:, 2], dues[:, 3] = rows[:, _TIME], task.index, rows[:, _NEXT], 0
+            dues[:, 4:] = middle, messages.shape[1]
             drawn.append(dues)
-            ranks.append((task, rows))
-        dues = np.concatenate(drawn)
-        rank = np.repeat(np.arange(len(ranks)), [len(rows) for _, rows in ranks])
-        order = np.lexsort((rank, dues[:, 0]))
-        begins = np.empty(len(dues), dtype=np.int64)
-        begins[order] = np.cumsum(dues[order, 5]) - dues[order, 5]
-        dues[:, 3:] += begins[:, None]
-        exchanged = np.empty((int((dues[:, 5] - dues[:, 3]).sum()), 4), dtype=np.int64)
-        later = [np.zeros((0, _ORDER + 4), dtype=np.int64)]
-        for number, (task, rows) in enumerate(ranks):
-            messages = task.messages(rows)
-            places = begins[rank == number][:, None] + np.arange(messages.shape[1])
-            exchanged[places] = messages
+            exchanged.append(messages)
             for place, link in enumerate(task.outgoing):
-                _, k, sent, arrivals = messages[:, len(task.incoming) + place].T
-                table = _table(link, k, sent, arrivals, rows[:, _TIME], 1, task.rank, place)
-                later.append(self._under_way(table, found))
-        return dues[order], exchanged, np.concatenate(later)
+                _, k, sent, arrivals = messages[:, middle + place].T
+                later.append(self._under_way(_Sent(link, k, sent, arrivals, dues[:, 0], 1, task.rank, place), found))
+        return *_one_after_the_other(np.concatenate(drawn), exchanged), np.concatenate(later)
 
-    def _under_way(self, table: Integers, found: _Collected) -> Integers:
-        """Messages that arrive later; for those that arrive at once their receivers halt."""
-        at_once = table[table[:, 3] == table[:, 4]]
-        found.add(at_once[:, 4], self._receiver[at_once[:, 0]])
-        return table[table[:, 3] > table[:, 4]]
+    def _under_way(self, sent: "_Sent", found: _Collected) -> Integers:
+        """Messages that arrive later; for those that arrive at once their receiver halts."""
+        found.add(sent.time[sent.arrival == sent.time], int(self._receiver[sent.link.index]))
+        return sent.table(sent.arrival > sent.time)
 
     def _arrive(self, end: int, more: Sequence[Integers], found: _Collected) -> Integers:
         """Messages that arrive before `end`; the others stay on their way."""
@@ -305,11 +294,44 @@ _ORDER = 4
 which of those of one sender they are"""
 
 
-def _table(
-    link: _Link, k: Integers, sent: Integers, arrivals: Integers, time: Integers, phase: int, whom: int, place: int
-) -> Integers:
-    columns = np.empty((len(k), _ORDER + 4), dtype=np.int64)
-    given: tuple[int | Integers, ...] = (link.index, k, sent, arrivals, time, phase, whom, place)
-    for i, column in enumerate(given):
-        columns[:, i] = column
-    return columns
+class _Sent(NamedTuple):
+    """Messages of a link, and by what they are put in order."""
+
+    link: _Link
+    k: Integers
+    sent: Integers
+    arrival: Integers
+    time: Integers
+    phase: int
+    whom: int
+    place: int
+
+    def table(self, which: Flags | None = None) -> Integers:
+        """All of them, or these: a row each."""
+        rows = np.empty((len(self.k) if which is None else int(which.sum()), _ORDER + 4), dtype=np.int64)
+        rows[:, 0], rows[:, 5], rows[:, 6], rows[:, 7] = self.link.index, self.phase, self.whom, self.place
+        if len(rows):
+            for i, column in enumerate((self.k, self.sent, self.arrival, self.time)):
+                rows[:, i + 1] = column if which is None else column[which]
+        return rows
+
+
+def _one_after_the_other(dues: Integers, exchanged: Sequence[Integers]) -> tuple[Integers, Integers]:
+    """Samples in order of time, and what they exchange: their last three columns say from where on in it.
+
+    They begin as 0, the number that is received, and that of all; `exchanged` has the messages task after task.
+    """
+    if sum(len(messages) > 0 for messages in exchanged) <= 1:
+        table = np.concatenate([messages.reshape(-1, 4) for messages in exchanged])
+        dues[:, 3:] += (np.cumsum(dues[:, 5]) - dues[:, 5])[:, None]
+        return dues, table
+    order = np.argsort(dues[:, 0], kind="stable")
+    begins = np.empty(len(dues), dtype=np.int64)
+    begins[order] = np.cumsum(dues[order, 5]) - dues[order, 5]
+    table, first = np.empty((int(dues[:, 5].sum()), 4), dtype=np.int64), 0
+    for messages in exchanged:
+        places = begins[first : first + len(messages), None] + np.arange(messages.shape[1])
+        table[places] = messages
+        first += len(messages)
+    dues[:, 3:] += begins[:, None]
+    return dues[order], table

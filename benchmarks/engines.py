@@ -1,0 +1,60 @@
+"""What a step of the closed loop costs by each engine, everything recorded: `python -m benchmarks.engines`.
+
+CPU time of the run alone, from after initialisation on, the smallest of several repetitions in turns; under other load
+it grows, and ratios within one run of this program are what can be compared.
+"""
+
+import os
+import time
+from collections import defaultdict
+from typing import get_args
+
+from orchestration.fmus import native_twin
+from orchestration.master.engine import Engine
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.timing import Timing
+from orchestration.simulation import prepared
+
+REPETITIONS = 9
+CASES = {
+    "native FMUs, both at 1 kHz": (0.001, True, {"python": 2.0, "compiled": 20.0}),
+    "native FMUs, 10 ms / 1 ms": (0.01, True, {"python": 4.0, "compiled": 30.0}),
+    "pythonfmu FMUs, both at 1 kHz": (0.001, False, {"python": 0.5, "compiled": 0.5}),
+}
+"""Period [s], whether native, stop time [s] by engine"""
+
+
+def scenario(period: float, stop_time: float, *, native: bool) -> Scenario:
+    """The paper's flight, sampled so."""
+    asked = Scenario(timing=Timing(period=period), stop_time=stop_time)
+    if not native:
+        return asked
+    return asked.with_fmus(plant=native_twin(asked.plant.fmu), controller=native_twin(asked.controller.fmu))
+
+
+def step(asked: Scenario, engine: Engine) -> float:
+    """CPU time of a step of the plant [us]."""
+    with prepared(asked, engine=engine) as flight:
+        flight.master.initialise()
+        start = time.process_time()
+        flight.master.run()
+        return (time.process_time() - start) / flight.master.steps * 1e6
+
+
+def main() -> None:
+    """Print a line for each case and engine, and how many times as fast the compiled loop is."""
+    found: dict[tuple[str, Engine], list[float]] = defaultdict(list)
+    for _ in range(REPETITIONS):
+        for case, (period, native, stops) in CASES.items():
+            for engine in get_args(Engine):
+                found[case, engine].append(step(scenario(period, stops[engine], native=native), engine))
+    print(f"load {os.getloadavg()[0]:.1f}; the smallest of {REPETITIONS}, in turns")
+    for case in CASES:
+        python, compiled = (min(found[case, engine]) for engine in get_args(Engine))
+        for engine, cost in (("python", python), ("compiled", compiled)):
+            print(f"{case}, {engine:<9} {cost:8.3f} us a step   {1e6 / cost:9.0f} steps/s")
+        print(f"{case}: compiled is {python / compiled:.1f} times as fast")
+
+
+if __name__ == "__main__":
+    main()
