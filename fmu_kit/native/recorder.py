@@ -84,6 +84,7 @@ class Recorder:
         """Have the symbols tell this recorder."""
         hooks.decide = self._decide
         hooks.fail_if = self.fail_if
+        hooks.effects = lambda: sum(_has_effect(each) for each in _statements(self._now.entries))
         hooks.is_running = lambda: self._path is not None
 
     # -- what happens on a path -----------------------------------------------------------------------------
@@ -433,6 +434,14 @@ def _values(text: list[Piece]) -> list[Symbol]:
 def _words(text: list[Piece]) -> tuple[str | tuple[str], ...]:
     """The text without its values: a format in place of each."""
     return tuple(piece if isinstance(piece, str) else (piece[1],) for piece in text)
+
+
+def _has_effect(each: Statement) -> bool:
+    """Whether a statement may fail, warn, or change what is kept; a store brings to memory what was changed before."""
+    if each.op == "call":
+        function: Function = each.data.function
+        return bool(function.stores or function.raises) or any(map(_has_effect, function.body))
+    return each.op in ("raise", "warn") or any(_has_effect(inner) for block in each.blocks for inner in block)
 
 
 def _stores(block: Block) -> set[str]:

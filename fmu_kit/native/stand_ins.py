@@ -143,25 +143,13 @@ def _all(values: Iterable[Any]) -> Any:
 
 
 def _of_which_none_fails(name: str, values: Iterable[Any]) -> Iterator[Any]:
-    """The values; Python computes none after the one that decides, so only the first of them may fail."""
-
-    def refuse(condition: Any, error: Exception) -> None:
-        if condition is not False:
+    """The values; Python computes none after the one that decides, so only the first may fail or change anything."""
+    decided, before = False, 0
+    for value in values:
+        if decided and hooks.effects() != before:
             raise TraceError(f"{name}() of values of which a later one may fail: expected an if for each")
-
-    first, may_fail = True, hooks.fail_if
-    rest = iter(values)
-    try:
-        while True:
-            try:
-                value = next(rest)
-            except StopIteration:
-                return
-            yield value
-            hooks.fail_if = refuse if not first or not is_known(value) else may_fail
-            first = first and is_known(value)
-    finally:
-        hooks.fail_if = may_fail
+        yield value
+        decided, before = decided or not is_known(value), hooks.effects()
 
 
 def _extreme(name: str, better: Callable[[Any, Any], Any]) -> Callable[..., Any]:

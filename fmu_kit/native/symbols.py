@@ -181,6 +181,8 @@ class Hooks:
     """which way the path goes where this condition is asked for"""
     fail_if: Callable[[Any, Exception], None]
     """this error is raised if the condition holds"""
+    effects: Callable[[], int]
+    """how much has been done on this path that fails, warns, or changes what is kept"""
     is_running: Callable[[], bool] = staticmethod(lambda: False)
     """whether a path is being run: code of a slave, and none of ours"""
 

@@ -104,8 +104,12 @@ class Branches(Probe):
         """Conditions within values."""
         self.put("y6", 1.0 if -1.0 < a < b <= 3.0 else 2.0)
         self.put("y7", (a or b) + (1 if a and b else 0))
-        self.put_boolean("lit", any((a > 3.0, b > 3.0)) and not all(x > 1.0 for x in (a, b)))
+        self.put_boolean("lit", any((a > 3.0, b > 3.0)) and not all(self._is_large(x) for x in (a, b)))
         self.put_count("count", self.count("n") + (2 if self.boolean("on") else -1) + both)
+
+    def _is_large(self, x: float) -> bool:
+        """Nothing but a truth value: it may be asked for in vain."""
+        return (x if x > 0.0 else -x) > self.real("q") + 0.75
 
     def _is_small(self, x: float) -> bool:
         """A method with a truth value of its own."""

@@ -45,6 +45,10 @@ class Refused(Slave):
         self._kept = 0.0
         {initialise}
 
+    def _changing(self, x):
+        self._kept += x
+        return x > 1.0
+
     def step(self, t, h):
         a = self.real("a")
         {step}
@@ -74,6 +78,7 @@ IN_A_STEP = [
         "self.put('y', repeat(math.floor(a), lambda i, x: self.put('y', i * x) or x, a))",
         "repeat: its body changes what the slave keeps",
     ),
+    ("self.put('y', all(self._changing(x) for x in (a, t)))", "all() of values of which a later one may fail"),
     ("self.put('y', any(1.0 / x > 2.0 for x in (a, t, h)))", "any() of values of which a later one may fail"),
 ]
 IN_INITIALISE = [
