@@ -8,6 +8,11 @@ $includes
 $mathematics
 /* -- the model ---------------------------------------------------------------------------------------------------- */
 
+#if defined(__GNUC__)
+#pragma GCC diagnostic ignored "-Wunused-variable" /* values that a message alone would show */
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#endif
+
 typedef $model Instance;
 
 Q_ONE int fail(Instance *m, int status, int kind)

@@ -198,3 +198,10 @@ def test_the_program_of_the_page_is_good_c(exported: dict[str, Path], tmp_path: 
     source = exported["UnifiedController"].with_name("main.c")
     source.write_text(program)
     assert made(source, "cc").is_file()
+
+
+@pytest.mark.parametrize("name", ["Branches", "Words"])
+def test_a_slave_with_much_to_say_is_written_without_a_warning_of_the_compiler(name: str, tmp_path: Path) -> None:
+    target = Target.parse(f"tests.fmu_kit.native.probes:{name}", Path().resolve())
+    for single, flags in ((False, ()), (True, ("-O1",))):
+        assert made(write(target, tmp_path, single=single), "cc", *flags).is_file()
