@@ -57,11 +57,11 @@ def life(sources: Path, *options: str) -> Path:
 
 def test_the_whole_life_of_an_instance_is_silent_under_sanitizers(sources: Path) -> None:
     """States, bytes that were damaged, failures, resets and two threads; and no step asks for memory."""
-    done = run(str(life(sources, "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")))
+    done = run(str(life(sources, "-fsanitize=address,undefined", "-fno-sanitize-recover=all")))
     assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.parametrize("fmu", ["UnifiedController"], indirect=True)
+@pytest.mark.parametrize("fmu", ["QuadrotorPlant"], indirect=True)
 def test_the_whole_life_of_an_instance_is_silent_under_valgrind(sources: Path) -> None:
     valgrind = (tool("valgrind"), "-q", "--error-exitcode=9", "--leak-check=full", "--show-leak-kinds=all")
     done = run(*valgrind, str(life(sources, "-O1")))
@@ -92,9 +92,8 @@ def test_its_library_needs_the_c_library_only_and_of_that_no_mathematics(fmu: Pa
     assert all(name.startswith("fmi2") for name in given)
 
 
-@pytest.mark.parametrize("standard", ["c99", "c11"])
-def test_its_sources_are_plain_c_without_a_warning(standard: str, sources: Path) -> None:
-    strict = (f"-std={standard}", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
+def test_its_sources_are_plain_c_of_1999_without_a_warning(sources: Path) -> None:
+    strict = ("-std=c99", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
     done = run(tool("gcc"), *strict, "-c", str(sources / "fmi2.c"), "-o", str(sources / "it.o"))
     assert (done.returncode, done.stderr) == (0, "")
 
