@@ -1,5 +1,6 @@
 """The compiled loop gives what the master in Python gives: rows, events, ends and words, to the byte."""
 
+import math
 import os
 import signal
 import threading
@@ -153,12 +154,28 @@ def test_a_condition_ends_both_at_the_same_instant_with_the_same_words(condition
 
 
 def test_a_value_on_the_edge_is_left_to_python(fmu: Path, kept: Kept) -> None:
-    """A root may be another in the last digit: what is just not more is not more."""
+    """The root of the sum of squares is less than Python's norm in its last digit here: what lies between is found."""
     free = ran(of(LOOP, fmu), "python", load=kept.load)
-    largest = max(map(np.hypot, free.signals["plant.y"], free.signals["plant.z"]))
-    for share in (1.0 - 2**-52, 1.0, 1.0 + 2**-52):
-        condition = f"norm(plant.y, plant.z) > {float(largest * share)!r}"
-        both(replace(of(LOOP, fmu), criterion=Criterion(diverged=condition)), load=kept.load)
+    y, z = free.signals["plant.y"], free.signals["plant.z"]
+    less = [i for i in range(1, len(y)) if math.sqrt(y[i] * y[i] + z[i] * z[i]) < math.hypot(y[i], z[i])]
+    assert less
+    edge = float(np.sqrt(y[less[0]] ** 2 + z[less[0]] ** 2))
+    condition = f"abs(time - {float(free.signals['time'][less[0]])!r}) < 1e-5 and norm(plant.y, plant.z) > {edge!r}"
+    found = both(replace(of(LOOP, fmu), criterion=Criterion(diverged=condition)), load=kept.load)
+    assert found.divergence is not None
+
+
+def test_messages_that_arrive_together_are_noted_as_they_were_sent(fmu: Path, kept: Kept) -> None:
+    tasks = {
+        name: Component(fmu="stub", sampling=Sampling(period=period)) for name, period in (("a", 0.02), ("b", 0.01))
+    }
+    wires = (
+        Connection(name="soon", start=("a.y",), end=("plant.u0y",), delay=0.01),
+        Connection(name="late", start=("b.y",), end=("plant.u1y",), delay=0.02),
+    )
+    what = replace(LOOP, components={"plant": LOOP.components["plant"], **tasks}, connections=wires)
+    found = both(of(what, fmu), load=kept.load)
+    assert [event.what for event in found.events if event.kind == "arrived"][:4] == ["soon", "late", "late", "soon"]
 
 
 def test_warnings_and_values_that_are_not_finite_are_the_same(fmu: Path, kept: Kept) -> None:
