@@ -14,7 +14,7 @@ from orchestration.exchange.interop.catalogue import Tool
 from orchestration.exchange.interop.copies import expect_traceable, traced_copy
 from orchestration.exchange.interop.trace import Trace, read_trace
 from orchestration.exchange.ssp import writing
-from orchestration.exchange.ssp.carried import carried, has_clock
+from orchestration.exchange.ssp.carried import carried, has_clock, wholly_carried
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_instance
@@ -40,7 +40,7 @@ class Flights:
         self._folder = folder
         with in_its_own_words(asked):
             system = _in_order(system_of(asked) if isinstance(asked, Scenario) else asked, "gauss-seidel")
-            given = carried(system, announce)
+            given = wholly_carried(system, announce)
             self._fmus = {part.name: part.fmu.absolute() for part in given.parts}
             self._system = _with_fmus(system, self._fmus)
             self._clocks = {part.name for part in given.parts if has_clock(part.model)}

@@ -1,6 +1,6 @@
 """What of a system other masters can be given: FMUs with their parameters, wires, and one step for all."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from orchestration.errors import UsageError
 from orchestration.fmi.model import Model, Variable, read_model
 from orchestration.master.plan import Plan
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.translation import in_its_own_words, system_of
+from orchestration.quadrotor.translation import in_its_own_words, in_words_of_a_scenario, system_of
 from orchestration.quadrotor.wiring import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.system.check import check
 from orchestration.system.model import Component, Connection, Parameter, Sampling, System, component_of, variable_of
@@ -43,49 +43,65 @@ class Carried:
     after the other exchanges what this master does"""
     step: float
     """communication step of all [s]"""
+    unsaid: tuple[str, ...]
+    """what other masters are not told, a line each that names its place"""
 
 
 def carried(asked: Scenario | System, announce: Callable[[str], None] | None = None) -> Carried:
-    """What other masters are given; raises `UsageError` for what they cannot say.
+    """What other masters are given of a system, and what they cannot be told.
 
     That is: anything late, lost or noisy, a source that is no constant, and components at steps of their own. A
     sampled component needs the common step for its period, or an FMU with a clock of its own by `sample_period`.
     """
     with in_its_own_words(asked):
         system = system_of(asked) if isinstance(asked, Scenario) else asked
-        for name, component in system.components.items():
-            if component.sampling is not None:
-                _expect_plain(f"components.{name}.sampling", component.sampling, ("jitter", "clock_ratio"))
-        for x in system.connections:
-            _expect_plain(f"connections.{x.name}", x, FAULTS)
-        for name, source in system.sources.items():
-            if source.to and source.constant is None:
-                kind = "file" if source.file is not None else "noise" if source.noise is not None else "trajectory"
-                raise UsageError(f"sources.{name}.{kind}: an SSP cannot feed one; expected a constant")
         located = fmus.of_components(system.fmus, announce)
         models = {name: read_model(path) for name, path in located.items()}
         check(system, models)
         plan = Plan(system)
+        step, unequal = _common_step(system, models)
+        unsaid = (*_unsaid(system), *unequal)
         return Carried(
             system=system,
             parts=tuple(_part(system, name, located[name], models[name]) for name in plan.sampled + plan.continuous),
-            step=_common_step(system, models),
+            step=step,
+            unsaid=tuple(map(in_words_of_a_scenario, unsaid)) if isinstance(asked, Scenario) else unsaid,
         )
+
+
+def wholly_carried(asked: Scenario | System, announce: Callable[[str], None] | None = None) -> Carried:
+    """As `carried`; raises `UsageError` for the first that other masters cannot be told."""
+    given = carried(asked, announce)
+    if given.unsaid:
+        raise UsageError(given.unsaid[0])
+    return given
+
+
+def _unsaid(system: System) -> Iterator[str]:
+    for name, component in system.components.items():
+        if component.sampling is not None:
+            yield from _not_plain(f"components.{name}.sampling", component.sampling, ("jitter", "clock_ratio"))
+    for x in system.connections:
+        yield from _not_plain(f"connections.{x.name}", x, FAULTS)
+    for name, source in system.sources.items():
+        if source.to and source.constant is None:
+            kind = "file" if source.file is not None else "noise" if source.noise is not None else "trajectory"
+            yield f"sources.{name}.{kind}: an SSP cannot feed one; expected a constant"
 
 
 FAULTS = ("delay", "delay_jitter", "loss", "hold", "noise", "quantisation")
 """Of a connection, what no other master can say"""
 
 
-def _expect_plain(place: str, of: Sampling | Connection, keys: tuple[str, ...]) -> None:
+def _not_plain(place: str, of: Sampling | Connection, keys: tuple[str, ...]) -> Iterator[str]:
     defaults = {f.name: f.default for f in fields(of)}
     for key in keys:
         value = getattr(of, key)
         if isinstance(value, Mapping):
             if any(value.values()):
-                raise UsageError(f"{place}.{key}: an SSP cannot say that; expected none")
+                yield f"{place}.{key}: an SSP cannot say that; expected none"
         elif value != defaults[key]:
-            raise UsageError(f"{place}.{key} = {value}: an SSP cannot say that; expected {defaults[key]}")
+            yield f"{place}.{key} = {value}: an SSP cannot say that; expected {defaults[key]}"
 
 
 def has_clock(model: Model) -> bool:
@@ -93,8 +109,11 @@ def has_clock(model: Model) -> bool:
     return SAMPLE_PERIOD in model.variables
 
 
-def _common_step(system: System, models: Mapping[str, Model]) -> float:
-    """The step of all components in continuous time, or the period of all others where there are none."""
+def _common_step(system: System, models: Mapping[str, Model]) -> tuple[float, list[str]]:
+    """The step of all components in continuous time, or the period of all others where there are none.
+
+    The first of them, and what differs from it.
+    """
     steps = {f"components.{name}.step": c.step for name, c in system.components.items() if c.step is not None}
     by_master = {
         name: c.sampling
@@ -104,15 +123,17 @@ def _common_step(system: System, models: Mapping[str, Model]) -> float:
     periods = {f"components.{name}.sampling.period": sampling.period for name, sampling in by_master.items()}
     own = [c.sampling.period for c in system.components.values() if c.sampling is not None]
     first = next(iter((*steps.values(), *periods.values(), *own)))
-    for place, step in (steps | periods).items():
-        if step != first:
-            raise UsageError(f"{place} = {step}: expected the one step of all, {first} s; an SSP has no more than one")
-    for name, sampling in by_master.items():
-        if sampling.offset != 0.0:
-            raise UsageError(
-                f"components.{name}.sampling.offset = {sampling.offset}: an SSP cannot say that; expected 0"
-            )
-    return first
+    unsaid = [
+        f"{place} = {step}: an SSP has one step for all; expected {first}"
+        for place, step in (steps | periods).items()
+        if step != first
+    ]
+    unsaid += [
+        f"components.{name}.sampling.offset = {sampling.offset}: an SSP cannot say that; expected 0"
+        for name, sampling in by_master.items()
+        if sampling.offset != 0.0
+    ]
+    return first, unsaid
 
 
 def _part(system: System, name: str, path: Path, model: Model) -> Part:

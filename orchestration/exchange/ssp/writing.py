@@ -36,9 +36,13 @@ TYPED: tuple[Kind, ...] = ("Real", "Integer", "Boolean", "String")
 def write(asked: Scenario | System, path: Path, announce: Callable[[str], None] | None = None) -> Path:
     """Write a system as an SSP; the same system and FMUs give the same bytes.
 
-    Raises `UsageError` for what an SSP has no words for, as `carried` does, and for different FMUs of one file name.
+    `announce` hears, a line each, of what the SSP has no words for: it is another system without its file with timing.
+    Raises `UsageError` for different FMUs of one file name.
     """
     given = carried(asked, announce)
+    if announce is not None:
+        for line in given.unsaid:
+            announce(f"warning: {line.partition('; expected')[0]}; only its file with timing does")
     files = {source: fmu.read_bytes() for source, fmu in _sources(given.parts).items()}
     for part in given.parts:
         files[_parameter_file(part)] = document(_parameter_set({"": part}))

@@ -16,6 +16,8 @@ from tests.commands import Main
 from tests.orchestration.exchange.interop.test_systems import CARRIED, carried
 from tests.orchestration.studies.common import error_line, one_line
 
+EXAMPLES = Path(__file__).parents[4] / "examples"
+
 
 @pytest.fixture(autouse=True)
 def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -61,8 +63,15 @@ def test_what_the_timing_says_on_top_is_flown(tmp_path: Path) -> None:
     read = load_request(ssp, timing)
     assert isinstance(read, System)
     assert [x.delay for x in read.connections] == [0.0, 0.1]
-    with pytest.raises(UsageError, match=r"connections.command.delay = 0.1: an SSP cannot say that"):
-        writing.write(read, ssp)
+
+
+def test_a_system_of_two_rates_with_a_late_and_lossy_connection_is_flown_back(tmp_path: Path) -> None:
+    system = load_request(EXAMPLES / "dc_servo" / "system.toml")
+    system = dataclasses.replace(system, stop_time=0.5)
+    assert isinstance(system, System)
+    assert any(x.loss for x in system.connections)
+    read = load_request(*writing.write_with_timing(system, tmp_path / "loop.ssp"))
+    assert bits(run(read)) == bits(run(system))
 
 
 def test_the_quadrotor_is_flown_back_to_the_bit(tmp_path: Path) -> None:
