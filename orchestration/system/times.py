@@ -4,9 +4,11 @@ import itertools
 import math
 from collections.abc import Iterator
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
-import numpy as np
-import numpy.typing as npt
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
 
 NANOSECONDS = 1_000_000_000
 
@@ -50,8 +52,10 @@ class Grid:
             k += 1
         return k
 
-    def between(self, first: int, end: int) -> npt.NDArray[np.int64]:
+    def between(self, first: int, end: int) -> "npt.NDArray[np.int64]":
         """Instants `first` up to `end` of them, without that one, as an array."""
+        import numpy as np  # what only reads a system does without
+
         if abs(self._offset + end * self._period) + 1 >= 2**62:
             return np.array([self[k] for k in range(first, end)], dtype=np.int64)
         numerators = self._offset + np.arange(first, end, dtype=np.int64) * self._period
