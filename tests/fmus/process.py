@@ -20,8 +20,11 @@ def run(
 
 
 def run_script(name: str, *arguments: str | Path) -> Any:
-    """What the script of that name prints as JSON in its last line; fails the test if it does not end well."""
+    """What the script of that name prints as JSON, in a line of its own, last; fails the test if it does not end well."""
     module = f"tests.fmus.scripts.{name}"
     done = run(sys.executable, "-X", "faulthandler", "-m", module, *map(str, arguments))
     assert done.returncode == 0, f"{module} ended with {done.returncode}:\n{done.stdout[-2000:]}\n{done.stderr[-4000:]}"
-    return json.loads(done.stdout.splitlines()[-1])
+    said = next(
+        line for line in reversed(done.stdout.splitlines()) if line[:1] in "[{"
+    )  # C libraries print as they end
+    return json.loads(said)
