@@ -20,7 +20,7 @@ def run(
 
 
 def run_script(name: str, *arguments: str | Path) -> Any:
-    """What the script of that name prints as JSON, in a line of its own, last; fails the test if it does not end well."""
+    """What the script of that name prints last as JSON, in a line; fails the test if it does not end well."""
     module = f"tests.fmus.scripts.{name}"
     done = run(sys.executable, "-X", "faulthandler", "-m", module, *map(str, arguments))
     assert done.returncode == 0, f"{module} ended with {done.returncode}:\n{done.stdout[-2000:]}\n{done.stderr[-4000:]}"
