@@ -122,6 +122,24 @@ class FlightFlags:
             text="The controller's nominal mass or inertia is not the plant's on purpose: no warning.",
         ),
     ] = None
+    controller: Annotated[
+        str | None,
+        _option(
+            "--controller",
+            panel=MODEL,
+            metavar="NAME|PATH",
+            text="The controller's FMU, anybody's that has its variables; UnifiedController unless told.",
+        ),
+    ] = None
+    plant: Annotated[
+        str | None,
+        _option(
+            "--plant",
+            panel=MODEL,
+            metavar="NAME|PATH",
+            text="The plant's FMU, anybody's that has its variables; QuadrotorPlant unless told.",
+        ),
+    ] = None
     native: Annotated[
         bool | None,
         _option(
@@ -163,9 +181,12 @@ class FlightFlags:
         }
         parameters = {key: _value(text) for key, text in _pairs("set", self.set or [])}
         changed = scenario.with_changes(timing=timing, parameters=parameters, **top)
-        if not self.native:
+        if not (self.native or self.controller or self.plant):
             return changed
-        return changed.with_fmus(plant=native_twin(changed.plant.fmu), controller=native_twin(changed.controller.fmu))
+        plant, controller = self.plant or changed.plant.fmu, self.controller or changed.controller.fmu
+        if self.native:
+            plant, controller = native_twin(plant), native_twin(controller)
+        return changed.with_fmus(plant=plant, controller=controller)
 
     def applied_to_system(self, system: "System") -> "System":
         """`system` with what was given; raises `UsageError` for flags that are for the quadrotor only."""
@@ -235,9 +256,7 @@ def _pairs(flag: str, given: list[str]) -> list[tuple[str, str]]:
         key, equals, value = text.partition("=")
         if key.strip() in ("controller.fmu", "plant.fmu"):
             side = key.strip().removesuffix(".fmu")
-            raise UsageError(
-                f'--{flag} {text}: expected a parameter; a scenario file names the FMU: [{side}] fmu = "…"'
-            )
+            raise UsageError(f"--{flag} {text}: expected a parameter; the FMU is given by --{side} NAME|PATH")
         if not (key and equals and value):
             raise UsageError(f"--{flag} {text}: expected NAME=VALUE")
         pairs.append((key.strip(), value.strip()))

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import orchestration
-from orchestration import Scenario, Timing
+from orchestration import Scenario, Timing, fmus
 from tests.commands import Done, Main
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -182,6 +182,18 @@ def test_set_reaches_both_fmus(main: Main) -> None:
         assert printed["position_rmse"] != flown()["position_rmse"]
 
 
+def test_the_fmus_are_those_that_are_named(main: Main, tmp_path: Path) -> None:
+    plant = shutil.copy(fmus.locate("QuadrotorPlant"), tmp_path / "other.fmu")
+    flown = [
+        json.loads(main("run", "--stop-time", "0.1", "--json", "--plant", fmu).stdout)["position_rmse"]
+        for fmu in (plant, "QuadrotorPlant", "native/QuadrotorPlant")
+    ]
+    assert flown[0] == flown[1]
+    assert flown[2] == pytest.approx(flown[1], rel=1e-12)
+    done = main("run", "--stop-time", "0.1", "--controller", plant, code=2)
+    assert "controller" in done.stderr
+
+
 def test_set_takes_whatever_a_path_of_a_system_can_be(main: Main) -> None:
     tank = Path(__file__).parents[3] / "examples" / "water_tank" / "system.toml"
     shown = main("show", tank, "--set", "connections.valve.hold=first", "--set", "seed=3").stdout
@@ -320,7 +332,8 @@ def test_a_run_paused_and_resumed_is_the_same_run(main: Main, here: Path) -> Non
         (["--set", "plant.mass"], "--set plant.mass: expected NAME=VALUE"),
         (["--set", "plant.mass=heavy"], "plant.mass = heavy: expected a number"),
         (["--set", "plant.mas=1"], "did you mean mass?"),
-        (["--set", "controller.fmu="], 'expected a parameter; a scenario file names the FMU: [controller] fmu = "…"'),
+        (["--set", "controller.fmu="], "expected a parameter; the FMU is given by --controller NAME|PATH"),
+        (["--plant", "nowhere.fmu"], "plant.fmu"),
         (["--set", "controller.sample_period=0.1"], "controller.sample_period: expected --period and --clock instead"),
         (["--preset", "arducopter"], "preset arducopter: expected one of px4"),
         (["none.toml"], "none.toml: expected a readable system or scenario file"),
