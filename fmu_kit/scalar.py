@@ -25,7 +25,7 @@ class ScalarOps:
     maximum: Callable[[Scalar, Scalar], Scalar]
     where: Callable[[Any, Scalar, Scalar], Scalar]
     all: Callable[[Any], Any]
-    """Whether a condition holds, as one truth value: at every point of a batch; True for a symbol."""
+    """Whether a condition holds, as one truth value: at every point of a batch."""
 
 
 FLOAT = ScalarOps(

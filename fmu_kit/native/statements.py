@@ -116,10 +116,11 @@ class Function:
 
 @dataclass(frozen=True)
 class Call:
-    """A call of a function: when, by what memory held before it, and what of its errors is looked at after it."""
+    """A call of a function."""
 
     function: Function
     memory: int
+    """version of the memory before it"""
 
 
 def symbols_of(block: Block) -> list[Symbol]:

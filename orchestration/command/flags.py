@@ -231,16 +231,6 @@ flies = takes("flags", FlightFlags)
 """Gives a command all flight flags."""
 
 
-def scenario_from(path: Path | None, flags: FlightFlags) -> "Scenario":
-    """The scenario of a file, or the paper's, with the flags applied; raises `UsageError` for a system file."""
-    from orchestration.quadrotor.scenario import Scenario
-
-    request = request_from(path, flags)
-    if not isinstance(request, Scenario):
-        raise UsageError(f"{path}: is a system file; this command is for scenarios of the quadrotor")
-    return request
-
-
 def request_from(path: Path | None, flags: FlightFlags, timing: Path | None = None) -> "Request":
     """The system or the scenario of a file, an SSP's with its timing, or the paper's, with the flags applied."""
     from orchestration.quadrotor.scenario import Scenario

@@ -83,10 +83,3 @@ class _Clause:
 
 
 _EXPECTED = {">": "at most", ">=": "less than", "<": "at least", "<=": "more than"}
-
-
-def expect_condition(condition: str) -> None:
-    """Raise `UsageError` for a text that is no expression."""
-    if not condition.strip():
-        raise UsageError("expected an expression")
-    parse(condition)

@@ -26,9 +26,3 @@ def position_error(signals: Mapping[str, Floats]) -> Floats:
     actual = np.column_stack([signals[f"plant.{name}"] for name in POSITION])
     error: Floats = np.linalg.norm(actual - desired(signals), axis=1)
     return error
-
-
-def attitude_angle(scalar: Floats) -> Floats:
-    """The angle [rad] of attitude errors with these scalar parts, 2 acos(min(1, |q̃_0|))."""
-    angle: Floats = 2.0 * np.arccos(np.minimum(1.0, np.abs(scalar)))
-    return angle

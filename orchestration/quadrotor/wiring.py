@@ -37,12 +37,6 @@ USE_REFERENCE_INPUTS = "use_reference_inputs"
 SAMPLE_PERIOD = "sample_period"
 SAMPLE_OFFSET = "sample_offset"
 
-INTERFACE = {
-    "plant": {"input": COMMAND, "output": MEASUREMENT},
-    "controller": {"input": MEASUREMENT, "output": COMMAND, "parameter": (SAMPLE_PERIOD, SAMPLE_OFFSET)},
-}
-"""Real variables that an FMU needs to be a side of the loop, by causality."""
-
 TRAJECTORY = {f"trajectory.{name}": name for name in ("amplitude_x", "amplitude_y", "frequency", "start_z", "rate_z")}
 """Parameters of the controller's built-in trajectory, and the fields of `Trajectory` they are."""
 
@@ -61,9 +55,6 @@ SURFACE_GAIN, SURFACE_EXPONENT = "gain.surface", "surface_exponent"
 
 RIGID_BODY = ("mass", *components("inertia", ("xx", "yy", "zz", "xy", "xz", "yz")))
 """Parameters of the plant and, by the same names, of the controller's nominal model."""
-
-THRUST_MAX = "thrust_max"
-TORQUE_MAX = "torque_max"
 
 UNITS = {
     **dict.fromkeys(POSITION, "m"),

@@ -125,17 +125,6 @@ class Tangent:
 
     # -- what it is made of --------------------------------------------------------------------------------------
 
-    def _short_enough(self, ladder: Sequence[float]) -> list[float]:
-        """`ladder` as long as what pulses make stays small."""
-        longest = len(ladder)
-        for i in range(len(self._inputs)):
-            up, down = (self._outputs_after(self._rest, self._pulses(i, sign), ladder[:longest]) for sign in (1, -1))
-            large = np.abs(up - down).max(axis=1, initial=0.0) > 2.0 * LARGEST
-            longest = min(longest, int(np.argmax(large))) if large.any() else longest
-        if longest < min(2, len(ladder)):
-            raise UsageError(f"{self._fmu.name}: a pulse of {PULSE:g} on its inputs becomes large within a step")
-        return list(ladder[:longest])
-
     def _find_coordinates(self) -> None:
         """As many points of the ladder as show states, and so many of these as have coordinates of their own."""
         made, before, rank = [self._struck()], 0, 0
