@@ -20,7 +20,7 @@ def test_packages_have_files_beside_their_modules():
     assert {file.name for file in FILES} >= {"loop.c", "instance.h", "system.toml", "UnifiedController.html"}
 
 
-@pytest.mark.parametrize("file", map(str, FILES))
+@pytest.mark.parametrize("file", [str(file) for file in FILES])
 def test_a_file_beside_modules_is_in_the_wheel(file):
     path = ROOT / file
     assert (path.parent / "__init__.py").is_file(), "expected a folder that is a package"
