@@ -1,0 +1,95 @@
+"""An ensemble of initial states of the quadrotor: errors of evenly spread size around the start of its reference."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fmu_kit.trajectory import Trajectory
+from orchestration.errors import UsageError
+from orchestration.master.streams import Streams
+from orchestration.simulator import Floats
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """One initial state."""
+
+    size: float
+    """of the initial error, in (0, 1], as a share of the largest of each kind"""
+    parameters: Mapping[str, float]
+    """of the plant, `initial.…`"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Starts:
+    """Initial errors in position, velocity, attitude and angular velocity, each in a direction of its own.
+
+    A start of size r has r times the largest error of each kind. Sizes are those of van der Corput's sequence, so that
+    they are spread evenly and more starts leave the first ones as they are; so do directions, each start having a
+    stream of random numbers of its own. Raises `UsageError` for values that cannot be.
+    """
+
+    count: int = 200
+    first: int = 0
+    """index of the first: starts of other indices are other ones"""
+    seed: int = 0
+    position: float = 4.0
+    """largest ‖P(0) - P_d(0)‖ [m]"""
+    velocity: float = 2.0
+    """largest ‖V(0) - V_d(0)‖ [m/s]"""
+    angle: float = 2.0
+    """largest angle of the attitude from level, with no yaw, about any axis [rad]"""
+    rate: float = 2.0
+    """largest ‖Ω(0)‖ [rad/s]"""
+
+    def __post_init__(self) -> None:
+        for name, lowest in (("count", 1), ("first", 0), ("seed", 0)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int) or value < lowest:
+                raise UsageError(f"starts.{name} = {value}: expected a whole number from {lowest}")
+        for name, highest in (("position", math.inf), ("velocity", math.inf), ("angle", math.pi), ("rate", math.inf)):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and 0.0 <= value <= highest):
+                raise UsageError(f"starts.{name} = {value}: expected a number from 0{_to(highest)}")
+
+    def drawn(self, trajectory: Trajectory) -> tuple[Start, ...]:
+        """The starts around the beginning of a trajectory, in the order of their indices."""
+        return tuple(self._start(i, trajectory) for i in range(self.first, self.first + self.count))
+
+    def _start(self, index: int, trajectory: Trajectory) -> Start:
+        size, reference = 1.0 - _van_der_corput(index), trajectory.at(0.0)
+        generator = Streams(self.seed).of(f"starts.{index}", "direction")
+        place, motion, axis, spin = (_direction(generator) for _ in range(4))
+        half = 0.5 * size * self.angle
+        found = {
+            "initial.position": np.array([*reference.position]) + size * self.position * place,
+            "initial.velocity": np.array([*reference.velocity]) + size * self.velocity * motion,
+            "initial.quaternion": np.array([*(math.sin(half) * axis), math.cos(half)]),
+            "initial.angular_velocity": size * self.rate * spin,
+        }
+        parameters = {
+            f"{name}.{letter}": float(x) for name, values in found.items() for letter, x in zip("xyzw", values)
+        }
+        return Start(size=size, parameters=parameters)
+
+
+def _to(highest: float) -> str:
+    return "" if math.isinf(highest) else f" to {highest:.6g}"
+
+
+def _direction(generator: np.random.Generator) -> Floats:
+    """A unit vector, all directions alike."""
+    vector = generator.standard_normal(3)
+    unit: Floats = vector / np.linalg.norm(vector)
+    return unit
+
+
+def _van_der_corput(index: int) -> float:
+    """The place of an index in [0, 1), its binary digits mirrored at the point."""
+    found, share = 0.0, 0.5
+    while index:
+        found += share * (index & 1)
+        index, share = index >> 1, 0.5 * share
+    return found

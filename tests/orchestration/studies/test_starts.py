@@ -1,0 +1,64 @@
+import math
+
+import numpy as np
+import pytest
+
+from fmu_kit.trajectory import Trajectory
+from orchestration.errors import UsageError
+from orchestration.studies.starts import Starts
+
+TRAJECTORY = Trajectory()
+STARTS = Starts(count=64, position=4.0, velocity=2.0, angle=2.0, rate=3.0)
+
+
+def vector(start, name, axes="xyz"):
+    return np.array([start.parameters[f"initial.{name}.{axis}"] for axis in axes])
+
+
+def test_sizes_are_spread_evenly():
+    sizes = sorted(start.size for start in STARTS.drawn(TRAJECTORY))
+    assert sizes == pytest.approx([(i + 1) / 64 for i in range(64)])
+
+
+def test_every_error_is_its_share_of_the_largest():
+    reference = TRAJECTORY.at(0.0)
+    for start in STARTS.drawn(TRAJECTORY):
+        assert np.linalg.norm(vector(start, "position") - [*reference.position]) == pytest.approx(4.0 * start.size)
+        assert np.linalg.norm(vector(start, "velocity") - [*reference.velocity]) == pytest.approx(2.0 * start.size)
+        assert np.linalg.norm(vector(start, "angular_velocity")) == pytest.approx(3.0 * start.size)
+        quaternion = vector(start, "quaternion", "xyzw")
+        assert np.linalg.norm(quaternion) == pytest.approx(1.0)
+        assert 2.0 * math.acos(quaternion[3]) == pytest.approx(2.0 * start.size)
+
+
+def test_directions_are_those_of_a_sphere():
+    directions = np.array(
+        [vector(s, "angular_velocity") / (3.0 * s.size) for s in Starts(count=2000, rate=3.0).drawn(TRAJECTORY)]
+    )
+    assert np.abs(directions.mean(axis=0)).max() < 0.05
+    assert np.abs(directions.T @ directions / 2000 - np.eye(3) / 3).max() < 0.03
+
+
+def test_more_starts_leave_the_first_ones_as_they_are():
+    assert Starts(count=100).drawn(TRAJECTORY)[:10] == Starts(count=10).drawn(TRAJECTORY)
+    assert Starts(count=100).drawn(TRAJECTORY)[50:60] == Starts(count=10, first=50).drawn(TRAJECTORY)
+
+
+def test_another_seed_gives_other_directions():
+    one, other = (Starts(count=1, seed=seed).drawn(TRAJECTORY)[0] for seed in (0, 1))
+    assert one.size == other.size
+    assert one.parameters != other.parameters
+
+
+@pytest.mark.parametrize(
+    ("given", "named"),
+    [
+        ({"count": 0}, "starts.count = 0: expected a whole number from 1"),
+        ({"angle": 4.0}, "starts.angle = 4.0: expected a number from 0 to 3.14159"),
+        ({"rate": math.nan}, "starts.rate = nan: expected a number from 0"),
+    ],
+)
+def test_what_cannot_be_is_said(given, named):
+    with pytest.raises(UsageError) as error:
+        Starts(**given)
+    assert str(error.value) == named
