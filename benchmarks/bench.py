@@ -13,6 +13,8 @@ from controller_fmu.sliding_mode.law import Gains, evaluate
 from controller_fmu.vehicle import Measurement, Model
 from fmu_kit import packaging
 from fmu_kit.algebra import Quaternion, Vec3
+from fmu_kit.integrator import rk4_step
+from fmu_kit.rigid_body import Body, RigidState, Wrench, derivative
 from fmu_kit.trajectory import Trajectory
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.model import read_model
@@ -26,8 +28,7 @@ from orchestration.quadrotor.translation import system_of
 from orchestration.simulation import prepared
 from orchestration.simulator import Floats
 from orchestration.system.check import recorded
-from plant_fmu.dynamics import Body, RigidState, Wind, Wrench, derivative
-from plant_fmu.integrator import rk4_step
+from plant_fmu.dynamics import Wind
 
 STEPS = 5000
 REPETITIONS = 7

@@ -1,21 +1,12 @@
 """What any controller knows of the vehicle: what it is told, and what it believes."""
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
-from fmu_kit.algebra import Inertia, Quaternion, Vec3
+from fmu_kit.algebra import Quaternion, Vec3
+from fmu_kit.rigid_body import Body
 
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Model:
-    """The rigid body a controller believes in."""
-
-    mass: float = 1.0
-    """m [kg]"""
-    inertia: Inertia = Inertia(xx=1.0, yy=1.0, zz=1.0)
-    """J [kg·m²], body frame"""
-    gravity: float = 9.81
-    """g [m/s²]"""
+Model = Body
+"""The rigid body that a controller believes in."""
 
 
 class Measurement(NamedTuple):

@@ -12,11 +12,12 @@ import numpy as np
 
 from controller_fmu.sliding_mode.law import Gains, Measurement, Model, evaluate
 from fmu_kit.algebra import Quaternion, Vec3
+from fmu_kit.integrator import rk4_step
+from fmu_kit.rigid_body import Body, RigidState, Wrench, derivative
 from fmu_kit.trajectory import Trajectory
 from orchestration.master.sources import NUMPY
 from orchestration.quadrotor.measures import SETTLED
-from plant_fmu.dynamics import Body, RigidState, Wind, Wrench, derivative
-from plant_fmu.integrator import rk4_step
+from plant_fmu.dynamics import Wind
 
 Array = Any
 Law = Callable[[Array, RigidState], Array]

@@ -1,6 +1,7 @@
 """The variables of the plant FMU."""
 
 from fmu_kit.algebra import Quaternion, Vec3
+from fmu_kit.rigid_body import Body
 from fmu_kit.variables import (
     INERTIA_AXES,
     QUATERNION_AXES,
@@ -11,7 +12,7 @@ from fmu_kit.variables import (
     tunable_parameter,
     vector,
 )
-from plant_fmu.dynamics import Actuators, Body, Wind
+from plant_fmu.dynamics import Actuators, Wind
 
 PAPER_ATTITUDE = Quaternion.from_xyzw(0.1699, 0.3058, 0.1699, 0.9212)
 """Q(0) of section V; normalised at initialisation."""

@@ -4,11 +4,12 @@ import math
 
 from fmu_kit.algebra import Vec3
 from fmu_kit.errors import require, require_finite_state
+from fmu_kit.integrator import internal_steps, rk4_step
+from fmu_kit.rigid_body import Body, RigidState, Wrench, acceleration, derivative, tilt
 from fmu_kit.saved_state import State
 from fmu_kit.scalar import repeat
 from fmu_kit.slave import Slave
-from plant_fmu.dynamics import Actuators, Body, RigidState, Wind, Wrench, acceleration, derivative, tilt
-from plant_fmu.integrator import internal_steps, rk4_step
+from plant_fmu.dynamics import Actuators, Wind
 from plant_fmu.interface import MOTION, QUADROTOR
 
 MOST_INTERNAL_STEPS = 100_000

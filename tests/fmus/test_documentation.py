@@ -24,7 +24,7 @@ from tests.fmus.instance import Instance
 from tests.fmus.process import ROOT, run
 from tests.fmus.source_tree import copy_sources, python
 
-SOURCES = {"UnifiedController": "controller_fmu/sliding_mode/law.py", "QuadrotorPlant": "plant_fmu/dynamics.py"}
+SOURCES = {"UnifiedController": "controller_fmu/sliding_mode/law.py", "QuadrotorPlant": "fmu_kit/rigid_body.py"}
 """Where the equations of each FMU are."""
 
 

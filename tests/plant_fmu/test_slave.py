@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 import plant_fmu.slave
 from fmu_kit.algebra import ZERO
-from plant_fmu.dynamics import RigidState
-from plant_fmu.integrator import rk4_step
+from fmu_kit.integrator import rk4_step
+from fmu_kit.rigid_body import RigidState
 from plant_fmu.interface import QUADROTOR
 from plant_fmu.slave import QuadrotorPlant
 from tests.reference.flight import Q0, integrated, quaternion

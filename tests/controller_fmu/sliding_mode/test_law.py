@@ -25,11 +25,11 @@ from controller_fmu.sliding_mode.law import (
 from controller_fmu.vehicle import Measurement, Model
 from fmu_kit.algebra import ZERO, Inertia, Quaternion, Vec3
 from fmu_kit.errors import DivergenceError
+from fmu_kit.integrator import rk4_step
+from fmu_kit.rigid_body import Body, RigidState, Wrench, derivative
 from fmu_kit.scalar import FLOAT, ScalarOps
 from fmu_kit.trajectory import Reference, Trajectory
 from orchestration.master.sources import NUMPY
-from plant_fmu.dynamics import Body, RigidState, Wrench, derivative
-from plant_fmu.integrator import rk4_step
 from tests.reference.tables import LAWS, law_at
 
 Z = Vec3(0.0, 0.0, 1.0)

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fmu_kit.algebra import Inertia, Quaternion, Vec3
-from plant_fmu.dynamics import Body, RigidState, Wrench, derivative
-from plant_fmu.integrator import internal_steps, rk4_step
+from fmu_kit.integrator import internal_steps, rk4_step
+from fmu_kit.rigid_body import Body, RigidState, Wrench, derivative
 
 
 @dataclass(frozen=True)
