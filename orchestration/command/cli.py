@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from orchestration.results.result import Result
 
 EXTRAS = {
-    "studies": ("dask", "distributed", "filelock", "pandas", "SALib", "scipy", "xarray"),
+    "studies": ("cma", "dask", "distributed", "filelock", "pandas", "SALib", "scipy", "xarray"),
     "interop": ("libcosimpy", "ecospy", "tbb", "fmu-manipulation-toolbox"),
 }
 """Packages that the base install does without, by the extra that brings them."""

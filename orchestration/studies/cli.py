@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from orchestration.command.flags import EngineFlag, FlightFlags, Timing, flies, request_from
-from orchestration.command.terminal import runs_bar, say
+from orchestration.command.terminal import progress_bar, runs_bar, say
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file.", metavar="STUDY.toml", show_default=False)]
 Out = Annotated[
@@ -82,6 +82,31 @@ def draw(
     _current_store(study, out)
     for written in draw_study(chosen, out, metric):
         print(written)
+
+
+def tune(
+    tuning: Annotated[
+        Path, typer.Argument(help="What is tuned, and on what.", metavar="TUNING.toml", show_default=False)
+    ],
+    out: Annotated[Path, typer.Option("--out", help="Folder for the files of tuned parameters.", metavar="DIR")],
+    workers: Annotated[int, typer.Option("--workers", help="Processes on this machine.", metavar="N")] = 1,
+    engine: EngineFlag = None,
+) -> None:
+    """Tune a controller on an ensemble of starts, and judge it on others; goes on where it was stopped."""
+    from orchestration.master.engine import engine_named
+    from orchestration.studies.engine import Pool
+    from orchestration.studies.tune import tune as search_all
+    from orchestration.studies.tuning_file import load_tuning
+
+    asked = load_tuning(tuning)
+    files = asked.files()
+    with progress_bar("searching") as progress, Pool(files, workers, engine_named(engine)) as pool:
+        written = search_all(
+            asked, files, Path("results") / asked.name, out, pool.fly_all,
+            command=f"quadcosim tune {tuning} --out {out}", progress=progress, announce=say,
+        )  # fmt: skip
+    for path in written:
+        print(path)
 
 
 @flies
@@ -159,5 +184,5 @@ def _current_store(study: Path, out: Path | None) -> Path:
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the command line."""
-    for command in (sweep, status, export, draw, limit):
+    for command in (sweep, status, export, draw, tune, limit):
         app.command()(command)

@@ -41,6 +41,10 @@ class Pool:
     def __exit__(self, *exception: object) -> None:
         self._stack.close()
 
+    def fly_all(self, systems: Sequence[System]) -> list[Any]:
+        """The metrics of all runs in their order; raises `QuadcosimError` if a run fails."""
+        return self.fly(systems, stop=lambda metrics: False)
+
     def fly(self, systems: Sequence[System], stop: Callable[[Any], bool]) -> list[Any]:
         """The metrics of the runs in their order, up to the first whose metrics `stop`, with any number of workers.
 

@@ -87,7 +87,7 @@ def _study(tables: dict[str, Any], path: Path) -> Study:
     study = Study(
         name=file.name or path.stem,
         base=base,
-        axes=tuple(_axis(table, path.parent) for table in file.axes),
+        axes=tuple(axis_of(table, path.parent) for table in file.axes),
         method=file.design.method,
         samples=file.design.samples,
         design_seed=file.design.seed,
@@ -99,7 +99,8 @@ def _study(tables: dict[str, Any], path: Path) -> Study:
     return study
 
 
-def _axis(table: AxisTable, folder: Path) -> Axis:
+def axis_of(table: AxisTable, folder: Path) -> Axis:
+    """The axis that a table says; raises `UsageError` for one that cannot be."""
     if table.sets is not None and table.multiplies is not None:
         raise UsageError(f"axis {table.name}: expected sets or multiplies, not both")
     targets = tuple(table.multiplies or table.sets or [table.name])

@@ -1,0 +1,190 @@
+"""Tuning: the parameters of a controller that cost least on an ensemble of starts, judged on other starts."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fmu_kit.trajectory import Trajectory
+from orchestration.errors import UsageError
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.translation import in_its_own_words
+from orchestration.request import system_meant
+from orchestration.simulator import Floats
+from orchestration.statistics import wilson
+from orchestration.studies.axes import Axis
+from orchestration.studies.files import Files, files_of
+from orchestration.studies.starts import Starts
+from orchestration.studies.study import paths_in
+from orchestration.studies.trials import is_good
+from orchestration.system.model import System
+from orchestration.system.paths import changed
+
+Fly = Callable[[Sequence[System]], Sequence[dict[str, Any]]]
+"""The metrics of runs, in their order"""
+COST = "cost"
+"""The objective that a tuning adds"""
+_WIDTH = 0.25
+"""of the first generation, as a share of each range"""
+_PERIOD = "timing.period"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """What is tuned, on what, and with how much effort; raises `UsageError` for what cannot be."""
+
+    name: str
+    base: Scenario
+    parameters: tuple[Axis, ...]
+    """each between its `low` and its `high`"""
+    cost: str
+    """of a flight: an expression over the objectives of the base"""
+    bad: float
+    """cost of a flight that does not fly"""
+    starts: Starts
+    """those that it is tuned on; those that it is judged on come after them"""
+    judged: int
+    """how many these are"""
+    periods: tuple[float, ...]
+    """[s]; tuned for each by itself"""
+    evaluations: int
+    """of the mean cost, for each parameter"""
+    seeds: tuple[int, ...]
+    """of the optimiser, each a search of its own; the best by its cost on the starts that it is tuned on is taken"""
+
+    def __post_init__(self) -> None:
+        if len(self.parameters) < 2:
+            raise UsageError("parameters: expected at least two; one is found by a study with an axis")
+        for name in ("evaluations", "judged"):
+            if getattr(self, name) < 1:
+                raise UsageError(f"{name} = {getattr(self, name)}: expected at least 1")
+        for name in ("periods", "seeds"):
+            if not getattr(self, name):
+                raise UsageError(f"{name}: expected at least one")
+        if COST in self.origin.objectives:
+            raise UsageError(f"objectives.{COST}: expected another name, which a tuning adds")
+        assert self._paths
+
+    @cached_property
+    def origin(self) -> System:
+        """The system that the base means."""
+        return system_meant(self.base)
+
+    @cached_property
+    def _paths(self) -> dict[str, tuple[str, ...]]:
+        return {
+            target: paths_in(self.base, target)
+            for target in (_PERIOD, *(target for axis in self.parameters for target in axis.targets))
+        }
+
+    @property
+    def budget(self) -> int:
+        """Evaluations of the mean cost in one search."""
+        return self.evaluations * len(self.parameters)
+
+    def files(self) -> Files:
+        """The files of all flights, FMUs built if need be."""
+        return files_of(self.origin)
+
+    def values(self, shares: Sequence[float]) -> dict[str, float]:
+        """What each target is set to, at a share in [0, 1] of the range of each parameter."""
+        return {
+            target: axis.at(float(share)) for axis, share in zip(self.parameters, shares) for target in axis.targets
+        }
+
+    def systems(self, period: float, values: Mapping[str, float], starts: Starts) -> list[System]:
+        """The flights from an ensemble of starts; raises `UsageError` for a value that cannot be."""
+        given = {**values, _PERIOD: period}
+        with in_its_own_words(self.base):
+            system = changed(self.origin, {path: given[target] for target in given for path in self._paths[target]})
+            system = replace(system, objectives={**system.objectives, COST: self.cost})
+            plant = "components.plant.parameters."
+            return [
+                changed(system, {f"{plant}{name}": value for name, value in start.parameters.items()})
+                for start in starts.drawn(Trajectory())
+            ]
+
+    def judging(self) -> Starts:
+        """The starts that the outcome is judged on."""
+        return replace(self.starts, first=self.starts.first + self.starts.count, count=self.judged)
+
+    def mean_cost(self, flights: Sequence[dict[str, Any]]) -> float:
+        """Of flights by their metrics."""
+        return sum(self._cost(metrics) for metrics in flights) / len(flights)
+
+    def _cost(self, metrics: dict[str, Any]) -> float:
+        cost = metrics[COST]
+        return self.bad if cost is None or not is_good(metrics) else min(float(cost), self.bad)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Found:
+    """The outcome of one search."""
+
+    period: float
+    """[s]"""
+    seed: int
+    values: dict[str, float]
+    """of each target"""
+    cost: float
+    """on the starts that it was tuned on"""
+    judged_cost: float
+    """on the others"""
+    flown: int
+    """of those on which it is judged"""
+    judged: int
+    share: tuple[float, float]
+    """Wilson interval of the share that flies, at 95 %"""
+    evaluations: int
+
+
+def search(tuning: Tuning, period: float, seed: int, fly: Fly, progress: Callable[[float], None]) -> Found:
+    """The best of one search by CMA-ES (Hansen, arXiv:1604.00772), begun at a point that the seed draws."""
+    import cma  # with it comes matplotlib
+
+    first = np.random.default_rng(seed).uniform(0.25, 0.75, len(tuning.parameters))
+    options = {"bounds": [0.0, 1.0], "seed": seed + 1, "verbose": -9}
+    strategy = cma.CMAEvolutionStrategy(first, _WIDTH, options)
+    best, lowest, count = first, np.inf, 0
+    while count < tuning.budget:  # whatever the optimiser thinks of it: every controller gets the same effort
+        candidates = [np.asarray(candidate) for candidate in strategy.ask()]
+        costs = _costs(tuning, period, candidates, fly)
+        strategy.tell(candidates, costs)
+        count += len(candidates)
+        place = int(np.argmin(costs))
+        if costs[place] < lowest:
+            best, lowest = candidates[place], costs[place]
+        progress(min(1.0, count / tuning.budget))
+    values = tuning.values(list(best))
+    judged = fly(tuning.systems(period, values, tuning.judging()))
+    flown = sum(map(is_good, judged))
+    return Found(
+        period=period,
+        seed=seed,
+        values=values,
+        cost=float(lowest),
+        judged_cost=tuning.mean_cost(judged),
+        flown=flown,
+        judged=len(judged),
+        share=wilson(flown, len(judged)),
+        evaluations=count,
+    )
+
+
+def _costs(tuning: Tuning, period: float, candidates: Sequence[Floats], fly: Fly) -> list[float]:
+    """The mean cost of each candidate; all their flights are flown together."""
+    systems = [
+        system
+        for candidate in candidates
+        for system in tuning.systems(period, tuning.values(list(candidate)), tuning.starts)
+    ]
+    flights, size = fly(systems), tuning.starts.count
+    return [tuning.mean_cost(flights[i : i + size]) for i in range(0, len(flights), size)]
+
+
+def best_by_period(found: Sequence[Found]) -> Iterator[Found]:
+    """Of the searches for each period the one whose cost on the starts that it was tuned on is lowest."""
+    for period in dict.fromkeys(one.period for one in found):
+        yield min((one for one in found if one.period == period), key=lambda one: one.cost)

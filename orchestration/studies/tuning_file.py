@@ -1,0 +1,130 @@
+"""Reads files that say what is tuned, and writes what was found."""
+
+import dataclasses
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pydantic
+
+from orchestration.documents import read_toml
+from orchestration.errors import UsageError
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.scenario_file import first_problem
+from orchestration.request import load_request, request_from_tables
+from orchestration.studies.starts import Starts
+from orchestration.studies.study_file import AxisTable, axis_of
+from orchestration.studies.tuning import Found, Tuning
+
+_FORBID: dict[str, str] = {"extra": "forbid"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CostTable:
+    """`[cost]`: of a flight that flies, by its objectives, and of one that does not."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
+
+    of: str
+    bad: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class StartsTable(Starts):
+    """`[starts]`: those that are tuned on, and how many come after them to judge by."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
+
+    judged: int = 200
+
+
+@dataclass(frozen=True, kw_only=True)
+class SearchTable:
+    """`[search]`: the effort."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
+
+    periods: list[float]
+    evaluations: int
+    seeds: list[int]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TuningFile:
+    """The file: a scenario, or the path of one, and what of it is tuned."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
+
+    cost: CostTable
+    search: SearchTable
+    parameters: list[AxisTable]
+    starts: StartsTable = field(default_factory=StartsTable)
+    name: str | None = None
+    scenario: str | None = None
+    base: dict[str, Any] = field(default_factory=dict)
+
+
+def load_tuning(path: str | Path) -> Tuning:
+    """Read such a file; paths in it are relative to its folder.
+
+    Raises `UsageError` for a file that cannot be read, a key that does not exist (naming those that do) or a value
+    that cannot be.
+    """
+    path = Path(path)
+    tables = read_toml(path, "tuning file")
+    try:
+        return _tuning(tables, path)
+    except UsageError as error:
+        raise UsageError(f"{path}: {error}") from error
+
+
+def _tuning(tables: dict[str, Any], path: Path) -> Tuning:
+    try:
+        file = pydantic.TypeAdapter(TuningFile).validate_json(json.dumps(tables, default=str), strict=True)
+    except pydantic.ValidationError as error:
+        raise UsageError(first_problem(error, TuningFile)) from error
+    if file.scenario is not None and file.base:
+        raise UsageError("scenario and base: expected one of them")
+    base = load_request(path.parent / file.scenario) if file.scenario else request_from_tables(file.base, path.parent)
+    if not isinstance(base, Scenario):
+        raise UsageError("base: expected a scenario of the quadrotor, whose starts are known")
+    parameters = tuple(axis_of(table, path.parent) for table in file.parameters)
+    for axis in parameters:
+        if axis.values is not None or axis.multiplies:
+            raise UsageError(f"parameters {axis.name}: expected start and stop, and what it sets")
+    given = {f.name: getattr(file.starts, f.name) for f in dataclasses.fields(Starts)}
+    return Tuning(
+        name=file.name or path.stem,
+        base=base,
+        parameters=parameters,
+        cost=file.cost.of,
+        bad=file.cost.bad,
+        starts=Starts(**given),
+        judged=file.starts.judged,
+        periods=tuple(file.search.periods),
+        evaluations=file.search.evaluations,
+        seeds=tuple(file.search.seeds),
+    )
+
+
+def gains_text(tuning: Tuning, best: Found, all_found: Sequence[Found], command: str) -> str:
+    """The file of tuned gains: parameters by their tables, and where they come from in comments."""
+    import tomli_w
+
+    others = [one for one in all_found if one.period == best.period]
+    low, high = best.share
+    lines = [
+        f"Tuned for a period of {best.period:g} s by: {command}",
+        f"{best.evaluations} evaluations of the mean of ({tuning.cost}), {tuning.bad:g} where it does not fly, over",
+        f"{tuning.starts.count} starts; of {len(others)} searches the one that costs least on these.",
+        f"Mean cost {best.cost:.5g}; on {best.judged} other starts {best.judged_cost:.5g}, and",
+        f"{best.flown} of them fly, a share of {low:.3f} to {high:.3f} (Wilson, 95 %).",
+        "The searches' costs on the other starts: " + ", ".join(f"{one.judged_cost:.5g}" for one in others),
+    ]
+    tables: dict[str, dict[str, float]] = {}
+    for target, value in best.values.items():
+        side, _, name = target.partition(".")
+        tables.setdefault(side, {})[name] = float(f"{value:.6g}")
+    return "".join(f"# {line}\n" for line in lines) + "\n" + tomli_w.dumps(tables)

@@ -1,0 +1,169 @@
+import itertools
+import math
+from dataclasses import replace
+
+import pytest
+
+from orchestration.documents import read_toml
+from orchestration.errors import UsageError
+from orchestration.studies.starts import Starts
+from orchestration.studies.tune import tune
+from orchestration.studies.tuning import Tuning, best_by_period, search
+from orchestration.studies.tuning_file import load_tuning
+from orchestration.system.paths import value_at
+
+FILE = """
+[base]
+stop_time = 5.0
+[base.controller]
+fmu = "native/UnifiedController"
+[base.plant]
+fmu = "native/QuadrotorPlant"
+[base.timing]
+plant_interval = 0.005
+[cost]
+of = "position_rmse + 0.01 * total_variation.torque / stop_time"
+bad = 10.0
+[starts]
+count = 3
+judged = 4
+position = 1.0
+[search]
+periods = [0.01, 0.02]
+evaluations = 100
+seeds = [1, 2]
+[[parameters]]
+name = "attitude"
+sets = ["controller.gain.attitude", "controller.gain.theta"]
+start = 1.0
+stop = 100.0
+scale = "logarithmic"
+[[parameters]]
+name = "surface"
+sets = ["controller.gain.surface"]
+start = 0.5
+stop = 20.0
+"""
+GAINS = "components.controller.parameters.gain"
+
+
+@pytest.fixture
+def tuning(tmp_path) -> Tuning:
+    (tmp_path / "bowl.toml").write_text(FILE)
+    return load_tuning(tmp_path / "bowl.toml")
+
+
+def bowl(systems):
+    """Metrics as of flights whose cost is lowest at an attitude gain of 10 and a surface gain of 5."""
+    found = []
+    for system in systems:
+        attitude, surface = (value_at(system, f"{GAINS}.{name}") for name in ("attitude", "surface"))
+        cost = 1.0 + math.log(attitude / 10.0) ** 2 + (surface - 5.0) ** 2
+        found.append({"cost": cost, "good": cost < 50.0})
+    return found
+
+
+def test_a_search_finds_the_bottom_of_a_bowl(tuning):
+    found = search(tuning, 0.01, 1, bowl, lambda share: None)
+    assert found.values["controller.gain.attitude"] == pytest.approx(10.0, rel=0.02)
+    assert found.values["controller.gain.surface"] == pytest.approx(5.0, rel=0.02)
+    assert found.values["controller.gain.theta"] == found.values["controller.gain.attitude"]
+    assert found.cost == pytest.approx(1.0, abs=1e-3)
+    assert found.evaluations <= tuning.budget + 10
+
+
+def test_the_same_seed_searches_the_same_way_and_another_another(tuning):
+    one, again, other = (search(tuning, 0.01, seed, bowl, lambda share: None) for seed in (1, 1, 2))
+    assert one == again
+    assert one.values != other.values
+
+
+def test_what_does_not_fly_costs_what_is_said_and_nothing_costs_more(tuning):
+    flights = [
+        {"cost": 1.0, "good": True},
+        {"cost": 1.0, "good": False},
+        {"cost": None, "good": True},
+        {"cost": 99.0, "good": True},
+    ]
+    assert tuning.mean_cost(flights) == pytest.approx((1.0 + 10.0 + 10.0 + 10.0) / 4)
+
+
+def test_no_start_is_both_tuned_on_and_judged_on(tuning):
+    seen = []
+
+    def fly(systems):
+        seen.append(
+            [tuple(value_at(s, f"components.plant.parameters.initial.velocity.{a}") for a in "xyz") for s in systems]
+        )
+        return bowl(systems)
+
+    search(tuning, 0.01, 1, fly, lambda share: None)
+    trained, judged = set(itertools.chain(*seen[:-1])), set(seen[-1])
+    assert len(trained) == 3
+    assert len(judged) == 4
+    assert not trained & judged
+
+
+def test_flights_have_the_period_that_is_tuned_for(tuning):
+    systems = tuning.systems(0.02, tuning.values([0.5, 0.5]), tuning.starts)
+    assert {system.components["controller"].sampling.period for system in systems} == {0.02}
+
+
+def test_the_best_is_the_one_that_costs_least_where_it_was_tuned(tuning):
+    one = search(tuning, 0.01, 1, bowl, lambda share: None)
+    worse = replace(one, seed=2, cost=one.cost + 1.0, judged_cost=0.0)
+    assert list(best_by_period([worse, one])) == [one]
+
+
+def test_a_tuning_goes_on_where_it_was_stopped(tuning, tmp_path):
+    files, told, count = tuning.files(), [], 0
+
+    def fly(systems):
+        nonlocal count
+        count += len(systems)
+        if count > 2000:
+            raise KeyboardInterrupt
+        return bowl(systems)
+
+    how = {"command": "quadcosim tune", "progress": lambda share: None, "announce": told.append}
+    with pytest.raises(KeyboardInterrupt):
+        tune(tuning, files, tmp_path / "kept", tmp_path / "gains", fly, **how)
+    before = list(told)
+    assert 0 < len(before) < 4
+    written = tune(tuning, files, tmp_path / "kept", tmp_path / "gains", bowl, **how)
+    assert len(told) == 4
+    assert [path.name for path in written] == ["bowl_10ms.toml", "bowl_20ms.toml"]
+    tune(tuning, files, tmp_path / "kept", tmp_path / "gains", lambda systems: pytest.fail("flown again"), **how)
+    gains = read_toml(written[0], "gains")["controller"]
+    assert set(gains) == {"gain.attitude", "gain.theta", "gain.surface"}
+    assert "of 2 searches" in written[0].read_text()
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "named"),
+    [
+        ('bad = 10.0', 'bad = 10.0\nworse = 1', "cost.worse: no such key; expected one of of, bad"),
+        ("stop = 20.0", "", "axis surface: expected values, or start and stop, with number or to be sampled"),
+        ("start = 0.5\nstop = 20.0", "values = [1.0]", "parameters surface: expected start and stop, and what it sets"),
+        ("seeds = [1, 2]", "seeds = []", "seeds: expected at least one"),
+        ("evaluations = 100", "evaluations = 0", "evaluations = 0: expected at least 1"),
+        ("controller.gain.surface", "controler.gain.surface", "controler.gain.surface: expected controller.NAME"),
+        ("count = 3", "count = 0", "starts.count = 0: expected a whole number from 1"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_file_is_said(tmp_path, before, after, named):
+    path = tmp_path / "bowl.toml"
+    path.write_text(FILE.replace(before, after))
+    with pytest.raises(UsageError) as error:
+        load_tuning(path)
+    assert str(error.value).startswith(f"{path}: {named}")
+
+
+def test_one_parameter_is_no_tuning(tuning):
+    with pytest.raises(UsageError, match="expected at least two"):
+        replace(tuning, parameters=tuning.parameters[:1])
+
+
+def test_starts_that_are_judged_on_come_after_the_others(tuning):
+    assert tuning.judging() == replace(tuning.starts, first=3, count=4)
+    assert isinstance(tuning.starts, Starts)
