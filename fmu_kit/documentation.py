@@ -97,7 +97,7 @@ def _tables(variables: Sequence[Variable]) -> Iterator[str]:
         chosen = [v for v in variables if v.causality == causality]
         if chosen:
             yield f"<h3>{heading} ({len(chosen)})</h3>"
-            columns = ("Name", "Unit", "Start", "Min", "Max", "Variability", "Description")
+            columns = ("Name", "Unit", "Start", "Min", "Max", "Items", "Variability", "Description")
             yield _table(columns, [_row(alike) for alike in _vectors(chosen)])
 
 
@@ -116,13 +116,14 @@ def _row(alike: list[Variable]) -> tuple[str, ...]:
     first = alike[0]
     vector = first.name.rpartition(".")[0]
     axes = ",".join(variable.name.rpartition(".")[2] for variable in alike)
-    starts = [_number(variable.start) for variable in alike if variable.has_start]
+    starts = [_start(variable) for variable in alike if variable.has_start]
     return (
         _code(f"{vector}.{{{axes}}}" if len(alike) > 1 else first.name),
         escape(first.unit) if first.unit is not None else first.type,
         starts[0] if len(set(starts)) == 1 else ", ".join(starts),
         _number(first.minimum) if first.above is None else f"&gt; {_number(first.above)}",
         _number(first.maximum),
+        ", ".join(f"{value}&nbsp;{_code(name)}" for name, value in first.items.items()),
         first.variability,
         escape(first.description),
     )
@@ -138,6 +139,12 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def _code(text: str) -> str:
     return f"<code>{escape(text)}</code>"
+
+
+def _start(variable: Variable) -> str:
+    """The start value, that of an Enumeration by its item."""
+    items = {value: name for name, value in variable.items.items()}
+    return _code(items[int(variable.start)]) if items else _number(variable.start)
 
 
 def _number(value: float | int | bool | None) -> str:

@@ -6,7 +6,7 @@ digits only; here every number is written in its shortest exact form.
 
 import datetime
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
@@ -48,6 +48,7 @@ def to_xml(slave: Any, sources: Sequence[str] | None = None) -> Element:
         for name in sources:
             SubElement(files, "File", name=name)
     add_units(root, slave.variables)
+    add_types(root, slave.variables, _simple_type)
     add_log_categories(root, {**slave.log_categories, **({} if sources is None else NATIVE_LOG_CATEGORIES)})
     add_experiment(root, slave)
     annotations = SubElement(root, "VendorAnnotations")
@@ -95,6 +96,18 @@ def add_units(root: Element, variables: tuple[Variable, ...]) -> None:
         SubElement(unit, "BaseUnit", attrib=exponents)
 
 
+def add_types(root: Element, variables: tuple[Variable, ...], add_type: Callable[[Element, str], Element]) -> None:
+    """The Enumerations of variables with their items; `add_type` adds what holds the items of one, by its name."""
+    found = {v.declared_type: v.items for v in variables if v.declared_type is not None}
+    if not found:
+        return
+    types = SubElement(root, "TypeDefinitions")
+    for name, items in sorted(found.items()):
+        listed = add_type(types, name)
+        for item, value in items.items():
+            SubElement(listed, "Item", name=item, value=str(value))
+
+
 def add_log_categories(root: Element, descriptions: Mapping[str, str]) -> None:
     """The categories of messages, by name with what they are for."""
     categories = SubElement(root, "LogCategories")
@@ -129,8 +142,10 @@ def attributes(variable: Variable, value_reference: int) -> dict[str, str]:
 
 
 def type_attributes(variable: Variable) -> dict[str, str]:
-    """Start, unit and bounds of a variable."""
+    """Declared type, start, unit and bounds of a variable."""
     found: dict[str, str] = {}
+    if variable.declared_type is not None:
+        found["declaredType"] = variable.declared_type
     if variable.has_start:
         found["start"] = _literal(variable.start)
     if variable.unit is not None:
@@ -151,8 +166,14 @@ def dependencies(slave: Any) -> tuple[list[int], list[int]]:
     return outputs, inputs if slave.initial_outputs_depend_on_inputs else []
 
 
+def _simple_type(types: Element, name: str) -> Element:
+    return SubElement(SubElement(types, "SimpleType", name=name), "Enumeration")
+
+
 def _literal(value: float | int | bool) -> str:
-    return str(value).lower() if isinstance(value, bool) else repr(value)
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(int(value)) if isinstance(value, int) else repr(value)
 
 
 def _add_structure(root: Element, slave: Any) -> None:

@@ -109,7 +109,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._reals: list[float] = [float(v) for v in starts[: self._real_count]]
         self._others: dict[int, int | bool] = {
             i: int(v) for i, v in enumerate(starts) if i >= self._real_count
-        }  # Integers and Booleans by value reference
+        }  # all but Reals, by value reference
         self._phase = Phase.INSTANTIATED
         self._initialised = False
         self._start_time = 0.0
@@ -166,6 +166,10 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         listed = ", ".join(f"{axis} {value:g}" for axis, value in entries.items())
         require(is_positive_definite(**entries), "inertia.{xx,yy,zz,xy,xz,yz}", listed, "a positive definite matrix")
         return Inertia(**entries)
+
+    def enumeration(self, name: str) -> int:
+        """The value of an Enumeration: to be compared with the members of its `IntEnum`."""
+        return int(self._others[self._index[name]])
 
     def put(self, name: str, value: float) -> None:
         """Set a Real variable."""
@@ -269,14 +273,14 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     @guarded
     def get_integer(self, vrs: list[int]) -> list[int]:
-        """fmi2GetInteger."""
+        """fmi2GetInteger; it is for Enumerations too."""
         self._bring_up_to_date(vrs)
-        return [int(self._others[vr]) for vr in self._of_type(vrs, "Integer")]
+        return [int(self._others[vr]) for vr in self._of_type(vrs, "Integer", "Enumeration")]
 
     @guarded
     def set_integer(self, vrs: list[int], values: list[int]) -> None:
-        """fmi2SetInteger."""
-        self._set_others("Integer", vrs, values)
+        """fmi2SetInteger; it is for Enumerations too."""
+        self._set_others(vrs, values, "Integer", "Enumeration")
 
     @guarded
     def get_boolean(self, vrs: list[int]) -> list[bool]:
@@ -287,7 +291,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     @guarded
     def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
         """fmi2SetBoolean."""
-        self._set_others("Boolean", vrs, values)
+        self._set_others(vrs, values, "Boolean")
 
     @guarded
     def get_string(self, vrs: list[int]) -> list[str]:
@@ -362,17 +366,17 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._stale = False
 
     def _check_parameters(self) -> None:
-        for variable, value in zip(self.variables, self._reals):
-            if variable.causality == "parameter":
-                variable.check(value)
+        for i, variable in enumerate(self.variables):
+            if variable.causality == "parameter" and variable.type != "Boolean":
+                variable.check(self._reals[i] if i < self._real_count else self._others[i])
 
     def _expect(self, phase: Phase, call: str) -> None:
         if self._phase is not phase:
             raise FmuError(f"{call} in phase {self._phase.name.lower()}: expected phase {phase.name.lower()}")
 
-    def _settable(self, vr: int, kind: str) -> Variable:
-        """The variable of `vr` if its value may be set now; raises `FmuError` if not."""
-        self._of_type([vr], kind)
+    def _settable(self, vr: int, *types: str) -> Variable:
+        """The variable of `vr`, of one of the types, if its value may be set now; raises `FmuError` if not."""
+        self._of_type([vr], *types)
         variable = self.variables[vr]
         if not variable.has_start:
             raise FmuError(f"{variable.name}: a variable with causality {variable.causality} cannot be set")
@@ -382,21 +386,21 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             self._stale = True
         return variable
 
-    def _set_others(self, kind: str, vrs: list[int], values: Iterable[int | bool]) -> None:
+    def _set_others(self, vrs: list[int], values: Iterable[int | bool], *types: str) -> None:
         for vr, value in zip(vrs, values):
-            self._settable(vr, kind)
+            self._settable(vr, *types)
             self._others[vr] = value
 
-    def _of_type(self, vrs: list[int], kind: str) -> list[int]:
-        if any(not 0 <= vr < len(self.variables) or self.variables[vr].type != kind for vr in vrs):
-            raise self._wrong_type(vrs, kind)
+    def _of_type(self, vrs: list[int], *types: str) -> list[int]:
+        if any(not 0 <= vr < len(self.variables) or self.variables[vr].type not in types for vr in vrs):
+            raise self._wrong_type(vrs, *types)
         return vrs
 
-    def _wrong_type(self, vrs: list[int], kind: str) -> FmuError:
-        known = [i for i, v in enumerate(self.variables) if v.type == kind]
+    def _wrong_type(self, vrs: list[int], *types: str) -> FmuError:
+        known = [i for i, v in enumerate(self.variables) if v.type in types]
         expected = f"{known[0]} to {known[-1]}" if known else "none, this FMU has no such variables"
         bad = [vr % 2**32 for vr in vrs if vr not in known]  # the native part passes them as signed numbers
-        return FmuError(f"value reference {bad}: expected one of a {kind} variable ({expected})")
+        return FmuError(f"value reference {bad}: expected one of a {types[0]} variable ({expected})")
 
     def _failed(self, error: Exception) -> Failure:
         failure = report(self, error, again=self._has_failed)

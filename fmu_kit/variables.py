@@ -1,5 +1,6 @@
 """Declarations of FMI variables: a slave lists them, and everything else is derived from the list."""
 
+import enum
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -9,14 +10,16 @@ from fmu_kit.errors import require
 
 Causality = Literal["input", "output", "parameter", "local"]
 Variability = Literal["continuous", "discrete", "fixed", "tunable"]
+Type = Literal["Real", "Integer", "Boolean", "Enumeration"]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Variable:
     """One scalar variable of FMI 2.0; its value reference is its place in the slave's list.
 
-    The type of `start` is the type of the variable. `minimum` and `maximum` are inclusive, `above` is an
-    exclusive lower bound; they are checked for parameters when initialisation ends.
+    The type of `start` is the type of the variable; one that is a member of an `IntEnum` makes an Enumeration of the
+    members, named in lower case, for a parameter only. `minimum` and `maximum` are inclusive, `above` is an exclusive
+    lower bound; they are checked for parameters when initialisation ends.
     """
 
     name: str
@@ -29,12 +32,31 @@ class Variable:
     maximum: float | None = None
     above: float | None = None
 
+    def __post_init__(self) -> None:
+        """Raise `TypeError` for an Enumeration that a check of its range would not do for."""
+        if self.items and (self.causality != "parameter" or [*self.items.values()] != [*range(1, len(self.items) + 1)]):
+            raise TypeError(f"{self.name}: expected an Enumeration to be a parameter, its items 1, 2, …")
+
     @property
-    def type(self) -> Literal["Real", "Integer", "Boolean"]:
+    def type(self) -> Type:
         """The FMI type."""
         if isinstance(self.start, bool):
             return "Boolean"
+        if isinstance(self.start, enum.IntEnum):
+            return "Enumeration"
         return "Integer" if isinstance(self.start, int) else "Real"
+
+    @property
+    def items(self) -> dict[str, int]:
+        """Of an Enumeration, its values by name, in their order; nothing for other types."""
+        return (
+            {item.name.lower(): int(item) for item in type(self.start)} if isinstance(self.start, enum.IntEnum) else {}
+        )
+
+    @property
+    def declared_type(self) -> str | None:
+        """The name of the type that an Enumeration is of; None for other types."""
+        return type(self.start).__name__ if self.items else None
 
     @property
     def has_start(self) -> bool:
@@ -44,6 +66,9 @@ class Variable:
     @property
     def bounds(self) -> str:
         """The allowed values, in words."""
+        if self.items:
+            *others, last = (f"{value} ({name})" for name, value in self.items.items())
+            return f"{', '.join(others)} or {last}" if others else last
         parts = []
         if self.above is not None:
             parts.append(f"> {self.above:g}")
@@ -51,10 +76,14 @@ class Variable:
             parts.append(f">= {self.minimum:g}")
         if self.maximum is not None:
             parts.append(f"<= {self.maximum:g}")
-        return "a finite value" + (" " + " and ".join(parts) if parts else "")
+        kind = "a finite value" if self.type == "Real" else "a whole number"
+        return kind + (" " + " and ".join(parts) if parts else "")
 
     def check(self, value: float) -> None:
-        """Raise `FmuError` if `value` is not finite or out of bounds."""
+        """Raise `FmuError` if `value` is not finite, out of bounds or no item of an Enumeration."""
+        if self.items:
+            require(1 <= value <= len(self.items), self.name, value, self.bounds)
+            return
         inside = (
             math.isfinite(value)
             and (self.above is None or value > self.above)

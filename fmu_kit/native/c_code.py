@@ -388,7 +388,8 @@ _TAKEN = KEYWORDS | {
     "begin", "create", "advance", "end", "save", "restore", "forget", "derive", "to_bytes", "from_bytes",
     "set_logging", "take_start_time", "enter_initialization", "exit_initialization", "are_of", "are_as_many",
     "bring_up_to_date", "get_reals", "get_integers", "get_booleans", "get_reals_and_time", "set_reals", "set_integers",
-    "set_booleans", "text_begin", "text_add", "text_real", "text_integer", "as_it_is", "as_int",
+    "set_booleans", "get_enumerations", "set_enumerations", "text_begin", "text_add", "text_real", "text_integer",
+    "as_it_is", "as_int",
     "owner", "log_if_wanted", "make_printable", "expect_own",
 }  # fmt: skip
 

@@ -9,7 +9,7 @@ from fmu_kit import model_description
 from fmu_kit.model_description import GUID_PLACEHOLDER, NATIVE_LOG_CATEGORIES
 from fmu_kit.variables import Variable
 
-TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
+TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
 """Of variables, by their names in FMI 2.0"""
 
 
@@ -35,6 +35,9 @@ def to_xml(slave: Any) -> Element:
         hasEventMode="false",
     )
     model_description.add_units(root, slave.variables)
+    model_description.add_types(
+        root, slave.variables, lambda types, name: SubElement(types, "EnumerationType", name=name)
+    )
     model_description.add_log_categories(root, {**slave.log_categories, **NATIVE_LOG_CATEGORIES})
     model_description.add_experiment(root, slave)
     variables = SubElement(root, "ModelVariables")

@@ -118,6 +118,7 @@ def comment(text: str) -> str:
 def described(variable: Variable) -> str:
     """What a variable is, by the words of the slave."""
     unit = f" [{variable.unit}]" if variable.unit else ""
-    kind = {"Real": "", "Integer": "an integer; ", "Boolean": "0 or 1; "}[variable.type]
-    bounds = f"; {variable.bounds.removeprefix('a finite value ')}" if variable.bounds != "a finite value" else ""
-    return comment(f"{variable.name}{unit}: {kind}{variable.description}{bounds}")
+    kind = {"Real": "", "Integer": "an integer; ", "Boolean": "0 or 1; ", "Enumeration": ""}[variable.type]
+    _, _, bounds = variable.bounds.rpartition("a finite value")
+    bounds = bounds.removeprefix("a whole number").strip()
+    return comment(f"{variable.name}{unit}: {kind}{variable.description}{bounds and '; '}{bounds}")

@@ -152,6 +152,9 @@ static Status get_reals_and_time(Instance *m, References vr, size_t n, double *v
     return OK;
 }
 
+GET(enumerations, ENUMERATION, int64_t, as_int)
+SET(enumerations, ENUMERATION, int64_t, (double)value[i])
+
 #define ACCESS(kind, get, set, ctype) \
     CALL(Get##kind, References vr, size_t n, ctype *value, size_t values) \
     { \
@@ -167,6 +170,7 @@ static Status get_reals_and_time(Instance *m, References vr, size_t n, double *v
 ACCESS(Float64, get_reals_and_time, set_reals, double)
 ACCESS(Int32, get_integers, set_integers, int32_t)
 ACCESS(Boolean, get_booleans, set_booleans, bool)
+ACCESS(Int64, get_enumerations, set_enumerations, int64_t)
 
 /* Of types that no variable has; some hosts ask for none of them. */
 #define NO_VARIABLES(name, ...) \
@@ -190,7 +194,6 @@ NONE_OF(UInt8, uint8_t)
 NONE_OF(Int16, int16_t)
 NONE_OF(UInt16, uint16_t)
 NONE_OF(UInt32, uint32_t)
-NONE_OF(Int64, int64_t)
 NONE_OF(UInt64, uint64_t)
 NONE_OF(String, Text)
 NO_VARIABLES(GetBinary, size_t *sizes, const uint8_t **values, size_t n_values)

@@ -19,7 +19,7 @@ from fmu_kit.native.structure import (
 from fmu_kit.native.symbols import Kind, Symbol, TraceError, common_kind, lifted, node
 from fmu_kit.slave import Slave
 
-_KINDS: dict[str, Kind] = {"Real": "real", "Integer": "int", "Boolean": "bool"}
+_KINDS: dict[str, Kind] = {"Real": "real", "Integer": "int", "Boolean": "bool", "Enumeration": "int"}
 _TYPES: dict[Kind, str] = {"real": "a float", "int": "an integer", "bool": "a truth value"}
 KEPT_BY_THE_BASE = ("_reals", "_others", "_stale", "_start_time")
 

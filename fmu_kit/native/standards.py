@@ -25,7 +25,7 @@ class Standard:
     calls: Mapping[str, str]
     """the functions that a phase may refuse, by what instance.h calls them"""
     types: Mapping[str, str]
-    """what it calls the types, by what FMI 2.0 does"""
+    """whose functions get and set values of a type: that type's name, by what FMI 2.0 calls the first"""
 
 
 def _build_description(model: str, main: str) -> dict[str, bytes]:
@@ -48,7 +48,13 @@ STANDARDS = {
             "EXIT_INITIALIZATION_MODE": "fmi2ExitInitializationMode",
             "DO_STEP": "fmi2DoStep",
         },
-        types={name: name for name in ("Real", "Integer", "Boolean", "String")},
+        types={
+            "Real": "Real",
+            "Integer": "Integer",
+            "Boolean": "Boolean",
+            "String": "String",
+            "Enumeration": "Integer",
+        },
     ),
     3: Standard(
         version=3,
@@ -61,7 +67,13 @@ STANDARDS = {
             "EXIT_INITIALIZATION_MODE": "fmi3ExitInitializationMode",
             "DO_STEP": "fmi3DoStep",
         },
-        types={"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String"},
+        types={
+            "Real": "Float64",
+            "Integer": "Int32",
+            "Boolean": "Boolean",
+            "String": "String",
+            "Enumeration": "Enumeration",
+        },
     ),
 }
 """By version"""

@@ -38,6 +38,10 @@ def tables(program: Program, guid: str, standard: Standard) -> str:
     variables = program.slave.variables
     places = place_names(program.places)
     inputs = [(1 if v.has_start else 0) + (2 if v.causality == "input" else 0) for v in variables]
+    alike = {
+        type: [other for other, its_name in standard.types.items() if its_name == name]
+        for type, name in standard.types.items()
+    }
     parts = [
         f"#define GUID {c_string(guid)}",
         f"#define MODEL {c_string(program.model)}",
@@ -45,8 +49,9 @@ def tables(program: Program, guid: str, standard: Standard) -> str:
         "/* The memory: the variables by value reference, then what the model keeps. */",
         _listed("enum", [*(places[place.name] for place in program.places), "PLACES"]) + ";",
         f"enum {{ DIVERGENCE = {1 + ERRORS.index('DivergenceError')} }}; /* what a function returns in that case */",
-        "typedef enum { REAL, INTEGER, BOOLEAN, STRING } Type;",
-        _array("Type types[VARIABLES]", (v.type.upper() for v in variables)),
+        "typedef enum { REAL, INTEGER, BOOLEAN, STRING, ENUMERATION } Type;",
+        "/* By whose functions they are got and set. */",
+        _array("Type types[VARIABLES]", (alike[v.type][0].upper() for v in variables)),
         _array("double starts[PLACES]", (repr(start_of(slave, place)) for place in program.places)),
         "enum { GIVEN = 1, INPUT = 2 }; /* from outside; while the FMU is stepped as well */",
         _array("unsigned char kinds[VARIABLES]", map(str, inputs)),
@@ -66,7 +71,7 @@ def tables(program: Program, guid: str, standard: Standard) -> str:
         "static const Text foreign_state[2] = "
         f"{_around('None, 0', slave, expect_state, {}, program.model, variables)};",
         f"static const Text bad_start_time[2] = {_around('nan', slave, _SET_START, slave, math.nan)};",
-        _array("Text wrong_type[4][2]", (_wrong_type(slave, *names) for names in standard.types.items())),
+        _array("Text wrong_type[5][2]", (_wrong_type(slave, alike[type], standard.types[type]) for type in alike)),
     ]
     return "\n".join(parts) + "\n"
 
@@ -105,9 +110,9 @@ def _refused_value(slave: Slave, reference: int) -> str:
     return _around("nan", slave, _SET_REAL, slave, [reference], [math.nan])
 
 
-def _wrong_type(slave: Slave, type: str, called: str) -> str:
-    """What it answers to a value reference that no variable of a type has: before the reference, and after it."""
-    return _around(f"{_UNUSED}", slave, slave._of_type, [_UNUSED], type).replace(f" {type} ", f" {called} ")
+def _wrong_type(slave: Slave, types: list[str], called: str) -> str:
+    """What it answers to a value reference that no variable of some types has: before the reference, and after it."""
+    return _around(f"{_UNUSED}", slave, slave._of_type, [_UNUSED], *types).replace(f" {types[0]} ", f" {called} ")
 
 
 def _around(value: str, slave: Slave, call: Callable[..., object], *given: object) -> str:

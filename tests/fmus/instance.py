@@ -69,8 +69,8 @@ class Instance:
         """Set variables by name."""
         for name, value in values.items():
             variable = self.variables[name]
-            setter = {"Real": self.fmu.setReal, "Integer": self.fmu.setInteger, "Boolean": self.fmu.setBoolean}
-            setter[variable.type]([variable.valueReference], [value])
+            setter = {"Real": self.fmu.setReal, "Boolean": self.fmu.setBoolean}
+            setter.get(variable.type, self.fmu.setInteger)([variable.valueReference], [value])
 
     def get(self, *names: str) -> list[float]:
         """The values of Real variables."""
@@ -79,8 +79,8 @@ class Instance:
     def value(self, name: str) -> Any:
         """The value of a variable of any type."""
         variable = self.variables[name]
-        getter = {"Real": self.fmu.getReal, "Integer": self.fmu.getInteger, "Boolean": self.fmu.getBoolean}
-        return getter[variable.type]([variable.valueReference])[0]
+        getter = {"Real": self.fmu.getReal, "Boolean": self.fmu.getBoolean}
+        return getter.get(variable.type, self.fmu.getInteger)([variable.valueReference])[0]
 
     def names(self, *causalities: str) -> list[str]:
         """Real variables of these causalities."""

@@ -1,5 +1,6 @@
 """Slaves that do what slaves may do and be written out as C, each some of it."""
 
+import enum
 import math
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
@@ -20,8 +21,16 @@ from fmu_kit.variables import (
 )
 
 
+class Mode(enum.IntEnum):
+    """Items of an Enumeration."""
+
+    AS_IT_IS = 1
+    TURNED = 2
+    DOUBLED = 3
+
+
 class Probe(Slave):
-    """What all have: inputs a, b, n, on; parameters p, q; outputs y0 to y7, count, lit."""
+    """What all have: inputs a, b, n, on; parameters p, q, times, mode; outputs y0 to y7, count, lit."""
 
     variables: ClassVar[tuple[Variable, ...]] = (
         continuous_input("a", "A number.", None),
@@ -33,6 +42,8 @@ class Probe(Slave):
         discrete_output("count", "A whole number.", None, 0),
         discrete_input("on", "A truth value.", None, False),
         discrete_output("lit", "A truth value.", None, False),
+        fixed_parameter("times", "How often.", None, 2, minimum=0, maximum=9),
+        tunable_parameter("mode", "What becomes of it.", None, Mode.TURNED),
     )
 
     def internal_state(self) -> State:
@@ -165,6 +176,38 @@ class Arithmetic(Probe):
         self.put("y5", a**2 - b**-2.0 if b else a**0.5 if a > 0.0 else -a + +b)
         self.put("y6", float(math.isnan(a / 2.0)) + (a == b) + float(n))
         self.put("y7", (n * n - n // 2) / 4)
+
+
+# -- choices -------------------------------------------------------------------------------------------------------
+
+
+def _chosen(x: float, mode: int) -> float:
+    if mode == Mode.AS_IT_IS:
+        return x
+    return -x if mode == Mode.TURNED else 2.0 * x
+
+
+class Choices(Probe):
+    """Branches on an Enumeration, and on a whole number that is a parameter."""
+
+    description = "Choices."
+
+    def read_parameters(self) -> None:
+        """One that is known from the parameters alone."""
+        self._offset = 10.0 if self.enumeration("mode") >= Mode.TURNED else 0.0
+
+    def initialise(self, t: float) -> None:
+        """Outputs of the inputs."""
+        self.step(t, 1.0)
+
+    def step(self, t: float, h: float) -> None:
+        """In a function, in a method and as a number."""
+        mode = self.enumeration("mode")
+        self.put("y0", _chosen(self.real("a"), mode) + self._offset)
+        self.put("y1", repeat(self.count("times"), lambda i, x: _chosen(x, mode), self.real("b")))
+        if mode != Mode.DOUBLED and self.count("times") > 1:
+            self.put("y2", t)
+        self.put_count("count", 10 * mode + self.count("times"))
 
 
 # -- what is kept ----------------------------------------------------------------------------------------------------

@@ -26,7 +26,7 @@ from tests.native import assert_the_same
 
 START = 0.5
 """[s]"""
-TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
+TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
 SOURCES = Path(c_code.__file__).parent
 
 
@@ -188,7 +188,7 @@ def test_what_is_refused_is_named_as_fmi_3_does(controller: Instance) -> None:
         "logStatusError: fmi3DoStep in phase instantiated: expected phase stepping",
         "logStatusError: value reference [9999]: expected one of a Float64 variable",
         "logStatusError: nValues: expected as many values as value references, for all variables are scalars",
-        "logStatusError: fmi3GetInt64: this FMU has no such variables",
+        "logStatusError: value reference [0]: expected one of a Enumeration variable",
     ]
 
 

@@ -11,12 +11,16 @@ from fmu_kit.packaging import slave_class
 from tests.fmu_kit.native.compiled import compiler
 from tests.fmu_kit.native.twins import InC, InPython, Values, answers, library
 
-PROBES = ("Branches", "Arithmetic", "Memory", "Kept", "Below", "Loops", "Words")
+PROBES = ("Branches", "Arithmetic", "Choices", "Memory", "Kept", "Below", "Loops", "Words")
 NUMBERS = st.sampled_from([0.0, -0.0, 0.5, 1.0, -1.0, 2.0, 3.0, 7.25, 100.0, 1e3, 1e200, -1e308]) | st.floats(-8.0, 8.0)
 INPUTS = st.fixed_dictionaries({"a": NUMBERS, "b": NUMBERS, "n": st.integers(-3, 12), "on": st.booleans()})
-TUNED = st.fixed_dictionaries({}, optional={"p": st.sampled_from([0.0, 2.0, -7.5, 13.0, 60.0, 200.0])})
+CHANGED = {"p": st.sampled_from([0.0, 2.0, -7.5, 13.0, 60.0, 200.0]), "mode": st.sampled_from([1, 2, 3, 0, 4])}
+TUNED = st.fixed_dictionaries({}, optional=CHANGED)
 STEPS = st.lists(st.tuples(INPUTS, TUNED).map(lambda both: both[0] | both[1]), max_size=5)
-FIXED = st.sampled_from([0.25, 2.0, 1e-3])
+FIXED = st.fixed_dictionaries(
+    {"q": st.sampled_from([0.25, 2.0, 1e-3])},
+    optional={"times": st.sampled_from([0, 1, 9, 10, -1]), "mode": st.sampled_from([1, 3, 4])},
+)
 
 
 @pytest.fixture(scope="module", params=PROBES)
@@ -33,9 +37,9 @@ def test_a_slave_in_c_answers_as_in_python(probe: tuple[Target, Path]) -> None:
     reset = InC.made(slave, path)
 
     @settings(derandomize=True, max_examples=150, database=None)
-    @given(start=INPUTS, q=FIXED, steps=STEPS)
-    def answer_alike(start: Values, q: float, steps: list[Values]) -> None:
-        given = {**start, "q": q}
+    @given(start=INPUTS, fixed=FIXED, steps=STEPS)
+    def answer_alike(start: Values, fixed: Values, steps: list[Values]) -> None:
+        given = {**start, **fixed}
         expected = answers(InPython(slave(instance_name="probe")), given, steps)
         reset.fmu.reset()
         assert answers(reset, given, steps) == expected

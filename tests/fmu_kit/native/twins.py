@@ -16,6 +16,7 @@ from fmu_kit.native.standards import STANDARDS
 from fmu_kit.native.tracing import trace
 from fmu_kit.packaging import slave_class
 from fmu_kit.slave import Slave
+from fmu_kit.variables import Variable
 
 GUID = "{00000000-0000-0000-0000-000000000000}"
 Values = Mapping[str, float | int | bool]
@@ -28,6 +29,11 @@ def library(target: Target, folder: Path) -> Path:
     path = folder / f"{target.model}.so"
     path.write_bytes(compiled_here(c_sources(program, GUID, STANDARDS[2]), STANDARDS[2].main, mathematics="libm"))
     return path
+
+
+def access(variable: Variable) -> str:
+    """The type whose functions of FMI 2.0 get and set a variable."""
+    return "Integer" if variable.type == "Enumeration" else variable.type
 
 
 def exact(value: float | int | bool) -> str:
@@ -58,8 +64,7 @@ class InPython:
     def _set(self, values: Values) -> None:
         for name, value in values.items():
             vr = type(self.slave)._index[name]
-            kind = self.slave.variables[vr].type.lower()
-            getattr(self.slave, f"set_{kind}")([vr], [value])
+            getattr(self.slave, f"set_{access(self.slave.variables[vr]).lower()}")([vr], [value])
 
     def _answer(self, call: Callable[[], object]) -> Answer:
         try:
@@ -114,7 +119,7 @@ class InC:
     def _set(self, values: Values) -> None:
         for name, value in values.items():
             vr = self.slave._index[name]
-            getattr(self.fmu, f"set{self.slave.variables[vr].type}")([vr], [value])
+            getattr(self.fmu, f"set{access(self.slave.variables[vr])}")([vr], [value])
 
     def _answer(self, call: Callable[[], object]) -> Answer:
         self.messages.clear()
@@ -126,7 +131,7 @@ class InC:
         words = [text for _, text in self.messages]
         found = []
         for vr, variable in enumerate(self.slave.variables):
-            found += getattr(self.fmu, f"get{variable.type}")([vr])
+            found += getattr(self.fmu, f"get{access(variable)}")([vr])
         return (*words, *map(exact, found))
 
 
