@@ -1,6 +1,7 @@
 """Slaves as `export-c` writes them, compiled for this machine and for a Cortex-M4F, and run there."""
 
 import functools
+import os
 import re
 import shutil
 import struct
@@ -54,6 +55,19 @@ def on_this_machine(main: str, sources: list[Path], folder: Path, *flags: str, b
     return _printed([str(folder / "here")])
 
 
+def elsewhere(emulator: str, by: str, main: str, sources: list[Path], folder: Path, *flags: str) -> list[str]:
+    """The lines that a program of this folder prints, compiled `by` a cross-compiler, under an emulator.
+
+    Skipped by name without one of them.
+    """
+    path = shutil.which(emulator)
+    if path is None:
+        pytest.skip(f"no {emulator}")
+    program = folder / "elsewhere.exe"
+    _succeeds([*_with(main, by, sources, folder), *flags, "-static", "-o", str(program), "-lm"])
+    return _printed([path, str(program)], WINEDEBUG="-all", WINEPREFIX=str(folder / "wine"))
+
+
 def on_cortex_m(machine: tuple[str, ...], main: str, sources: list[Path], folder: Path, *flags: str) -> list[str]:
     """The lines that a program of this folder prints on a Cortex-M under QEMU; skipped by name without the tools."""
     if shutil.which(QEMU) is None:
@@ -83,11 +97,11 @@ def _with(main: str, with_compiler: str, sources: list[Path], folder: Path, *mac
     return [compiler(with_compiler), "-std=c99", "-O2", *machine, *places, str(HERE / main), *objects]
 
 
-def _printed(command: list[str]) -> list[str]:
-    return _succeeds(command).splitlines()
+def _printed(command: list[str], **variables: str) -> list[str]:
+    return _succeeds(command, **variables).splitlines()
 
 
-def _succeeds(command: list[str]) -> str:
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+def _succeeds(command: list[str], **variables: str) -> str:
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, env={**os.environ, **variables})
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout

@@ -19,6 +19,7 @@ from tests.fmu_kit.native.embedded import (
     M4F,
     M7,
     calls,
+    elsewhere,
     made,
     on_cortex_m,
     on_this_machine,
@@ -79,6 +80,9 @@ def flown() -> dict[str, list[float]]:
 RUNS = {
     "here": on_this_machine,
     "by_clang": functools.partial(on_this_machine, by="clang"),
+    "aarch64": functools.partial(elsewhere, "qemu-aarch64", "aarch64-linux-gnu-gcc"),
+    "riscv64": functools.partial(elsewhere, "qemu-riscv64", "riscv64-linux-gnu-gcc"),
+    "win64": functools.partial(elsewhere, "wine", "x86_64-w64-mingw32-gcc"),
     "cortex_m4f": functools.partial(on_cortex_m, M4F),
     "cortex_m7": functools.partial(on_cortex_m, M7),
 }

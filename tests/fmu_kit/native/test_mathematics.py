@@ -5,6 +5,7 @@ import hashlib
 import itertools
 import math
 import operator
+import os
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -164,7 +165,9 @@ BUILDS = {
     "clang, lanes of 4": ("clang", ("-O1", "-mavx2", "-DQUADCOSIM_LANES=4")),
     "aarch64": ("aarch64-linux-gnu-gcc", ("-O1", "-static")),
     "riscv64": ("riscv64-linux-gnu-gcc", ("-O1", "-static")),
+    "win64": ("x86_64-w64-mingw32-gcc", ("-O1", "-static")),
 }
+EMULATORS = {"aarch64": "qemu-aarch64", "riscv64": "qemu-riscv64", "win64": "wine"}
 
 
 @pytest.mark.parametrize("build", BUILDS)
@@ -173,12 +176,13 @@ def test_the_bits_are_the_same_from_every_compiler_in_any_lane_on_every_machine(
     for flag in flags:
         if flag.startswith("-mavx") and flag.removeprefix("-m") not in processor():
             pytest.skip(f"the processor has no {flag.removeprefix('-m')}")
-    program = compiled("hash.c", folder / build.replace(" ", "_"), *flags, with_compiler=name)
-    emulator = f"qemu-{build}" if "-static" in flags else None
+    program = compiled("hash.c", folder / f"{build.replace(' ', '_')}.exe", *flags, with_compiler=name)
+    emulator = EMULATORS.get(build)
     if emulator and shutil.which(emulator) is None:
         pytest.skip(f"no {emulator}")
     command = [*([emulator] if emulator else []), str(program)]
-    lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    quiet = {"WINEDEBUG": "-all", "WINEPREFIX": str(folder / "wine")}
+    lines = subprocess.run(command, capture_output=True, text=True, check=True, env={**os.environ, **quiet}).stdout
     assert hashlib.sha256(lines.encode()).hexdigest()[:16] == HASH, lines
 
 
