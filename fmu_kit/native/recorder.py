@@ -220,16 +220,18 @@ class Recorder:
         function, exit_view, returned = self._traced[key]
         call = statement("call", given, Call(function, memory.version))
         self.add(call)
-        memory.version = memory.next_version(call)
+        after = memory.next_version(call)
+        if function.stores:
+            memory.version = after
         if exit_view is None:
             raise _EndedError
         memory.returned(exit_view, function.stores, before)
         if self._catches:
             for kind in sorted(function.raises):
-                if node("failed", (), "bool", (kind, memory.version)):
+                if node("failed", (), "bool", (kind, after)):
                     raise error_class(kind)(token(node("failure", (), "real"), "failure"))
         numbers = [leaf for _, leaf in leaves(returned) if is_number(leaf)]
-        results = iter([node("result", (), lifted(leaf).kind, (k, memory.version)) for k, leaf in enumerate(numbers)])
+        results = iter([node("result", (), lifted(leaf).kind, (k, after)) for k, leaf in enumerate(numbers)])
         return mapped(returned, lambda _, leaf: next(results) if is_number(leaf) else leaf)
 
     def function(
@@ -300,6 +302,7 @@ class Recorder:
     def repeat(self, count: Any, body: Callable[[Any, Any], Any], state: Any) -> Any:
         """`state = body(i, state)` for i = 0 … count - 1, where the count is computed."""
         depth = self._depth
+        self.add(*self.memory.flushed())  # what the body calls finds it in the memory
         starts = [lifted(leaf) for _, leaf in leaves(state) if is_number(leaf)]
         kinds = [start.kind for start in starts]
         while True:
@@ -325,7 +328,9 @@ class Recorder:
         if leaf is None:
             raise TraceError("a loop that always fails")
         if leaf.version != version:
-            raise TraceError("repeat: its body calls a method of the slave, expected functions only")
+            raise TraceError(
+                "repeat: its body calls a method that changes what the slave keeps, expected to get all by its state"
+            )
         if not _is_same(leaf.view, kept):
             raise TraceError("repeat: its body changes what the slave keeps, expected to get all by its state")
         if shape(leaf.value) != shape(state):

@@ -369,6 +369,13 @@ class Loops(Probe):
             return x - 1.0
 
         self.put("y3", repeat(times, root, abs(b)))
+        self.put("y4", repeat(times, lambda i, x: self._nearer(x, i + self._nearer(x, 1.0)), a))
+        self.put("y5", self._nearer(b, 2.0))
+
+    def _nearer(self, x: float, far: float) -> float:
+        """Half of the way from one number to another, by what this step has put."""
+        require(far != 17.0, "far", far, "another number than 17")
+        return x if far < 0.0 else x + 0.5 * (far - x) * self.real("p") / (1.0 + abs(self.real("y0")))
 
 
 # -- words ---------------------------------------------------------------------------------------------------------

@@ -78,6 +78,10 @@ IN_A_STEP = [
         "self.put('y', repeat(math.floor(a), lambda i, x: self.put('y', i * x) or x, a))",
         "repeat: its body changes what the slave keeps",
     ),
+    (
+        "self.put('y', repeat(math.floor(a), lambda i, x: self._changing(x) * x, a))",
+        "repeat: its body calls a method that changes what the slave keeps",
+    ),
     ("self.put('y', all(self._changing(x) for x in (a, t)))", "all() of values of which a later one may fail"),
     ("self.put('y', any(1.0 / x > 2.0 for x in (a, t, h)))", "any() of values of which a later one may fail"),
 ]
