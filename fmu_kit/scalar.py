@@ -21,6 +21,7 @@ class ScalarOps:
     tanh: Callable[[Scalar], Scalar]
     sin: Callable[[Scalar], Scalar]
     cos: Callable[[Scalar], Scalar]
+    atan2: Callable[[Scalar, Scalar], Scalar]
     sign: Callable[[Scalar], Scalar]
     maximum: Callable[[Scalar, Scalar], Scalar]
     where: Callable[[Any, Scalar, Scalar], Scalar]
@@ -33,6 +34,7 @@ FLOAT = ScalarOps(
     tanh=math.tanh,
     sin=math.sin,
     cos=math.cos,
+    atan2=math.atan2,
     sign=lambda x: math.copysign(1.0, x) if x else 0.0,
     maximum=max,
     where=lambda condition, a, b: a if condition else b,

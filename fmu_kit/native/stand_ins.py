@@ -245,7 +245,7 @@ def _sign(x: Any) -> Any:
 
 FLOAT_AS_IT_IS = dataclasses.replace(scalar.FLOAT)
 SCALARS: Mapping[str, Any] = {
-    **{name: MATH[name] for name in ("sqrt", "tanh", "sin", "cos")},
+    **{name: MATH[name] for name in ("sqrt", "tanh", "sin", "cos", "atan2")},
     "sign": _sign,
     "maximum": BUILTINS["max"],
     "where": select,

@@ -70,7 +70,15 @@ class Table:
 
 
 NUMPY = ScalarOps(
-    sqrt=np.sqrt, tanh=np.tanh, sin=np.sin, cos=np.cos, sign=np.sign, maximum=np.maximum, where=np.where, all=np.all
+    sqrt=np.sqrt,
+    tanh=np.tanh,
+    sin=np.sin,
+    cos=np.cos,
+    atan2=np.arctan2,
+    sign=np.sign,
+    maximum=np.maximum,
+    where=np.where,
+    all=np.all,
 )
 """Scalars that are numpy arrays, one value a point."""
 

@@ -24,6 +24,7 @@ EXACT = ScalarOps(
     tanh=mpmath.tanh,
     sin=mpmath.sin,
     cos=mpmath.cos,
+    atan2=mpmath.atan2,
     sign=mpmath.sign,
     maximum=max,
     where=lambda condition, a, b: a if condition else b,
