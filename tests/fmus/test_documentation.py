@@ -15,6 +15,7 @@ from xml.etree.ElementTree import Element, fromstring
 import fmpy
 import numpy as np
 import pytest
+from fmpy.model_description import ModelVariable
 from fmpy.validation import validate_fmu
 
 from fmu_kit.trajectory import Trajectory
@@ -155,16 +156,24 @@ def described(page: Element) -> dict[str, tuple[Any, ...]]:
     return found
 
 
-def number(text: str | None) -> float | bool | None:
-    """The value that a text stands for."""
-    return {"true": True, "false": False}[text] if text in ("true", "false") else float(text) if text else None
+def number(text: str | None) -> float | bool | str | None:
+    """The value that a text stands for; the name of an item for itself."""
+    if text in ("true", "false"):
+        return text == "true"
+    return text if text and text.isidentifier() else float(text) if text else None
+
+
+def start_of(variable: ModelVariable) -> str | None:
+    """As the page has it: by its item for an Enumeration."""
+    items = {item.value: item.name for item in getattr(variable.declaredType, "items", ())}
+    return items.get(variable.start, variable.start)
 
 
 def test_the_page_says_of_every_variable_what_the_model_description_says(of: Documented) -> None:
     expected = {
         v.name: (
             *(v.causality, v.unit or v.type),
-            *(number(text) for text in (v.start, v.min, v.max)),
+            *(number(text) for text in (start_of(v), v.min, v.max)),
             *(v.variability, v.description),
         )
         for v in fmpy.read_model_description(str(of.fmu)).modelVariables
