@@ -60,16 +60,6 @@ def first_ends(flew: Array) -> Array:
     return np.concatenate([[0.0], PERIODS])[failed.argmax(axis=-1)]
 
 
-def median_interval(values: Array) -> tuple[float, float, float, float]:
-    """The median, an interval of two order statistics for that of all, and the interval's confidence, >= 95 %."""
-    from scipy.stats import binom
-
-    n, ordered = len(values), np.sort(values)
-    below = max(k for k in range(n // 2) if 1.0 - 2.0 * binom.cdf(k, n, 0.5) >= 0.95)
-    confidence = 1.0 - 2.0 * binom.cdf(below, n, 0.5)
-    return float(np.median(ordered)), float(ordered[below]), float(ordered[n - 1 - below]), float(confidence)
-
-
 def continuous(stop_time: float = 30.0) -> Outcomes:
     """The paper's start in continuous time, for each of `CONTINUOUS_KAPPAS`."""
     return fly_continuously(Flights(kappa=np.array(CONTINUOUS_KAPPAS)), stop_time, CONTINUOUS_STEP)

@@ -22,7 +22,7 @@ import pandas as pd
 from docs import batch, charts, experiments
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import system_of
-from orchestration.statistics import wilson
+from orchestration.statistics import quantile, wilson
 from orchestration.studies import drawing, figures, limit
 from orchestration.studies.engine import Pool
 from orchestration.studies.files import files_of
@@ -114,7 +114,7 @@ def starts() -> list[str]:
     lines = []
     for (name, *_), case, all_flew in zip(experiments.CASES, ends, flew, strict=True):
         for size, values, each in zip(experiments.SIZES, case, all_flew, strict=True):
-            median, low, high, confidence = experiments.median_interval(values)
+            median, low, high, confidence = quantile(values)
             again = sum(bool(one[round(end / 0.0025) - 1 :].any()) for one, end in zip(each, values, strict=True))
             lines.append(
                 f"{name}, {size:g} m: median {_ms(median)} [{_ms(low)}, {_ms(high)}] at {confidence:.1%}, "

@@ -1,7 +1,9 @@
 """What a number of trials says about a share: its interval, and what it refutes."""
 
 import math
+from collections.abc import Sequence
 from statistics import NormalDist
+from typing import NamedTuple
 
 from orchestration.errors import UsageError
 
@@ -25,6 +27,52 @@ def wilson(successes: int, trials: int, confidence: float = 0.95) -> tuple[float
     low = 0.0 if successes == 0 else (middle - half) / scale
     high = 1.0 if successes == trials else (middle + half) / scale
     return low, high
+
+
+class Estimate(NamedTuple):
+    """A quantile that was estimated."""
+
+    value: float
+    low: float
+    high: float
+    """ends of its interval; minus infinity and infinity where so few values bound nothing"""
+    confidence: float
+    """of the interval: at least what was asked for, since it ends at values that were seen"""
+
+
+def quantile(values: Sequence[float], share: float = 0.5, confidence: float = 0.95) -> Estimate:
+    """A quantile, by default the median, with the interval between two order statistics.
+
+    Free of any distribution: of n values the number below the quantile is binomial. The ends are the innermost values
+    beyond each of which the quantile lies with a probability of at most (1 - confidence)/2. Raises `UsageError` for
+    no values or shares that cannot be.
+    """
+    if not len(values) or not (0.0 < share < 1.0 and 0.0 < confidence < 1.0):
+        raise UsageError(f"quantile {share} of {len(values)} values: expected some, and shares between 0 and 1")
+    ordered, n, tail = sorted(map(float, values)), len(values), 0.5 * (1.0 - confidence)
+    below = above = 0.0
+    first, last = -1, n
+    while first + 1 < n and below + _binomial(first + 1, n, share) <= tail:
+        first += 1
+        below += _binomial(first, n, share)
+    while last > 0 and above + _binomial(last, n, share) <= tail:
+        above += _binomial(last, n, share)
+        last -= 1
+    place = share * (n - 1)
+    lower, upper = ordered[math.floor(place)], ordered[math.ceil(place)]
+    middle = lower if lower == upper else lower + (place - math.floor(place)) * (upper - lower)
+    return Estimate(
+        value=middle,
+        low=ordered[first] if first >= 0 else -math.inf,
+        high=ordered[last] if last < n else math.inf,
+        confidence=1.0 - below - above,
+    )
+
+
+def _binomial(k: int, n: int, share: float) -> float:
+    """The probability of k successes in n."""
+    combinations = math.lgamma(n + 1) - math.lgamma(k + 1) - math.lgamma(n - k + 1)
+    return math.exp(combinations + k * math.log(share) + (n - k) * math.log(1.0 - share))
 
 
 def refutes(successes: int, trials: int, share: float, confidence: float) -> bool:

@@ -48,12 +48,6 @@ def test_the_first_end_is_before_the_first_period_that_does_not_fly() -> None:
     assert experiments.first_ends(flew).tolist() == [experiments.PERIODS[3], 0.0, last]
 
 
-def test_the_interval_of_a_median_is_that_of_the_tables() -> None:
-    median, low, high, confidence = experiments.median_interval(np.arange(1.0, 31.0))
-    assert (median, low, high) == (15.5, 10.0, 21.0)  # n = 30: the 10th and the 21st
-    assert confidence == pytest.approx(0.957, abs=5e-4)
-
-
 def test_what_diverged_comes_last_in_rank_and_shares_it() -> None:
     assert experiments.ranks(np.array([0.3, np.nan, 0.1, np.nan])) == pytest.approx([1 / 3, 2.5 / 3, 0.0, 2.5 / 3])
 

@@ -3,12 +3,14 @@
 import math
 from statistics import NormalDist
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import binom
 
 from orchestration import UsageError
-from orchestration.statistics import refutes, wilson
+from orchestration.statistics import quantile, refutes, wilson
 
 
 @given(st.integers(1, 2000), st.data(), st.sampled_from([0.5, 0.9, 0.95, 0.99]))
@@ -47,6 +49,29 @@ def test_a_share_is_refuted_where_so_few_are_seen_too_rarely() -> None:
     assert refutes(22, 29, 0.9, 0.95)
     assert refutes(23, 29, 0.9, 0.93)
     assert not refutes(29, 29, 0.9, 0.05)
+
+
+def test_the_interval_of_a_median_is_that_of_the_tables() -> None:
+    found = quantile([float(k) for k in range(30, 0, -1)])
+    assert found[:3] == (15.5, 10.0, 21.0)  # n = 30: the 10th and the 21st
+    assert found.confidence == pytest.approx(0.957, abs=5e-4)
+
+
+@pytest.mark.parametrize(("n", "share"), [(7, 0.5), (40, 0.9), (200, 0.1), (200, 0.5), (2000, 0.25)])
+def test_the_ends_of_a_quantile_s_interval_are_the_innermost_of_the_binomial_distribution(n: int, share: float) -> None:
+    found = quantile([float(k) for k in range(1, n + 1)], share)
+    low, high = found.low if math.isfinite(found.low) else 0, found.high if math.isfinite(found.high) else n + 1
+    outside = binom.cdf([low - 1, low], n, share), binom.sf([high - 1, high - 2], n, share)
+    for tail, wider in outside:
+        assert tail <= 0.025 < wider
+    assert found.confidence == pytest.approx(1.0 - outside[0][0] - outside[1][0], rel=1e-9)
+
+
+def test_few_values_bound_nothing_and_many_cover_what_they_should() -> None:
+    assert quantile([1.0, 2.0, 3.0, 4.0, 5.0])[:3] == (3.0, -math.inf, math.inf)
+    generator = np.random.default_rng(0)
+    inside = sum(low <= 0.0 <= high for _, low, high, _ in (quantile(generator.normal(size=25)) for _ in range(400)))
+    assert inside / 400 == pytest.approx(0.957, abs=0.03)
 
 
 @pytest.mark.parametrize(

@@ -35,6 +35,7 @@ KEYS = {
     "attitude_error_max",
     "control_effort.thrust",
     "control_effort.torque",
+    "torque_max",
     "total_variation.thrust",
     "total_variation.torque",
     "energy_growth_share",

@@ -233,6 +233,7 @@ def test_control_effort_is_the_integral_of_the_squares() -> None:
     m = measured(command=sine)
     assert m["control_effort.thrust"] == pytest.approx(12.0)
     assert m["control_effort.torque"] == pytest.approx(5.0 * 3.0)
+    assert m["torque_max"] == pytest.approx(math.sqrt(5.0))
 
 
 def test_a_command_that_is_held_counts_until_the_next_row() -> None:
