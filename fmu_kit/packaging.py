@@ -239,10 +239,16 @@ def licences_and_icon(target: Target, **others: str) -> dict[str, bytes]:
 def _fragment(target: Target) -> str:
     """The part of the documentation written by hand; empty if there is none.
 
-    `<?include NAME?>` in it stands for the file NAME of this package, which several may share.
+    `<?include PATH?>` in it stands for a file that several may share: from the folder of the slave, or else of this
+    package.
     """
+
+    def shared(found: re.Match[str]) -> str:
+        beside = target.fragment.parent / found[1]
+        return _text(beside if beside.is_file() else Path(__file__).parent / found[1])
+
     text = _text(target.fragment) if target.fragment.is_file() else ""
-    return re.sub(r"<\?include (\S+)\?>", lambda found: _text(Path(__file__).with_name(found[1])), text)
+    return re.sub(r"<\?include (\S+)\?>", shared, text)
 
 
 def _well_formed_fragment(target: Target) -> str:
