@@ -18,9 +18,10 @@ PALE, DARK = "#f3f7fa", "#33414d"
 
 
 def main() -> None:
-    """Draw both."""
+    """Draw each."""
     for place, draw in (
         ("controller_fmu/sliding_mode/UnifiedController", controller),
+        ("controller_fmu/geometric/GeometricController", geometric),
         ("plant_fmu/QuadrotorPlant", plant),
     ):
         figure = Figure(figsize=(1.0, 1.0), dpi=PIXELS)
@@ -48,6 +49,20 @@ def controller(axes: Axes) -> None:
     axes.plot(
         samples[:-1], held[:-1], "o", color=ORANGE, markersize=5.0, markeredgecolor=PALE, markeredgewidth=0.8
     )  # fmt: skip
+
+
+def geometric(axes: Axes) -> None:
+    """The axes of the body, and the great circle by which they are to be turned to others."""
+    _tile(axes, BLUE)
+    angles = np.linspace(0.0, 2.0 * np.pi, 100)
+    axes.plot(0.66 * np.cos(angles), 0.66 * np.sin(angles), color="white", linewidth=1.0, alpha=0.6)
+    for angle in np.radians((90.0, 205.0, 330.0)):
+        axes.plot((0.0, 0.66 * np.cos(angle)), (0.0, 0.66 * np.sin(angle)), color=PALE, linewidth=2.2)
+    way = np.radians(np.linspace(90.0, 42.0, 40))
+    x, y = 0.66 * np.cos(way), 0.66 * np.sin(way)
+    axes.plot(x, y, color=ORANGE, linewidth=2.2)
+    axes.plot((0.0, x[-1]), (0.0, y[-1]), color=ORANGE, linewidth=2.2)
+    axes.plot(x[-1], y[-1], "o", color=ORANGE, markersize=5.0, markeredgecolor=PALE, markeredgewidth=0.8)
 
 
 def plant(axes: Axes) -> None:

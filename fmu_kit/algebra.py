@@ -103,6 +103,30 @@ class Quaternion:
         """The quaternion of four components, scalar last."""
         return cls(Vec3(x, y, z), w)
 
+    @classmethod
+    def from_axes(cls, a: Vec3, b: Vec3, c: Vec3, ops: ScalarOps = FLOAT) -> Quaternion:
+        """The attitude of a body whose axes are `a`, `b`, `c` in inertial components: the columns of R(Q)ᵀ.
+
+        Of Q and -Q the one whose scalar is not negative.
+        """
+        # Each row is four times one component of Q times all of Q: that of the largest loses no digits.
+        xx, yy, zz = a.x, b.y, c.z
+        xy, yz, zx = a.y + b.x, b.z + c.y, c.x + a.z
+        xw, yw, zw = b.z - c.y, c.x - a.z, a.y - b.x
+        rows = (
+            (1.0 + xx - yy - zz, xy, zx, xw),
+            (xy, 1.0 - xx + yy - zz, yz, yw),
+            (zx, yz, 1.0 - xx - yy + zz, zw),
+        )
+        best, row = 1.0 + xx + yy + zz, (xw, yw, zw, 1.0 + xx + yy + zz)
+        for i, other in enumerate(rows):
+            larger = other[i] > best
+            best = ops.where(larger, other[i], best)
+            row = tuple(ops.where(larger, theirs, ours) for theirs, ours in zip(other, row))
+        sign = ops.where(row[3] < 0.0, -1.0, 1.0)
+        Q = cls.from_xyzw(*row)
+        return Q / (sign * Q.norm(ops))
+
     def __mul__(self, other: Quaternion) -> Quaternion:
         """Q1 ⊙ Q2 = [q01 q2 + q02 q1 + q1 × q2, q01 q02 - q1·q2]."""
         q1, q01, q2, q02 = self.vector, self.scalar, other.vector, other.scalar

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 MODELS = {
     "UnifiedController": "controller_fmu.sliding_mode.slave:UnifiedController",
+    "GeometricController": "controller_fmu.geometric.slave:GeometricController",
     "QuadrotorPlant": "plant_fmu.slave:QuadrotorPlant",
 }
 """FMUs of this project by name, and the slave that each is built from."""

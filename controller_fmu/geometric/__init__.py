@@ -1,0 +1,1 @@
+"""The geometric tracking controller on SE(3)."""
