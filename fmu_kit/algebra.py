@@ -124,7 +124,7 @@ class Quaternion:
             best = ops.where(larger, other[i], best)
             row = tuple(ops.where(larger, theirs, ours) for theirs, ours in zip(other, row))
         sign = ops.where(row[3] < 0.0, -1.0, 1.0)
-        Q = cls.from_xyzw(*row)
+        Q: Quaternion = cls.from_xyzw(*row)
         return Q / (sign * Q.norm(ops))
 
     def __mul__(self, other: Quaternion) -> Quaternion:

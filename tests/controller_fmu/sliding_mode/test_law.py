@@ -2,7 +2,6 @@
 
 import csv
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -30,6 +29,7 @@ from fmu_kit.rigid_body import Body, RigidState, Wrench, derivative
 from fmu_kit.scalar import FLOAT, ScalarOps
 from fmu_kit.trajectory import Reference, Trajectory
 from orchestration.master.sources import NUMPY
+from tests.controller_fmu.closed_loop import assert_is_the_rate, between, inertias, quaternions, trajectories, triple
 from tests.reference.tables import LAWS, law_at
 
 Z = Vec3(0.0, 0.0, 1.0)
@@ -166,32 +166,6 @@ class Situation:
         return self.evaluation(self.t + h, rk4_step(self.motion, self.t, self.state, h))
 
 
-def between(low: float, high: float) -> st.SearchStrategy[float]:
-    return st.floats(low, high)
-
-
-def triple(component: st.SearchStrategy[float]) -> st.SearchStrategy[Vec3]:
-    return st.builds(Vec3, component, component, component)
-
-
-@st.composite
-def inertias(draw: st.DrawFn) -> Inertia:
-    """A full, positive definite J = A Aᵀ + ½."""
-    A = np.array([list(draw(triple(between(-0.5, 0.5)))) for _ in range(3)])
-    J = A @ A.T + 0.5 * np.eye(3)
-    xx, xy, xz, _, yy, yz, _, _, zz = J.ravel().tolist()
-    return Inertia(xx=xx, yy=yy, zz=zz, xy=xy, xz=xz, yz=yz)
-
-
-def quaternions() -> st.SearchStrategy[Quaternion]:
-    component = between(-1.0, 1.0)
-    return (
-        st.builds(Quaternion.from_xyzw, component, component, component, component)
-        .filter(lambda Q: Q.norm() > 0.1)
-        .map(lambda Q: Q.normalised())
-    )
-
-
 gains_anywhere = st.builds(
     Gains,
     k_t=triple(between(0.5, 3.0)),
@@ -203,14 +177,6 @@ gains_anywhere = st.builds(
     k_theta=between(1.0, 15.0),
     k_q=between(1.0, 15.0),
     kappa=st.one_of(st.sampled_from([0.0, 1.0]), between(0.0, 15.0)),
-)
-trajectories = st.builds(
-    Trajectory,
-    amplitude_x=between(-4.0, 4.0),
-    amplitude_y=between(-4.0, 4.0),
-    frequency=between(0.0, 0.6),
-    start_z=between(-5.0, 5.0),
-    rate_z=between(-1.0, 1.0),
 )
 
 
@@ -233,24 +199,6 @@ def situations(draw: st.DrawFn) -> Situation:
             draw(triple(between(-2.0, 2.0))),
         ),
     )
-
-
-STEP = 5e-5
-"""[s], short against every time constant of these loops, and too short to cross |e| = ε."""
-
-
-def rate_of(f: Callable[[float], Any]) -> Any:
-    """df/dh at h = 0 of an array, by the central difference of sixth order."""
-    h = STEP
-    near, middle, far = (np.asarray(f(k * h)) - np.asarray(f(-k * h)) for k in (1, 2, 3))
-    return (45.0 * near - 9.0 * middle + far) / (60.0 * h)
-
-
-def assert_is_the_rate(exact: Any, f: Callable[[float], Any]) -> None:
-    """The difference quotient loses about 1e-16/STEP of the value, its truncation less."""
-    value, exact = np.asarray(f(0.0)), np.asarray(exact)
-    error = np.max(np.abs(rate_of(f) - exact))
-    assert error <= 1e-7 * (1.0 + np.max(np.abs(exact)) + np.max(np.abs(value))), error
 
 
 @pytest.mark.parametrize(
