@@ -72,7 +72,7 @@ PLANT = (
 
 _REFERENCE_UNITS = {"position": "m", "velocity": "m/s", "acceleration": "m/s2", "jerk": "m/s3", "snap": "m/s4"}
 
-CONTROLLER = (
+_COMMON = (
     *_motion("input continuous", (0.0, 0.0, 0.0, 1.0)),
     *(
         variable
@@ -88,6 +88,18 @@ CONTROLLER = (
     *row("thrust", "output discrete", "N"),
     *row("torque", "output discrete", "N.m", axes=XYZ),
     *_body(),
+    *row("sample_period", "parameter fixed", "s", 0.01),
+    *row("sample_offset", "parameter fixed", "s", 0.0),
+    *row("desired_quaternion", "local discrete", "1", axes=XYZW),
+    *row("position_error", "local discrete", "m", axes=XYZ),
+    *row("velocity_error", "local discrete", "m/s", axes=XYZ),
+    *row("attitude_error", "local discrete", "1", axes=XYZW),
+    *row("angular_velocity_error", "local discrete", "rad/s", axes=XYZ),
+    *row("sample_count", "local discrete", None, type="Integer"),
+)
+
+UNIFIED = (
+    *_COMMON,
     *row("gain.translation", "parameter tunable", "m/s2", 2.0, axes=XYZ),
     *row("gain.disturbance", "parameter tunable", "m/s2", 0.99),
     *row("gain.surface", "parameter tunable", "1/s", 5.0),
@@ -97,18 +109,23 @@ CONTROLLER = (
     *row("surface_exponent", "parameter tunable", "1", 0.99),
     *row("boundary_layer", "parameter tunable", "m", 0.001),
     *row("coupling", "parameter tunable", "kg", 1.0),
-    *row("sample_period", "parameter fixed", "s", 0.01),
-    *row("sample_offset", "parameter fixed", "s", 0.0),
-    *row("desired_quaternion", "local discrete", "1", axes=XYZW),
-    *row("position_error", "local discrete", "m", axes=XYZ),
-    *row("velocity_error", "local discrete", "m/s", axes=XYZ),
-    *row("attitude_error", "local discrete", "1", axes=XYZW),
-    *row("angular_velocity_error", "local discrete", "rad/s", axes=XYZ),
     *row("sliding", "local discrete", "m/s", axes=XYZ),
     *row("theta", "local discrete", "rad/s", axes=XYZ),
     *row("desired_angular_velocity", "local discrete", "rad/s", axes=XYZ),
     *row("energy", "local discrete", "J"),
-    *row("sample_count", "local discrete", None, type="Integer"),
 )
 
-TABLES = {"QuadrotorPlant": PLANT, "UnifiedController": CONTROLLER}
+GEOMETRIC = (
+    *_COMMON,
+    *row("gain.position", "parameter tunable", "1/s2", 4.0),
+    *row("gain.velocity", "parameter tunable", "1/s", 2.8),
+    *row("gain.attitude", "parameter tunable", "N.m", 104.26),
+    *row("gain.angular_velocity", "parameter tunable", "N.m.s", 30.06),
+    *row("heading", "parameter tunable", "rad", 0.0),
+    *row("rotation_error", "local discrete", "1", axes=XYZ),
+    *row("error_function", "local discrete", "1"),
+    *row("desired_angular_velocity", "local discrete", "rad/s", axes=XYZ),
+    *row("energy", "local discrete", "J"),
+)
+
+TABLES = {"QuadrotorPlant": PLANT, "UnifiedController": UNIFIED, "GeometricController": GEOMETRIC}

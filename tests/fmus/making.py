@@ -2,6 +2,14 @@
 
 from dataclasses import dataclass
 
+from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT, MODELS
+
+PAIR = {name: MODELS[name] for name in (DEFAULT_CONTROLLER, DEFAULT_PLANT)}
+"""One controller and one plant: what every slave does by its base, and what a packing does to any, is shown with them.
+
+What is an FMU's own (interface, documentation, native build) is looked at in each of `MODELS`.
+"""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Making:

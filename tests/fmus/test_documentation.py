@@ -22,10 +22,15 @@ from fmu_kit.trajectory import Trajectory
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT, MODELS
 from tests.fmus.archive import files_of
 from tests.fmus.instance import Instance
+from tests.fmus.making import PAIR
 from tests.fmus.process import ROOT, run
 from tests.fmus.source_tree import copy_sources, python
 
-SOURCES = {"UnifiedController": "controller_fmu/sliding_mode/law.py", "QuadrotorPlant": "fmu_kit/rigid_body.py"}
+SOURCES = {
+    "UnifiedController": "controller_fmu/sliding_mode/law.py",
+    "GeometricController": "controller_fmu/geometric/law.py",
+    "QuadrotorPlant": "fmu_kit/rigid_body.py",
+}
 """Where the equations of each FMU are."""
 
 
@@ -109,6 +114,7 @@ def test_the_page_links_to_the_readable_equations(of: Documented) -> None:
     assert functions & {"evaluate", "derivative"}
 
 
+@pytest.mark.parametrize("of", PAIR, indirect=True)  # those whose sources number them
 def test_every_equation_of_the_sources_is_on_the_page(of: Documented) -> None:
     in_source = set(equation_numbers((ROOT / SOURCES[of.model]).read_text(encoding="utf-8")))
     cells = [row[-1].text or "" for row in of.page.iterfind(".//table[@class='equations']/tr")]
@@ -204,7 +210,7 @@ def test_the_wiring_is_that_of_the_master(of: Documented) -> None:
     assert connected == {"from the plant": list(MEASUREMENT), "from the controller": list(COMMAND)}
 
 
-def test_both_pages_show_the_same_example(built: dict[str, Path]) -> None:
+def test_all_pages_show_the_same_example(built: dict[str, Path]) -> None:
     assert len({documented(fmu).example for fmu in built.values()}) == 1
 
 
@@ -215,6 +221,7 @@ sys.modules.update(dict.fromkeys(("fmu_kit", "controller_fmu", "plant_fmu", "orc
 """Lets every import of these fail."""
 
 
+@pytest.mark.parametrize("of", ["UnifiedController"], indirect=True)
 def test_the_example_flies_with_the_two_fmus_and_fmpy_alone(
     of: Documented, built: dict[str, Path], data: Path, tmp_path: Path
 ) -> None:
@@ -228,7 +235,7 @@ def test_the_example_flies_with_the_two_fmus_and_fmpy_alone(
     assert position == pytest.approx([reference[f"position{axis}"] for axis in "xyz"], abs=1e-9)
     assert "({:.3f}, {:.3f}, {:.3f})".format(*position).replace("-", "−") in of.text
     assert np.linalg.norm(np.subtract(position, [*Trajectory().position(30.0)])) == pytest.approx(1e-3, rel=0.4)
-    assert {path.name for path in tmp_path.iterdir()} == {*MODELS, *(f"{model}.fmu" for model in MODELS)}
+    assert {path.name for path in tmp_path.iterdir()} == {*PAIR, *(f"{model}.fmu" for model in MODELS)}
 
 
 def test_the_example_could_not_have_imported_the_project() -> None:

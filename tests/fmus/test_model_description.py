@@ -123,11 +123,11 @@ def test_no_output_is_declared_to_follow_an_input_directly(description: ModelDes
     assert declared == {name: [] for name in outputs}
 
 
-def test_declared_initial_dependencies_are_all_inputs_of_the_controller_and_none_of_the_plant(
+def test_declared_initial_dependencies_are_all_inputs_of_a_controller_and_none_of_the_plant(
     description: ModelDescription,
 ) -> None:
     inputs = [v.name for v in description.modelVariables if v.causality == "input"]
-    expected = inputs if description.modelName == "UnifiedController" else []
+    expected = [] if description.modelName == "QuadrotorPlant" else inputs
     outputs = {v.name for v in description.modelVariables if v.causality == "output"}
     declared = {u.variable.name: [d.name for d in u.dependencies] for u in description.initialUnknowns}
     assert declared == dict.fromkeys(outputs, expected)

@@ -15,6 +15,7 @@ from orchestration.quadrotor.wiring import MODELS
 from tests.examples.common import EXAMPLES
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
 from tests.fmus.instance import Instance
+from tests.fmus.making import PAIR
 from tests.fmus.process import run
 from tests.fmus.test_c_host import GUIDE_HOST, NOT_PYTHON, STEPS, H, arguments, compiled
 from tests.native import natives
@@ -55,6 +56,7 @@ def life(sources: Path, *options: str) -> Path:
     return program
 
 
+@pytest.mark.parametrize("fmu", PAIR, indirect=True)
 def test_the_whole_life_of_an_instance_is_silent_under_sanitizers(sources: Path) -> None:
     """States, bytes that were damaged, failures, resets and two threads; and no step asks for memory."""
     done = run(str(life(sources, "-fsanitize=address,undefined", "-fno-sanitize-recover=all")))

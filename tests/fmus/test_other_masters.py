@@ -8,12 +8,11 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import fmi2False
 
-from orchestration.quadrotor.wiring import MODELS
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
 from tests.fmus.flights import STEPS, Flight
 from tests.fmus.instance import Instance
 from tests.fmus.loop import Loop
-from tests.fmus.making import Making
+from tests.fmus.making import PAIR, Making
 from tests.fmus.process import run_script
 
 PLANT, CONTROLLER = "QuadrotorPlant", "UnifiedController"
@@ -109,7 +108,7 @@ def test_what_was_set_is_what_is_read_back_in_every_phase(instance: Instance, fl
     assert instance.get(*flight.inputs(4)) == list(flight.inputs(4).values())
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", PAIR)
 def test_parameters_are_read_back_one_by_one_while_they_do_not_fit_together_yet(
     model: str, built: dict[str, Path]
 ) -> None:
@@ -329,13 +328,13 @@ def test_reset_from_any_phase_gives_the_first_flight_again(
     assert flight.fly(instance, 0, STEPS) == plain
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", PAIR)
 def test_an_instance_may_be_freed_in_any_phase_without_terminate(model: str, built: dict[str, Path]) -> None:
     assert run_script("freed_anywhere", built[model]) == {"freed": 50, "flies as before": True}
 
 
 @pytest.mark.parametrize("seed", ["1", "2"])
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", PAIR)
 def test_no_order_of_calls_brings_the_process_down(model: str, seed: str, built: dict[str, Path]) -> None:
     result = run_script("any_calls", built[model], seed)
     assert result["failures"] > 500  # or too little was out of order
@@ -355,7 +354,7 @@ def test_fmus_fly_on_while_others_are_unloaded_and_their_files_deleted(
 
 
 @pytest.mark.parametrize("called", ["", "two words", "Quadrocoptère 四旋翼", "100 %s", "a" * 1000])
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", PAIR)
 def test_an_instance_may_have_any_name(model: str, called: str, built: dict[str, Path]) -> None:
     with Instance(built[model], name=called) as first, Instance(built[model], name=called) as second:
         first.initialise({})
@@ -389,7 +388,7 @@ def test_an_fmu_finds_its_resources(folder: str, form: str, built: dict[str, Pat
 
 
 def test_without_logging_a_failure_is_a_status_and_no_message(making: Making, built: dict[str, Path]) -> None:
-    for model in MODELS:
+    for model in PAIR:
         with Instance(built[model], logging=False) as instance:
             with pytest.raises(FMICallException, match=f"status {making.failure} "):
                 instance.initialise({"mass": -1.0})

@@ -29,6 +29,7 @@ from tests.fmu_kit.native.embedded import (
 from tests.fmus.expected import COMMAND
 from tests.fmus.instance import Instance
 from tests.fmus.loop import MOTION, Loop
+from tests.fmus.making import PAIR
 
 H, STEPS = 0.01, 500
 FLOWN = {"mass": 1.1, "wind.amplitude.x": 0.5, "initial.position.x": 0.3}
@@ -48,7 +49,7 @@ TOLERANCES = {
 def exported(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """The sources of both sides, and of the controller in single precision."""
     double, single = tmp_path_factory.mktemp("double"), tmp_path_factory.mktemp("single")
-    targets = {name: Target.parse(text) for name, text in MODELS.items()}
+    targets = {name: Target.parse(text) for name, text in PAIR.items()}
     written = {name: write(target, double) for name, target in targets.items()}
     return {**written, "single": write(targets["UnifiedController"], single, single=True)}
 
@@ -151,7 +152,7 @@ def test_what_cannot_be_is_said_by_a_status_with_words_and_the_outputs_stay(
     ]
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", PAIR)
 def test_in_double_precision_nothing_is_called_but_what_fills_memory(name: str, exported: dict[str, Path]) -> None:
     assert calls(made(exported[name], "cc")) <= {"memset", "memcpy", "_GLOBAL_OFFSET_TABLE_"}
     there = calls(made(exported[name], ARM, *M4F), "arm-none-eabi-nm")
@@ -188,7 +189,7 @@ def test_the_command_writes_one_slave_of_a_folder_and_says_in_one_line_what_is_n
     assert done.stdout.splitlines() == [str(tmp_path / "out" / f"PidController.{end}") for end in "hc"]
     assert made(tmp_path / "out" / "PidController.c", "cc").is_file()
     for asked, words in (
-        ("Controller", "Controller: expected UnifiedController or QuadrotorPlant, a folder"),
+        ("Controller", f"Controller: expected {' or '.join(MODELS)}, a folder"),
         ("examples/dc_servo/Pid", "examples/dc_servo/Pid: expected one of PidController, Servo in examples/dc_servo"),
     ):
         refused = main("export-c", asked, "--out", tmp_path, code=2)

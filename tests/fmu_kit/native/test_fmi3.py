@@ -17,10 +17,10 @@ import orchestration
 from fmu_kit.native import c_code
 from orchestration import fmus
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.wiring import MODELS
 from tests.commands import Main
 from tests.fmu_kit.native.compiled import compiled
 from tests.fmus.expected import MEASUREMENT
+from tests.fmus.making import PAIR
 from tests.fmus.process import run, run_script
 from tests.native import assert_the_same
 
@@ -71,7 +71,7 @@ def controller(tmp_path: Path) -> Iterator[Instance]:
     instance.fmu.freeInstance()
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", PAIR)
 def test_it_has_the_variables_of_the_other(name: str) -> None:
     two, three = read(f"native/{name}"), read(f"native/fmi3/{name}")
     common = (
@@ -100,7 +100,7 @@ def test_it_has_the_variables_of_the_other(name: str) -> None:
         assert found[0]
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", PAIR)
 def test_fmpy_finds_nothing_and_flies_it_as_it_does_the_other(name: str) -> None:
     three = str(fmus.locate(f"native/fmi3/{name}"))
     assert validate_fmu(three) == []

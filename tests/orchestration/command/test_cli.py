@@ -14,6 +14,7 @@ import pytest
 
 import orchestration
 from orchestration import Scenario, Timing, fmus
+from orchestration.quadrotor.wiring import MODELS
 from tests.commands import Done, Main
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -430,17 +431,17 @@ def test_debug_shows_where(main: Main, parameter: str, code: int, text: str) -> 
 # -- build and validate -----------------------------------------------------------------------------------
 
 
-def test_build_writes_both_fmus_where_it_is_told(here: Path) -> None:
+def test_build_writes_all_fmus_where_it_is_told(here: Path) -> None:
     done = quadcosim("build", "--out", "mine")
     assert {Path(line).resolve() for line in done.stdout.splitlines()} == {
-        here.resolve() / "mine" / name for name in ("QuadrotorPlant.fmu", "UnifiedController.fmu")
+        here.resolve() / "mine" / f"{model}.fmu" for model in MODELS
     }
-    assert len(list((here / "mine").iterdir())) == 2
+    assert len(list((here / "mine").iterdir())) == len(MODELS)
 
 
 def test_validate_finds_nothing_wrong_with_the_fmus(main: Main, built: dict[str, Path]) -> None:
-    assert quadcosim("validate").stdout.count(": no problems found") == 2
-    assert main("validate", *built.values()).stdout.count(": no problems found") == 2
+    assert quadcosim("validate").stdout.count(": no problems found") == len(MODELS)
+    assert main("validate", *built.values()).stdout.count(": no problems found") == len(MODELS)
 
 
 def damaged(fmu: Path, path: Path) -> Path:

@@ -10,7 +10,7 @@ import pytest
 import orchestration
 from fmu_kit.bundle import Target
 from orchestration import Result
-from orchestration.quadrotor.wiring import MODELS
+from tests.fmus.making import PAIR
 from tests.native import assert_near, assert_the_same, natives
 from tests.orchestration.quadrotor.signals_table import TABLE, entry, fingerprint, flights, flown, scenario_of
 
@@ -42,7 +42,7 @@ def test_a_flight_is_that_of_the_table(name: str) -> None:
 @pytest.fixture(scope="module")
 def on_libm(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Both FMUs by name, with the elementary functions that CPython takes."""
-    targets = [Target.parse(text) for text in MODELS.values()]
+    targets = [Target.parse(text) for text in PAIR.values()]
     return natives(targets, tmp_path_factory.mktemp("native"), "libm")
 
 
@@ -59,4 +59,4 @@ def test_a_native_flight_on_the_same_libm_is_that_of_the_slaves_in_python(name: 
 
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_a_native_flight_on_its_own_mathematics_is_near(name: str) -> None:
-    assert_near(flown_by({model: f"native/{model}" for model in MODELS}, name), in_python(name), 1e-9)
+    assert_near(flown_by({model: f"native/{model}" for model in PAIR}, name), in_python(name), 1e-9)
