@@ -28,15 +28,17 @@ from fmu_kit.native.compiler import (
 )
 from fmu_kit.native.derivatives import with_tangents
 from fmu_kit.native.freshness import source_hash
+from fmu_kit.native.lane_code import lane_code
 from fmu_kit.native.precomputing import precomputed
 from fmu_kit.native.standards import STANDARDS, Standard
 from fmu_kit.native.symbols import TraceError
-from fmu_kit.native.tables import tables
+from fmu_kit.native.tables import places, tables
 from fmu_kit.native.tracing import Program, trace
 from fmu_kit.packaging import SOURCE_HASH_FILE, described, licences_and_icon, put_guid, slave_class, written
 
 _HERE = Path(__file__).parent
-HEADERS = ("instance.h", "lanes.h", "mathematics.h", "text.h")
+BESIDE = ("instance.h", "lanes.c", "lanes.h", "mathematics.h", "text.h")
+"""What lies beside the file to compile, the same for every slave."""
 _NEEDS = _HERE / "needs.html"
 _PYTHON = "python"
 """Where in the documentation the Python is from which the C was written."""
@@ -88,10 +90,16 @@ def build(
 
 def c_sources(program: Program, guid: str, standard: Standard) -> dict[str, bytes]:
     """The sources of an FMU, by the names of their files."""
-    fixed = {name: (_HERE / name).read_bytes() for name in (standard.main, *HEADERS)}
+    fixed = {name: (_HERE / name).read_bytes() for name in (standard.main, *BESIDE)}
     derivatives = with_tangents(program, program.initialise)
     functions = f"{c_code(program)}\n{c_code(derivatives)}"
-    return {**fixed, "tables.h": tables(program, guid, standard).encode(), "functions.h": functions.encode()}
+    made = {
+        "places.h": places(program),
+        "tables.h": tables(program, guid, standard),
+        "functions.h": functions,
+        "lane_functions.h": lane_code(program),
+    }
+    return {**fixed, **{name: text.encode() for name, text in made.items()}}
 
 
 def modules_of(target: Target) -> list[types.ModuleType]:

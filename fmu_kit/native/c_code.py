@@ -8,8 +8,8 @@ import re
 from collections.abc import Iterable
 from typing import ClassVar
 
-from fmu_kit.native.statements import Block, Call, Function, Place, Statement, ends, symbols_of
-from fmu_kit.native.symbols import Symbol, TraceError, closure, node, value_of
+from fmu_kit.native.statements import Block, Call, Function, Place, Statement, ends
+from fmu_kit.native.symbols import Kind, Symbol, TraceError, closure, node, value_of
 from fmu_kit.native.tracing import Program
 
 _BINARY = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
@@ -62,7 +62,7 @@ class Writer:
         self.lines: list[list[str]] = [[]]
         self.count = 0
         self.parameters = [f"{_identifier(name)}_" for name in function.names]
-        self.used = _used(function.body)
+        self.used = self._used(function.body)
 
     def text(self) -> str:
         """The function."""
@@ -74,20 +74,62 @@ class Writer:
                 self.scopes[0][id(symbol)] = self._define(symbol, self._load(symbol))
         self._block(f.body)
         if not ends(f.body):
-            self._line("return 0;")
-        parameters = ["Instance *m"]
-        parameters += [f"{_type(symbol)} {name}" for symbol, name in zip(f.parameters, self.parameters)]
+            self._line(self.through)
+        parameters = [f"{c_type(symbol)} {name}" for symbol, name in zip(f.parameters, self.parameters)]
         parameters += [f"q_real *r{k}" for k in range(f.results)]
-        head = f"static int {c_name(f.name)}({', '.join(parameters)})\n{{\n"
+        head = f"static {self.type} {c_name(f.name)}({', '.join([*self.first, *parameters])})\n{{\n"
         doc = f"/* {f.doc.replace('*/', '* /')} */\n" if f.doc else ""
         before = self._memory()
         unused = [name for symbol, name in zip(f.parameters, self.parameters) if id(symbol) not in self.used]
-        before.append(", ".join(f"(void){name}" for name in (self.memory, *unused)) + ";")
+        before.append(", ".join(f"(void){name}" for name in (*self.always, *unused)) + ";")
         return doc + head + "\n".join([*(f"    {line}" for line in (*before, *self.declared)), *self.lines[0]]) + "\n}"
+
+    type: ClassVar = "int"
+    """what the function returns: 0, or what it has failed with"""
+    first: ClassVar[tuple[str, ...]] = ("Instance *m",)
+    """its first parameters"""
+    through: str = "return 0;"
+    """its end, if it comes to that"""
+
+    # -- what is made use of ---------------------------------------------------------------------------------
+
+    def _named(self, each: Statement) -> tuple[Symbol, ...]:
+        """The symbols that a statement names itself, as far as it is written."""
+        return each.symbols
+
+    def _named_in(self, block: Block) -> list[Symbol]:
+        found: list[Symbol] = []
+        for each in block:
+            found += self._named(each)
+            for inner in each.blocks:
+                found += self._named_in(inner)
+        return found
+
+    def _used(self, block: Block) -> dict[int, Symbol]:
+        """The symbols that a block makes use of, other than to choose between values that nobody asks for."""
+        assigned: dict[int, list[Symbol]] = {}
+        named: list[Symbol] = []
+
+        def note(block: Block) -> None:
+            for each in block:
+                if each.op == "assign":
+                    assigned.setdefault(id(each.symbols[0]), []).append(each.symbols[1])
+                else:
+                    named.extend(self._named(each))
+                for inner in each.blocks:
+                    note(inner)
+
+        note(block)
+        found: dict[int, Symbol] = {}
+        while named:
+            new = {key: symbol for key, symbol in closure(named).items() if key not in found}
+            found |= new
+            named = [value for key in new for value in assigned.get(key, ())]
+        return found
 
     # -- memory ----------------------------------------------------------------------------------------------
 
-    memory: ClassVar = "v"
+    always: ClassVar[tuple[str, ...]] = ("v",)
     """what is there even where a function makes no use of it"""
 
     def _memory(self) -> list[str]:
@@ -118,14 +160,16 @@ class Writer:
 
     def _define(self, symbol: Symbol, expression: str) -> str:
         name = self._name()
-        self._line(f"const {_type(symbol)} {name} = {expression};")
+        self._line(f"const {c_type(symbol)} {name} = {expression};")
         return name
 
     def _pin(self, symbol: Symbol) -> str:
         """The variable of what a statement gives its value; declared where the function begins."""
         if id(symbol) not in self.pinned:
             name = self.pinned[id(symbol)] = self._name("y")
-            self.declared.append(f"{_type(symbol)} {name} = {'Q_TEST(0)' if symbol.kind == 'bool' else 'q_all(0.0)'};")
+            self.declared.append(
+                f"{c_type(symbol)} {name} = {'q_known(0)' if symbol.kind == 'bool' else 'q_all(0.0)'};"
+            )
         return self.pinned[id(symbol)]
 
     # -- values ----------------------------------------------------------------------------------------------
@@ -161,12 +205,16 @@ class Writer:
         text = self._real(symbol)
         return f"q_all({text.strip('()')})" if symbol.op == "constant" and text.strip("(-")[0].isdigit() else text
 
+    def _as(self, kind: Kind, symbol: Symbol) -> str:
+        """A value as what is of a kind is set to it."""
+        return self.value(symbol) if kind == "bool" else self._lanes(symbol)
+
     def _expression(self, symbol: Symbol) -> str:
         op, args = symbol.op, symbol.args
-        if op in _BINARY:
-            return f"{self._real(args[0])} {_BINARY[op]} {self._real(args[1])}"
-        if op in _COMPARED:
-            return f"Q_TEST({self._real(args[0])} {_COMPARED[op]} {self._real(args[1])})"
+        if op in _BINARY or op in _COMPARED:
+            first = self._lanes(args[0]) if args[1].op == "constant" else self._real(args[0])
+            text = f"{first} {(_BINARY | _COMPARED)[op]} {self._real(args[1])}"
+            return f"Q_TEST({text})" if op in _COMPARED else text
         if op == "neg":
             return f"-{self._real(args[0])}"
         if op in ("and", "or"):
@@ -219,7 +267,7 @@ class Writer:
 
     def _hoist(self, then: Block, otherwise: Block, rest: Block) -> None:
         """Compute before a branch what is needed in more than one of its ways, or in one and after it."""
-        a, b, after = (closure(symbols_of(block)) for block in (then, otherwise, rest))
+        a, b, after = (closure(self._named_in(block)) for block in (then, otherwise, rest))
         for key, symbol in {**a, **b}.items():
             if (key in a) + (key in b) + (key in after) > 1:
                 self._compute_unless_given_in(symbol, (*then, *otherwise))
@@ -255,77 +303,92 @@ class Writer:
 
     def _assign(self, each: Statement, rest: Block) -> None:
         target, value = each.symbols
-        if id(target) not in self.used:
-            return
-        given = self.value(value) if target.kind == "bool" else self._real(value)
-        self._line(f"{self._pin(target)} = {given};")
+        if id(target) in self.used:
+            self._set(target, self._as(target.kind, value))
+
+    def _set(self, symbol: Symbol, value: str) -> None:
+        """Give a symbol the value that it has from here on."""
+        self._line(f"{self._pin(symbol)} = {value};")
 
     def _store(self, each: Statement, rest: Block) -> None:
-        self._line(f"{self._place(each.data)} = {self._real(each.symbols[0])};")
+        self._line(f"{self._place(each.data)} = {self._lanes(each.symbols[0])};")
 
     def _return(self, each: Statement, rest: Block) -> None:
         for k, symbol in enumerate(each.symbols):
-            self._line(f"*r{k} = {self._real(symbol)};")
+            self._line(f"*r{k} = {self._lanes(symbol)};")
         self._line("return 0;")
 
     def _call(self, each: Statement, rest: Block) -> None:
         call: Call = each.data
-        callee, version = call.function, self.program.versions[call.memory, each]
-        given = ["m"]
-        for symbol, parameter in zip(each.symbols, callee.parameters):
-            given.append(self.value(symbol) if parameter.kind == "bool" else self._real(symbol))
-        mine = {s.data: s for s in self.used.values() if s.op in ("result", "failed", "load") and s.data[1] == version}
-        results = []
-        for _ in range(callee.results):
-            name = self._name("r")
-            self.declared.append(f"q_real {name} = q_all(0.0);")
-            given.append(f"&{name}")
-            results.append(name)
-        caught = any(symbol.op == "failed" for symbol in mine.values())
-        text = f"{c_name(callee.name)}({', '.join(given)})"
+        given = [self._as(p.kind, symbol) for symbol, p in zip(each.symbols, call.function.parameters)]
+        results = [self._name("r") for _ in range(call.function.results)]
+        self.declared += [f"q_real {name} = q_all(0.0);" for name in results]
         status = self._name("status")
-        if callee.raises:
-            self._line(f"const int {status} = {text};")
-            if not caught:
-                self._line(f"if ({status}) return {status};")
-        else:
-            self._line(f"{text};")
-        for symbol in mine.values():
+        self._called(each, [*given, *(f"&{name}" for name in results)], status)
+        for symbol in self._coming_of(each):
             if symbol.op == "failed":
-                self._line(f"{self._pin(symbol)} = {status} == {1 + ERRORS.index(symbol.data[0])};")
+                self._set(symbol, self._has_failed(status, 1 + ERRORS.index(symbol.data[0])))
             elif symbol.op == "result":
                 name = results[symbol.data[0]]
-                self._line(f"{self._pin(symbol)} = {f'Q_TEST({name} != 0.0)' if symbol.kind == 'bool' else name};")
+                self._set(symbol, f"Q_TEST({name} != 0.0)" if symbol.kind == "bool" else name)
             else:
-                self._line(f"{self._pin(symbol)} = {self._load(symbol)};")
+                self._set(symbol, self._load(symbol))
+
+    def _called(self, each: Statement, given: list[str], status: str) -> None:
+        """Call a function; go on only if it did not fail, or if it is asked whether it did."""
+        callee = each.data.function
+        text = f"{c_name(callee.name)}({', '.join(['m', *given])})"
+        self._line(f"const int {status} = {text};" if callee.raises else f"{text};")
+        if callee.raises and not self._is_caught(each):
+            self._line(f"if ({status}) return {status};")
+
+    def _has_failed(self, status: str, number: int) -> str:
+        return f"{status} == {number}"
+
+    def _coming_of(self, call: Statement) -> list[Symbol]:
+        """What is made use of that is known after a call: its results, how it failed, what it has changed."""
+        version = self.program.versions[call.data.memory, call]
+        mine = {s.data: s for s in self.used.values() if s.op in ("result", "failed", "load") and s.data[1] == version}
+        return list(mine.values())
+
+    def _is_caught(self, call: Statement) -> bool:
+        return any(symbol.op == "failed" for symbol in self._coming_of(call))
 
     def _loop(self, each: Statement, rest: Block) -> None:
         depth, (body,) = each.data, each.blocks
         size = (len(each.symbols) - 1) // 2
         count, starts, nexts = each.symbols[0], each.symbols[1 : 1 + size], each.symbols[1 + size :]
-        needed = closure([*symbols_of(body), *nexts])
+        needed = closure([*self._named_in(body), *nexts])
         for symbol in needed.values():
             self._compute_unless_given_in(symbol, body)
         states = []
         for start in starts:
             states.append(self._name("s"))
-            self._line(f"{_type(start)} {states[-1]} = {self.value(start)};")
+            self._line(f"{c_type(start)} {states[-1]} = {self._as(start.kind, start)};")
         last, index = self.value(count), self._name("i")
-        self._line(f"for (q_real {index} = q_all(0.0); {index} < {last}; {index} = {index} + 1.0) {{")
+        self._line(f"for (q_real {index} = q_all(0.0); {self._goes_on(index, last)}; {index} = {index} + 1.0) {{")
         self.scopes.append({})
         for symbol in needed.values():
             if symbol.op == "index" and symbol.data == depth:
                 self.scopes[-1][id(symbol)] = index
             elif symbol.op == "variable" and symbol.data[0] == depth:
                 self.scopes[-1][id(symbol)] = self._define(symbol, states[symbol.data[1]])
-        self._block(body)
-        for state, name in zip(states, [self.value(symbol) for symbol in nexts]):
-            self._line(f"{state} = {name};")
+        self._round(body, states, nexts)
         self.scopes.pop()
         self._line("}")
         for symbol in self.used.values():
             if symbol.op == "outcome" and symbol.data[1] is each:
                 self.scopes[-1][id(symbol)] = states[symbol.data[0]]
+
+    def _goes_on(self, index: str, last: str) -> str:
+        """The condition of a loop."""
+        return f"{index} < {last}"
+
+    def _round(self, body: Block, states: list[str], nexts: tuple[Symbol, ...]) -> None:
+        """What a loop does each time."""
+        self._block(body)
+        for state, name in zip(states, [self._as(symbol.kind, symbol) for symbol in nexts]):
+            self._line(f"{state} = {name};")
 
     def _warn(self, each: Statement, rest: Block) -> None:
         key, words = each.data
@@ -402,42 +465,20 @@ def c_string(text: str) -> str:
     return f'"{escaped}"'
 
 
-def _type(symbol: Symbol) -> str:
+def c_type(symbol: Symbol) -> str:
+    """The type of a value in C."""
     return "q_mask" if symbol.kind == "bool" else "q_real"
 
 
 def _constant(symbol: Symbol) -> str:
     value = value_of(symbol)
     if symbol.kind == "bool":
-        return f"Q_TEST({int(value)})"
+        return f"q_known({int(value)})"
     if math.isnan(value):
         return "Q_NAN"
     if math.isinf(value):
         return "Q_INFINITY" if value > 0.0 else "(-Q_INFINITY)"
     return f"({value!r})" if value < 0 or repr(value).startswith("-") else repr(value)
-
-
-def _used(block: Block) -> dict[int, Symbol]:
-    """The symbols that a block makes use of, other than to choose between values that nobody asks for."""
-    assigned: dict[int, list[Symbol]] = {}
-    named: list[Symbol] = []
-
-    def note(block: Block) -> None:
-        for each in block:
-            if each.op == "assign":
-                assigned.setdefault(id(each.symbols[0]), []).append(each.symbols[1])
-            else:
-                named.extend(each.symbols)
-            for inner in each.blocks:
-                note(inner)
-
-    note(block)
-    found: dict[int, Symbol] = {}
-    while named:
-        new = {key: symbol for key, symbol in closure(named).items() if key not in found}
-        found |= new
-        named = [value for key in new for value in assigned.get(key, ())]
-    return found
 
 
 def _unknown_below(symbol: Symbol, is_known: object) -> list[Symbol]:

@@ -19,6 +19,8 @@ OPTIONS = (
     *("-std=gnu11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno"),
     "-s",
 )
+FOR_THIS_PROCESSOR = ("-mcpu=native",) if platform.machine() in ("aarch64", "arm64") else ("-march=native",)
+"""Not for a library that is passed on."""
 _LINUX = ("-Wl,--build-id=none",)  # nothing that differs from one build to the next
 
 TARGETS = {
@@ -57,18 +59,25 @@ def targets_of(text: str) -> tuple[str, ...]:
     return given
 
 
-def compiled_here(sources: dict[str, bytes], main: str, *, mathematics: Mathematics = "own") -> bytes:
-    """The library for this machine that the file `main` among the sources is compiled to, by its compiler `cc`.
-
-    Raises `PackagingError`, saying what to install if there is no compiler.
-    """
+def compiler() -> str:
+    """The path of this machine's C compiler; raises `PackagingError`, saying what to install if there is none."""
     cc = shutil.which("cc")
     if cc is None:
         raise PackagingError(
             "no C compiler that is called cc: install one (Debian, Ubuntu: apt install gcc libc6-dev; Fedora: dnf "
             "install gcc)"
         )
-    return _compiled([cc, *OPTIONS, *_LINUX], sources, main, _MATHEMATICS[mathematics])
+    return cc
+
+
+def compiled_here(
+    sources: dict[str, bytes], main: str, *, mathematics: Mathematics = "own", options: Sequence[str] = ()
+) -> bytes:
+    """The library for this machine that the file `main` among the sources is compiled to, by its compiler `cc`.
+
+    Raises `PackagingError` without a compiler.
+    """
+    return _compiled([compiler(), *OPTIONS, *_LINUX, *options], sources, main, _MATHEMATICS[mathematics])
 
 
 def compiled_for(target: str, sources: dict[str, bytes], main: str, version: int = 2) -> dict[str, bytes]:

@@ -78,7 +78,7 @@ def single_number(value: float) -> str:
 class _StructWriter(Writer):
     """Writes one function, for a microcontroller."""
 
-    memory: ClassVar = "m"
+    always: ClassVar[tuple[str, ...]] = ("m",)
 
     def __init__(self, function: object, program: Program, places: dict[str, str], words: Words) -> None:
         super().__init__(function, program, places)  # type: ignore[arg-type]

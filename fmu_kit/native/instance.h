@@ -1,8 +1,8 @@
 /* A slave as any version of FMI for co-simulation asks for it: calls in their order, values, states, messages.
 
-   tables.h and functions.h, which lie beside this file, have what differs from slave to slave: what it says of its
-   variables, and what it computes. Both are written by quadcosim from the slave's Python; nothing here depends on what
-   the model is. An instance is one piece of memory, made by `create` and never grown; nothing is shared between
+   places.h, tables.h and functions.h, which lie beside this file, have what differs from slave to slave: what it keeps,
+   what it says of its variables, and what it computes. They are written by quadcosim from the slave's Python; nothing
+   here depends on what the model is. An instance is one piece of memory, made by `create` and never grown; nothing is shared between
    instances.
 
    The file of a version of FMI includes this one, and has the functions that a host calls. Before that it defines
@@ -29,6 +29,7 @@ typedef const char *Text;
 typedef const unsigned *References;
 typedef struct Host Host;
 
+#include "places.h"
 #include "tables.h"
 
 static const Text categories[CATEGORIES] = {"logStatusWarning", "logStatusError", "divergence"};

@@ -121,6 +121,7 @@ typedef int q_mask;
 #define Q_TEST(comparison) ((q_mask)(comparison))
 
 Q_ONE q_real q_all(double x) { return x; }
+Q_ONE q_mask q_known(int holds) { return holds; }
 Q_ONE q_real q_select(q_mask condition, q_real yes, q_real no) { return condition ? yes : no; }
 Q_ONE q_mask q_not(q_mask condition) { return !condition; }
 Q_ONE int q_any(q_mask condition) { return condition; }
@@ -139,6 +140,7 @@ typedef q_bits q_mask; /* all bits of a lane where it holds */
 #define Q_TEST(comparison) ((q_mask)(comparison))
 
 Q_ONE q_real q_all(double x) { return x - (q_real){0.0}; } /* keeps the sign of a zero */
+Q_ONE q_mask q_known(int holds) { return (q_mask){0} - (uint64_t)holds; }
 Q_ONE q_mask q_not(q_mask condition) { return ~condition; }
 Q_ONE double q_lane(q_real x, int lane) { return x[lane]; }
 Q_ONE q_real q_select(q_mask condition, q_real yes, q_real no) {

@@ -29,6 +29,7 @@ typedef struct {
 #define Q_NAN NAN
 
 Q_ONE q_real q_all(float x) { return x; }
+Q_ONE q_mask q_known(int holds) { return holds; }
 Q_ONE q_real q_select(q_mask condition, q_real yes, q_real no) { return condition ? yes : no; }
 Q_ONE q_mask q_not(q_mask condition) { return !condition; }
 Q_ONE q_real q_fabs(q_real x) { return fabsf(x); }

@@ -36,7 +36,6 @@ def tables(program: Program, guid: str, standard: Standard) -> str:
     """The tables of a program, for the FMU of this GUID; calls and types are named as the version of FMI does."""
     slave = program.slave(instance_name="tables")
     variables = program.slave.variables
-    places = place_names(program.places)
     inputs = [(1 if v.has_start else 0) + (2 if v.causality == "input" else 0) for v in variables]
     alike = {
         type: [other for other, its_name in standard.types.items() if its_name == name]
@@ -45,14 +44,10 @@ def tables(program: Program, guid: str, standard: Standard) -> str:
     parts = [
         f"#define GUID {c_string(guid)}",
         f"#define MODEL {c_string(program.model)}",
-        f"enum {{ VARIABLES = {len(variables)}, REALS = {sum(v.type == 'Real' for v in variables)} }};",
-        "/* The memory: the variables by value reference, then what the model keeps. */",
-        _listed("enum", [*(places[place.name] for place in program.places), "PLACES"]) + ";",
-        f"enum {{ DIVERGENCE = {1 + ERRORS.index('DivergenceError')} }}; /* what a function returns in that case */",
+        f"enum {{ REALS = {sum(v.type == 'Real' for v in variables)} }};",
         "typedef enum { REAL, INTEGER, BOOLEAN, STRING, ENUMERATION } Type;",
         "/* By whose functions they are got and set. */",
         _array("Type types[VARIABLES]", (alike[v.type][0].upper() for v in variables)),
-        _array("double starts[PLACES]", (repr(start_of(slave, place)) for place in program.places)),
         "enum { GIVEN = 1, INPUT = 2 }; /* from outside; while the FMU is stepped as well */",
         _array("unsigned char kinds[VARIABLES]", map(str, inputs)),
         _listed("typedef enum", _CALLS) + " Call;",
@@ -72,6 +67,20 @@ def tables(program: Program, guid: str, standard: Standard) -> str:
         f"{_around('None, 0', slave, expect_state, {}, program.model, variables)};",
         f"static const Text bad_start_time[2] = {_around('nan', slave, _SET_START, slave, math.nan)};",
         _array("Text wrong_type[5][2]", (_wrong_type(slave, alike[type], standard.types[type]) for type in alike)),
+    ]
+    return "\n".join(parts) + "\n"
+
+
+def places(program: Program) -> str:
+    """The memory of a program: the name of each place, and what it holds at first."""
+    slave = program.slave(instance_name="places")
+    names = place_names(program.places)
+    parts = [
+        "/* The memory: the variables by value reference, then what the model keeps. */",
+        f"enum {{ VARIABLES = {len(program.slave.variables)} }};",
+        _listed("enum", [*(names[place.name] for place in program.places), "PLACES"]) + ";",
+        _array("double starts[PLACES]", (repr(start_of(slave, place)) for place in program.places)),
+        f"enum {{ DIVERGENCE = {1 + ERRORS.index('DivergenceError')} }}; /* what a function returns in that case */",
     ]
     return "\n".join(parts) + "\n"
 

@@ -1,0 +1,162 @@
+"""A program as C for several lanes of runs at once: what is a branch in one run is a mask over lanes in many.
+
+A function gets the lanes that it is done in, and returns those that have come through; a lane that fails leaves the
+number of its error behind. Nothing is said: texts are for instances.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from fmu_kit.native.c_code import ERRORS, Writer, c_name, place_names
+from fmu_kit.native.statements import Block, Function, Statement, ends
+from fmu_kit.native.symbols import Symbol
+from fmu_kit.native.tracing import Program
+
+
+def lane_code(program: Program) -> str:
+    """The functions of a program in lanes, each after those that it calls."""
+    names = place_names(program.places)
+    return "\n\n".join(LaneWriter(function, program, names).text() for function in program.functions) + "\n"
+
+
+class LaneWriter(Writer):
+    """Writes one function, in lanes.
+
+    `masks` has, for each block that is being written, the variable that holds the lanes that it is done in.
+    """
+
+    always: ClassVar[tuple[str, ...]] = ("v", "failed")
+    type: ClassVar = "q_mask"
+    first: ClassVar[tuple[str, ...]] = ("q_place *v", "q_mask live", "q_real *failed")
+
+    def __init__(self, function: Function, program: Program, places: dict[str, str]) -> None:
+        super().__init__(function, program, places)
+        self.masks = ["live"]
+        self.returns_early = any(_returns(inner) for each in function.body for inner in each.blocks)
+        self.through = "return done | live;" if self.returns_early else "return live;"
+        if self.returns_early:
+            self.declared.append("q_mask done = q_known(0);")
+
+    def _memory(self) -> list[str]:
+        return []
+
+    def _named(self, each: Statement) -> tuple[Symbol, ...]:
+        return () if each.op == "raise" or _is_silent((each,)) else each.symbols
+
+    # -- lanes -----------------------------------------------------------------------------------------------
+
+    def _in_lanes(self, mask: str, block: Block) -> None:
+        self.masks.append(mask)
+        self._inner(block)
+        self.masks.pop()
+
+    def _takes_out(self, block: Block) -> bool:
+        """Whether lanes may leave a block before its end."""
+        return any(
+            each.op in ("raise", "return")
+            or (each.op == "call" and bool(each.data.function.raises) and not self._is_caught(each))
+            or any(map(self._takes_out, each.blocks))
+            for each in block
+        )
+
+    def _set(self, symbol: Symbol, value: str) -> None:
+        """Where it is set first, it may be set in all lanes: only in those of this block will it be asked for."""
+        first = id(symbol) not in self.pinned
+        name = self._pin(symbol)
+        self._line(f"{name} = {value if first else self._choice(symbol, value, name)};")
+
+    def _choice(self, symbol: Symbol, value: str, otherwise: str) -> str:
+        mask = self.masks[-1]
+        if symbol.kind == "bool":
+            return f"({mask} & {value}) | (q_not({mask}) & {otherwise})"
+        return f"q_select({mask}, {value}, {otherwise})"
+
+    # -- statements ------------------------------------------------------------------------------------------
+
+    def _if(self, each: Statement, rest: Block) -> None:
+        (condition,), (then, otherwise) = each.symbols, each.blocks
+        if _is_silent(then) and _is_silent(otherwise):
+            return
+        holds, mask = self.value(condition), self.masks[-1]
+        if not ends(then):
+            self._hoist(then, otherwise, rest)
+        ways = [(then, holds, f"q_not({holds})"), (otherwise, f"q_not({holds})", holds)]
+        masks = []
+        for block, condition_of_block, _ in ways:
+            masks.append(self._name("m"))
+            if not _is_silent(block):
+                self._line(f"q_mask {masks[-1]} = {mask} & {condition_of_block};")
+        for own, (block, _, others) in zip(masks, ways):
+            if _is_silent(block):
+                continue
+            seldom = ends(block) and block[-1].op == "raise"
+            self._line(f"if ({f'Q_SELDOM(q_any({own}))' if seldom else f'q_any({own})'}) {{")
+            self._in_lanes(own, block)
+            if self._takes_out(block):
+                self._line(f"    {mask} = {mask} & {others if ends(block) else f'({others} | {own})'};")
+            self._line("}")
+
+    def _store(self, each: Statement, rest: Block) -> None:
+        place = self._place(each.data)
+        self._line(f"{place} = q_select({self.masks[-1]}, {self._lanes(each.symbols[0])}, {place});")
+
+    def _return(self, each: Statement, rest: Block) -> None:
+        for k, symbol in enumerate(each.symbols):
+            value = self._lanes(symbol)
+            self._line(f"*r{k} = {f'q_select({self.masks[-1]}, {value}, *r{k})' if self.returns_early else value};")
+        if len(self.masks) == 1:
+            self._line(self.through)
+        else:
+            self._line(f"done = done | {self.masks[-1]};")
+
+    def _called(self, each: Statement, given: list[str], status: str) -> None:
+        callee, mask = each.data.function, self.masks[-1]
+        text = f"{c_name(callee.name)}({', '.join(['v', mask, 'failed', *given])})"
+        if not callee.raises:
+            self._line(f"{text};")
+        elif self._is_caught(each):
+            self._line(f"const q_mask {status} = {mask} & q_not({text});")
+        else:
+            self._line(f"{mask} = {text};")
+
+    def _has_failed(self, status: str, number: int) -> str:
+        return f"{status} & Q_TEST(*failed == {number}.0)"
+
+    def _goes_on(self, index: str, last: str) -> str:
+        goes = self._name("m")
+        self.declared.append(f"q_mask {goes};")
+        condition = f"q_any({goes} = {self.masks[-1]} & Q_TEST({index} < {last}))"
+        self.masks.append(goes)
+        return condition
+
+    def _round(self, body: Block, states: list[str], nexts: tuple[Symbol, ...]) -> None:
+        goes, before = self.masks[-1], self._name("m")
+        takes_out = self._takes_out(body)
+        if takes_out:
+            self._line(f"const q_mask {before} = {goes};")
+        self._block(body)
+        for state, symbol, value in zip(states, nexts, [self._as(symbol.kind, symbol) for symbol in nexts]):
+            self._line(f"{state} = {self._choice(symbol, value, state)};")
+        self.masks.pop()
+        if takes_out:
+            self._line(f"{self.masks[-1]} = {self.masks[-1]} & (q_not({before}) | {goes});")
+
+    def _warn(self, each: Statement, rest: Block) -> None:
+        pass
+
+    def _raise(self, each: Statement, rest: Block) -> None:
+        kind, _ = each.data
+        mask = self.masks[-1]
+        self._line(f"*failed = q_select({mask}, q_all({1 + ERRORS.index(kind)}.0), *failed); /* {kind} */")
+        if len(self.masks) == 1:
+            self._line(f"return {'done' if self.returns_early else 'q_known(0)'};")
+
+
+def _returns(block: Block) -> bool:
+    return any(each.op == "return" or any(map(_returns, each.blocks)) for each in block)
+
+
+def _is_silent(block: Block) -> bool:
+    """Whether a block does nothing, or nothing but speak."""
+    return all(each.op == "warn" or (each.op == "if" and all(map(_is_silent, each.blocks))) for each in block)

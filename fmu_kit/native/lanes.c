@@ -1,0 +1,108 @@
+/* The slave for several runs at once, one in each lane of vector registers, for whoever computes many of them.
+
+   It is no part of the FMU's library, and empty unless QUADCOSIM_LANES says how many lanes there are:
+
+       cc -O2 -march=native -ffp-contract=off -DQUADCOSIM_LANES=8 -shared -fPIC lanes.c -o lanes.so
+
+   A lane has the bits of an instance of the FMU, whatever the others do. The memory of all lanes is
+   double[places][lanes], aligned to 64 bytes; the first places are the variables by their value references, of
+   Integers and Booleans as doubles, those behind them are the slave's own. `active` has all bits of a lane that is
+   meant, or none; others stay as they are. `status` becomes 0 in an active lane, or the number of the error that an
+   instance would have failed with; such a lane is not to be used any more.
+
+   What an instance refuses when a value is set is not looked at here. Whoever writes into the memory makes sure that
+   Reals, the start time too, are finite, Integers whole numbers of 32 bits, Booleans 0 or 1; that nothing is written
+   but inputs, and before the first step parameters. */
+
+#ifdef QUADCOSIM_LANES
+
+#include "mathematics.h"
+#include "places.h"
+
+#if defined(_WIN32)
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+
+#if defined(__GNUC__)
+#define Q_SELDOM(condition) __builtin_expect(condition, 0)
+typedef q_real q_place __attribute__((aligned(QUADCOSIM_LANES < 8 ? 8 * QUADCOSIM_LANES : 64)));
+#else
+#define Q_SELDOM(condition) (condition)
+typedef q_real q_place;
+#endif
+
+#include "lane_functions.h"
+
+enum { LANES = QUADCOSIM_LANES };
+
+static q_mask lanes_of(const uint64_t *active)
+{
+    q_mask mask = q_known(0);
+    memcpy(&mask, active, sizeof mask);
+    return mask;
+}
+
+static void tell_status(const uint64_t *active, q_mask through, q_real failed, int32_t *status)
+{
+    const q_real number = q_select(through, q_all(0.0), failed);
+    for (int lane = 0; lane < LANES; lane++)
+        if (active[lane])
+            status[lane] = (int32_t)q_lane(number, lane);
+}
+
+static q_real values_of(const double *of_lanes)
+{
+    q_real value;
+    memcpy(&value, of_lanes, sizeof value);
+    return value;
+}
+
+EXPORT int quadcosim_lanes(void);
+int quadcosim_lanes(void) { return LANES; }
+
+EXPORT int quadcosim_places(void);
+int quadcosim_places(void) { return PLACES; }
+
+EXPORT int quadcosim_variables(void);
+int quadcosim_variables(void) { return VARIABLES; }
+
+/* The status that is a divergence. */
+EXPORT int quadcosim_divergence(void);
+int quadcosim_divergence(void) { return DIVERGENCE; }
+
+/* The start values, in all lanes. */
+EXPORT void quadcosim_begin(double *memory);
+void quadcosim_begin(double *memory)
+{
+    for (int place = 0; place < PLACES; place++)
+        for (int lane = 0; lane < LANES; lane++)
+            memory[place * LANES + lane] = starts[place];
+}
+
+/* Take over what was set, and compute outputs at the start time [s]: once at the end of initialisation, and before
+   that wherever an output is asked for after something was set. */
+EXPORT void quadcosim_initialise(double *memory, const uint64_t *active, const double *start_time, int32_t *status);
+void quadcosim_initialise(double *memory, const uint64_t *active, const double *start_time, int32_t *status)
+{
+    q_place *v = (q_place *)memory;
+    const q_mask live = lanes_of(active);
+    q_real failed = q_all(0.0);
+    v[SELF_START_TIME] = q_select(live, values_of(start_time), v[SELF_START_TIME]);
+    const q_mask through = enter_stepping(v, live, &failed);
+    tell_status(active, through, failed, status);
+}
+
+/* Advance from t by h [s], which may differ from lane to lane. */
+EXPORT void quadcosim_do_step(double *memory, const uint64_t *active, const double *t, const double *h, int32_t *status);
+void quadcosim_do_step(double *memory, const uint64_t *active, const double *t, const double *h, int32_t *status)
+{
+    q_real failed = q_all(0.0), done = q_all(0.0);
+    const q_mask through = do_step((q_place *)memory, lanes_of(active), &failed, values_of(t), values_of(h), &done);
+    tell_status(active, through, failed, status);
+}
+
+#else
+typedef int quadcosim_no_lanes; /* C wants something to compile */
+#endif

@@ -1,0 +1,126 @@
+"""A slave in lanes beside instances of it, one for each lane: what they hold, to the last bit."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fmpy import fmi2
+from fmpy.fmi1 import FMICallException
+from numpy.typing import NDArray
+
+from fmu_kit.native.c_code import ERRORS
+from fmu_kit.native.lanes import Lanes
+from tests.fmu_kit.native.twins import GUID
+
+_BEFORE_THE_MEMORY = 136
+"""Bytes of an instance's state that say whose it is."""
+
+Values = Mapping[int, float | int | bool]
+"""By value reference"""
+
+
+@dataclass
+class Alone:
+    """An instance of the FMU; it remembers how its last call has failed."""
+
+    fmu: Any
+    places: int
+    types: Sequence[str]
+    """by value reference"""
+    status: int = 0
+    messages: list[str] = field(default_factory=list)
+
+    @classmethod
+    def made(cls, library: Path, places: int, types: Sequence[str], guid: str = GUID) -> "Alone":
+        """An instance of a library."""
+        messages: list[str] = []
+
+        def log(_: Any, __: bytes, status: int, category: bytes | None, message: bytes) -> None:
+            messages.append((category or b"").decode())
+
+        callbacks = fmi2.fmi2CallbackFunctions()
+        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(log)
+        fmu = fmi2.FMU2Slave(
+            guid=guid, unzipDirectory=str(library.parent), modelIdentifier="lane", libraryPath=str(library)
+        )
+        fmu.instantiate(callbacks=callbacks, loggingOn=True)
+        return cls(fmu, places, types, messages=messages)
+
+    def put(self, values: Values) -> None:
+        """Set variables."""
+        for reference, value in values.items():
+            getattr(self.fmu, f"set{self.types[reference]}")([reference], [value])
+
+    def initialise(self, start: float) -> None:
+        """From instantiation to the first step."""
+        self.fmu.setupExperiment(startTime=start)
+        self.fmu.enterInitializationMode()
+        self._try(self.fmu.exitInitializationMode)
+
+    def step(self, t: float, h: float) -> None:
+        """A step."""
+        self._try(self.fmu.doStep, t, h)
+
+    def memory(self) -> NDArray[np.float64]:
+        """All that it holds."""
+        state = self.fmu.getFMUState()
+        held = self.fmu.serializeFMUState(state)
+        self.fmu.freeFMUState(state)
+        return np.frombuffer(held, np.float64, self.places, _BEFORE_THE_MEMORY)
+
+    def _try(self, call: Any, *given: float) -> None:
+        self.messages.clear()
+        try:
+            call(*given)
+            self.status = 0
+        except FMICallException:
+            self.status = 1 + ERRORS.index("DivergenceError" if self.messages[-1] == "divergence" else "FmuError")
+
+
+class Together:
+    """The same in lanes."""
+
+    def __init__(self, library: Path) -> None:
+        self.lanes = Lanes(library)
+        self.count = self.lanes.lanes
+        self.memory = self._aligned(self.lanes.places * self.count).reshape(self.lanes.places, self.count)
+        self.status = np.zeros(self.count, np.int32)
+
+    def begin(self) -> None:
+        """As new, all lanes."""
+        self.status[:] = 0
+        self.lanes.begin(self.memory.ctypes.data)
+
+    def held(self) -> list[bytes]:
+        """What each lane holds."""
+        return [values.tobytes() for values in self.memory.T]
+
+    def put(self, lane: int, values: Values) -> None:
+        """Set variables of a lane."""
+        for reference, value in values.items():
+            self.memory[reference, lane] = value
+
+    def initialise(self, active: NDArray[np.bool_], start: NDArray[np.float64]) -> None:
+        """Compute outputs at the start time."""
+        given = [self._mask(active), start]
+        self.lanes.initialise(self.memory.ctypes.data, *(a.ctypes.data for a in given), self.status.ctypes.data)
+
+    def step(self, active: NDArray[np.bool_], t: NDArray[np.float64], h: NDArray[np.float64]) -> None:
+        """A step."""
+        given = [self._mask(active), t, h]
+        self.lanes.do_step(self.memory.ctypes.data, *(a.ctypes.data for a in given), self.status.ctypes.data)
+
+    def _mask(self, active: NDArray[np.bool_]) -> NDArray[np.uint64]:
+        return np.where(active, ~np.uint64(0), np.uint64(0))
+
+    @staticmethod
+    def _aligned(size: int) -> NDArray[np.float64]:
+        room = np.zeros(size + 8)
+        return room[-room.ctypes.data % 64 // 8 :][:size]
+
+
+def bits(values: NDArray[np.float64]) -> bytes:
+    """Values to the last bit; what is not a number has no bits that count."""
+    return np.where(np.isnan(values), np.nan, values).tobytes()

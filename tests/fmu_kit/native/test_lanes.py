@@ -1,0 +1,136 @@
+"""A slave in lanes has, in every lane, the bits of an instance alone, whatever the others do."""
+
+import shutil
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from fmu_kit.bundle import PackagingError, Target
+from fmu_kit.native.building import c_sources, modules_of
+from fmu_kit.native.c_code import ERRORS
+from fmu_kit.native.compiler import compiled_here
+from fmu_kit.native.lanes import compiled_lanes, lanes_here
+from fmu_kit.native.precomputing import precomputed
+from fmu_kit.native.standards import STANDARDS
+from fmu_kit.native.tracing import trace
+from fmu_kit.packaging import slave_class
+from fmu_kit.variables import Variable
+from orchestration import fmus
+from orchestration.quadrotor.wiring import MODELS
+from tests.fmu_kit.native.compiled import compiler
+from tests.fmu_kit.native.in_lanes import Alone, Together, Values, bits
+from tests.fmu_kit.native.twins import GUID
+
+PROBES = {"Arithmetic": 4, "Branches": 8, "Kept": 4, "Loops": 4, "Memory": 1}
+"""Slaves that do what slaves may do, and in how many lanes"""
+FMU_ERROR, DIVERGENCE = (1 + ERRORS.index(name) for name in ("FmuError", "DivergenceError"))
+STRANGE = (0.0, -0.0, 1.0, -1.0, 3.0, 1e3, 1e200, -1e308)
+
+
+def _value(rng: np.random.Generator, variable: Variable) -> float | int | bool:
+    """Near the start value, or, seldom, anything."""
+    if variable.type == "Boolean":
+        return bool(rng.integers(2))
+    if variable.type == "Integer":
+        return int(rng.integers(-3, 12))
+    if variable.type == "Enumeration":
+        return int(rng.integers(0, 4))
+    if rng.random() < 0.02:
+        return float(rng.choice(STRANGE))
+    return float(variable.start + rng.normal() * max(abs(variable.start), 0.3) * 0.1)
+
+
+def _given(rng: np.random.Generator, variables: list[Variable], causality: str, share: float) -> Values:
+    return {
+        k: _value(rng, variable)
+        for k, variable in enumerate(variables)
+        if variable.causality == causality and variable.has_start and rng.random() < share
+    }
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_in_a_lane_are_the_bits_of_the_fmu(model: str, tmp_path: Path) -> None:
+    compiler("cc")
+    path = Path(fmpy.extract(str(fmus.locate(f"native/{model}")), str(tmp_path)))
+    guid = fmpy.read_model_description(str(path)).guid
+    sources = {file.name: file.read_bytes() for file in (path / "sources").iterdir()}
+    (tmp_path / "lanes.so").write_bytes(compiled_lanes(sources, 8))
+    target = Target.parse(MODELS[model])
+    shutil.copy(path / "binaries" / fmpy.platform / f"{model}.so", tmp_path / "alone.so")
+    assert _come_to(tmp_path, target, guid) >= {0, FMU_ERROR, DIVERGENCE}
+
+
+@pytest.mark.parametrize("name", PROBES)
+def test_whatever_a_slave_does_it_does_in_lanes(name: str, tmp_path: Path) -> None:
+    compiler("cc")
+    target = Target.parse(f"tests.fmu_kit.native.probes:{name}")
+    sources = c_sources(precomputed(trace(slave_class(target), modules_of(target))), GUID, STANDARDS[2])
+    (tmp_path / "alone.so").write_bytes(compiled_here(sources, STANDARDS[2].main))
+    (tmp_path / "lanes.so").write_bytes(compiled_lanes(sources, PROBES[name]))
+    assert _come_to(tmp_path, target, GUID) > {0}
+
+
+def _come_to(folder: Path, target: Target, guid: str) -> set[int]:
+    """Fly all lanes again and again, each beside an instance; returns the statuses that they came to."""
+    rng = np.random.default_rng(1)
+    variables = list(slave_class(target).variables)
+    together = Together(folder / "lanes.so")
+    types = [variable.type.replace("Enumeration", "Integer") for variable in variables]
+    alone = [Alone.made(folder / "alone.so", together.lanes.places, types, guid) for _ in range(together.count)]
+    return {status for _ in range(12) for status in _fly(together, alone, variables, rng)}
+
+
+def _fly(together: Together, alone: list[Alone], variables: list[Variable], rng: np.random.Generator) -> list[int]:
+    """Both from initialisation on, each lane with values, times and steps of its own, until it fails."""
+    together.begin()
+    for lane, instance in enumerate(alone):
+        instance.fmu.reset()
+        given = {**_given(rng, variables, "parameter", 0.3), **_given(rng, variables, "input", 0.8)}
+        instance.put(given)
+        together.put(lane, given)
+    active = rng.random(together.count) < 0.9
+    start = rng.choice([0.0, 0.5, -1.0], together.count)
+    period = float(rng.choice([0.001, 0.01, 0.25]))
+    before = together.held()
+    together.initialise(active, start)
+    for lane in np.flatnonzero(active):
+        alone[lane].initialise(start[lane])
+    for k in range(12):
+        _expect_alike(together, alone, active, before)
+        active &= together.status == 0
+        t, h = start + period * k, period * rng.choice([0.5, 1.0, 1.0, 2.0], together.count)
+        for lane in np.flatnonzero(active):
+            given = _given(rng, variables, "input", 0.5)
+            together.put(lane, given)
+            alone[lane].put(given)
+            alone[lane].step(t[lane], h[lane])
+        before = together.held()
+        together.step(active, t, h)
+    return list(map(int, together.status))
+
+
+def _expect_alike(together: Together, alone: list[Alone], active: NDArray[np.bool_], before: list[bytes]) -> None:
+    """Active lanes are as their instances, the others as before."""
+    for lane, (instance, held) in enumerate(zip(alone, before)):
+        if active[lane]:
+            assert together.status[lane] == instance.status
+            assert bits(together.memory[:, lane]) == bits(instance.memory())
+        else:
+            assert together.held()[lane] == held
+
+
+def test_lanes_are_refused_by_name() -> None:
+    with pytest.raises(PackagingError, match=r"lanes = 3: expected 1 or a power of two up to 64"):
+        compiled_lanes({"lanes.c": b""}, 3)
+    with pytest.raises(PackagingError, match=r"expected lanes\.c"):
+        compiled_lanes({"fmi2.c": b""}, 8)
+
+
+def test_without_a_compiler_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "")
+    lanes_here.cache_clear()
+    with pytest.raises(PackagingError, match="install one"):
+        lanes_here()
