@@ -123,9 +123,9 @@ class Quaternion:
             larger = other[i] > best
             best = ops.where(larger, other[i], best)
             row = tuple(ops.where(larger, theirs, ours) for theirs, ours in zip(other, row))
-        sign = ops.where(row[3] < 0.0, -1.0, 1.0)
-        Q: Quaternion = cls.from_xyzw(*row)
-        return Q / (sign * Q.norm(ops))
+        length = cls.from_xyzw(*row).norm(ops)
+        unit: Quaternion = cls.from_xyzw(*row) / ops.where(row[3] < 0.0, -length, length)
+        return unit
 
     def __mul__(self, other: Quaternion) -> Quaternion:
         """Q1 ⊙ Q2 = [q01 q2 + q02 q1 + q1 × q2, q01 q02 - q1·q2]."""

@@ -134,6 +134,29 @@ def test_z_axis_is_the_inertial_image_of_the_body_z_axis(Q: Quaternion) -> None:
     assert_equal_vectors(Q.z_axis(), Q.to_inertial(Vec3(0.0, 0.0, 1.0)), 1.0)
 
 
+AXES = (Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
+
+
+@given(quaternions)
+@example(rotation(AXES[0], math.pi))
+@example(rotation(AXES[1], math.pi))
+@example(rotation(AXES[2], math.pi))
+def test_an_attitude_is_found_from_its_axes(Q: Quaternion) -> None:
+    found = Quaternion.from_axes(*(Q.to_inertial(axis) for axis in AXES))
+    assert found.scalar >= 0.0
+    same = Q if found.vector @ Q.vector + found.scalar * Q.scalar > 0.0 else -Q
+    assert_equal_quaternions(found, same)
+
+
+def test_attitudes_are_found_from_their_axes_in_a_batch() -> None:
+    many = [rotation(axis, angle) for axis in AXES for angle in (0.1, 2.0, 3.0, 4.0)]
+    batch = Quaternion.from_xyzw(*np.array([[*Q] for Q in many]).T)
+    found = Quaternion.from_axes(*(batch.to_inertial(axis) for axis in AXES), NUMPY)
+    for i, Q in enumerate(many):
+        expected = Quaternion.from_axes(*(Q.to_inertial(axis) for axis in AXES))
+        assert_equal_quaternions(Quaternion.from_xyzw(*(component[i] for component in found)), expected)
+
+
 @given(quaternions, vectors)
 def test_opposite_quaternions_are_the_same_rotation(Q: Quaternion, v: Vec3) -> None:
     assert (-Q).to_body(v) == Q.to_body(v)
