@@ -28,7 +28,7 @@ from orchestration.quadrotor.translation import system_of
 from orchestration.simulation import prepared
 from orchestration.simulator import Floats
 from orchestration.system.check import recorded
-from plant_fmu.dynamics import Wind
+from plant_fmu.wind import Wind
 
 STEPS = 5000
 REPETITIONS = 7

@@ -17,7 +17,7 @@ from fmu_kit.rigid_body import Body, RigidState, Wrench, derivative
 from fmu_kit.trajectory import Trajectory
 from orchestration.master.sources import NUMPY
 from orchestration.quadrotor.measures import SETTLED
-from plant_fmu.dynamics import Wind
+from plant_fmu.wind import Wind
 
 Array = Any
 Law = Callable[[Array, RigidState], Array]

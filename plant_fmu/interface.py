@@ -12,7 +12,8 @@ from fmu_kit.variables import (
     tunable_parameter,
     vector,
 )
-from plant_fmu.dynamics import Actuators, Wind
+from plant_fmu.actuators import Box, Motors
+from plant_fmu.wind import Wind
 
 PAPER_ATTITUDE = Quaternion.from_xyzw(0.1699, 0.3058, 0.1699, 0.9212)
 """Q(0) of section V; normalised at initialisation."""
@@ -20,7 +21,7 @@ PAPER_ATTITUDE = Quaternion.from_xyzw(0.1699, 0.3058, 0.1699, 0.9212)
 LARGEST_INTERNAL_STEP = 0.002
 """[s]"""
 
-_BODY, _WIND, _ACTUATORS, _ORIGIN = Body(), Wind(), Actuators(), Vec3(0.0, 0.0, 0.0)
+_BODY, _WIND, _BOX, _MOTORS, _ORIGIN = Body(), Wind(), Box(), Motors(), Vec3(0.0, 0.0, 0.0)
 
 
 COMMAND = (
@@ -35,6 +36,36 @@ MOTION = (
     *vector(continuous_output("velocity", "velocity V, inertial frame", "m/s")),
     *vector(continuous_output("quaternion", "attitude Q, inertial to body, scalar last", "1"), QUATERNION_AXES),
     *vector(continuous_output("angular_velocity", "angular velocity, body frame (forward-right-down)", "rad/s")),
+)
+
+MOTOR = (
+    fixed_parameter(
+        "motor.thrust_max",
+        "largest thrust of each of four motors on an X frame; 0: no motors",
+        "N",
+        _MOTORS.thrust_max,
+        minimum=0.0,
+    ),
+    fixed_parameter("motor.thrust_min", "least thrust of each motor", "N", _MOTORS.thrust_min),
+    fixed_parameter("motor.arm.x", "from the centre to each motor along x of the body", "m", _MOTORS.arm_x, above=0.0),
+    fixed_parameter("motor.arm.y", "from the centre to each motor along y of the body", "m", _MOTORS.arm_y, above=0.0),
+    fixed_parameter(
+        "motor.drag_to_thrust", "torque about z by thrust of a propeller", "m", _MOTORS.drag_to_thrust, above=0.0
+    ),
+    fixed_parameter(
+        "motor.time_constant.up",
+        "lag of a motor's thrust that grows; 0: actuator_time_constant",
+        "s",
+        _MOTORS.up,
+        minimum=0.0,
+    ),
+    fixed_parameter(
+        "motor.time_constant.down",
+        "lag of a motor's thrust that falls; 0: actuator_time_constant",
+        "s",
+        _MOTORS.down,
+        minimum=0.0,
+    ),
 )
 
 PARAMETERS = (
@@ -58,16 +89,17 @@ PARAMETERS = (
         start=_WIND.amplitude,
     ),
     tunable_parameter("wind.frequency", "w of the wind force a cos(w t)", "rad/s", _WIND.frequency),
-    fixed_parameter("thrust_max", "thrust is limited to [0, thrust_max]", "N", _ACTUATORS.thrust_max, minimum=0.0),
-    fixed_parameter("torque_max", "each torque is limited to +-torque_max", "N.m", _ACTUATORS.torque_max, minimum=0.0),
+    fixed_parameter("thrust_max", "thrust is limited to [0, thrust_max]", "N", _BOX.thrust_max, minimum=0.0),
+    fixed_parameter("torque_max", "each torque is limited to +-torque_max", "N.m", _BOX.torque_max, minimum=0.0),
     fixed_parameter(
         "actuator_time_constant",
-        "first-order lag of thrust and torques, after the limits; 0: none",
+        "first-order lag of thrust and torques, or of the motors, after the limits; 0: none",
         "s",
-        _ACTUATORS.time_constant,
+        _BOX.time_constant,
         minimum=0.0,
     ),
     fixed_parameter("max_internal_step", "largest internal integration step", "s", LARGEST_INTERNAL_STEP, above=0.0),
+    *MOTOR,
 )
 
 LOCALS = (

@@ -2,15 +2,15 @@
 
 import math
 
-from fmu_kit.algebra import Vec3
 from fmu_kit.errors import require, require_finite_state
 from fmu_kit.integrator import internal_steps, rk4_step
 from fmu_kit.rigid_body import Body, RigidState, Wrench, acceleration, derivative, tilt
 from fmu_kit.saved_state import State
 from fmu_kit.scalar import repeat
 from fmu_kit.slave import Slave
-from plant_fmu.dynamics import Actuators, Wind
+from plant_fmu.actuators import Actuators, Box, Channels, Motors
 from plant_fmu.interface import MOTION, QUADROTOR
+from plant_fmu.wind import Wind
 
 MOST_INTERNAL_STEPS = 100_000
 """In one communication step: some seconds of work, during which no master can get in between"""
@@ -28,11 +28,7 @@ class QuadrotorPlant(Slave):
         """Build the body, the wind and the actuators."""
         self._body = Body(mass=self.real("mass"), inertia=self.inertia(), gravity=self.real("gravity"))
         self._wind = Wind(amplitude=self.vec3("wind.amplitude"), frequency=self.real("wind.frequency"))
-        self._actuators = Actuators(
-            thrust_max=self.real("thrust_max"),
-            torque_max=self.real("torque_max"),
-            time_constant=self.real("actuator_time_constant"),
-        )
+        self._actuators = self._read_actuators()
         self._largest_step = self.real("max_internal_step")
 
     def initialise(self, t: float) -> None:
@@ -45,17 +41,17 @@ class QuadrotorPlant(Slave):
             quaternion.unit(),
             self.vec3("initial.angular_velocity"),
         )
-        self._wrench = self._actuators.limited(self._command())
+        self._channels = self._actuators.limited(self._command())
         self._write(t)
 
     def step(self, t: float, h: float) -> None:
         """Integrate from `t` to `t + h` in equal internal steps, the command held."""
         body, wind, actuators = self._body, self._wind, self._actuators
-        start, target = self._wrench, actuators.limited(self._command())
+        start, target = self._channels, actuators.limited(self._command())
         external = self.vec3("external_force")
 
         def f(time: float, x: RigidState) -> RigidState:
-            wrench = actuators.response(start, target, time - t)
+            wrench = actuators.wrench(actuators.response(start, target, time - t))
             return derivative(x, wrench, wind.force(time) + external, body)
 
         require(
@@ -69,21 +65,42 @@ class QuadrotorPlant(Slave):
         self._state = repeat(
             count, lambda i, state: rk4_step(f, t + i * internal, state, internal).normalised(), self._state
         )
-        self._wrench = actuators.response(start, target, h)
+        self._channels = actuators.response(start, target, h)
         self._write(t + h)
 
     def internal_state(self) -> State:
         """The actuators; the motion is among the variables."""
-        torque = self._wrench.torque
-        return {"thrust": self._wrench.thrust, "torque": [torque.x, torque.y, torque.z]}
+        return {"actuators": list(self._channels)}
 
     def restore(self, state: State) -> None:
         """Put the actuators and the motion back."""
-        x, y, z = map(float, state["torque"])
-        self._wrench = Wrench(float(state["thrust"]), Vec3(x, y, z))
+        a, b, c, d = map(float, state["actuators"])
+        self._channels = Channels(a, b, c, d)
         self._state = RigidState(
             self.vec3("position"), self.vec3("velocity"), self.quaternion("quaternion"), self.vec3("angular_velocity")
         )
+
+    def _read_actuators(self) -> Actuators:
+        box = Box(
+            thrust_max=self.real("thrust_max"),
+            torque_max=self.real("torque_max"),
+            time_constant=self.real("actuator_time_constant"),
+        )
+        motors = Motors(
+            thrust_max=self.real("motor.thrust_max"),
+            thrust_min=self.real("motor.thrust_min"),
+            arm_x=self.real("motor.arm.x"),
+            arm_y=self.real("motor.arm.y"),
+            drag_to_thrust=self.real("motor.drag_to_thrust"),
+            up=_unless_zero(self.real("motor.time_constant.up"), box.time_constant),
+            down=_unless_zero(self.real("motor.time_constant.down"), box.time_constant),
+        )
+        if motors.thrust_max > 0.0:
+            highest = motors.thrust_max
+            require(
+                motors.thrust_min <= highest, "motor.thrust_min", motors.thrust_min, f"at most {highest}, the largest"
+            )
+        return Actuators(box=box, motors=motors)
 
     def _command(self) -> Wrench:
         return Wrench(self.real("thrust"), self.vec3("torque"))
@@ -97,6 +114,14 @@ class QuadrotorPlant(Slave):
         self._reals[first : first + len(values)] = values
         wind = self._wind.force(t)
         force = wind + self.vec3("external_force")
-        self.put_vec3("acceleration", acceleration(state.quaternion, self._wrench.thrust, force, self._body))
+        thrust = self._actuators.wrench(self._channels).thrust
+        self.put_vec3("acceleration", acceleration(state.quaternion, thrust, force, self._body))
         self.put_vec3("wind.force", wind)
         self.put("tilt", tilt(state.quaternion))
+
+
+def _unless_zero(own: float, general: float) -> float:
+    """What a motor has of its own, else what is said of all actuators."""
+    if own == 0.0:
+        return general
+    return own

@@ -68,7 +68,7 @@ def test_nesting_that_is_allowed_is_read() -> None:
         ("start_time", None, "FMU state (start_time) = None"),
         ("stale", 0, "FMU state (stale) = 0: expected of type bool"),
         ("internal", {}, "FMU state (internal) = {}: expected what the model saves"),
-        ("internal", {"thrust": "x", "torque": 1}, "FMU state (internal) = "),
+        ("internal", {"actuators": [1.0, 2.0, 3.0, "x"]}, "FMU state (internal) = "),
     ],
 )
 def test_a_state_with_another_value_is_refused_in_words(key: str, value: Any, words: str) -> None:

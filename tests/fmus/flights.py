@@ -55,6 +55,19 @@ FLIGHTS = {
         {"actuator_time_constant": 0.05, "wind.amplitude.x": 2.0, "wind.frequency": 3.0, "inertia.xy": 0.1},
         0.007,
     ),
+    # Motors: four thrusts that no variable shows, some of them at their limits, some on their way up and some down.
+    "plant with motors": Flight(
+        "QuadrotorPlant",
+        {
+            "motor.thrust_max": 2.5,
+            "motor.arm.x": 0.1,
+            "motor.arm.y": 0.08,
+            "motor.drag_to_thrust": 0.2,
+            "motor.time_constant.up": 0.02,
+            "motor.time_constant.down": 0.05,
+        },
+        0.01,
+    ),
     "controller": Flight("UnifiedController", {"gain.eta": 12.0}, 0.01),
     # 4 ms steps on a 10 ms clock: at most communication points the next sample is still to come.
     "controller between samples": Flight(

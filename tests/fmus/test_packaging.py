@@ -297,7 +297,7 @@ def test_a_failed_build_says_why(sources: Path, tmp_path: Path, monkeypatch: pyt
 
 def test_the_source_hash_changes_with_a_source(sources: Path) -> None:
     before = {model: hash_of(sources, model) for model in MODELS}
-    replace(sources / "plant_fmu" / "dynamics.py", "amplitude: Vec3 = Vec3(0.01, ", "amplitude: Vec3 = Vec3(0.02, ")
+    replace(sources / "plant_fmu" / "wind.py", "amplitude: Vec3 = Vec3(0.01, ", "amplitude: Vec3 = Vec3(0.02, ")
     assert hash_of(sources, "QuadrotorPlant") != before["QuadrotorPlant"]
     assert hash_of(sources, "UnifiedController") == before["UnifiedController"]
 

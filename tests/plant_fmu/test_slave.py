@@ -290,6 +290,42 @@ def test_torques_lag_as_the_thrust_does() -> None:
     assert get(slave, "angular_velocity.x") == close([expected], 1e-8)
 
 
+MOTORS = {"motor.thrust_max": 4.0, "motor.arm.x": 0.1, "motor.arm.y": 0.1, "motor.drag_to_thrust": 0.02}
+
+
+def test_motors_start_at_the_limited_initial_command_and_each_goes_at_its_own_pace() -> None:
+    """Roll cuts two of them at the top: half of the thrust rises with one time constant, half falls with the other."""
+    lag = {"motor.time_constant.up": 0.02, "motor.time_constant.down": 0.05}
+    slave = started({**LEVEL, **NO_WIND, **MOTORS, **lag, "thrust": 8.0})
+    assert thrust_of(slave) == pytest.approx(8.0, abs=1e-13)
+    put(slave, {"torque.x": 1.0})
+    slave.do_step(0.0, 0.01)
+    rising, falling = 1.0 - math.exp(-0.5), 1.0 - math.exp(-0.2)
+    assert slave.internal_state()["actuators"] == close(
+        [2.0 - 2.0 * falling, 2.0 + 2.0 * rising, 2.0 + 2.0 * rising, 2.0 - 2.0 * falling]
+    )
+
+
+def test_motors_lag_as_all_actuators_do_unless_they_have_a_lag_of_their_own() -> None:
+    own = {"motor.time_constant.up": 0.02, "motor.time_constant.down": 0.05}
+    thrusts = []
+    for lag in (own, {**own, "motor.time_constant.up": 0.0, "actuator_time_constant": 0.02}):
+        slave = started({**LEVEL, **NO_WIND, **MOTORS, **lag, "thrust": 8.0})
+        put(slave, {"torque.y": 0.2})
+        slave.do_step(0.0, 0.01)
+        thrusts.append(slave.internal_state()["actuators"])
+    assert thrusts[0] == thrusts[1]
+
+
+def test_motors_that_nothing_limits_fly_the_same_path_as_without_them() -> None:
+    flown = []
+    for motors in ({}, {**MOTORS, "motor.thrust_max": 1e3, "motor.thrust_min": -1e3}):
+        slave = started({**BODY, **MOVING, **motors, "thrust": 14.0, "torque.x": 0.5, "torque.z": -0.2})
+        fly(slave, 0.01, 100)
+        flown.append(get(slave, *MOTION))
+    assert flown[0] == close(flown[1], 1e-11)
+
+
 def test_limits_act_before_the_lag() -> None:
     """A lag of the unlimited command would reach the limit almost at once."""
     slave = started({**LEVEL, **NO_WIND, "actuator_time_constant": 0.1, "thrust_max": 20.0, "thrust": 0.0})

@@ -492,9 +492,9 @@ def test_fmus_are_built_into_the_project_when_they_are_missing_or_old(project: P
     assert [line.split()[0] for line in run().splitlines()] == ["building", "building"]
     assert {path.name for path in (project / "fmus").iterdir()} == {"QuadrotorPlant.fmu", "UnifiedController.fmu"}
     assert run() == ""
-    with (project / "plant_fmu" / "dynamics.py").open("a", encoding="utf-8") as source:
+    with (project / "plant_fmu" / "wind.py").open("a", encoding="utf-8") as source:
         source.write("# changed\n")
-    os.utime(project / "plant_fmu" / "dynamics.py", (0, 0))  # as after a clone, the FMU is the younger file
+    os.utime(project / "plant_fmu" / "wind.py", (0, 0))  # as after a clone, the FMU is the younger file
     (line,) = run().splitlines()
     assert line.startswith("building")
     assert "QuadrotorPlant" in line

@@ -20,6 +20,7 @@ from orchestration.results import objectives
 from orchestration.results.objectives import Metrics
 from orchestration.system.model import Hold
 from orchestration.system.paths import changed
+from plant_fmu.actuators import Channels, Motors
 
 Array = npt.NDArray[np.float64]
 
@@ -38,6 +39,7 @@ def measured(
     hold: Hold = "zero",
     thrust_max: float = math.inf,
     torque_max: float = math.inf,
+    motor_max: float = 0.0,
     cuts: Sequence[int] = (),
     divergence_time: float | None = None,
     **controller: Array,
@@ -62,7 +64,9 @@ def measured(
     end = float(t[-1])
     system = changed(quadrotor(), {"stop_time": planned or end or 1.0, "connections.command.hold": hold})
     recording = recorded(signals, sorted(events), cuts)
+    motors = {"thrust_max": motor_max, "thrust_min": 0.1, "arm.x": 0.2, "arm.y": 0.1, "drag_to_thrust": 0.02}
     limits = {"plant.thrust_max": thrust_max, "plant.torque_max": torque_max}
+    limits |= {f"plant.motor.{name}": value for name, value in motors.items()}
     return objectives.compute(
         system,
         lambda: objectives.spans(system, recording, limits, end),
@@ -296,6 +300,21 @@ def test_saturation_is_the_share_of_time_beyond_a_limit(command: Limited) -> Non
     active = np.array([False, True, False, True, True])  # each until the next row: 0.5 s and 1 s of 5 s
     m = measured(t=t, command=command(active), thrust_max=20.0, torque_max=3.0)
     assert m["saturation_share"] == pytest.approx(1.5 / 5.0)
+
+
+@pytest.mark.parametrize("beyond", ["above", "below"])
+@pytest.mark.parametrize("motor", range(4))
+def test_saturation_is_seen_of_every_motor(motor: int, beyond: str) -> None:
+    """One of the four asked for a little more than it can give, or a little less than it must."""
+    motors = Motors(thrust_max=4.0, thrust_min=0.1, arm_x=0.2, arm_y=0.1, drag_to_thrust=0.02)
+    t, thrusts = np.array([0.0, 1.0, 2.0, 3.0]), [1.0, 1.5, 2.0, 0.9]
+    thrusts[motor] = 4.0 if beyond == "above" else 0.1
+    edge = np.array([thrusts[motor] + (-1e-9 if beyond == "above" else 1e-9)] * 4)
+    edge[1] += 2e-9 if beyond == "above" else -2e-9  # for 1 s of 3 s
+    asked = motors.wrench(Channels(*(edge if i == motor else thrust for i, thrust in enumerate(thrusts))))
+    command = dict(zip(COMMAND, (asked.thrust + 0.0 * t, *(torque + 0.0 * t for torque in asked.torque)), strict=True))
+    assert measured(t=t, command=command, motor_max=4.0)["saturation_share"] == pytest.approx(1.0 / 3.0)
+    assert measured(t=t, command=command)["saturation_share"] == 0.0
 
 
 def test_a_command_at_its_limit_is_not_beyond_it() -> None:

@@ -60,3 +60,15 @@ def test_a_native_flight_on_the_same_libm_is_that_of_the_slaves_in_python(name: 
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_a_native_flight_on_its_own_mathematics_is_near(name: str) -> None:
     assert_near(flown_by({model: f"native/{model}" for model in PAIR}, name), in_python(name), 1e-9)
+
+
+def test_motors_written_out_as_c_are_those_in_python(on_libm: dict[str, Path]) -> None:
+    motors = {"thrust_max": 20.0, "thrust_min": -20.0, "arm": {"x": 1.2, "y": 1.0}, "drag_to_thrust": 1.0}
+    motors |= {"time_constant": {"up": 0.0125, "down": 0.025}}
+    scenario = scenario_of({"stop_time": 1.0, "plant": {"motor": motors}})
+    flown = [
+        orchestration.run(scenario.with_fmus(plant=fmus["QuadrotorPlant"], controller=fmus["UnifiedController"]))
+        for fmus in (on_libm, {model: model for model in PAIR})
+    ]
+    assert_the_same(*flown)
+    assert 0.01 < flown[0].metrics["saturation_share"] < 0.9

@@ -262,7 +262,7 @@ def test_powers_of_the_matrix_are_derivatives_of_whole_periods_of_flight(
 def test_the_lag_that_an_fmu_has_by_itself_is_in_the_loop(tmp_path: Path) -> None:
     sources = source_tree.copy_sources(tmp_path)
     source_tree.replace(
-        sources / "plant_fmu" / "dynamics.py", "time_constant: float = 0.0", "time_constant: float = 0.05"
+        sources / "plant_fmu" / "actuators.py", "time_constant: float = 0.0", "time_constant: float = 0.05"
     )
     lagging = source_tree.build(sources, tmp_path, "QuadrotorPlant")
     by_itself = dataclasses.replace(scenario_of(), plant=FmuChoice(fmu=str(lagging)))

@@ -1,0 +1,160 @@
+"""What lies between a commanded wrench and the one that acts: a box of limits, or four motors on an X frame.
+
+Inertial frame north-east-down, body frame forward-right-down, thrust along -z of the body, SI units.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from fmu_kit.algebra import Vec3
+from fmu_kit.rigid_body import Wrench
+from fmu_kit.scalar import Scalar
+
+
+class Channels(NamedTuple):
+    """Four numbers that lag each on its own: thrust and torques x, y, z [N, N·m], or the thrusts of four motors [N].
+
+    The motors are front right, rear left, front left, rear right. Seen from above, the first two turn
+    anticlockwise, so that their drag turns the body to the right, and the others clockwise.
+    """
+
+    a: Scalar
+    b: Scalar
+    c: Scalar
+    d: Scalar
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Box:
+    """Limits of thrust and of each torque, then a first-order lag of each: no motor has part in it."""
+
+    thrust_max: float = 1e6
+    """[N]; thrust is limited to [0, thrust_max]"""
+    torque_max: float = 1e6
+    """[N·m]; each torque is limited to ±torque_max"""
+    time_constant: float = 0.0
+    """[s]; 0: no lag"""
+
+    def limited(self, command: Wrench) -> Wrench:
+        """`command` within the limits."""
+        highest = self.torque_max
+        return Wrench(
+            min(max(command.thrust, 0.0), self.thrust_max),
+            command.torque.map(lambda component: min(max(component, -highest), highest)),
+        )
+
+    def response(self, start: Channels, target: Channels, elapsed: float) -> Channels:
+        """Thrust and torques `elapsed` [s] after `start`, with the limited command held at `target`.
+
+        This is the exact solution of the lag, so no integration step is too long for it.
+        """
+        if self.time_constant == 0.0:
+            return target
+        left = math.exp(-elapsed / self.time_constant)
+        return Channels(
+            target.a + left * (start.a - target.a),
+            target.b + left * (start.b - target.b),
+            target.c + left * (start.c - target.c),
+            target.d + left * (start.d - target.d),
+        )
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Motors:
+    """Four motors at (±arm_x, ±arm_y), each with its limits and its lag.
+
+    What four motors cannot give is not shared out: each is cut to its own limits, and thrust and torques come out as
+    they may. So a large torque costs thrust or adds to it, and a large thrust costs torque.
+    """
+
+    thrust_max: float = 0.0
+    """[N] of one motor; 0: there are no motors, the box alone acts"""
+    thrust_min: float = 0.0
+    """[N] of one motor"""
+    arm_x: float = 0.1
+    """[m], from the centre to a motor along x of the body"""
+    arm_y: float = 0.1
+    """[m], along y"""
+    drag_to_thrust: float = 0.016
+    """[m], of a propeller: torque about z by thrust"""
+    up: float = 0.0
+    """[s], time constant of a thrust that grows; 0: no lag"""
+    down: float = 0.0
+    """[s], of one that falls"""
+
+    def limited(self, command: Wrench) -> Channels:
+        """The thrusts that make up `command`, each within its limits."""
+        thrust, torque = 0.25 * command.thrust, 0.25 * command.torque
+        roll, pitch, yaw = torque.x / self.arm_y, torque.y / self.arm_x, torque.z / self.drag_to_thrust
+        return Channels(
+            self._cut(thrust - roll + pitch + yaw),
+            self._cut(thrust + roll - pitch + yaw),
+            self._cut(thrust + roll + pitch - yaw),
+            self._cut(thrust - roll - pitch - yaw),
+        )
+
+    def response(self, start: Channels, target: Channels, elapsed: float) -> Channels:
+        """The thrusts `elapsed` [s] after `start`, with the limited command held at `target`: the exact solution."""
+        rising, falling = _left(elapsed, self.up), _left(elapsed, self.down)
+        return Channels(
+            _between(start.a, target.a, rising, falling),
+            _between(start.b, target.b, rising, falling),
+            _between(start.c, target.c, rising, falling),
+            _between(start.d, target.d, rising, falling),
+        )
+
+    def wrench(self, thrusts: Channels) -> Wrench:
+        """What the motors exert on the body."""
+        front_right, rear_left, front_left, rear_right = thrusts
+        return Wrench(
+            front_right + rear_left + front_left + rear_right,
+            Vec3(
+                self.arm_y * (rear_left + front_left - front_right - rear_right),
+                self.arm_x * (front_right + front_left - rear_left - rear_right),
+                self.drag_to_thrust * (front_right + rear_left - front_left - rear_right),
+            ),
+        )
+
+    def _cut(self, thrust: Scalar) -> Scalar:
+        return min(max(thrust, self.thrust_min), self.thrust_max)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Actuators:
+    """The limits of the box, and behind them the motors with their lag if there are any, else the lag of the box."""
+
+    box: Box = Box()
+    motors: Motors = Motors()
+
+    def limited(self, command: Wrench) -> Channels:
+        """What `command` is at the actuators, within the limits."""
+        allowed = self.box.limited(command)
+        if self.motors.thrust_max > 0.0:
+            return self.motors.limited(allowed)
+        return Channels(allowed.thrust, allowed.torque.x, allowed.torque.y, allowed.torque.z)
+
+    def response(self, start: Channels, target: Channels, elapsed: float) -> Channels:
+        """The channels `elapsed` [s] after they were `start`, with the limited command held at `target`."""
+        if self.motors.thrust_max > 0.0:
+            return self.motors.response(start, target, elapsed)
+        return self.box.response(start, target, elapsed)
+
+    def wrench(self, channels: Channels) -> Wrench:
+        """What acts on the body."""
+        if self.motors.thrust_max > 0.0:
+            return self.motors.wrench(channels)
+        return Wrench(channels.a, Vec3(channels.b, channels.c, channels.d))
+
+
+def _left(elapsed: float, time_constant: float) -> float:
+    """The share of a difference that is left of it after `elapsed` [s]."""
+    if time_constant == 0.0:
+        return 0.0
+    return math.exp(-elapsed / time_constant)
+
+
+def _between(start: Scalar, target: Scalar, rising: float, falling: float) -> Scalar:
+    """On the way from `start` to `target`, with the share that is left of it on the way up and down."""
+    left = rising if target > start else falling
+    return target + left * (start - target)
