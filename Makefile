@@ -18,9 +18,9 @@ demo: .venv/.base
 	$(BIN)/quadcosim run --period 0.01 --out results/demo
 	@echo "figures: results/demo/path.png errors.png commands.png energy.png"
 
-# Laws, plant, algebra, expressions, agenda, master with stubs, files of systems and scenarios.
+# Laws, plant, algebra, expressions, timetable, master with stubs, files of systems and scenarios.
 QUICK := $(addprefix tests/,controller_fmu plant_fmu fmu_kit/test_algebra.py fmu_kit/test_trajectory.py fmu_kit/test_units.py) \
-	$(addprefix tests/orchestration/,expressions master/test_agenda.py master/test_master.py master/test_order.py \
+	$(addprefix tests/orchestration/,expressions master/test_timetable.py master/test_master.py master/test_order.py \
 	master/test_streams.py quadrotor/test_loop.py quadrotor/test_scenario.py quadrotor/test_timing.py \
 	studies/test_axes.py studies/test_study_file.py system exchange/ssp/test_reading.py test_statistics.py)
 

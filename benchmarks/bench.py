@@ -18,9 +18,10 @@ from fmu_kit.rigid_body import Body, RigidState, Wrench, derivative
 from fmu_kit.trajectory import Trajectory
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.model import read_model
-from orchestration.master.agenda import Agenda
 from orchestration.master.board import Board
+from orchestration.master.position import Position
 from orchestration.master.streams import Streams
+from orchestration.master.timetable import Timetable
 from orchestration.quadrotor import wiring
 from orchestration.quadrotor.scenario import FmuChoice, Scenario
 from orchestration.quadrotor.timing import Timing
@@ -131,7 +132,7 @@ def clock(timing: Timing) -> float:
     system = system_of(Scenario(timing=timing, stop_time=STEPS * MILLISECOND))
 
     def work() -> int:
-        return sum(1 for _ in Agenda(system, Streams(0, system.streams)))
+        return sum(1 for _ in Position(Timetable(system, Streams(0, system.streams))).instants())
 
     return microseconds(work, work())
 

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestration.master.agenda import Agenda
 from orchestration.master.master import Master
 from orchestration.master.recording import InMemory
 from orchestration.master.streams import Streams
+from orchestration.master.timetable import Timetable
 from orchestration.results import plots
 from orchestration.simulator import Floats, Transfer
 from orchestration.system.model import Component, Connection, Sampling, System
@@ -92,7 +92,7 @@ def seconds(system: System) -> float:
     master = Master(
         system,
         {name: Nothing() for name in system.components},
-        agenda=Agenda(system, streams),
+        timetable=Timetable(system, streams),
         streams=streams,
         recorded=dict.fromkeys(system.components, ()),
         recorder=InMemory(),

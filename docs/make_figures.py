@@ -7,8 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from orchestration import run
-from orchestration.master.agenda import Agenda
+from orchestration.master.position import Position
 from orchestration.master.streams import Streams
+from orchestration.master.timetable import Timetable
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.translation import system_of
@@ -32,7 +33,7 @@ def main() -> None:
 
 
 def timing_diagram() -> Figure:
-    """When each sample is taken and its command applied, as the agenda of a run says."""
+    """When each sample is taken and its command applied, as the timetable of a run says."""
     cases = (
         ("Gauss-Seidel", Timing(period=0.01)),
         ("Jacobi", Timing(period=0.01, order="jacobi")),
@@ -52,18 +53,19 @@ def timing_diagram() -> Figure:
 
 def _draw_case(axes: Axes, timing: Timing) -> None:
     system, sampled = system_of(Scenario(timing=timing, stop_time=0.065, seed=3)), {}
-    for instant in Agenda(system, Streams(system.seed, system.streams)):
-        now, arrivals = instant.time * MILLISECONDS, list(instant.arrivals)
+    for instant in Position(Timetable(system, Streams(system.seed, system.streams))).instants():
+        now, arrivals = instant.time * MILLISECONDS, [k for _, k, _, _ in instant.arrivals]
         axes.plot(now, 0.0, "|", color=plots.GREY, markersize=4, label="plant point")
-        for due in instant.due:
-            sampled[due.k] = now
+        for due in instant.dues:
+            ((_, k, _, arrival),) = due.sent
+            sampled[k] = now
             axes.plot(now, 1.0, "o", color=plots.BLUE, markersize=5, label="sample")
-            if any(message.arrival is None for message in due.sent):
+            if arrival < 0:
                 axes.plot(now, 0.72, "x", color=plots.RED, markersize=6, label="command lost")
-            arrivals += [message for message in due.sent if message.arrival == instant.time]
-        for message in arrivals:
+            arrivals += [k] if arrival == instant.time else []
+        for k in arrivals:
             arrow = {"arrowstyle": "-|>", "color": plots.GREEN, "shrinkA": 3, "shrinkB": 0}
-            axes.annotate("", xy=(now, 0.0), xytext=(sampled[message.k], 1.0), arrowprops=arrow)
+            axes.annotate("", xy=(now, 0.0), xytext=(sampled[k], 1.0), arrowprops=arrow)
     axes.set(yticks=(0.0, 1.0), yticklabels=("plant", "controller"), ylim=(-0.3, 1.35), xlim=(-1.0, 66.0))
     axes.grid(False)
     axes.spines["left"].set_visible(False)

@@ -21,16 +21,17 @@ from orchestration.fmi.model import NUMERIC, Model, read_model
 from orchestration.fmi.values import number_of
 from orchestration.interrupt import Interrupt, Interrupted, interrupts_held_back
 from orchestration.master import initial
-from orchestration.master.agenda import Agenda, FixedStep
 from orchestration.master.condition import program
 from orchestration.master.engine import Engine
 from orchestration.master.engine import master as master_of
 from orchestration.master.feeds import Feed
+from orchestration.master.fixed_step import FixedStep
 from orchestration.master.master import Master
 from orchestration.master.recording import InMemory, Recorder
 from orchestration.master.sources import BuiltIn, Constant, Table, Values, WhiteNoise
 from orchestration.master.streams import VALUE, Streams
 from orchestration.master.table_file import read_table
+from orchestration.master.timetable import Timetable
 from orchestration.master.watch import watch
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import in_its_own_words, system_of, warnings
@@ -171,7 +172,7 @@ def prepared(
                 engine,
                 system,
                 instances,
-                agenda=Agenda(system, streams, fixed_steps(system, models)),
+                timetable=Timetable(system, streams, fixed_steps(system, models)),
                 streams=streams,
                 recorded=recorded(system, models),
                 recorder=recorder,

@@ -86,10 +86,11 @@ class Channel:
         else:
             self.apply(self.take(), time)
 
-    def skip(self) -> None:
+    def skip(self, messages: int = 1) -> None:
         """Noise is drawn for each variable of each message, lost or not, so that nothing shifts another's numbers."""
         if self._noisy:
-            self.stream.standard_normal(out=self._noise)
+            for _ in range(messages):
+                self.stream.standard_normal(out=self._noise)
 
     def send(self, k: int, *, lost: bool) -> None:
         """Keep message `k` until it arrives."""
@@ -127,12 +128,11 @@ class Channel:
         return [self.received, *self.in_flight.values(), *past]
 
     def state(self) -> dict[str, Any]:
-        """All that what it will pass on depends on, in JSON types."""
+        """All that what it will pass on depends on, but for how far the noise is, in JSON types."""
         return {
             "received": self.received.tolist(),
             "in_flight": [(k, value.tolist()) for k, value in self.in_flight.items()],
             "applied": [(time, value.tolist()) for time, value in self.applied],
-            "noise": self.stream.bit_generator.state,
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -140,7 +140,6 @@ class Channel:
         self.received[:] = state["received"]
         self.in_flight = {k: np.array(value) for k, value in state["in_flight"]}
         self.applied = [(time, np.array(value)) for time, value in state["applied"]]
-        self.stream.bit_generator.state = state["noise"]
 
     def _convert(self, value: Floats) -> None:
         value *= self._scale

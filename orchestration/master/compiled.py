@@ -22,16 +22,12 @@ from orchestration.master.loop import library
 from orchestration.master.master import Diverged, Master
 from orchestration.master.memory import Memory
 from orchestration.master.recording import Integers
-from orchestration.master.schedule import Schedule, Schedules
+from orchestration.master.schedule import Schedule
 from orchestration.master.sources import Values
-from orchestration.master.streams import Streams
-from orchestration.master.timetable import Timetable
 from orchestration.simulator import Floats, Simulator
 from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS
 
-INSTANTS = 2**13
-"""Of one schedule"""
 SLICE = 0.05
 """[s] that C may be away for, about"""
 AT_END, FULL, PAUSED, FAILED, REFUSED, EARLY, NOT_FINITE, DIVERGED = range(8)
@@ -69,14 +65,10 @@ class CompiledMaster(Master):
         system: System,
         simulators: Mapping[str, NativeInstance],
         *,
-        streams: Streams,
         condition: Condition,
         **others: Any,
     ) -> None:
-        super().__init__(system, simulators, streams=streams, **others)
-        self._schedules = Schedules(self._agenda) if self._agenda.aligns else Timetable(system, streams)
-        self._schedule: Schedule | None = None
-        self._before = 0  # instants of schedules that are past
+        super().__init__(system, simulators, **others)
         self._pace = 4  # instants of a slice
         self._shared: list[_OnTheirWay] = []
         self._fly = library()
@@ -98,7 +90,7 @@ class CompiledMaster(Master):
             tasks=memory.indices(list(self._tasks)),
             some_by_themselves=self._some_by_themselves,
             settles=self._settling,
-            stop=self._agenda.stop,
+            stop=self._stop,
             row=c.address(self.board.row),
             rows=c.address(self._row_table),
             width=len(self.board.columns),
@@ -115,55 +107,47 @@ class CompiledMaster(Master):
     # -- a run ---------------------------------------------------------------------------------------------------
 
     def _run(self, pause_at: int | None, progress: Callable[[float], None] | None) -> bool:
-        stop = self._agenda.stop
-        self._loop.pause_at = stop if pause_at is None else pause_at
-        self._share()
+        self._loop.pause_at = self._stop if pause_at is None else pause_at
         try:
-            while self._has_instants():
-                code = self._slice()
-                if code == FULL:
-                    self._hand_over()
-                elif code not in (AT_END, PAUSED):
-                    self._fail(code)
-                if self._interrupted() and self.now < stop:
-                    self.interrupted_at = self.now
-                    self._drop_later_events()
-                    return True
-                if code == PAUSED:
-                    return False
-                if progress is not None:
-                    progress(self.now / stop)
+            while (schedule := self._position.schedule()) is not None:
+                self._share(schedule)
+                try:
+                    over = self._through(schedule, progress)
+                finally:
+                    self._take_back()
+                if over is not None:
+                    return over
         except (Diverged, SimulatorError) as error:
             self._diverged(error)
-        finally:
-            self._take_back()
         if progress is not None:
             progress(1.0)
         return True
 
-    def _has_instants(self) -> bool:
-        """Whether there is another instant; it is then in the schedule that C has."""
-        if self._schedule is not None:
-            if self._loop.at < len(self._schedule):
+    def _through(self, schedule: Schedule, progress: Callable[[float], None] | None) -> bool | None:
+        """Go through what is left of a schedule; whether the run is over if it stops before."""
+        while self._position.at < len(schedule):
+            code = self._slice(schedule)
+            if code == FULL:
+                self._hand_over()
+            elif code not in (AT_END, PAUSED):
+                self._fail(code)
+            if self._interrupted() and self.now < self._stop:
+                self.interrupted_at = self.now
+                self._drop_later_events()
                 return True
-            self._take_back()
-            self._before += len(self._schedule)
-        if self._schedules.error is not None:
-            raise self._schedules.error
-        self._schedule, self._loop.at = self._schedules.following(INSTANTS), 0
-        if self._schedule is None and self._schedules.error is not None:
-            raise self._schedules.error
-        self._share()
-        return self._schedule is not None
+            if code == PAUSED:
+                return False
+            if progress is not None:
+                progress(self.now / self._stop)
+        return None
 
-    def _slice(self) -> int:
+    def _slice(self, schedule: Schedule) -> int:
         """Have C pass through instants for about `SLICE`; the code says why it has come back."""
         loop, begin = self._loop, clock.perf_counter()
-        assert self._schedule is not None
-        code = int(self._fly(ctypes.addressof(loop), min(len(self._schedule), loop.at + self._pace)))
+        code = int(self._fly(ctypes.addressof(loop), min(len(schedule), loop.at + self._pace)))
         share = SLICE / max(clock.perf_counter() - begin, 1e-9)
-        self._pace = min(max(1, int(self._pace * min(share, 8.0))), INSTANTS)
-        self.now, self.steps = loop.now, loop.steps
+        self._pace = min(max(1, int(self._pace * min(share, 8.0))), len(schedule))
+        self.now, self.steps, self._position.at = loop.now, loop.steps, loop.at
         return code
 
     def _fail(self, code: int) -> None:
@@ -231,23 +215,11 @@ class CompiledMaster(Master):
         self.board.row[0] = time / NANOSECONDS
         self._keep_rows(self.board.row.tobytes())
 
-    def _pass_over(self, instants: int) -> None:
-        while instants > self._passed():
-            self._before += 0 if self._schedule is None else len(self._schedule)
-            self._schedule = self._schedules.following(INSTANTS)
-            assert self._schedule is not None
-            self._loop.at = min(len(self._schedule), instants - self._before)
-
-    def _passed(self) -> int:
-        return self._before + (0 if self._schedule is None else self._loop.at)
-
     # -- between Python and C ------------------------------------------------------------------------------------
 
-    def _share(self) -> None:
+    def _share(self, schedule: Schedule) -> None:
         """All that a schedule needs goes to where C has it, from the next instant on."""
-        loop, schedule = self._loop, self._schedule
-        if schedule is None:
-            return
+        loop, loop.at = self._loop, self._position.at
         for name in c.SCHEDULE:
             setattr(loop.schedule, name, c.address(getattr(schedule, name)))
         self._make_room(schedule)
@@ -255,8 +227,9 @@ class CompiledMaster(Master):
         for index, body in self._bodies.items():
             self._components[index].now = body.now
         loop.now, loop.steps = self.now, self.steps
+        rest = schedule.part(loop.at)
         self._shared = [
-            _OnTheirWay(channel, self._channel_table[i], *schedule.of(i, int(loop.at), self._table(i)))
+            _OnTheirWay(channel, self._channel_table[i], *rest.of(i, self._table(i)))
             for i, channel in enumerate(self._channels)
         ]
 
@@ -286,12 +259,6 @@ class CompiledMaster(Master):
         if self._watched:
             self._seen = np.ascontiguousarray(np.column_stack([values.over(t) for values in self._watched]))
             self._loop.watched, self._loop.watched_size = c.address(self._seen), self._seen.shape[1]
-
-    def _table(self, index: int) -> str:
-        """Where a schedule has the messages of a connection, each when it takes its values."""
-        if index in self._plan.posted:
-            return "posted"
-        return "measured" if index in self._read_ahead else "exchanged"
 
     # -- how it is made ------------------------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""The master: steps components through the instants of an agenda, and records every row.
+"""The master: steps components through the instants of a timetable, and records every row.
 
 At one instant, in this order: components in continuous time have reached it; messages that arrive are delivered;
 sampled components that are due read what they have received, step and send, and what arrives without delay is
@@ -6,21 +6,23 @@ delivered; the row is recorded. So a row is the value just after its instant, an
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
 from orchestration.errors import SimulatorError
-from orchestration.master.agenda import Agenda, Due, Message
 from orchestration.master.board import Board
 from orchestration.master.channel import Channel
 from orchestration.master.feeds import Feed
 from orchestration.master.plan import Plan
+from orchestration.master.position import Position
 from orchestration.master.recording import ARRIVED, EVENTS, LOST, ROWS, SAMPLED, SENT, Chunk, Events, Integers, Recorder
+from orchestration.master.schedule import Due, Message, Schedule
 from orchestration.master.sources import Values
 from orchestration.master.streams import NOISE, Streams
+from orchestration.master.timetable import Timetable
 from orchestration.simulator import Floats, Simulator, Transfer
 from orchestration.system.model import System, variable_of
 from orchestration.system.times import NANOSECONDS
@@ -86,7 +88,7 @@ class Master:
         system: System,
         simulators: Mapping[str, Simulator],
         *,
-        agenda: Agenda,
+        timetable: Timetable,
         streams: Streams,
         recorded: Mapping[str, Sequence[str]],
         recorder: Recorder,
@@ -104,7 +106,9 @@ class Master:
         self.divergence_time: int | None = None
         self.steps = 0
         self.now = 0
-        self._system, self._simulators, self._agenda = system, simulators, agenda
+        self._system, self._simulators, self._stop = system, simulators, timetable.stop
+        self._position = Position(timetable)
+        self._instants = self._position.instants()
         self._plan = plan = Plan(system)
         self._read_ahead = plan.read_ahead
         self._names = names = list(system.components)
@@ -147,36 +151,38 @@ class Master:
         return over
 
     def _run(self, pause_at: int | None, progress: Callable[[float], None] | None) -> bool:
-        agenda, by_themselves, count = self._agenda, self._some_by_themselves, 0
+        by_themselves, stop, count = self._some_by_themselves, self._stop, 0
         try:
-            for instant in agenda:
-                self.now = time = instant.time
-                halts = instant.halts
+            for time, next_time, halts, arrivals, posted, measured, dues in self._instants:
+                self.now = time
                 if halts:
                     self._step_bodies(time, halts)
-                if instant.arrivals:  # before what is sent now, which is delivered last if it arrives at once
-                    self._arrive(instant.arrivals, time)
-                if instant.posted:
-                    self._post(instant.posted, time)
-                if instant.measured:
-                    self._measure(instant.measured)
-                for sample in self._in_turn(instant.due, time) if by_themselves else instant.due:
-                    self._sample(sample, time)
+                if arrivals:  # before what is sent now, which is delivered last if it arrives at once
+                    self._arrive(arrivals, time)
+                if posted:
+                    self._post(posted, time)
+                if measured:
+                    self._measure(measured)
+                if by_themselves:
+                    self._sample_in_turn(dues, time, next_time)
+                else:
+                    for due in dues:
+                        self._sample(due, time, due.next_time)
                 if self._settling:
                     self._settle(time, halts)
                 if self._arrived:
                     self._events += self._arrived
                     self._arrived.clear()
                 self._record(time)
-                if self._interrupted() and time < agenda.stop:
+                if self._interrupted() and time < stop:
                     self.interrupted_at = time
                     self._drop_later_events()
                     return True
-                if pause_at is not None and pause_at <= time < agenda.stop:
+                if pause_at is not None and pause_at <= time < stop:
                     return False
                 count += 1
                 if progress is not None and count % 512 == 0:
-                    progress(time / agenda.stop)
+                    progress(time / stop)
         except (Diverged, SimulatorError) as error:
             self._diverged(error)
         if progress is not None:
@@ -198,12 +204,9 @@ class Master:
         return self._channels
 
     def state(self) -> dict[str, Any]:
-        """All that the rest of the run depends on, and what the recorder does not have yet, but for `saved`."""
+        """Where the run is, what is on its way, and what the recorder does not have yet, but for `saved`."""
         return {
-            "instants": self._passed(),
-            "now": self.now,
-            "reached": {name: self._bodies[self._names.index(name)].now for name in self._plan.continuous},
-            "steps": self.steps,
+            "instants": self._position.past,
             "row": self.board.row.tolist(),
             "handed_over": self._handed_over,
             "channels": [channel.state() for channel in self._channels],
@@ -221,10 +224,8 @@ class Master:
         """Continue where `state` and `saved` were taken, instead of `initialise`."""
         for name, simulator in self._simulators.items():
             simulator.restore(saved[name])
-        self._pass_over(state["instants"])
-        self.now, self.steps = state["now"], state["steps"]
-        for name, time in state["reached"].items():
-            self._bodies[self._names.index(name)].now = time
+        for schedule in self._position.move_to(state["instants"]):
+            self._pass_over(schedule)
         self.board.row[:] = state["row"]
         self._handed_over = state["handed_over"]
         self._keep_rows(saved[ROWS_PENDING])
@@ -262,81 +263,82 @@ class Master:
     def _post(self, messages: Sequence[Message], time: int) -> None:
         for message in messages:
             self._note_sending(message)
-            channel = self._channels[message.connection]
-            channel.send(message.k, lost=message.arrival is None)
-            if message.arrival == time:
-                self._deliver(message, time)
+            index, k, _, arrival = message
+            self._channels[index].send(k, lost=arrival < 0)
+            if arrival == time:
+                self._deliver(index, k, time)
 
     def _measure(self, messages: Sequence[Message]) -> None:
         """Values for samples to come."""
-        for message in messages:
-            self._channels[message.connection].send(message.k, lost=message.arrival is None)
+        for index, k, _, arrival in messages:
+            self._channels[index].send(k, lost=arrival < 0)
 
     def _arrive(self, messages: Sequence[Message], time: int) -> None:
-        for message in messages:
-            self._deliver(message, time)
+        for index, k, _, _ in messages:
+            self._deliver(index, k, time)
 
-    def _deliver(self, message: Message, time: int) -> None:
-        self._arrived += (time, ARRIVED, message.connection, message.k)
-        self._channels[message.connection].deliver(message.k, time)
+    def _deliver(self, index: int, k: int, time: int) -> None:
+        self._arrived += (time, ARRIVED, index, k)
+        self._channels[index].deliver(k, time)
 
-    def _sample(self, due: Due, time: int) -> None:
+    def _sample_in_turn(self, dues: Sequence[Due], time: int, next_time: int) -> None:
+        """The samples; who has a clock of its own is stepped to the next instant, and also if it does not sample."""
+        samples = {due.component: due for due in dues}
+        for index, task in self._tasks.items():
+            if index in samples:
+                due = samples[index]
+                self._sample(due, time, next_time if task.by_itself else due.next_time)
+            elif task.by_itself and time < self._stop:
+                for channel in task.held:
+                    channel.extrapolate(time)
+                self._step_task(task, time, next_time)
+
+    def _sample(self, due: Due, time: int, end: int) -> None:
+        """A component reads, steps to `end` [ns], and sends."""
         task = self._tasks[due.component]
-        self._sense(due, time)
+        self._sense(due.received, time)
         for channel in task.held:
             channel.extrapolate(time)
         for feed in task.feeds:
             feed.write(time / NANOSECONDS)
-        self._step_task(task, time, self._agenda.next_time() if task.by_itself else due.next_time)
-        self._send(due, time)
-
-    def _in_turn(self, due: Sequence[Due], time: int) -> Iterator[Due]:
-        """The samples; components with a clock of their own that do not sample now are stepped in between."""
-        samples = {sample.component: sample for sample in due}
-        for index, task in self._tasks.items():
-            if index in samples:
-                yield samples[index]
-            elif task.by_itself and time < self._agenda.stop:
-                for channel in task.held:
-                    channel.extrapolate(time)
-                self._step_task(task, time, self._agenda.next_time())
+        self._step_task(task, time, end)
+        self._send(due.sent, time)
 
     def _step_task(self, task: _Task, time: int, end: int) -> None:
-        start, stop = time / NANOSECONDS, self._agenda.stop
-        task.step(task.ratio * start, task.ratio * ((min(end, stop) - time) / NANOSECONDS))
+        start = time / NANOSECONDS
+        task.step(task.ratio * start, task.ratio * ((min(end, self._stop) - time) / NANOSECONDS))
         task.read()
         task.expect_finite(start)
 
-    def _sense(self, due: Due, time: int) -> None:
+    def _sense(self, messages: Sequence[Message], time: int) -> None:
         """The sample reads what it measures itself."""
-        for message in due.received:
-            index, k, measured, arrival = message
+        for index, k, measured, arrival in messages:
             channel = self._channels[index]
             self._events += (measured, SAMPLED, index, k)
-            if arrival is None:
+            if arrival < 0:
                 self._events += (measured, LOST, index, k)
             if index not in self._read_ahead:
-                channel.hand_over(time, lost=arrival is None)
-            elif arrival is not None:
+                channel.hand_over(time, lost=arrival < 0)
+            elif arrival >= 0:
                 channel.deliver(k, time)
 
-    def _send(self, due: Due, time: int) -> None:
+    def _send(self, messages: Sequence[Message], time: int) -> None:
         """What it sends are its outputs, which no arrival changes."""
-        for message in due.sent:
+        for message in messages:
             self._note_sending(message)
             index, k, _, arrival = message
             if arrival == time:
                 self._arrived += (time, ARRIVED, index, k)
                 self._channels[index].hand_over(time, lost=False)
             else:
-                self._channels[index].send(k, lost=arrival is None)
+                self._channels[index].send(k, lost=arrival < 0)
 
     def _note_sending(self, message: Message) -> None:
         index, k, sent, arrival = message
-        if sent > self._agenda.stop:
+        if sent > self._stop:
             return
         self._events += (sent, SENT, index, k)
-        if arrival is None:
+        if arrival < 0:
             self._events += (sent, LOST, index, k)
 
     def _settle(self, time: int, halts: Sequence[int]) -> None:
@@ -405,18 +407,27 @@ class Master:
     def _keep_events(self, events: Integers) -> None:
         self._events = events.ravel().tolist()
 
-    def _pass_over(self, instants: int) -> None:
-        for _ in range(instants):  # the agenda is the same again: it follows from the system and the seed
-            next(self._agenda)
+    def _pass_over(self, schedule: Schedule) -> None:
+        """These instants are past, and what follows from them alone is as if the run had gone through them."""
+        self.now = int(schedule.times[-2])
+        reached = np.repeat(schedule.times[:-1], np.diff(schedule.halts_at))
+        self.steps += int(np.count_nonzero(reached))  # nobody steps to the start
+        for index, body in self._bodies.items():
+            body.now = max(body.now, int(reached[schedule.halts == index].max(initial=0)))
+        for index, channel in enumerate(self._channels):
+            taken, _ = schedule.of(index, self._table(index))
+            channel.skip(taken)
 
-    def _passed(self) -> int:
-        """How many instants are past."""
-        return self._agenda.count
+    def _table(self, index: int) -> str:
+        """Where a schedule has the messages of a connection, each when it takes its values."""
+        if index in self._plan.posted:
+            return "posted"
+        return "measured" if index in self._read_ahead else "exchanged"
 
     # -- initialisation ------------------------------------------------------------------------------------------
 
     def _exchange_first(self) -> None:
-        stop = self._agenda.stop / NANOSECONDS
+        stop = self._stop / NANOSECONDS
         for name in self._names:
             self._simulators[name].enter_initialization(0.0, stop)
         for feed in self._feeds:

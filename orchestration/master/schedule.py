@@ -1,12 +1,48 @@
-"""What happens when as arrays, some thousand instants at a time: what a loop without Python reads."""
+"""What happens when, as arrays: some thousand instants that follow each other, and the same one by one."""
 
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from orchestration.errors import UsageError
-from orchestration.master.agenda import Agenda, Instant, Message
 from orchestration.master.recording import Integers
+
+Message: TypeAlias = Sequence[int]
+"""Index of its connection; k, which message of it; when it is sent [ns] or, of one that is measured for a sample, when
+that is; when it arrives [ns], negative if it is lost on the way"""
+
+
+class Due(NamedTuple):
+    """One sampling instant of a component."""
+
+    component: int
+    next_time: int
+    """true time of the sample after it [ns], also if that lies beyond the end"""
+    received: Sequence[Message]
+    """what it reads of components in continuous time"""
+    sent: Sequence[Message]
+    """what it sends; a message whose arrival is this instant is delivered at once"""
+
+
+class Instant(NamedTuple):
+    """A point at which something happens, in this order."""
+
+    time: int
+    """[ns]"""
+    next_time: int
+    """of the instant after it [ns]"""
+    halts: Sequence[int]
+    """components in continuous time that are stepped to this time, in this order"""
+    arrivals: Sequence[Message]
+    """messages on their way that arrive, in the order of sending"""
+    posted: Sequence[Message]
+    """of components in continuous time to one another, where a message can be late or lost"""
+    measured: Sequence[Message]
+    """values that are measured now for samples to come"""
+    dues: Sequence[Due]
+    """samples, in the order in which they are processed"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,7 +55,7 @@ class Schedule:
     """components in continuous time, in the order in which they are stepped"""
     halts_at: Integers
     posted: Integers
-    """messages, shape (m, 4): connection, k, sent [ns], arrival [ns], which is -1 for one that is lost"""
+    """messages, shape (m, 4), as `Message`; -1 is the arrival of one that is lost"""
     posted_at: Integers
     measured: Integers
     measured_at: Integers
@@ -35,82 +71,60 @@ class Schedule:
     def __len__(self) -> int:
         return len(self.times) - 1
 
+    def instants(self) -> Iterator[Instant]:
+        """One by one."""
+        times = self.times.tolist()
+        parts = (_parts(getattr(self, table), getattr(self, f"{table}_at")) for table in TABLES[:-1])
+        return map(Instant._make, zip(times, times[1:], *parts, self._dues()))
+
+    def part(self, begin: int, end: int | None = None) -> "Schedule":
+        """Instants from `begin` on, up to `end` of them without that one, as a schedule of their own."""
+        end = len(self) if end is None else end
+        found = {"times": self.times[begin : end + 1]}
+        for table in TABLES:
+            at = getattr(self, f"{table}_at")[begin : end + 1]
+            found |= {table: getattr(self, table)[at[0] : at[-1]], f"{table}_at": at - at[0]}
+        dues = found["dues"] = found["dues"].copy()
+        first, last = (dues[0, 2], dues[-1, 4]) if len(dues) else (0, 0)
+        dues[:, 2:] -= first
+        return Schedule(exchanged=self.exchanged[first:last], **found)
+
     def most_events(self) -> int:
         """More than any instant has."""
         exchanged = np.append(self.dues[:, 2], len(self.exchanged))[self.dues_at]
         counts = 2 * np.diff(self.posted_at + exchanged) + np.diff(self.arrivals_at + self.posted_at + exchanged)
         return int(counts.max(initial=0)) + 1
 
-    def of(self, connection: int, begin: int, table: str) -> tuple[int, list[int]]:
-        """Of a connection, whose messages take their values as `table` has them, those from instant `begin` on.
+    def of(self, connection: int, table: str) -> tuple[int, list[int]]:
+        """Of a connection, whose messages take their values as `table` has them.
 
         How many they are, and which of them are kept until they arrive.
         """
-        if table != "exchanged":
-            messages = getattr(self, table)[getattr(self, f"{table}_at")[begin] :]
-            messages = messages[messages[:, 0] == connection]
-            return len(messages), messages[messages[:, 3] >= 0, 1].tolist()
-        dues = self.dues[self.dues_at[begin] :]
-        if not len(dues):
-            return 0, []
-        messages = self.exchanged[dues[0, 2] :]
-        times = np.repeat(self.times[:-1], np.diff(self.dues_at))[self.dues_at[begin] :]
-        sampled = np.repeat(times, dues[:, 4] - dues[:, 2])
+        messages = getattr(self, table)
         which = messages[:, 0] == connection
-        kept = which & (messages[:, 3] >= 0) & (messages[:, 3] != sampled)
+        kept = which & (messages[:, 3] >= 0)
+        if table == "exchanged":
+            sampled = np.repeat(np.repeat(self.times[:-1], np.diff(self.dues_at)), self.dues[:, 4] - self.dues[:, 2])
+            kept &= messages[:, 3] != sampled
         return int(which.sum()), messages[kept, 1].tolist()
 
-
-class Schedules:
-    """The schedules of one run, in order, made from its agenda."""
-
-    def __init__(self, agenda: Agenda) -> None:
-        self._agenda = agenda
-        self.error: UsageError | None = None
-        """why there are no more instants before the end; to be raised when those before it are past"""
-
-    def following(self, most: int) -> Schedule | None:
-        """The next instants, at most so many; None at the end."""
-        instants: list[Instant] = []
-        try:
-            for instant in self._agenda:
-                instants.append(instant)
-                if len(instants) == most:
-                    break
-        except UsageError as error:
-            self.error = error
-        return _of(instants, self._agenda.next_time()) if instants else None
+    def _dues(self) -> Iterator[Sequence[Due]]:
+        """Of each instant."""
+        messages = self.exchanged.tolist()
+        for rows in _parts(self.dues, self.dues_at):
+            yield [
+                Due(component, next_time, messages[received:sent], messages[sent:end])
+                for component, next_time, received, sent, end in rows
+            ]
 
 
-def _of(instants: list[Instant], end: int) -> Schedule:
-    dues: list[tuple[int, ...]] = []
-    exchanged: list[Message] = []
-    for instant in instants:
-        for due in instant.due:
-            begin, middle = len(exchanged), len(exchanged) + len(due.received)
-            exchanged += due.received
-            exchanged += due.sent
-            dues.append((due.component, due.next_time, begin, middle, len(exchanged)))
-    return Schedule(
-        times=np.array([*(instant.time for instant in instants), end], dtype=np.int64),
-        halts=np.array([index for instant in instants for index in instant.halts], dtype=np.int64),
-        halts_at=_ends([len(instant.halts) for instant in instants]),
-        posted=_messages([message for instant in instants for message in instant.posted]),
-        posted_at=_ends([len(instant.posted) for instant in instants]),
-        measured=_messages([message for instant in instants for message in instant.measured]),
-        measured_at=_ends([len(instant.measured) for instant in instants]),
-        arrivals=_messages([message for instant in instants for message in instant.arrivals]),
-        arrivals_at=_ends([len(instant.arrivals) for instant in instants]),
-        dues=np.array(dues, dtype=np.int64).reshape(-1, 5),
-        dues_at=_ends([len(instant.due) for instant in instants]),
-        exchanged=_messages(exchanged),
-    )
+TABLES = ("halts", "arrivals", "posted", "measured", "dues")
+"""In the order of an `Instant`"""
 
 
-def _messages(messages: list[Message]) -> Integers:
-    flat = [-1 if value is None else value for message in messages for value in message]
-    return np.array(flat, dtype=np.int64).reshape(-1, 4)
-
-
-def _ends(counts: list[int]) -> Integers:
-    return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+def _parts(table: Integers, at: Integers) -> Iterable[list[Any]]:
+    """What each instant has of a table."""
+    if not len(table):
+        return itertools.repeat([])
+    rows = table.tolist()
+    return [rows[begin:end] for begin, end in itertools.pairwise(at.tolist())]

@@ -111,7 +111,7 @@ class WhiteNoise:
 
     def __init__(self, intensity: float, period: float, count: int, stream: np.random.Generator) -> None:
         self._sigma, self._period, self._count = math.sqrt(intensity / period), exact_nanoseconds(period), count
-        self._grid = Grid(Fraction(0), self._period)  # the agenda's
+        self._grid = Grid(Fraction(0), self._period)  # the timetable's
         self._stream, self._drawn = stream, np.zeros((0, count))
 
     def at(self, t: float) -> Sequence[float]:

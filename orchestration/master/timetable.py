@@ -1,10 +1,11 @@
-"""The schedules of a run made as arrays: what an `Agenda` says instant by instant, for many instants at once.
+"""What happens when: the instants of one run, in integer nanoseconds, as arrays. Nothing here knows an FMU.
 
-A window of time after the other: points, samples and messages of each component and connection are drawn up to its
-end, and sorted into instants. Nothing here moves to the grid of a component of fixed steps; an `Agenda` does that.
+All of it follows from the system, the stop time and the seed; no value of a signal is needed. It is made a window of
+time after the other: points, samples and messages of each component and connection are drawn up to its end, and sorted
+into instants.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from functools import partial
 from typing import NamedTuple
@@ -12,40 +13,53 @@ from typing import NamedTuple
 import numpy as np
 
 from orchestration.errors import UsageError
-from orchestration.master.chance import Flags, Latenesses, LossesOfMany, latenesses, losses_of_many
+from orchestration.master.chance import Flags, lateness, losses
+from orchestration.master.fixed_step import FixedStep, Refusal, seconds
 from orchestration.master.plan import Plan
 from orchestration.master.recording import Integers
 from orchestration.master.schedule import Schedule
 from orchestration.master.streams import DELAY_JITTER, JITTER, LOSS, Streams
 from orchestration.system.model import Connection, System
-from orchestration.system.times import Grid, exact_nanoseconds, nanoseconds
+from orchestration.system.times import NANOSECONDS, Grid, exact_nanoseconds, nanoseconds
+
+LONGEST = 2**60
+"""[ns], 36 years: a few of them together still are a whole number of 64 bits"""
 
 
 class _Link:
     """A connection, and the random numbers that it has not used."""
 
-    def __init__(self, index: int, x: Connection, streams: Streams) -> None:
+    def __init__(
+        self, index: int, x: Connection, streams: Streams, fixed: FixedStep | None, refused: list[Refusal]
+    ) -> None:
+        """`fixed` is who halts for its messages, if that takes steps of one length only."""
         owner, jitter = f"connections.{x.name}", nanoseconds(x.delay_jitter)
         self.index, self.delay, self.jacobi = index, nanoseconds(x.delay), x.order == "jacobi"
         self.longest = self.delay + jitter
-        self._late: Latenesses = latenesses(jitter, x.jitter_distribution, partial(streams.of, owner, DELAY_JITTER))
-        self._lost: LossesOfMany = losses_of_many(x.loss, x.burst_length, partial(streams.of, owner, LOSS))
+        self._name, self._fixed, self._refused = owner, fixed, refused
+        self._late = lateness(jitter, x.jitter_distribution, partial(streams.of, owner, DELAY_JITTER))
+        self._lost = losses(x.loss, x.burst_length, partial(streams.of, owner, LOSS))
         self._last = 0
 
     def messages(self, sent: Integers) -> Integers:
         """Arrivals of the next messages, sent at these times; -1 for one that is lost."""
         lost, own = self._lost(len(sent)), sent + self.delay + self._late(len(sent))
-        arrivals = np.maximum.accumulate(np.append(self._last, np.where(lost, 0, own)))[1:]
-        self._last = int(arrivals[-1]) if len(arrivals) else self._last
+        arrivals = self._in_order(np.where(lost, 0, own), "an arrival")
         result: Integers = np.where(lost, -1, arrivals)
         return result
 
     def measurements(self, samples: Integers) -> tuple[Integers, Integers]:
         """When the next messages are measured, for samples at these times, and their arrivals as in `messages`."""
         lost, own = self._lost(len(samples)), samples - self.delay - self._late(len(samples))
-        taken = np.maximum.accumulate(np.append(self._last, own))[1:]
-        self._last = int(taken[-1]) if len(taken) else self._last
-        return taken, np.where(lost, -1, samples)
+        return self._in_order(own, "a measurement"), np.where(lost, -1, samples)
+
+    def _in_order(self, times: Integers, what: str) -> Integers:
+        """Messages never overtake."""
+        times = np.maximum.accumulate(np.append(self._last, times))[1:]
+        if self._fixed is not None:
+            times = self._fixed.aligned(times, f"{what} over {self._name}", self._refused)
+        self._last = int(times[-1]) if len(times) else self._last
+        return times
 
 
 class _Task:
@@ -55,31 +69,61 @@ class _Task:
     outgoing one when it is sent and arrives.
     """
 
-    def __init__(self, index: int, rank: int, name: str, plan: Plan, links: Sequence[_Link], streams: Streams) -> None:
-        component = plan.system.components[name]
-        sampling = component.sampling
+    def __init__(
+        self,
+        name: str,
+        plan: Plan,
+        links: Sequence[_Link],
+        streams: Streams,
+        fixed: Mapping[str, FixedStep],
+        refused: list[Refusal],
+    ) -> None:
+        connections, sampling = plan.system.connections, plan.system.components[name].sampling
         assert sampling is not None
-        connections, ratio = plan.system.connections, Fraction(repr(float(sampling.clock_ratio)))
-        self.index, self.rank = index, rank
+        ratio = Fraction(repr(float(sampling.clock_ratio)))
+        self.index, self.rank = list(plan.system.components).index(name), plan.sampled.index(name)
         self.incoming = [links[i] for i in plan.measured if connections[i].receiver == name]
         self.outgoing = [links[i] for i in plan.commanded if connections[i].sender == name]
         self._ahead = max((link.longest for link in self.incoming), default=0)
         self._grid = Grid(exact_nanoseconds(sampling.offset) / ratio, exact_nanoseconds(sampling.period) / ratio)
-        self._late = latenesses(
-            nanoseconds(sampling.jitter), sampling.jitter_distribution,
-            partial(streams.of, f"components.{name}", JITTER),
-        )  # fmt: skip
-        self._k, self._next = 0, self._times(0, 1)
+        jitter, owner = nanoseconds(sampling.jitter), f"components.{name}"
+        self._late = lateness(jitter, sampling.jitter_distribution, partial(streams.of, owner, JITTER))
+        self._name, self._refused, self._stop = owner, refused, nanoseconds(plan.system.stop_time)
+        self._fixed = [fixed[x] for x in sorted({connections[link.index].sender for link in self.incoming} & {*fixed})]
+        self._k, self._next = 0, self._times(0, 1, -1)
         self.rows: Integers = np.zeros((0, 3 + 2 * (len(self.incoming) + len(self.outgoing))), dtype=np.int64)
 
-    def _times(self, first: int, end: int) -> Integers:
-        return self._grid.between(first, end) + self._late(end - first)
+    def _times(self, first: int, end: int, before: int) -> Integers:
+        """Of samples `first` up to `end`, without that one; `before` is that of the one before them [ns]."""
+        times = self._grid.between(first, end) + self._late(end - first)
+        if not self._fixed:
+            return times
+        found = []
+        for k, time in enumerate(times.tolist(), first):
+            found.append(self._aligned(time))
+            if found[-1] == before < self._stop:
+                text = (
+                    f"samples {k - 1} and {k} of {self._name} both move to t = {seconds(before)} s, the next point of "
+                    f"components.{self._fixed[-1].name}: expected a period that leaves one for each"
+                )
+                self._refused.append(Refusal(before, text))
+            before = found[-1]
+        return np.array(found, dtype=np.int64)
+
+    def _aligned(self, time: int) -> int:
+        """The next point from `time` [ns] of all that it reads and that take steps of one length only."""
+        before = None
+        while time < self._stop + self._ahead and time != before:
+            before = time
+            for fixed in self._fixed:
+                time = int(fixed.aligned(np.array([time]), f"a sample of {self._name}", self._refused)[0])
+        return time
 
     def drawn_to(self, end: int) -> None:
         """Draw until no sample that is still to be drawn has anything to do with what is before `end` [ns]."""
         while self._next[0] - self._ahead < end:
             last = max(self._grid.index_from(end + self._ahead), self._k + 1)
-            times = np.append(self._next, self._times(self._k + 1, last + 1))
+            times = np.append(self._next, self._times(self._k + 1, last + 1, int(self._next[0])))
             now, then, k = times[:-1], times[1:], np.arange(self._k, last)
             columns: list[Integers] = [k, now, then]
             for link in self.incoming:
@@ -131,14 +175,24 @@ class _Collected:
 class Timetable:
     """Gives the schedules of one run, in order."""
 
-    error: UsageError | None = None
-    """None: there is always a next instant before the end"""
+    def __init__(self, system: System, streams: Streams, fixed: Mapping[str, FixedStep] | None = None) -> None:
+        """`fixed` has the components that take steps of one length only.
 
-    def __init__(self, system: System, streams: Streams) -> None:
+        Raises `UsageError` if the end is between two points of one of them, or for times beyond `LONGEST`.
+        """
+        _expect_no_longer(system)
         self._plan = plan = Plan(system)
+        self.stop = nanoseconds(system.stop_time)
+        fixed = fixed or {}
+        for each in fixed.values():
+            each.expect_end(self.stop)
+        self._begin, self._end = 0, self.stop + 1
+        self._refused: list[Refusal] = []
         names = list(system.components)
-        links = [_Link(i, x, streams) for i, x in enumerate(system.connections)]
-        self._stop, self._begin = nanoseconds(system.stop_time), 0
+        links = []
+        for i, x in enumerate(system.connections):
+            halting = fixed.get(x.sender if i in plan.measured else x.receiver)
+            links.append(_Link(i, x, streams, halting, self._refused))
         self._bodies = np.array([names.index(name) for name in plan.continuous], dtype=np.int64)
         self._place = np.full(len(names) + 1, -1)  # the last one for nobody
         self._place[self._bodies] = np.arange(len(self._bodies))
@@ -146,9 +200,7 @@ class Timetable:
             i: Grid(Fraction(0), exact_nanoseconds(system.components[names[i]].step or 0.0))
             for i in sorted(self._bodies.tolist())
         }
-        self._tasks = [
-            _Task(names.index(name), rank, name, plan, links, streams) for rank, name in enumerate(plan.sampled)
-        ]
+        self._tasks = [_Task(name, plan, links, streams, fixed, self._refused) for name in plan.sampled]
         self._sender = np.array([names.index(x.sender) for x in system.connections], dtype=np.int64)
         self._receiver = np.array([names.index(x.receiver) for x in system.connections], dtype=np.int64)
         self._posted = {i: [links[j] for j in plan.posted if self._sender[j] == i] for i in self._points}
@@ -158,25 +210,32 @@ class Timetable:
             if source.period is not None
         ]
         self._on_their_way: Integers = np.zeros((0, _ORDER + 4), dtype=np.int64)
-        rates = [1.0 / float(points[1]) for points in self._points.values()]
-        rates += [1.0 / float(exact_nanoseconds(c.sampling.period)) for c in system.components.values() if c.sampling]
-        self._pace = 1.0 / sum(rates)  # from one instant to the next [ns], about
+        self._pace = _pace(system)
         self._ahead: Schedule | None = None
 
     def following(self, most: int) -> Schedule | None:
-        """The next instants, about `most` of them; None at the end."""
+        """The next instants, about `most` of them; None at the end.
+
+        Raises `UsageError` for what cannot be on the grid of a component of fixed steps, when all instants before it
+        have been given.
+        """
         found = self._ahead or self._window(most)
         if found is not None:
             self._ahead = self._window(most)
-            found.times[-1] = self._stop + 1 if self._ahead is None else self._ahead.times[0]
+            found.times[-1] = self._end if self._ahead is None else self._ahead.times[0]
+        elif self._end <= self.stop:
+            raise UsageError(min(self._refused).text)
         return found
 
     def _window(self, most: int) -> Schedule | None:
         """The instants of the next window that has any."""
-        while self._begin <= self._stop:
+        while self._begin < self._end:
             begin = self._begin
-            self._begin = min(self._stop + 1, begin + max(int(most * self._pace), 1))
+            self._begin = min(self._end, begin + max(int(most * self._pace), 1))
             schedule = self._between(begin, self._begin)
+            if self._refused:
+                self._end = min(self._end, min(self._refused).time)
+                schedule = schedule.part(0, int(np.searchsorted(schedule.times[:-1], self._end)))
             if len(schedule):
                 return schedule
         return None
@@ -219,9 +278,9 @@ class Timetable:
             times = grid.between(max(grid.index_from(begin), 1), max(grid.index_from(end), 1))
             for receiver in receivers:
                 found.add(times, receiver)
-        if end > self._stop:
-            found.add(np.full(len(self._bodies), self._stop), self._bodies)
-            found.add(np.full(1, self._stop))
+        if end > self.stop:
+            found.add(np.full(len(self._bodies), self.stop), self._bodies)
+            found.add(np.full(1, self.stop))
 
     def _post(self, begin: int, end: int, found: _Collected) -> tuple[Integers, Integers]:
         """Messages of components in continuous time to one another: all in order, and those that arrive later."""
@@ -258,7 +317,7 @@ class Timetable:
         for task in self._tasks:  # those that come first at one instant come first
             times = task.rows[:, _TIME]
             found.add(times[(times >= begin) & (times < end)])
-            rows = task.rows[(times >= begin) & (times < min(end, self._stop))]
+            rows = task.rows[(times >= begin) & (times < min(end, self.stop))]
             for link in task.incoming:
                 if link.index not in self._plan.read_ahead:
                     found.add(rows[:, _TIME], int(self._sender[link.index]))
@@ -285,6 +344,32 @@ class Timetable:
         self._on_their_way, table = table[~now], table[now]
         found.add(table[:, 3], self._receiver[table[:, 0]])
         return np.ascontiguousarray(table[np.lexsort(table[:, [1, 7, 6, 5, 4, 3]].T), :4])
+
+
+def _expect_no_longer(system: System) -> None:
+    """Raise `UsageError` for a time beyond `LONGEST`."""
+    times = {"stop_time": system.stop_time}
+    for name, component in system.components.items():
+        if component.sampling is not None:
+            for key in ("period", "offset"):
+                place = f"components.{name}.sampling.{key}"
+                times[place] = getattr(component.sampling, key) / component.sampling.clock_ratio
+    for x in system.connections:
+        times |= {f"connections.{x.name}.delay": x.delay, f"connections.{x.name}.delay_jitter": x.delay_jitter}
+    for place, time in times.items():
+        if time >= LONGEST / NANOSECONDS:
+            raise UsageError(f"{place} = {time:g} s: expected less than {LONGEST / NANOSECONDS:.4g} s")
+
+
+def _pace(system: System) -> float:
+    """From one instant to the next [ns], about."""
+    periods = [component.step for component in system.components.values()]
+    periods += [source.period for source in system.sources.values()]
+    rates = [1.0 / float(exact_nanoseconds(period)) for period in periods if period is not None]
+    for component in system.components.values():
+        if component.sampling is not None:
+            rates.append(component.sampling.clock_ratio / float(exact_nanoseconds(component.sampling.period)))
+    return 1.0 / sum(rates)
 
 
 _TIME, _NEXT, _MESSAGES = 1, 2, 3

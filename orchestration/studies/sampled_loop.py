@@ -18,10 +18,10 @@ import numpy as np
 from orchestration.errors import UsageError
 from orchestration.fmi.instance import Instance, Loader
 from orchestration.fmi.reuse import Instances
-from orchestration.master.agenda import Agenda
 from orchestration.master.master import Master
 from orchestration.master.recording import Chunk, InMemory
 from orchestration.master.streams import Streams
+from orchestration.master.timetable import Timetable
 from orchestration.simulation import Simulation, fixed_steps, prepared
 from orchestration.simulator import Floats, Transfer
 from orchestration.studies.at_rest import calmed, common_period, exchanged, expect_rest, latest_offset
@@ -139,7 +139,7 @@ def _map_of(simulation: Simulation, tangents: dict[str, Tangent], begin: Fractio
     master = Master(
         system,
         tangents,
-        agenda=Agenda(system, streams, fixed_steps(system, models)),
+        timetable=Timetable(system, streams, fixed_steps(system, models)),
         streams=streams,
         recorded=dict.fromkeys(tangents, ()),
         recorder=Nowhere(),

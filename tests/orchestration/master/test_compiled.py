@@ -1,5 +1,6 @@
 """The compiled loop gives what the master in Python gives: rows, events, ends and words, to the byte."""
 
+import json
 import math
 import os
 import signal
@@ -22,7 +23,7 @@ from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_here
 from orchestration.fmi.native import NativeInstance
-from orchestration.master import compiled, loop
+from orchestration.master import loop, position
 from orchestration.master.compiled import CompiledMaster
 from orchestration.master.recording import InMemory
 from orchestration.results.pause import fly_until, resume
@@ -37,6 +38,7 @@ from tests.orchestration.master.random_systems import systems, systems_of_fixed_
 from tests.orchestration.quadrotor.signals_table import flights, scenario_of
 
 pytestmark = needs_compiler
+ENGINES = st.sampled_from(("python", "compiled"))
 FLIGHTS = dict(flights())
 EXAMPLES = sorted(Path(__file__).parents[3].glob("examples/*/system.toml"))
 
@@ -101,7 +103,7 @@ def test_random_systems_run_the_same_in_schedules_of_any_length(
     fmu: Path, kept: Kept, what: System, instants: int
 ) -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(compiled, "INSTANTS", instants)
+        patch.setattr(position, "INSTANTS", instants)
         both(of(what, fmu), load=kept.load)
 
 
@@ -225,6 +227,26 @@ def test_a_run_that_one_engine_pauses_another_ends(first: Any, then: Any, fmu: P
     system = of(LOOP, fmu)
     assert fly_until(system, 0.4, tmp_path / "paused", engine=first, figures=False) is None
     assert_the_same(resume(tmp_path / "paused", engine=then), ran(system, "python"))
+
+
+@settings(max_examples=30, derandomize=True, deadline=None)
+@given(systems(most=4), st.floats(0.0, 1.0), st.tuples(ENGINES, ENGINES), st.sampled_from((5, position.INSTANTS)))
+def test_random_systems_go_on_from_a_pause_as_if_there_was_none(
+    fmu: Path, kept: Kept, what: System, share: float, engines: tuple[Any, Any], size: int
+) -> None:
+    system, (first, then) = of(what, fmu), engines
+    whole = ran(system, "python", load=kept.load)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(position, "INSTANTS", size)
+        with prepared(system, engine=first, load=kept.load) as run:
+            run.master.initialise()
+            if run.master.run(pause_at=int(share * 1e9 * system.stop_time)):
+                return
+            state, saved = json.loads(json.dumps(run.master.state())), run.master.saved()
+    with prepared(system, engine=then, load=kept.load) as run:
+        run.master.restore(state, saved)
+        run.master.run()
+        assert_the_same(run.result(), whole)
 
 
 def test_a_run_may_be_stopped_and_go_on_in_the_same_process(fmu: Path) -> None:

@@ -1,14 +1,14 @@
-"""The master obeys the agenda: what each component sees, in which order, without any FMU."""
+"""The master obeys the timetable: what each component sees, in which order, without any FMU."""
 
 import math
 
 import pytest
 
 from orchestration.errors import SimulatorError
-from orchestration.master.agenda import Agenda
 from orchestration.master.master import Master
 from orchestration.master.recording import InMemory
 from orchestration.master.streams import Streams
+from orchestration.master.timetable import Timetable
 from tests.orchestration.master.stubs import Stub, clock, column, continuous, events, near, sampled, system, wire
 
 
@@ -16,7 +16,7 @@ def run(what, stubs, **keys):
     streams = Streams(what.seed, what.streams)
     recorded = {name: ["y"] if "y" in stub.values else [] for name, stub in stubs.items()}
     master = Master(
-        what, stubs, agenda=Agenda(what, streams), streams=streams, recorded=recorded, recorder=InMemory(), **keys
+        what, stubs, timetable=Timetable(what, streams), streams=streams, recorded=recorded, recorder=InMemory(), **keys
     )  # fmt: skip
     master.initialise()
     master.run()

@@ -14,10 +14,12 @@ from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
 from orchestration.errors import UsageError
-from orchestration.master.agenda import Agenda, FixedStep
+from orchestration.master import position
+from orchestration.master.fixed_step import FixedStep
 from orchestration.master.master import Master
 from orchestration.master.recording import InMemory
 from orchestration.master.streams import Streams
+from orchestration.master.timetable import Timetable
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.translation import quadrotor, system_of
@@ -67,9 +69,10 @@ def both(what: System, fixed: Iterable[str] = ()) -> tuple[second_clock.Seen, se
     stubs = {name: Moved(first[name], ends(what, name, "end")) for name in what.components}
     streams, zero = Streams(what.seed, what.streams), exact_nanoseconds(0.0)
     grids = {name: Grid(zero, exact_nanoseconds(what.components[name].step or 0.0)) for name in fixed}
-    agenda = Agenda(what, streams, {name: FixedStep(name=name, grid=grid, moves=True) for name, grid in grids.items()})
+    steps = {name: FixedStep(name=name, grid=grid, moves=True) for name, grid in grids.items()}
     master = Master(
-        what, stubs, agenda=agenda, streams=streams, recorded=dict.fromkeys(stubs, ()), recorder=InMemory()
+        what, stubs, timetable=Timetable(what, streams, steps), streams=streams, recorded=dict.fromkeys(stubs, ()),
+        recorder=InMemory(),
     )  # fmt: skip
     master.initialise()
     master.run()
@@ -84,8 +87,11 @@ def both(what: System, fixed: Iterable[str] = ()) -> tuple[second_clock.Seen, se
     return ours, second_clock.run(asdict(what), models, fixed)
 
 
-def same(what: System, fixed: Iterable[str] = ()) -> second_clock.Seen:
-    ours, theirs = both(what, fixed)
+def same(what: System, fixed: Iterable[str] = (), size: int = position.INSTANTS) -> second_clock.Seen:
+    """What both saw, by schedules of about so many instants."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(position, "INSTANTS", size)
+        ours, theirs = both(what, fixed)
     for name in reversed(second_clock.Seen._fields):
         assert getattr(ours, name) == getattr(theirs, name), name
     return theirs
@@ -96,17 +102,22 @@ def flight(case: Case) -> System:
     return system_of(Scenario(timing=case.timing, stop_time=case.stop_time, seed=case.seed))
 
 
+SIZES = st.sampled_from((1, 7, position.INSTANTS))
+
+
 @settings(max_examples=120)
-@given(systems())
-def test_steps_rows_and_events_are_the_same_over_random_systems(what: System) -> None:
-    same(what)
+@given(systems(), SIZES)
+def test_steps_rows_and_events_are_the_same_over_random_systems(what: System, size: int) -> None:
+    same(what, size=size)
 
 
-@settings(max_examples=40)
-@given(systems_of_fixed_steps())
-def test_and_with_components_of_one_step_to_whose_points_things_move(drawn: tuple[System, list[str]]) -> None:
+@settings(max_examples=80)
+@given(systems_of_fixed_steps(), SIZES)
+def test_and_with_components_of_one_step_to_whose_points_things_move(
+    drawn: tuple[System, list[str]], size: int
+) -> None:
     try:
-        same(*drawn)
+        same(*drawn, size=size)
     except UsageError as error:
         if "both move" not in str(error):
             raise

@@ -5,10 +5,11 @@ import hashlib
 import numpy as np
 from hypothesis import given, settings
 
-from orchestration.master.agenda import Agenda
 from orchestration.master.master import Master
+from orchestration.master.position import Position
 from orchestration.master.recording import InMemory
 from orchestration.master.streams import Streams
+from orchestration.master.timetable import Timetable
 from tests.orchestration.master.random_systems import systems_with_more
 from tests.orchestration.master.stubs import Stub
 
@@ -42,12 +43,10 @@ def test_adding_a_component_and_lossy_connections_changes_no_number_of_the_other
 def history(what, name):
     """When a component samples, and what becomes of the messages that it reads and sends."""
     place, found = list(what.components).index(name), []
-    for instant in Agenda(what, Streams(what.seed)):
-        for due in (due for due in instant.due if due.component == place):
-            messages = [
-                (what.connections[m.connection].name, m.k, m.sent, m.arrival) for m in (*due.received, *due.sent)
-            ]
-            found.append((due.time, {m for m in messages if len(m[0]) < len("c100")}))
+    for instant in Position(Timetable(what, Streams(what.seed))).instants():
+        for due in (due for due in instant.dues if due.component == place):
+            messages = [(what.connections[i].name, *message) for i, *message in (*due.received, *due.sent)]
+            found.append((instant.time, {m for m in messages if len(m[0]) < len("c100")}))
         found += [message for message in posted(what, instant, name) if len(message[0]) < len("c100")]
     return found
 
@@ -55,9 +54,7 @@ def history(what, name):
 def posted(what, instant, name):
     """What a component in continuous time sends."""
     wires = what.connections
-    return [
-        (wires[m.connection].name, m.k, m.sent, m.arrival) for m in instant.posted if wires[m.connection].sender == name
-    ]
+    return [(wires[i].name, *message) for i, *message in instant.posted if wires[i].sender == name]
 
 
 def noisy(what):
@@ -66,7 +63,7 @@ def noisy(what):
               for name in what.components}  # fmt: skip
     stubs = {name: Stub(y=1.0, z=2.0, **dict.fromkeys(names, 0.0)) for name, names in inputs.items()}
     streams = Streams(what.seed)
-    master = Master(what, stubs, agenda=Agenda(what, streams), streams=streams, recorded=dict.fromkeys(stubs, ()),
+    master = Master(what, stubs, timetable=Timetable(what, streams), streams=streams, recorded=dict.fromkeys(stubs, ()),
                     recorder=InMemory())  # fmt: skip
     master.initialise()
     master.run()

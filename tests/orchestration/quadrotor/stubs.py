@@ -1,4 +1,4 @@
-"""Simulators in a few lines of Python that write down every call, a master over two of them, and its agenda."""
+"""Simulators in a few lines of Python that write down every call, a master over two of them, and its timetable."""
 
 import json
 import math
@@ -9,11 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from orchestration.errors import SimulatorError
-from orchestration.master.agenda import Agenda
 from orchestration.master.master import Master
+from orchestration.master.position import Position
 from orchestration.master.recording import Chunk, Event, InMemory
 from orchestration.master.sources import Constant, Values
 from orchestration.master.streams import Streams
+from orchestration.master.timetable import Timetable
 from orchestration.master.watch import watch
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
@@ -188,23 +189,22 @@ class Instant(NamedTuple):
     arrivals: tuple[int, ...]
 
 
-def agenda_of(timing: Timing, stop_time: float, seed: int = 0) -> Agenda:
-    """What happens when in a flight with this timing."""
+def position_of(timing: Timing, stop_time: float, seed: int = 0) -> Position:
+    """At the start of a flight with this timing."""
     system = system_of(Scenario(timing=timing, stop_time=stop_time))
-    return Agenda(system, Streams(seed, system.streams))
+    return Position(Timetable(system, Streams(seed, system.streams)))
 
 
-def instants_of(agenda: Agenda) -> Iterator[Instant]:
+def instants_of(position: Position) -> Iterator[Instant]:
     """The instants of a flight in words of the loop of two: at each the plant halts."""
-    for instant in agenda:
-        sample, at_once = None, ()
-        for due in instant.due:
-            (measurement,), (command,) = due.received, due.sent
-            lost = measurement.arrival is None
-            sample = Sample(due.k, due.time, due.next_time, lost, command.sent, command.arrival)
-            at_once = (command,) if command.arrival == instant.time else ()
-        assert instant.halts == (0,)
-        yield Instant(instant.time, sample, tuple(message.k for message in (*instant.arrivals, *at_once)))
+    for instant in position.instants():
+        sample, arrivals = None, [k for _, k, _, _ in instant.arrivals]
+        for due in instant.dues:
+            ((_, k, _, received),), ((_, _, sent, arrival),) = due.received, due.sent
+            sample = Sample(k, instant.time, due.next_time, received < 0, sent, None if arrival < 0 else arrival)
+            arrivals += [k] if arrival == instant.time else []
+        assert list(instant.halts) == [0]
+        yield Instant(instant.time, sample, tuple(arrivals))
 
 
 class Flown:
@@ -231,7 +231,7 @@ class Flown:
         self.master = Master(
             system,
             {"plant": self.plant, "controller": self.controller},
-            agenda=Agenda(system, streams),
+            timetable=Timetable(system, streams),
             streams=streams,
             recorded={"plant": (), "controller": ()},
             recorder=self.recorder,

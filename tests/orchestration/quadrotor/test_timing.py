@@ -1,4 +1,4 @@
-"""The agenda of a flight: theorems about which instants there are, in integers and exact rationals."""
+"""What happens when in a flight: theorems about which instants there are, in integers and exact rationals."""
 
 import itertools
 import math
@@ -16,7 +16,8 @@ from orchestration import Scenario
 from orchestration.command import cli
 from orchestration.command.flags import FlightFlags
 from orchestration.errors import UsageError
-from orchestration.master.agenda import Agenda
+from orchestration.master import position
+from orchestration.master.position import INSTANTS, Position
 from orchestration.master.streams import Streams
 from orchestration.quadrotor.timing import TIMING_KEYS, Timing
 from orchestration.quadrotor.translation import quadrotor
@@ -29,12 +30,12 @@ SECOND = 10**9
 COMMANDS = typer.main.get_command(cli.app).commands  # type: ignore[attr-defined]
 
 
-def agenda_of(case: Case) -> Agenda:
-    return stubs.agenda_of(case.timing, case.stop_time, case.seed)
+def position_of(case: Case) -> Position:
+    return stubs.position_of(case.timing, case.stop_time, case.seed)
 
 
 def instants_of(case: Case) -> list[Instant]:
-    return list(stubs.instants_of(agenda_of(case)))
+    return list(stubs.instants_of(position_of(case)))
 
 
 def samples_of(case: Case) -> list[Sample]:
@@ -139,12 +140,10 @@ def test_the_next_time_is_right_also_beyond_the_end(case: Case) -> None:
 
 
 @given(cases())
-def test_the_time_that_the_agenda_announces_comes_next(case: Case) -> None:
-    agenda = agenda_of(case)
-    announced = agenda.next_time()
-    for instant in agenda:
-        assert instant.time == announced
-        announced = agenda.next_time()
+def test_the_time_that_an_instant_announces_comes_next(case: Case) -> None:
+    instants = list(position_of(case).instants())
+    assert all(one.next_time == other.time for one, other in itertools.pairwise(instants))
+    assert instants[-1].next_time > nanoseconds(case.stop_time)
 
 
 def test_an_offset_beyond_the_end_leaves_no_samples() -> None:
@@ -326,15 +325,17 @@ def test_streams_of_one_seed_differ_from_each_other() -> None:
 
 
 @given(cases(), st.data())
-def test_an_agenda_made_again_and_counted_on_continues_identically(case: Case, data: st.DataObject) -> None:
+def test_a_timetable_made_again_and_moved_on_continues_identically(case: Case, data: st.DataObject) -> None:
     whole = instants_of(case)
-    at = data.draw(st.integers(0, len(whole)))
-    first, again = agenda_of(case), agenda_of(case)
+    at, size = data.draw(st.integers(0, len(whole))), data.draw(st.sampled_from((1, 3, INSTANTS)))
+    first, again = position_of(case), position_of(case)
     before = list(itertools.islice(stubs.instants_of(first), at))
-    assert first.count == at
-    for _ in range(first.count):
-        next(again)
-    assert before + list(stubs.instants_of(again)) == whole
+    assert first.past == at
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(position, "INSTANTS", size)
+        passed = list(again.move_to(at))
+        assert again.past == sum(map(len, passed)) == at
+        assert before + list(stubs.instants_of(again)) == whole
 
 
 # -- what is refused --------------------------------------------------------------------------------------

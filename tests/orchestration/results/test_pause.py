@@ -137,7 +137,7 @@ def test_a_folder_without_a_pause_is_refused(tmp_path: Path) -> None:
         resume(tmp_path)
 
 
-@pytest.mark.parametrize("part", ["now", "instants", "of", "row", "plant"])
+@pytest.mark.parametrize("part", ["instants", "of", "row", "events", "plant"])
 def test_a_state_that_has_been_edited_is_refused_in_one_line(part: str, tmp_path: Path) -> None:
     fly_until(Scenario(stop_time=0.1), 0.05, tmp_path / "paused")
     path = tmp_path / "paused" / "paused.npz"

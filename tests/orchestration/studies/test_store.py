@@ -442,7 +442,7 @@ def test_a_parameter_given_as_its_fmu_has_it_is_the_same_run() -> None:
 
 
 @pytest.mark.parametrize(
-    "module", ["orchestration.master.master", "orchestration.master.agenda", "orchestration.results.objectives",
+    "module", ["orchestration.master.master", "orchestration.master.timetable", "orchestration.results.objectives",
                "fmu_kit.trajectory", "orchestration.fmi.native", "orchestration.studies.worker",
                "orchestration.quadrotor.wiring"],
 )  # fmt: skip

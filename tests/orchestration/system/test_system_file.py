@@ -5,8 +5,9 @@ from pathlib import Path
 import pytest
 
 from orchestration.errors import UsageError
-from orchestration.master.agenda import Agenda
+from orchestration.master.position import Position
 from orchestration.master.streams import Streams
+from orchestration.master.timetable import Timetable
 from orchestration.quadrotor import translation
 from orchestration.quadrotor.translation import quadrotor
 from orchestration.request import load_request
@@ -176,7 +177,7 @@ def test_a_file_without_components_is_a_scenario_of_the_quadrotor(tmp_path: Path
 
 def test_what_happens_when_needs_no_fmu(tmp_path: Path) -> None:
     system = loaded(tmp_path, TANK.replace("60.0", "1.0"))
-    assert sum(len(instant.due) for instant in Agenda(system, Streams(system.seed))) == 10
+    assert sum(len(i.dues) for i in Position(Timetable(system, Streams(system.seed))).instants()) == 10
 
 
 def test_the_schema_holds_for_the_files_that_are_read_and_for_no_unknown_key(tmp_path: Path) -> None:

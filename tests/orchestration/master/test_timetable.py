@@ -3,8 +3,11 @@
 import pytest
 
 from orchestration.errors import UsageError
-from orchestration.master.agenda import Agenda, FixedStep
+from orchestration.master import position
+from orchestration.master.fixed_step import FixedStep
+from orchestration.master.position import Position
 from orchestration.master.streams import Streams
+from orchestration.master.timetable import LONGEST, Timetable
 from orchestration.system.times import Grid, exact_nanoseconds
 from tests.orchestration.master.stubs import continuous, sampled, system, wire
 
@@ -12,7 +15,7 @@ MS = 1_000_000
 
 
 def instants(what, fixed=None):
-    return list(Agenda(what, Streams(what.seed), fixed))
+    return list(Position(Timetable(what, Streams(what.seed), fixed)).instants())
 
 
 def loop(sampling, **keys):
@@ -27,7 +30,7 @@ def loop(sampling, **keys):
 def test_instants_are_points_samples_arrivals_and_the_end():
     found = instants(loop(sampled(0.25), command={"delay": 0.03}, stop_time=0.5))
     assert [i.time // MS for i in found] == [0, 30, 100, 200, 250, 280, 300, 400, 500]
-    assert [i.time // MS for i in found if i.due] == [0, 250]  # none at the end
+    assert [i.time // MS for i in found if i.dues] == [0, 250]  # none at the end
     assert [i.time // MS for i in found if i.arrivals] == [30, 280]
 
 
@@ -38,42 +41,42 @@ def test_a_component_halts_only_where_something_happens_to_it():
         stop_time=1.0,
     )
     halts = {i.time // MS: i.halts for i in instants(what)}
-    assert halts[250] == (0,)
+    assert halts[250] == [0]
     assert [time for time, which in halts.items() if 1 in which] == [0, 500, 1000]
 
 
 def test_what_is_measured_late_is_measured_before_its_sample():
     found = instants(loop(sampled(0.2), measurement={"delay": 0.03}, stop_time=0.5))
-    taken = [(i.time // MS, [m.arrival // MS for m in i.measured]) for i in found if i.measured]
+    taken = [(i.time // MS, [arrival // MS for *_, arrival in i.measured]) for i in found if i.measured]
     assert taken == [(0, [0]), (170, [200]), (370, [400])]
 
 
 def test_a_delay_of_measurements_longer_than_periods_is_the_same():
     found = instants(loop(sampled(0.1), measurement={"delay": 0.25}, stop_time=1.0))
-    taken = [(m.sent // MS, m.arrival // MS) for i in found for m in i.measured]
+    taken = [(sent // MS, arrival // MS) for i in found for _, _, sent, arrival in i.measured]
     assert taken[:3] == [(0, 0), (0, 100), (0, 200)]
     assert taken[3:] == [(50 + 100 * k, 300 + 100 * k) for k in range(10)]  # also for samples beyond the end
-    received = [[m.sent // MS for m in due.received] for i in found for due in i.due]
+    received = [[sent // MS for _, _, sent, _ in due.received] for i in found for due in i.dues]
     assert received[:4] == [[0], [0], [0], [50]]
 
 
 def test_messages_never_overtake():
     found = instants(loop(sampled(0.01), command={"delay_jitter": 0.1}, stop_time=2.0, seed=4))
-    arrivals = [m.arrival for i in found for due in i.due for m in due.sent]
+    arrivals = [arrival for i in found for due in i.dues for *_, arrival in due.sent]
     assert arrivals == sorted(arrivals)
     assert len(set(arrivals)) < len(arrivals)  # some wait for the one before
 
 
 def test_in_jacobi_order_a_command_goes_out_with_the_next_sample():
     found = instants(loop(sampled(0.2), command={"order": "jacobi"}, stop_time=0.5))
-    assert [(due.time // MS, m.sent // MS) for i in found for due in i.due for m in due.sent] == [
+    assert [(i.time // MS, sent // MS) for i in found for due in i.dues for _, _, sent, _ in due.sent] == [
         (0, 200), (200, 400), (400, 600),
     ]  # fmt: skip
 
 
 def test_components_that_are_due_together_follow_what_feeds_what():
     what = system({"controller": sampled(), "sensor": sampled()}, [wire("sensor.y", "controller.y")], stop_time=0.15)
-    assert [[due.component for due in i.due] for i in instants(what) if i.due] == [[1, 0], [1, 0]]
+    assert [[due.component for due in i.dues] for i in instants(what) if i.dues] == [[1, 0], [1, 0]]
 
 
 def fixed_plant(moves):
@@ -87,10 +90,41 @@ def test_between_two_points_of_a_fixed_step_is_an_error_that_names_them():
         instants(loop(sampled(0.2), command={"delay": 0.03}), fixed_plant(False))
 
 
+def test_the_error_comes_when_all_instants_before_it_are_past(monkeypatch):
+    what = loop(sampled(0.2), command={"delay": 0.03, "loss": 0.5}, stop_time=2.0, seed=5)
+    first = next(time for time in instants(what) if time.arrivals).time
+    for size in (1, 3, position.INSTANTS):
+        monkeypatch.setattr(position, "INSTANTS", size)
+        begun = Position(Timetable(what, Streams(what.seed), fixed_plant(False)))
+        with pytest.raises(UsageError, match=rf"arrival over connections\.command at t = {first / 1e9:g} s"):
+            list(begun.instants())
+        assert begun.past == len(range(0, first, 100 * MS))
+
+
+def test_what_would_be_between_two_points_after_the_end_is_no_error():
+    late = loop(sampled(0.5), command={"delay": 0.03, "order": "jacobi"}, stop_time=0.5)
+    assert len(instants(late, fixed_plant(False))) == 6
+    assert len(instants(loop(sampled(0.75), stop_time=0.7), fixed_plant(False))) == 8
+
+
+@pytest.mark.parametrize("key", ["offset", "period"])
+def test_a_sample_in_millions_of_years_is_refused(key):
+    with pytest.raises(UsageError, match=rf"^components\.controller\.sampling\.{key} = 1e\+12 s: expected less"):
+        instants(loop(sampled(**{key: 1e12})))
+
+
+def test_times_up_to_the_longest_are_what_they_are():
+    longest = (LONGEST - 10**6) / 10**9
+    found = instants(loop(sampled(longest, offset=longest), command={"delay": longest, "delay_jitter": longest}))
+    assert len(found) == 11
+    with pytest.raises(UsageError, match=r"connections\.command\.delay = 2e\+09 s: expected less than 1.153e\+09 s"):
+        instants(loop(sampled(), command={"delay": 2e9}))
+
+
 def test_or_moves_to_the_next_point():
     found = instants(loop(sampled(0.25), command={"delay": 0.03}, stop_time=0.8), fixed_plant(True))
-    assert [due.time // MS for i in found for due in i.due] == [0, 300, 500]
-    assert [m.arrival // MS for i in found for m in i.arrivals] == [100, 400, 600]
+    assert [i.time // MS for i in found for due in i.dues] == [0, 300, 500]
+    assert [arrival // MS for i in found for *_, arrival in i.arrivals] == [100, 400, 600]
     assert {i.time // MS % 100 for i in found} == {0}
 
 
@@ -101,7 +135,7 @@ def test_a_message_between_components_in_continuous_time_leaves_at_the_senders_p
         stop_time=0.3,
     )
     found = instants(what)
-    assert [(m.sent // MS, m.arrival // MS) for i in found for m in i.posted] == [
+    assert [(sent // MS, arrival // MS) for i in found for _, _, sent, arrival in i.posted] == [
         (0, 30), (100, 130), (200, 230), (300, 330),
     ]  # fmt: skip
     assert [i.time // MS for i in found if 1 in i.halts] == [0, 30, 130, 230, 250, 300]

@@ -1,0 +1,62 @@
+"""Components that take steps of one length only: what happens to them moves to their next point, or cannot be."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from orchestration.errors import UsageError
+from orchestration.master.recording import Integers
+from orchestration.system.times import NANOSECONDS, Grid
+
+
+class Refusal(NamedTuple):
+    """What a run cannot go through."""
+
+    time: int
+    """[ns], of the instant that it would be"""
+    text: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class FixedStep:
+    """The grid of a component that takes no other step, and whether what happens to it moves to its next point."""
+
+    name: str
+    grid: Grid
+    moves: bool
+
+    def aligned(self, times: Integers, what: str, refused: list[Refusal]) -> Integers:
+        """`times` [ns] on the grid; if they may not move, the first between two points is added to `refused`."""
+        points: Integers = np.array([self.grid.from_(time) for time in times.tolist()], dtype=np.int64)
+        between = np.flatnonzero(points != times)
+        if len(between) and not self.moves:
+            time, point = int(times[between[0]]), int(points[between[0]])
+            before = max(point - self.grid[1], 0)
+            refused.append(
+                Refusal(
+                    time,
+                    f"{what} at t = {seconds(time)} s falls between two points of components.{self.name}, "
+                    f"{self._steps}: expected {seconds(before)} s or {seconds(point)} s; "
+                    'align = "next" moves it there',
+                )
+            )
+        return points
+
+    def expect_end(self, stop: int) -> None:
+        """Raise `UsageError` unless `stop` [ns] is on the grid: the end moves for nobody."""
+        point = self.grid.from_(stop)
+        if point != stop:
+            raise UsageError(
+                f"stop_time = {seconds(stop)}: falls between two points of components.{self.name}, {self._steps}: "
+                f"expected {seconds(point - self.grid[1])} or {seconds(point)}"
+            )
+
+    @property
+    def _steps(self) -> str:
+        return f"which takes steps of {seconds(self.grid[1])} s only"
+
+
+def seconds(time: int) -> str:
+    """A time [ns] in words."""
+    return f"{time / NANOSECONDS:.9g}"
