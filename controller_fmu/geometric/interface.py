@@ -1,5 +1,6 @@
 """The variables of the geometric controller's FMU: those of every controller, and what this law adds."""
 
+from controller_fmu.gain_scaling import GAIN_SCALING
 from controller_fmu.interface import (
     COMMAND,
     COMMON_LOCALS,
@@ -40,5 +41,6 @@ GEOMETRIC = (
     *COMMON_LOCALS,
     *LAW_LOCALS,
     *COUNT_AND_SWITCH,
+    *GAIN_SCALING,
 )
 """All variables of the geometric controller; the place in this list is the value reference."""

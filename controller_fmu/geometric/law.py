@@ -16,6 +16,7 @@ errors are actual minus desired.
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from controller_fmu.gain_scaling import feedback
 from controller_fmu.vehicle import Measurement, Model
 from fmu_kit.algebra import ZERO, Quaternion, Vec3
 from fmu_kit.errors import DivergenceError
@@ -37,9 +38,11 @@ class Gains:
     k_v: float = 2.8
     """velocity, k_v/m [1/s]"""
     k_R: float = 104.26  # noqa: N815
-    """attitude, k_R [N·m]"""
+    """attitude, k_R [N·m], per unit inertia [1/s²]"""
     k_Omega: float = 30.06  # noqa: N815
-    """angular velocity, k_Ω [N·m·s]"""
+    """angular velocity, k_Ω [N·m·s], per unit inertia [1/s]"""
+    per_inertia: bool = False
+    """Whether k_R and k_Ω stand for the matrices k_R J and k_Ω J."""
 
 
 class Heading(NamedTuple):
@@ -92,7 +95,7 @@ class Evaluation(NamedTuple):
     error_function: Scalar
     """Ψ [1], from 0 to 2"""
     energy: Scalar
-    """½ k_x e_x·e_x + ½ m e_v·e_v + ½ e_Ω·Je_Ω + k_R Ψ [J]"""
+    """½ k_x e_x·e_x + ½ m e_v·e_v + ½ e_Ω·Je_Ω + k_R Ψ [J]; with gains per unit inertia that of m = 1, J = I, [1/s²]"""
 
 
 class Unit(NamedTuple):
@@ -212,10 +215,11 @@ def evaluate(
     omega_c_body = Q_err.to_body(omega_c)
     e_Omega = omega - omega_c_body
 
-    feedforward = omega.cross(omega_c_body) - Q_err.to_body(omega_c_dot)
-    torque = omega.cross(J @ omega) - J @ feedforward - gains.k_R * e_R - gains.k_Omega * e_Omega
-    motion = 0.5 * model.mass * (k_x * (e_x @ e_x) + e_v @ e_v)
-    energy = motion + 0.5 * (e_Omega @ (J @ e_Omega)) + gains.k_R * psi
+    damping, restoring, momentum = feedback(gains.per_inertia, J, gains.k_Omega * e_Omega, gains.k_R * e_R, e_Omega)
+    feedforward = Q_err.to_body(omega_c_dot) - omega.cross(omega_c_body)
+    torque = omega.cross(J @ omega) + J @ feedforward - damping - restoring
+    mass = ops.where(gains.per_inertia, 1.0, model.mass)
+    energy = 0.5 * (mass * (k_x * (e_x @ e_x) + e_v @ e_v) + e_Omega @ momentum) + gains.k_R * psi
 
     return Evaluation(
         thrust=model.mass * lift,

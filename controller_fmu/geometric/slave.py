@@ -2,6 +2,7 @@
 
 import math
 
+from controller_fmu.gain_scaling import GainScaling
 from controller_fmu.geometric.interface import GEOMETRIC
 from controller_fmu.geometric.law import Evaluation, Gains, Heading, evaluate
 from controller_fmu.sampled import SampledController
@@ -26,6 +27,7 @@ class GeometricController(SampledController):
             k_v=self.real("gain.velocity"),
             k_R=self.real("gain.attitude"),
             k_Omega=self.real("gain.angular_velocity"),
+            per_inertia=self.enumeration("gain_scaling") == GainScaling.INERTIA,
         )
         heading = self.real("heading")
         self._direction = Vec3(math.cos(heading), math.sin(heading), 0.0)

@@ -12,6 +12,7 @@ errors are actual minus desired.
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from controller_fmu.gain_scaling import feedback
 from controller_fmu.vehicle import Measurement, Model
 from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.errors import DivergenceError
@@ -39,14 +40,16 @@ class Gains:
     k_eta: float = 15.0
     """k_η [rad/s]"""
     k_theta: float = 15.0
-    """k_θ [N·m·s]"""
+    """k_θ [N·m·s], per unit inertia [1/s]"""
     k_q: float = 15.0
-    """attitude, k_q [N·m]"""
+    """attitude, k_q [N·m], per unit inertia [1/s²]"""
     kappa: float = 1.0
     """κ [kg], weight of ½ s·s in the energy, and so of its term in Ψ: any κ >= 0 has the proof (erratum 8).
 
-    0: none; 1: as the energy is printed; k_q: as Ψ is printed.
+    0: none; 1: as the energy is printed; k_q: as Ψ is printed. Per unit inertia [1/m²].
     """
+    per_inertia: bool = False
+    """Whether k_θ and k_q stand for the matrices k_θ J and k_q J in (30), and κ/k_q for a weight per unit inertia."""
 
 
 class Evaluation(NamedTuple):
@@ -87,7 +90,7 @@ class Evaluation(NamedTuple):
     theta: Vec3
     """Θ [rad/s], body"""
     energy: Scalar
-    """L_κ (33) [J]"""
+    """L_κ (33) [J]; with gains per unit inertia that of J = I, [1/s²]"""
 
 
 class Surface(NamedTuple):
@@ -235,9 +238,9 @@ def evaluate(
     cross_s_dot = q_bar_dot.cross(s_body) + q_bar.cross(s_body_dot)
     psi_dot = -gains.k_eta * q_dot - coupling * (n_dot * cross_s + n * cross_s_dot)  # (31) (erratum 9)
     theta = omega_err - psi  # (9)
-    J_theta = J @ theta
+    damping, restoring, J_theta = feedback(gains.per_inertia, J, gains.k_theta * theta, gains.k_q * q, theta)
     feedforward = Q_err.to_body(omega_d_dot) - omega_err.cross(omega_d_body) + psi_dot
-    torque = omega.cross(J @ omega) + J @ feedforward - gains.k_theta * theta - gains.k_q * q  # (30)
+    torque = omega.cross(J @ omega) + J @ feedforward - damping - restoring  # (30)
     energy = 2.0 * gains.k_q * (1.0 - q0) + 0.5 * (theta @ J_theta) + 0.5 * gains.kappa * (s @ s)  # (33) (errata 8, 10)
 
     return Evaluation(

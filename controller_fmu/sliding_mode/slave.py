@@ -1,5 +1,6 @@
 """The controller as an FMU: evaluates the law at its samples, and writes what it computed."""
 
+from controller_fmu.gain_scaling import GainScaling
 from controller_fmu.sampled import SampledController
 from controller_fmu.sliding_mode.interface import UNIFIED
 from controller_fmu.sliding_mode.law import Evaluation, Gains, evaluate
@@ -28,6 +29,7 @@ class UnifiedController(SampledController):
             k_theta=self.real("gain.theta"),
             k_q=self.real("gain.attitude"),
             kappa=self.real("coupling"),
+            per_inertia=self.enumeration("gain_scaling") == GainScaling.INERTIA,
         )
 
     def control(self, measurement: Measurement, reference: Reference) -> None:

@@ -103,8 +103,11 @@ _COMMON = (
     *row("sample_count", "local discrete", None, type="Integer"),
 )
 
+_SCALING = (*row("gain_scaling", "parameter fixed", None, 1.0, type="Enumeration"),)
+
 UNIFIED = (
     *_COMMON,
+    *_SCALING,
     *row("gain.translation", "parameter tunable", "m/s2", 2.0, axes=XYZ),
     *row("gain.disturbance", "parameter tunable", "m/s2", 0.99),
     *row("gain.surface", "parameter tunable", "1/s", 5.0),
@@ -122,6 +125,7 @@ UNIFIED = (
 
 GEOMETRIC = (
     *_COMMON,
+    *_SCALING,
     *row("gain.position", "parameter tunable", "1/s2", 4.0),
     *row("gain.velocity", "parameter tunable", "1/s", 2.8),
     *row("gain.attitude", "parameter tunable", "N.m", 104.26),

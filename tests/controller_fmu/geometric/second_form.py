@@ -25,8 +25,9 @@ class Parameters:
     g: float
     k_x: float
     k_v: float
-    k_R: float
-    k_Omega: float
+    k_R: Array
+    """a number or a matrix, as is k_Omega"""
+    k_Omega: Array
 
 
 def vee(S: Array) -> Array:
@@ -72,7 +73,7 @@ def evaluate(
     e_Omega = Omega - seen[0]
     return {
         "thrust": f[0],
-        "torque": cross(Omega, p.J @ Omega) + p.J @ seen[1] - p.k_R * e_R - p.k_Omega * e_Omega,
+        "torque": cross(Omega, p.J @ Omega) + p.J @ seen[1] - np.dot(p.k_R, e_R) - np.dot(p.k_Omega, e_Omega),
         "position_error": e[0],
         "velocity_error": e[1],
         "acceleration_error": e[2],

@@ -78,6 +78,7 @@ def situations(draw: st.DrawFn) -> Situation:
             k_v=draw(between(0.0, 6.0)),
             k_R=draw(between(0.0, 100.0)),
             k_Omega=draw(between(0.0, 30.0)),
+            per_inertia=draw(st.booleans()),
         ),
         model=Model(mass=draw(between(0.3, 5.0)), inertia=draw(inertias()), gravity=draw(between(9.0, 10.0))),
         trajectory=trajectory,
@@ -115,6 +116,8 @@ def matrix(J: Inertia) -> Any:
 def test_law_equals_a_second_form_written_with_rotation_matrices_and_series(situation: Situation) -> None:
     now, x, m, gains = situation.now(), situation.state, situation.model, situation.gains
     r, heading = situation.trajectory.at(situation.t), situation.heading.at(situation.t)
+    J = matrix(m.inertia)
+    unit = J if gains.per_inertia else 1.0
     expected = second_form.evaluate(
         vector(x.position),
         vector(x.velocity),
@@ -124,12 +127,12 @@ def test_law_equals_a_second_form_written_with_rotation_matrices_and_series(situ
         [vector(v) for v in heading],
         second_form.Parameters(
             m=m.mass,
-            J=matrix(m.inertia),
+            J=J,
             g=m.gravity,
             k_x=m.mass * gains.k_x,
             k_v=m.mass * gains.k_v,
-            k_R=gains.k_R,
-            k_Omega=gains.k_Omega,
+            k_R=gains.k_R * unit,
+            k_Omega=gains.k_Omega * unit,
         ),
     )
     R_c = expected.pop("R_c")
@@ -148,8 +151,9 @@ def test_law_equals_a_second_form_written_with_rotation_matrices_and_series(situ
 def test_energy_is_that_of_the_errors(situation: Situation) -> None:
     now, gains, m = situation.now(), situation.gains, situation.model
     e_x, e_v, e_Omega = (vector(v) for v in (now.position_error, now.velocity_error, now.angular_velocity_error))
-    turning = gains.k_R * now.error_function + 0.5 * e_Omega @ matrix(m.inertia) @ e_Omega
-    moving = 0.5 * m.mass * (gains.k_x * e_x @ e_x + e_v @ e_v)
+    mass, J = (1.0, np.eye(3)) if gains.per_inertia else (m.mass, matrix(m.inertia))
+    turning = gains.k_R * now.error_function + 0.5 * e_Omega @ J @ e_Omega
+    moving = 0.5 * mass * (gains.k_x * e_x @ e_x + e_v @ e_v)
     assert now.energy == pytest.approx(turning + moving, rel=1e-12)
 
 
@@ -228,7 +232,8 @@ def test_attitude_energy_falls_by_what_the_damping_takes(situation: Situation) -
 
     def energy(now: Evaluation) -> float:
         e_Omega = now.angular_velocity_error
-        return float(gains.k_R * now.error_function + 0.5 * (e_Omega @ (J @ e_Omega)))
+        momentum = e_Omega if gains.per_inertia else J @ e_Omega
+        return float(gains.k_R * now.error_function + 0.5 * (e_Omega @ momentum))
 
     e_Omega = situation.now().angular_velocity_error
     assert_is_the_rate(-gains.k_Omega * (e_Omega @ e_Omega), lambda h: energy(situation.flow(h)))

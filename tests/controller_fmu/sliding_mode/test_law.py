@@ -262,6 +262,26 @@ def test_energy_has_the_rate_of_the_proof_for_every_weight(kappa: float | None, 
     assert_is_the_rate(energy_rate(situation), lambda h: situation.flow(h).energy)
 
 
+@given(situation=situations())
+def test_energy_per_unit_inertia_has_the_rate_of_the_proof(situation: Situation) -> None:
+    situation = replace(situation, gains=replace(situation.gains, per_inertia=True))
+    assert_is_the_rate(energy_rate(situation), lambda h: situation.flow(h).energy)
+
+
+@given(situations(), between(0.01, 3.0))
+def test_gains_per_unit_inertia_are_torques_for_an_inertia_that_is_a_number(situation: Situation, j: float) -> None:
+    gains, x = situation.gains, situation.state
+    measurement = Measurement(x.position, x.velocity, x.quaternion, x.angular_velocity)
+    model = replace(situation.model, inertia=Inertia(xx=j, yy=j, zz=j))
+    torques = replace(gains, k_theta=j * gains.k_theta, k_q=j * gains.k_q, kappa=j * gains.kappa)
+    reference = situation.trajectory.at(situation.t)
+    a = evaluate(measurement, reference, replace(gains, per_inertia=True), model)
+    b = evaluate(measurement, reference, torques, model)
+    assert a.thrust == b.thrust
+    assert (a.torque - b.torque).norm() <= 1e-12 * (1.0 + a.torque.norm() + b.torque.norm())
+    assert j * a.energy == pytest.approx(b.energy, rel=1e-12)
+
+
 @given(gains_anywhere)
 def test_energy_is_none_at_the_goal_and_some_elsewhere(gains: Gains) -> None:
     goal = Measurement(ZERO, ZERO, IDENTITY, ZERO)

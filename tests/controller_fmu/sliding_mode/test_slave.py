@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pythonfmu.enums import Fmi2Status
 
+from controller_fmu.gain_scaling import GainScaling
 from controller_fmu.sliding_mode.interface import UNIFIED
 from controller_fmu.sliding_mode.law import Gains, evaluate
 from controller_fmu.sliding_mode.slave import UnifiedController
@@ -124,6 +125,15 @@ def test_due_sample_evaluates_the_law_at_the_start_of_the_step() -> None:
         assert slave.do_step(0.01 * k, 0.01) is True
         assert command(slave) == close(law(measured(k), 0.01 * k))
         assert count(slave) == k + 1
+
+
+def test_gains_are_per_unit_inertia_where_that_is_chosen() -> None:
+    slave = instance({**measured(3), "inertia.xx": 0.02, "inertia.yy": 0.03, "inertia.zz": 0.04})
+    slave.set_integer([slave._index["gain_scaling"]], [GainScaling.INERTIA])
+    slave.setup_experiment(0.0)
+    slave.enter_initialization_mode()
+    model = Model(inertia=Inertia(xx=0.02, yy=0.03, zz=0.04))
+    assert command(slave) == close(law(measured(3), 0.0, Gains(per_inertia=True), model))
 
 
 def test_command_is_held_between_samples() -> None:
@@ -397,7 +407,7 @@ def test_parameter_that_is_not_finite_is_refused(name: str, value: float) -> Non
 def test_fixed_parameter_cannot_be_set_after_initialisation(name: str) -> None:
     slave = started()
     index = slave._index[name]
-    set_value = slave.set_boolean if UNIFIED[index].type == "Boolean" else slave.set_real
+    set_value = {"Boolean": slave.set_boolean, "Real": slave.set_real}.get(UNIFIED[index].type, slave.set_integer)
     assert_fails(lambda: set_value([index], [1]), name, "a fixed parameter cannot be set after initialisation")
 
 
