@@ -123,7 +123,7 @@ def _row(alike: list[Variable]) -> tuple[str, ...]:
         starts[0] if len(set(starts)) == 1 else ", ".join(starts),
         _number(first.minimum) if first.above is None else f"&gt; {_number(first.above)}",
         _number(first.maximum),
-        ", ".join(f"{value}&nbsp;{_code(name)}" for name, value in first.items.items()),
+        ", ".join(f"{value}&#160;{_code(name)}" for name, value in first.items.items()),
         first.variability,
         escape(first.description),
     )

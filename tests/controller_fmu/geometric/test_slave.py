@@ -84,7 +84,8 @@ def test_a_reference_in_free_fall_fails_by_name() -> None:
     put(slave, {"reference.acceleration.z": 9.81})
     slave.setup_experiment(0.0)
     slave.enter_initialization_mode()
-    assert_fails(slave.exit_initialization_mode, "-A/m = (", "a length of at least 1e-09 m/s2", "the desired attitude does not exist")
+    words = ("-A/m = (", "a length of at least 1e-09 m/s2", "the desired attitude does not exist")
+    assert_fails(slave.exit_initialization_mode, *words)
 
 
 def test_the_flight_of_its_c_is_that_of_its_python() -> None:
