@@ -12,7 +12,8 @@ from orchestration.errors import UsageError
 from orchestration.quadrotor.timing import TIMING_KEYS
 
 if TYPE_CHECKING:
-    from orchestration.quadrotor.scenario import Parameter, Scenario
+    from orchestration.quadrotor.parameters import Parameter
+    from orchestration.quadrotor.scenario import Scenario
     from orchestration.request import Request
     from orchestration.system.model import System
 
@@ -140,6 +141,15 @@ class FlightFlags:
             text="The plant's FMU, anybody's that has its variables; QuadrotorPlant unless told.",
         ),
     ] = None
+    vehicle: Annotated[
+        str | None,
+        _option(
+            "--vehicle",
+            panel=MODEL,
+            metavar="NAME|FILE",
+            text="Parameters of plant and controller by a file: paper, crazyflie, hummingbird, agilicious, or a path.",
+        ),
+    ] = None
     native: Annotated[
         bool | None,
         _option(
@@ -163,6 +173,7 @@ class FlightFlags:
         """`scenario` with what was given; raises `UsageError` for what cannot be."""
         from orchestration.fmus import native_twin
         from orchestration.quadrotor.presets import preset_timing
+        from orchestration.quadrotor.vehicles import load_vehicle
 
         timing: dict[str, Any] = {} if self.preset is None else preset_timing(self.preset)
         timing |= {name: getattr(self, name) for name in _TIMING_FLAGS if getattr(self, name) is not None}
@@ -174,11 +185,13 @@ class FlightFlags:
             if given:
                 old: Mapping[str, float] = getattr(scenario.timing, name)
                 timing[name] = {**old, **{key: _number(f"--{name} {key} =", text) for key, text in _pairs(name, given)}}
-        top = {
+        top: dict[str, Any] = {
             name: value
             for name in ("seed", "stop_time", "model_mismatch")
             if (value := getattr(self, name)) is not None
         }
+        if self.vehicle is not None:
+            top["vehicle"] = load_vehicle(self.vehicle, Path())
         parameters = {key: _value(text) for key, text in _pairs("set", self.set or [])}
         changed = scenario.with_changes(timing=timing, parameters=parameters, **top)
         if not (self.native or self.controller or self.plant):

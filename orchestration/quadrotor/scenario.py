@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from orchestration.errors import UsageError, shown
+from orchestration.quadrotor.parameters import Parameter
 from orchestration.quadrotor.timing import Timing
+from orchestration.quadrotor.vehicles import Vehicle
 from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT, SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.system.requirements import is_finite
-
-Parameter = float | bool | str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,6 +54,8 @@ class Scenario:
     """of all random numbers"""
     model_mismatch: bool = False
     """whether it is meant if the controller's nominal mass or inertia is not the plant's; no effect on the flight"""
+    vehicle: Vehicle | None = None
+    """whose parameters hold where `controller` and `plant` say nothing else"""
     controller: FmuChoice = field(default_factory=lambda: FmuChoice(fmu=DEFAULT_CONTROLLER))
     plant: FmuChoice = field(default_factory=lambda: FmuChoice(fmu=DEFAULT_PLANT))
     timing: Timing = field(default_factory=Timing)
@@ -106,10 +108,22 @@ class Scenario:
             controller=dataclasses.replace(self.controller, fmu=str(controller)),
         )
 
+    def resolved(self) -> "Scenario":
+        """The same flight with the parameters of its vehicle as its own."""
+        if self.vehicle is None:
+            return self
+        of_vehicle = {"plant": self.vehicle.plant, "controller": self.vehicle.for_controller(self.controller.fmu)}
+        sides: dict[str, Any] = {
+            side: dataclasses.replace(choice, parameters={**of_vehicle[side], **choice.parameters})
+            for side, choice in (("plant", self.plant), ("controller", self.controller))
+        }
+        return dataclasses.replace(self, vehicle=None, **sides)
+
     def to_toml(self) -> str:
-        """The scenario file that loads as this scenario."""
+        """The scenario file that loads as this scenario, with the parameters of its vehicle written out."""
         import tomli_w
 
+        resolved = self.resolved()
         timing = {
             key: value
             for key, value in dataclasses.asdict(self.timing).items()
@@ -119,8 +133,8 @@ class Scenario:
             "stop_time": self.stop_time,
             "seed": self.seed,
             **({"model_mismatch": True} if self.model_mismatch else {}),
-            "controller": _table(self.controller),
-            "plant": _table(self.plant),
+            "controller": _table(resolved.controller),
+            "plant": _table(resolved.plant),
             "timing": timing,
         }
         if self.reference.file is not None:

@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import typing
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -12,9 +11,11 @@ import pydantic
 
 from orchestration.documents import read_toml
 from orchestration.errors import UsageError, shown
+from orchestration.quadrotor.parameters import parameters_in
 from orchestration.quadrotor.presets import preset_timing
 from orchestration.quadrotor.scenario import FmuChoice, Record, ReferenceChoice, Scenario
 from orchestration.quadrotor.timing import Timing
+from orchestration.quadrotor.vehicles import load_vehicle
 from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
 
 
@@ -27,6 +28,7 @@ class ScenarioFile:
     stop_time: float = Scenario.stop_time
     seed: int = Scenario.seed
     model_mismatch: bool = Scenario.model_mismatch
+    vehicle: str | None = None
     controller: dict[str, Any] = field(default_factory=dict)
     plant: dict[str, Any] = field(default_factory=dict)
     timing: Timing = field(default_factory=Timing)
@@ -56,6 +58,7 @@ def scenario_from_tables(tables: dict[str, Any], folder: Path) -> Scenario:
         stop_time=parsed.stop_time,
         seed=parsed.seed,
         model_mismatch=parsed.model_mismatch,
+        vehicle=None if parsed.vehicle is None else load_vehicle(parsed.vehicle, folder),
         controller=_choice("controller", parsed.controller, DEFAULT_CONTROLLER, folder),
         plant=_choice("plant", parsed.plant, DEFAULT_PLANT, folder),
         timing=parsed.timing,
@@ -82,25 +85,13 @@ def _expanded(tables: dict[str, Any]) -> dict[str, Any]:
 
 
 def _choice(side: str, table: dict[str, Any], default: str, folder: Path) -> FmuChoice:
-    parameters = dict(_flattened(table))
+    parameters = parameters_in(table, side)
     fmu = parameters.pop("fmu", default)
     if not isinstance(fmu, str):
         raise UsageError(f"{side}.fmu = {shown(fmu)}: expected the name of an FMU or a path")
-    for name, value in parameters.items():
-        if not isinstance(value, (int, float, str)):
-            raise UsageError(f"{side}.{name} = {shown(repr(value))}: expected a number, true, false or a text")
     if fmu.endswith(".fmu"):
         fmu = str(folder / fmu)
     return FmuChoice(fmu=fmu, parameters=parameters)
-
-
-def _flattened(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Nested tables as dotted names: `gain.eta = 15` and `"gain.eta" = 15` mean the same."""
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _flattened(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", value
 
 
 def _parse(tables: dict[str, Any]) -> ScenarioFile:

@@ -55,6 +55,7 @@ def warnings(scenario: Scenario, parameters: Mapping[str, float]) -> tuple[str, 
 
 def system_of(scenario: Scenario) -> System:
     """The system that a scenario means: the quadrotor with the scenario's values."""
+    scenario = scenario.resolved()
     timing, sides = scenario.timing, {"plant": scenario.plant, "controller": scenario.controller}
     changes: dict[str, Any] = {"stop_time": scenario.stop_time, "seed": scenario.seed}
     for key, paths in TIMING.items():

@@ -42,6 +42,7 @@ _NO_EFFECT = 1e-9
 
 def hover_of(scenario: Scenario) -> Scenario:
     """`scenario` with the vehicle at rest at the origin, where its reference rests too, and no wind."""
+    scenario = scenario.resolved()
     controller = {k: v for k, v in scenario.controller.parameters.items() if k != wiring.USE_REFERENCE_INPUTS}
     controller |= dict.fromkeys(wiring.TRAJECTORY, 0.0)
     plant = dict(scenario.plant.parameters) | dict.fromkeys(wiring.DISTURBANCE, 0.0)
@@ -56,6 +57,7 @@ def hover_of(scenario: Scenario) -> Scenario:
 
 def at_hover(scenario: Scenario) -> System:
     """The system that hovers as `scenario` would, by values for what its FMUs have."""
+    scenario = scenario.resolved()
     system = system_of(hover_of(scenario))
     given = {"plant": scenario.plant.parameters, "controller": scenario.controller.parameters}
     models = files_of(system).models_of(system)
@@ -78,13 +80,14 @@ def at_edge(scenario: Scenario) -> Scenario | None:
 
     That is the slope of k_s |e|^β_t sgn(e) at |e| = ε. None for a controller without parameters of these names.
     """
+    scenario = scenario.resolved()
     system = system_of(scenario)
     known = files_of(system).starts_of(system)
-    known |= {f"controller.{name}": float(value) for name, value in scenario.controller.parameters.items()}
+    own = {f"controller.{name}": value for name, value in scenario.controller.parameters.items()}
     names = [f"controller.{name}" for name in (wiring.SURFACE_GAIN, wiring.SURFACE_EXPONENT, wiring.BOUNDARY_LAYER)]
     if any(name not in known for name in names):
         return None
-    gain, exponent, layer = (known[name] for name in names)
+    gain, exponent, layer = (float(own.get(name, known[name])) for name in names)
     return scenario.with_changes(parameters={names[0]: exponent * gain * layer ** (exponent - 1.0)})
 
 

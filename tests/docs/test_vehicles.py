@@ -1,55 +1,67 @@
-"""The page on vehicles: its scenario flies, its commands end as it says, and the scaling is what it says."""
+"""The page on vehicles: its file loads, its commands end as it says, its figures are those of the files."""
 
 import json
 import re
 import shlex
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
 
-import orchestration
-from orchestration import Result, Scenario, Timing
 from orchestration.command.cli import main
-from orchestration.quadrotor.scenario_file import load_scenario
+from orchestration.quadrotor.vehicles import Vehicle, load_vehicle, names
 
 PAGE = (Path(__file__).parents[2] / "docs" / "vehicles.md").read_text(encoding="utf-8")
-SHORT = ["--stop-time", "10", "--plant-interval", "0.002", "--json"]
-INERTIA = ("inertia.xx", "inertia.yy", "inertia.zz")
 
 
-def commands() -> list[tuple[str, str]]:
-    """The commands of the table, and the outcome of each."""
-    return re.findall(r"^\| `quadcosim (run[^`]*)` \| (settled|diverged)", PAGE, re.M)
+def commands() -> list[tuple[str, str, str]]:
+    """The commands of the tables, with the outcome of each and the time that it is given for it."""
+    found = re.findall(r"^\| `quadcosim (run[^`]*)` \| (settled|diverged)(?:.*?, at|.*?from) ([\d.]+) s", PAGE, re.M)
+    return [(command, outcome, time) for command, outcome, time in found]
 
 
 @pytest.fixture
-def vehicle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The scenario of the page, in the working directory."""
-    (text,) = re.findall(r"^```toml vehicle.toml\n(.*?)^```$", PAGE, re.M | re.S)
+def _mine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The vehicle of the page, in the working directory."""
+    (text,) = re.findall(r"^```toml mine.toml\n(.*?)^```$", PAGE, re.M | re.S)
     monkeypatch.chdir(tmp_path)
-    path = tmp_path / "vehicle.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
 
 
-def test_the_table_has_its_commands() -> None:
-    assert [outcome for _, outcome in commands()].count("settled") == 3
-    assert len(commands()) == 6
+def test_the_tables_have_their_commands() -> None:
+    assert [outcome for _, outcome, _ in commands()].count("settled") == 7
+    assert len(commands()) == 11
 
 
-@pytest.mark.usefixtures("vehicle")
-@pytest.mark.parametrize(("command", "outcome"), commands())
-def test_command_of_the_page_ends_as_it_says(command: str, outcome: str, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = shlex.split(command)
+@pytest.mark.usefixtures("_mine")
+@pytest.mark.parametrize(("command", "outcome", "time"), commands())
+def test_command_of_the_page_ends_as_it_says(
+    command: str, outcome: str, time: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     with pytest.raises(SystemExit) as ended:
-        main([*arguments, *SHORT, *(["--plant-interval", "0.001"] if "0.001" in arguments else [])])
+        main([*shlex.split(command), "--native", "--json"])
     printed = capsys.readouterr()
     assert not ended.value.code
-    assert json.loads(printed.out)["outcome"] == outcome
-    only_plant_changed = "vehicle.toml" not in arguments
-    assert ("nominal model is not the plant" in printed.err) is only_plant_changed
+    metrics = json.loads(printed.out)
+    assert metrics["outcome"] == outcome
+    found = metrics["settling_time" if outcome == "settled" else "divergence_time"]
+    assert f"{found:.{len(time.partition('.')[2])}f}" == time
+    assert ("nominal model is not the plant" in printed.err) is ("--vehicle" not in command)
+
+
+@pytest.mark.parametrize("vehicle", [load_vehicle(name, Path()) for name in names() if name != "paper"], ids=str)
+def test_the_table_of_vehicles_has_the_figures_of_their_files(vehicle: Vehicle) -> None:
+    (row,) = re.findall(rf"^\| `{vehicle.name}` \| (.*) \|$", PAGE, re.M)
+    mass, inertia, arms, thrusts, by_weight, drag, lags, _ = row.split(" | ")
+    of = {name: float(value) for name, value in vehicle.plant.items()}
+    assert float(mass) == of["mass"]
+    assert [float(x) for x in inertia.split(", ")] == pytest.approx(
+        [1e3 * of[f"inertia.{a}"] for a in ("xx", "yy", "zz")], rel=1e-3
+    )
+    assert [float(x[1:]) for x in arms.split(", ")] == pytest.approx([of["motor.arm.x"], of["motor.arm.y"]], rel=2e-3)
+    assert [float(x) for x in thrusts.split(" to ")] == [of["motor.thrust_min"], of["motor.thrust_max"]]
+    assert float(by_weight) == pytest.approx(4.0 * of["motor.thrust_max"] / (9.81 * of["mass"]), abs=0.005)
+    assert float(drag) == pytest.approx(of["motor.drag_to_thrust"], rel=2e-3)
+    assert [float(x) for x in lags.split(", ")] == [1e3 * of[f"motor.time_constant.{way}"] for way in ("up", "down")]
 
 
 @pytest.mark.parametrize("meant", [False, True])
@@ -58,33 +70,3 @@ def test_flag_says_that_the_mismatch_is_meant(meant: bool, capsys: pytest.Captur
         main(["run", "--set", "plant.mass=1.2", "--stop-time", "0.1", *(["--model-mismatch"] if meant else [])])
     warned = "warning: the controller's nominal model is not the plant: controller.mass = 1 where plant.mass = 1.2."
     assert (warned in capsys.readouterr().err) is not meant
-
-
-def test_scenario_of_the_page_scales_the_gains_of_the_paper_by_its_inertia(vehicle: Path) -> None:
-    scenario = load_scenario(vehicle)
-    j = scenario.controller.parameters["inertia.xx"]
-    gains = {name: scenario.controller.parameters[name] / j for name in ("gain.theta", "gain.attitude", "coupling")}
-    assert gains == pytest.approx({"gain.theta": 15.0, "gain.attitude": 15.0, "coupling": 1.0})
-    assert all(scenario.plant.parameters[n] == scenario.controller.parameters[n] for n in ("mass", *INERTIA))
-
-
-def test_gains_per_unit_inertia_fly_the_same_path_with_every_mass_and_inertia() -> None:
-    """J = j times the identity, and a wind that accelerates alike."""
-    m, j = 3.7, 0.012
-    body = {name: m if name == "mass" else j for name in ("mass", *INERTIA)}
-    scaled: dict[str, Any] = {
-        f"{side}.{name}": value for side in ("plant", "controller") for name, value in body.items()
-    }
-    scaled |= {"controller.gain.theta": 15.0 * j, "controller.gain.attitude": 15.0 * j, "controller.coupling": j}
-    scaled |= {f"plant.wind.amplitude.{axis}": 0.01 * m for axis in "xyz"}
-
-    def fly(parameters: dict[str, Any]) -> Result:
-        scenario = Scenario(stop_time=5.0, timing=Timing(period=0.02, plant_interval=0.002))
-        return orchestration.run(scenario.with_changes(parameters=parameters))
-
-    paper, own = fly({}), fly(scaled)
-    for axis in "xyz":
-        name = f"plant.position.{axis}"
-        np.testing.assert_allclose(own.signals[name], paper.signals[name], rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(own.signals["plant.thrust"], m * paper.signals["plant.thrust"], rtol=1e-11)
-    np.testing.assert_allclose(own.signals["controller.energy"], j * paper.signals["controller.energy"], rtol=1e-7)

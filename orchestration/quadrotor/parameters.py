@@ -1,0 +1,26 @@
+"""Parameters of an FMU as files nest them, by their names."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from orchestration.errors import UsageError, shown
+
+Parameter = float | bool | str
+
+
+def parameters_in(table: Mapping[str, Any], place: str) -> dict[str, Parameter]:
+    """The values of a table by dotted names; raises `UsageError`, naming the `place`, for what is no value."""
+    found = dict(_flattened(table))
+    for name, value in found.items():
+        if not isinstance(value, (int, float, str)):
+            raise UsageError(f"{place}.{name} = {shown(repr(value))}: expected a number, true, false or a text")
+    return found
+
+
+def _flattened(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Nested tables as dotted names: `gain.eta = 15` and `"gain.eta" = 15` mean the same."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _flattened(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value

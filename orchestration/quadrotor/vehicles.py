@@ -1,0 +1,66 @@
+"""Vehicles: what a plant is made of and what its controllers are told of it, from files of their own."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path, PurePath
+from typing import Any
+
+import vehicles
+from orchestration.documents import read_toml
+from orchestration.errors import UsageError
+from orchestration.quadrotor.parameters import Parameter, parameters_in
+
+SHIPPED = Path(vehicles.__file__).parent
+"""Where the vehicles are that go by a name"""
+ENDING = ".toml"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vehicle:
+    """Parameters of the plant, of every controller, and of single controllers by the names of their FMUs."""
+
+    name: str
+    plant: Mapping[str, Parameter] = field(default_factory=dict)
+    controller: Mapping[str, Parameter] = field(default_factory=dict)
+    controllers: Mapping[str, Mapping[str, Parameter]] = field(default_factory=dict)
+
+    def for_controller(self, fmu: str) -> dict[str, Parameter]:
+        """The parameters of a controller whose FMU has this name or path."""
+        return {**self.controller, **self.controllers.get(PurePath(fmu).stem, {})}
+
+
+def names() -> list[str]:
+    """The vehicles that are shipped."""
+    return sorted(path.stem for path in SHIPPED.glob(f"*{ENDING}"))
+
+
+def load_vehicle(given: str, folder: Path) -> Vehicle:
+    """The vehicle of a name, or of a path that ends in .toml and starts at `folder`.
+
+    Raises `UsageError` for a name that none has, a file that cannot be read, or what does not belong in it.
+    """
+    path = folder / given if given.endswith(ENDING) else SHIPPED / f"{given}{ENDING}"
+    if not given.endswith(ENDING) and given not in names():
+        raise UsageError(f"vehicle {given}: expected one of {', '.join(names())}, or a path that ends in {ENDING}")
+    tables = read_toml(path, "vehicle file")
+    try:
+        return _vehicle(path.stem, tables)
+    except UsageError as error:
+        raise UsageError(f"{path}: {error}") from error
+
+
+def _vehicle(name: str, tables: dict[str, Any]) -> Vehicle:
+    for key, table in tables.items():
+        if key not in ("plant", "controller", "controllers") or not isinstance(table, Mapping):
+            raise UsageError(f"{key}: expected the tables [plant], [controller] and [controllers.NAME] only")
+    for fmu, table in tables.get("controllers", {}).items():
+        if not isinstance(table, Mapping):
+            raise UsageError(f"controllers.{fmu}: expected a table [controllers.NAME], NAME that of an FMU")
+    return Vehicle(
+        name=name,
+        plant=parameters_in(tables.get("plant", {}), "plant"),
+        controller=parameters_in(tables.get("controller", {}), "controller"),
+        controllers={
+            fmu: parameters_in(table, f"controllers.{fmu}") for fmu, table in tables.get("controllers", {}).items()
+        },
+    )

@@ -1,0 +1,1 @@
+"""Vehicles as files of parameters, each figure with its source."""
