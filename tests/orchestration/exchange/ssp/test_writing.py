@@ -56,12 +56,12 @@ def values_in(path: Path, name: str) -> dict[str, tuple[str, str, str | None]]:
 
 
 def expected_values(scenario: Scenario, component: str) -> Iterator[tuple[str, tuple[str, str, str | None]]]:
-    """By the table of the interface: every parameter that is no Boolean, and what else is set."""
+    """By the table of the interface: every parameter that is a number, and what else is set."""
     given = dict(getattr(scenario, component).parameters)
     if component == "controller":
         given |= {"sample_period": scenario.timing.period, "sample_offset": scenario.timing.offset}
     for row in TABLES[MODELS[component]]:
-        if row.name in given or (row.causality == "parameter" and row.type != "Boolean"):
+        if row.name in given or (row.causality == "parameter" and row.type not in ("Boolean", "Enumeration")):
             yield row.name, (row.type, repr(given.get(row.name, row.start)), row.unit)
 
 
@@ -181,7 +181,7 @@ def test_the_step_and_the_stop_time_of_the_scenario_are_in_it(scenario: Scenario
 def test_the_fmus_inside_are_byte_for_byte_those_of_the_scenario(written: Path, built: dict[str, Path]) -> None:
     with zipfile.ZipFile(written) as archive:
         inside = {name: archive.read(name) for name in archive.namelist()}
-    assert inside.keys() == {"SystemStructure.ssd", *SETS, *(f"resources/{model}.fmu" for model in built)}
+    assert inside.keys() == {"SystemStructure.ssd", *SETS, *(f"resources/{model}.fmu" for model in MODELS.values())}
     for component in document(written).iterfind("ssd:System/ssd:Elements/ssd:Component", NAMES):
         model = MODELS[component.attrib["name"]]
         assert component.attrib["source"] == f"resources/{model}.fmu"
