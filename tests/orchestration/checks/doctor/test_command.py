@@ -11,6 +11,7 @@ import pytest
 
 from orchestration.checks.confined import Limits
 from orchestration.checks.doctor import loading
+from orchestration.quadrotor.wiring import MODELS
 from tests.fmus.foreign import lag, needs_compiler
 from tests.fmus.process import ROOT, run
 from tests.orchestration.checks.doctor.common import (
@@ -47,10 +48,10 @@ def examined(fmu: Path, environment: dict[str, str] | None = None) -> dict[str, 
     return {"machine": report["machine"], **table}
 
 
-def test_both_fmus_of_the_project_load_here() -> None:
+def test_all_fmus_of_the_project_load_here() -> None:
     done = doctor("--json")
     report = json.loads(done.stdout)
-    assert [Path(table["path"]).name for table in report["fmus"]] == ["UnifiedController.fmu", "QuadrotorPlant.fmu"]
+    assert [Path(table["path"]).name for table in report["fmus"]] == [f"{model}.fmu" for model in MODELS]
     for table in report["fmus"]:
         assert table["loads"]
         assert table["problems"] == []

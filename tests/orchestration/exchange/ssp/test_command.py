@@ -11,6 +11,7 @@ from fmpy.ssp.ssd import read_ssd
 from orchestration import Scenario, Timing, UsageError, fmus
 from orchestration.exchange.ssp import writing
 from tests.commands import Main
+from tests.fmus.making import PAIR
 from tests.orchestration.exchange.interop.common import OTHER
 from tests.orchestration.studies.common import error_line, one_line, quadcosim
 
@@ -170,10 +171,10 @@ def test_a_value_of_another_type_is_refused(
 
 def test_two_fmus_of_one_file_name_are_refused(short: Scenario, built: dict[str, Path], tmp_path: Path) -> None:
     copies = []
-    for model, path in built.items():
+    for model in PAIR:
         copies.append(tmp_path / model / "model.fmu")
         copies[-1].parent.mkdir()
-        shutil.copyfile(path, copies[-1])
+        shutil.copyfile(built[model], copies[-1])
     controller, plant = copies
     chosen = short.with_fmus(plant=plant, controller=controller)
     assert refusal(chosen, tmp_path) == f"{controller} and {plant}: expected FMUs of different file names"
