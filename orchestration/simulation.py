@@ -165,7 +165,7 @@ def prepared(
             for name, component in system.components.items():
                 _set_parameters(instances[name], component)
                 _set_clock(instances[name], component, models[name])
-            sources = {name: _source(system, name, parameters, streams) for name in system.sources}
+            sources = {name: source_values(system, name, parameters, streams) for name in system.sources}
             signals = {name: system.sources[name].signals(name) for name in sources}
             watched = (sources, signals, parameters)
             master = master_of(
@@ -301,7 +301,8 @@ def _signals(system: System, models: Mapping[str, Model]) -> set[str]:
     return found.union(columns_of(system)) - {"time"}
 
 
-def _source(system: System, name: str, parameters: Mapping[str, float], streams: Streams) -> Values:
+def source_values(system: System, name: str, parameters: Mapping[str, float], streams: Streams) -> Values:
+    """A source at work in a run; `parameters` are those of the component of a trajectory, as COMPONENT.NAME."""
     source = system.sources[name]
     if source.constant is not None:
         return Constant([source.constant] * len(source.to))

@@ -22,13 +22,13 @@ def evaluate(nodes: Mapping[str, Node], spans: Spans) -> dict[str, float | None]
     """
     whole: dict[str, Node] = {}
     for name, node in nodes.items():
-        whole[name] = _inlined(node, whole)
-    reductions = {call: _depth(call) for node in whole.values() for call in _reductions(node)}
+        whole[name] = inlined(node, whole)
+    depths = {call: _depth(call) for node in whole.values() for call in reductions(node)}
     known: dict[Node, float | None] = {}
     context: Recorded | None = None
     with np.errstate(all="ignore"):
-        for level in range(1, max(reductions.values(), default=0) + 1):
-            folds = {call: FOLDS[call.function](call) for call, depth in reductions.items() if depth == level}
+        for level in range(1, max(depths.values(), default=0) + 1):
+            folds = {call: FOLDS[call.function](call) for call, depth in depths.items() if depth == level}
             for span in spans():
                 context, values = span, SpanValues(span, known)
                 for call, fold in folds.items():
@@ -59,24 +59,25 @@ def _all(node: Node) -> Iterator[Node]:
         yield from _all(child)
 
 
-def _inlined(node: Node, known: Mapping[str, Node]) -> Node:
+def inlined(node: Node, known: Mapping[str, Node]) -> Node:
     """The expression with those that it names in place of their names."""
     match node:
         case Name(name):
             return known.get(name, node)
         case Operation(sign, operands):
-            return Operation(sign, tuple(_inlined(operand, known) for operand in operands))
+            return Operation(sign, tuple(inlined(operand, known) for operand in operands))
         case Call("growth_share", (argument, floor)):
-            inner = _inlined(argument, known)
-            return Call("growth_share", (inner, Operation("*", (_inlined(floor, known), Call("max", (inner,))))))
+            inner = inlined(argument, known)
+            return Call("growth_share", (inner, Operation("*", (inlined(floor, known), Call("max", (inner,))))))
         case Call(function, arguments):
-            return Call(function, tuple(_inlined(argument, known) for argument in arguments))
+            return Call(function, tuple(inlined(argument, known) for argument in arguments))
         case Sampled(connection, argument):
-            return Sampled(connection, _inlined(argument, known))
+            return Sampled(connection, inlined(argument, known))
     return node
 
 
-def _reductions(node: Node) -> Iterator[Call]:
+def reductions(node: Node) -> Iterator[Call]:
+    """The functions over a run in an expression, also those inside others."""
     return (part for part in _all(node) if isinstance(part, Call) and is_over_run(part))
 
 

@@ -30,22 +30,30 @@ def compute(system: System, spans: Spans, *, end: float, divergence_time: float 
     A run that diverged has no objective: an average over the time that it lasted would grow better the sooner it
     ended. Raises `UsageError` for an objective that cannot be evaluated, naming it.
     """
-    diverged = divergence_time is not None
-    found: dict[str, float | None] = dict.fromkeys((*system.objectives, *system.optional))
+    if divergence_time is not None:
+        return told(system, None, end=end, divergence_time=divergence_time, steps=steps)
+    nodes = {name: parse(text) for name, text in system.objectives.items()}
+    if system.criterion.good is not None:
+        nodes[GOOD] = parse(system.criterion.good)
+    return told(system, evaluate(nodes, spans), end=end, divergence_time=None, steps=steps)
+
+
+def told(
+    system: System, found: Mapping[str, float | None] | None, *, end: float, divergence_time: float | None, steps: int
+) -> Metrics:
+    """The metrics of a run, from what its expressions, `GOOD` with them, have come to; None: it diverged."""
+    objectives: dict[str, float | None] = dict.fromkeys((*system.objectives, *system.optional))
     good = None if system.criterion.good is None else False
-    if not diverged:
-        nodes = {name: parse(text) for name, text in system.objectives.items()}
-        if system.criterion.good is not None:
-            nodes[GOOD] = parse(system.criterion.good)
-        found |= evaluate(nodes, spans)
+    if found is not None:
+        objectives |= found
         if good is not None:
-            good = bool(found.pop(GOOD))
+            good = bool(objectives.pop(GOOD))
     return {
-        "outcome": outcome(system, good=good, diverged=diverged),
+        "outcome": outcome(system, good=good, diverged=found is None),
         "good": good,
-        "horizon": system.stop_time if diverged else end,
-        **found,
-        "diverged": diverged,
+        "horizon": system.stop_time if found is None else end,
+        **objectives,
+        "diverged": found is None,
         "divergence_time": divergence_time,
         "steps": steps,
     }

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #define API __attribute__((visibility("default")))
-enum { INPUTS = 32, Y = 32, Z = 33, PLACE = 34, FAILS_AT = 35, NAN_AT = 36, WARNS_AT = 37, COUNT = 40 };
+enum { INPUTS = 32, Y = 32, Z = 33, PLACE = 34, FAILS_AT = 35, NAN_AT = 36, WARNS_AT = 37, BEGUN = 40, COUNT };
 typedef void (*Log)(void *, const char *, int, const char *, const char *, ...);
 typedef struct { Log log; void *allocate, *release, *finished, *environment; } Callbacks;
 typedef struct { double v[COUNT]; Log log; void *environment; } Model;
@@ -29,9 +29,9 @@ API void *fmi2Instantiate(const char *name, int kind, const char *guid, const ch
 API void fmi2FreeInstance(void *c) { free(c); }
 API int fmi2SetupExperiment(void *c, int defined, double tolerance, double t, int ends, double stop) { return 0; }
 API int fmi2EnterInitializationMode(void *c) { return 0; }
+static void begin(Model *m) { m->v[Y] = 0.25 * m->v[PLACE], m->v[Z] = m->v[Y] + 0.125; }
 API int fmi2ExitInitializationMode(void *c) {
-    Model *m = c;
-    m->v[Y] = 0.25 * m->v[PLACE], m->v[Z] = m->v[Y] + 0.125;
+    begin(c), ((Model *)c)->v[BEGUN] = 1.0;
     return 0;
 }
 API int fmi2Terminate(void *c) { return 0; }
@@ -48,6 +48,7 @@ API int fmi2DoStep(void *c, double t, double h, int no_set) {
     return 3;
 }
 API int fmi2GetReal(void *c, const unsigned vr[], size_t n, double v[]) {
+    if (((Model *)c)->v[BEGUN] == 0.0) begin(c);
     for (size_t i = 0; i < n; i++) v[i] = ((Model *)c)->v[vr[i]];
     return 0;
 }

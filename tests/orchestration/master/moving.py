@@ -21,7 +21,7 @@ _VARIABLE = '<ScalarVariable name="{}" valueReference="{}" causality="{}" variab
 
 
 def moving(folder: Path) -> Path:
-    """The FMU in `folder`."""
+    """The FMU in `folder`, which can be computed in lanes too."""
     library = folder / f"Moving{fmpy.sharedLibraryExtension}"
     source = Path(__file__).with_name("moving.c")
     subprocess.run([str(COMPILER), "-shared", "-fPIC", "-O1", "-w", str(source), "-o", str(library), "-lm"], check=True)
@@ -43,4 +43,5 @@ def moving(folder: Path) -> Path:
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", text)
         archive.write(library, f"binaries/{fmpy.platform}/{library.name}")
+        archive.write(Path(__file__).with_name("moving_lanes.c"), "sources/lanes.c")
     return path

@@ -1,0 +1,102 @@
+"""The C of a system's expressions: expressions.h, which batch.c includes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from orchestration.batch.folds import Folds
+from orchestration.batch.writing import Leaf, Section, Writer
+from orchestration.expressions.recorded import TIME
+from orchestration.expressions.syntax import Call, Name, Node
+
+
+@dataclass(frozen=True, kw_only=True)
+class Written:
+    """Expressions in C, and how their numbers are found in what it leaves behind."""
+
+    text: str
+    folds: Folds
+
+    @property
+    def states(self) -> Sequence[float]:
+        """What each state is at the beginning."""
+        return self.folds.writer.states
+
+
+def written(
+    leaves: Mapping[str, Leaf],
+    lines: Mapping[str, int],
+    reductions: Mapping[Node, str],
+    calls: Sequence[Call],
+    condition: Node | None,
+    *,
+    connections: Sequence[str],
+) -> Written:
+    """The C for reductions and the condition of divergence over `leaves`.
+
+    `lines` are signals on a line, by the connection that they come by; `reductions` what those that are inside others
+    are in C. Raises `UsageError` for what cannot be evaluated.
+    """
+    writer = Writer(leaves, reductions)
+    time = writer.before(Name(TIME))
+    folds = Folds(writer)
+    for call in calls:
+        folds.add(call)
+    after = _Slopes(writer, lines)
+    watched = Section("w")
+    over = "mask_of(0)" if condition is None else writer.truth(condition, "row", watched)
+    rows = folds.rows[None]
+    sampled: list[str] = []
+    for connection, each in folds.rows.items():
+        if connection is None:
+            continue
+        marks = f"now->marks[{connections.index(connection)}]"
+        sampled += [f"if ({marks}) {{", f"const q_mask some = m & mask_of({marks});"]
+        sampled += [*each.section.lines, *each.always, "}"]
+    kept = [f"{state} = q_select(m, {value}, {state});" for state, value in writer.remembered().items()]
+    constants = [f"AT(b->constants, {slot}) = {writer.value(node, 'row', writer.once)};"
+                 for node, slot in writer.constants.items()]  # fmt: skip
+    used = sorted({leaf.code.partition("(")[2].partition(",")[0] for leaf in leaves.values() if "SIGNAL" in leaf.code})
+    known = [f"const double *const memory{i} = b->components[{i}].memory;" for i in used]
+    known.append("const double *const constants_ = b->constants;")
+    unused = [*(f"(void)memory{i};" for i in used), "(void)constants_;", "(void)t;"]
+    here = [*known, "double *const state = b->state;", "const q_real t = now->t;",
+            "q_mask doubtful = m & q_not(m);", *unused]  # fmt: skip
+    done = [*kept, "*(q_mask *)b->doubtful |= doubtful;", "return 1;"]
+    step = [f"const q_real dt = q_select(m, t - {time}, q_all(0.0));"]
+    return Written(
+        text="\n".join([
+            *_function("void constants(Batch *b)", [*writer.once.lines, *constants]),
+            *_function("q_mask holds(const Batch *b, q_real t)", [*known, *unused, *watched.lines, f"return {over};"]),
+            *_row("begin_row", [*here, *rows.section.lines, *rows.first, *rows.always, *sampled, *after.first, *done]),
+            *_row("next_row", [
+                *here, *rows.section.lines, *step, *writer.step.lines, *rows.next, *rows.always, *sampled, *after.next,
+                *done,
+            ]),
+        ]),
+        folds=folds,
+    )  # fmt: skip
+
+
+class _Slopes:
+    """Of signals on a line: what arrived last, when, and how steep it goes on."""
+
+    def __init__(self, writer: Writer, lines: Mapping[str, int]) -> None:
+        self.first: list[str] = []
+        self.next: list[str] = []
+        for name, slope in writer.slopes.items():
+            height, since, connection = writer.state(), writer.state(), lines[name]
+            x = writer.value(Name(name), "row", writer.now)
+            self.first += [f"{height} = q_select(m, {x}, {height});", f"{since} = q_select(m, t, {since});"]
+            self.next += [
+                "{", f"const q_mask some = m & mask_of(now->marks[{connection}]);",
+                f"{slope} = q_select(some, ({x} - {height}) / (t - {since}), {slope});",
+                f"{height} = q_select(some, {x}, {height});", f"{since} = q_select(some, t, {since});", "}",
+            ]  # fmt: skip
+
+
+def _row(name: str, lines: Sequence[str]) -> list[str]:
+    return _function(f"int {name}(Batch *b, const Instant *now, q_mask m)", lines)
+
+
+def _function(head: str, lines: Sequence[str]) -> list[str]:
+    return [f"static {head} {{", *(f"    {line}" for line in lines), "}", ""]

@@ -1,0 +1,471 @@
+"""A batch at work: as many runs of one shape as there are lanes, from their start values to what they come to."""
+
+import ctypes
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from orchestration.batch import structures as c
+from orchestration.batch.shape import Ends, Shape, changes_of, ends_of
+from orchestration.batch.windows import Windows
+from orchestration.errors import QuadcosimError
+from orchestration.expressions.recorded import STOP_TIME
+from orchestration.expressions.syntax import Call
+from orchestration.fmi.values import number_of, taken
+from orchestration.master.master import CONVERGED, SWEEPS
+from orchestration.master.schedule import Schedule
+from orchestration.master.sources import Values
+from orchestration.master.streams import NOISE, Streams
+from orchestration.simulation import SAMPLE_OFFSET, SAMPLE_PERIOD, source_values
+from orchestration.simulator import Floats
+from orchestration.system.model import System, component_of, variable_of
+from orchestration.system.times import NANOSECONDS, nanoseconds
+
+Integers = npt.NDArray[np.int64]
+Lanes = npt.NDArray[np.bool_]
+ALL_ENDED, NEXT_WINDOW, NO_MEMORY = range(3)
+FLYING, STATUS, NOT_FINITE, DIVERGED, REFUSED = range(5)
+"""What has become of a run"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Landed:
+    """What has become of the runs of a batch, lane by lane."""
+
+    fate: Integers
+    time: Integers
+    """[ns] of divergence"""
+    component: Integers
+    steps: Integers
+    doubtful: Lanes
+    """in which a value was not a number: what Python makes of that is not known here"""
+    reductions: Mapping[Call, Floats]
+    """NaN for what has no value"""
+    signals: Sequence[Floats]
+    """rows of what was to be recorded, with the time [s] first, of each run"""
+
+
+@dataclass(kw_only=True)
+class _Run:
+    """What one lane has of its own while it flies."""
+
+    system: System
+    streams: Streams
+    seen: list[Values]
+    given: list[Values]
+    noise: dict[int, np.random.Generator] = field(default_factory=dict)
+    arrays: list[Any] = field(default_factory=list)
+    """that C has the addresses of"""
+
+
+@dataclass(kw_only=True)
+class _Track:
+    """Runs that share a schedule."""
+
+    lanes: list[int]
+    windows: Iterator[Schedule]
+    ahead: Schedule | None
+    window: Schedule | None = None
+    now: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    alike: bool = False
+    """whether sources are the same for all of them"""
+
+
+class Batch:
+    """Memory for the runs of a shape, used for one group of them after the other."""
+
+    def __init__(self, shape: Shape, windows: Windows) -> None:
+        self._shape, self._windows, self._lanes = shape, windows, shape.lanes
+        self._library = shape.library
+        self._written = shape.written
+        self._kept_arrays: list[Any] = []
+        kernels = list(shape.kernels.values())
+        self._memories = [self._array(kernel.lanes.places) for kernel in kernels]
+        self._ends: list[Ends] = [ends_of(shape, x) for x in shape.system.connections]
+        self._channel_type = c.channel_of(self._lanes)
+        self._track_type = c.track_of(self._lanes)
+        connections = shape.system.connections
+        self._of_channels = [self._arrays_of(len(x.start)) for x in connections]
+        self._channels = (self._channel_type * max(1, len(connections)))(*map(self._channel, range(len(connections))))
+        self._ratios = [self._array(1) for _ in kernels]
+        self._components = (c.Component * len(kernels))(*map(self._component, range(len(kernels))))
+        self._tracks = (self._track_type * self._lanes)()
+        seen, fed = sum(map(len, shape.seen.values())), sum(len(s.to) for s in shape.system.sources.values())
+        self._given_count = fed if shape.fed_changes else 0
+        self._state = self._array(len(self._written.states))
+        self._numbers = self._array(len(shape.numbers) + 1 + len(shape.inner))
+        self._doubtful: npt.NDArray[np.uint64] = self._array(1).view(np.uint64)
+        self._status = np.zeros(self._lanes, dtype=np.int32)
+        self._kept = (c.Kept * max(1, len(self._written.folds.kept)))()
+        self._batch: Any = c.batch_of(self._lanes, self._channel_type, self._track_type)(
+            components=self._components, component_count=len(kernels), channels=self._channels,
+            channel_count=len(connections),
+            bodies=self._indices([shape.names.index(name) for name in shape.plan.continuous]),
+            tasks=self._indices([shape.names.index(name) for name in shape.plan.sampled]),
+            tracks=self._tracks, seen_count=seen, given_count=self._given_count,
+            seen=c.address(self._array(seen)), given=c.address(self._array(self._given_count)),
+            state=c.address(self._state), constants=c.address(self._array(len(self._written.folds.writer.constants))),
+            numbers=c.address(self._numbers), doubtful=c.address(self._doubtful), kept=self._kept,
+            status=c.address(self._status),
+        )  # fmt: skip
+
+    def __del__(self) -> None:
+        if hasattr(self, "_batch"):
+            self._library.land(ctypes.addressof(self._batch))
+
+    # -- a group of runs -------------------------------------------------------------------------------------------
+
+    def fly(self, systems: Sequence[System], timings: Sequence[Hashable], record: Sequence[str] = ()) -> Landed:
+        """Fly at most as many runs as there are lanes; `record` are columns that are kept of each row."""
+        found: dict[Call, Floats] = {}
+        for _ in range(self._shape.passes):
+            landed = self._once(systems, timings, found, record)
+            found = dict(landed.reductions)
+        return landed
+
+    def _once(
+        self,
+        systems: Sequence[System],
+        timings: Sequence[Hashable],
+        known: Mapping[Call, Floats],
+        record: Sequence[str],
+    ) -> Landed:
+        batch, count = self._batch, len(systems)
+        runs = [self._run(system) for system in systems]
+        self._library.clear(ctypes.addressof(batch))
+        self._state[:] = np.array(self._written.states)[:, None]
+        self._doubtful[:] = 0
+        for name in ("fate", "fate_component", "fate_time", "steps", "record_counts"):
+            getattr(batch, name)[:] = [0] * self._lanes
+        batch.alive = batch.full = (1 << count) - 1
+        self._put_values(systems, known)
+        wrong = self._initialise(runs)
+        for lane in np.flatnonzero(wrong[:count]).tolist():
+            batch.fate[lane] = REFUSED
+            batch.alive &= ~(1 << lane)
+        tracks = self._tracks_of(runs, timings)
+        recorded = self._record(record, tracks)
+        self._pass(runs, tracks)
+        return self._landed(systems, recorded)
+
+    def _pass(self, runs: Sequence[_Run], tracks: Sequence[_Track]) -> None:
+        batch = self._batch
+        batch.track_count = len(tracks)
+        for i in range(len(tracks)):
+            self._next_window(i, tracks[i], runs)
+        while (code := self._library.fly(ctypes.addressof(batch))) == NEXT_WINDOW:
+            self._next_window(batch.track, tracks[batch.track], runs)
+        if code == NO_MEMORY:
+            raise QuadcosimError("a batch of runs: expected memory for the messages that are on their way")
+
+    def _landed(self, systems: Sequence[System], recorded: Sequence[Floats]) -> Landed:
+        batch, count = self._batch, len(systems)
+        end = np.array([nanoseconds(system.stop_time) / NANOSECONDS for system in systems])
+        states = self._state[:, :count]
+        values = {call: self._written.folds.values[own](states, end) for call, own in self._shape.calls.items()}
+        for call, own in self._shape.calls.items():
+            if call.function == "growth_share":
+                values[call] = self._growth(call, own, values)
+        arrays = [np.array(getattr(batch, name)[:count]) for name in ("fate", "fate_time", "fate_component", "steps")]
+        fate, time, component, steps = arrays
+        return Landed(
+            fate=fate, time=time, component=component, steps=steps, doubtful=self._doubtful[0, :count] != 0,
+            reductions={call: np.where(np.isfinite(found), found, np.nan) for call, found in values.items()},
+            signals=[rows[: batch.record_counts[lane]] for lane, rows in enumerate(recorded)],
+        )  # fmt: skip
+
+    def _growth(self, call: Call, own: Call, values: Mapping[Call, Floats]) -> Floats:
+        from orchestration.batch.combining import combined
+
+        folds, batch = self._written.folds, self._batch
+        count = len(next(iter(values.values())))
+        numbers = dict(zip((*self._shape.numbers, STOP_TIME), self._numbers[:, :count]))
+        floor, none = combined(call.arguments[1], values, numbers, count)
+        floors, found = self._array(1), self._array(1)
+        floors[0, :count] = np.where(none, np.nan, floor)
+        self._library.grown(ctypes.addressof(batch), folds.kept[own], c.address(floors), c.address(found))
+        steps = self._state[folds.steps[own], :count]
+        share: Floats = np.where((steps > 0) & ~none, found[0, :count] / np.where(steps > 0, steps, np.nan), np.nan)
+        return share
+
+    # -- values at the start ---------------------------------------------------------------------------------------
+
+    def _run(self, system: System) -> _Run:
+        shape = self._shape
+        streams = Streams(system.seed, system.streams)
+        parameters = self.parameters(system)
+        at_work = {name: source_values(system, name, parameters, streams) for name in system.sources}
+        noisy = {
+            i: streams.of(f"connections.{x.name}", NOISE)
+            for i, x in enumerate(system.connections)
+            if any(x.noise.values())
+        }
+        given = [at_work[name] for name, source in system.sources.items() if source.to]
+        return _Run(
+            system=system, streams=streams, seen=[at_work[name] for name in shape.seen], given=given, noise=noisy
+        )
+
+    def numbers(self, systems: Sequence[System]) -> dict[str, Floats]:
+        """What has one value in a run, of each of some runs."""
+        found = {name: np.array([self._number(system, name) for system in systems]) for name in self._shape.numbers}
+        return {**found, STOP_TIME: np.array([nanoseconds(system.stop_time) / NANOSECONDS for system in systems])}
+
+    def parameters(self, system: System) -> dict[str, float]:
+        """Those that its look-out or its sources may name."""
+        owners = [source.trajectory for source in system.sources.values() if source.trajectory is not None]
+        names = [*self._shape.numbers, *(each for owner in owners for each in self._trajectory_parameters(owner))]
+        return {name: self._number(system, name) for name in names}
+
+    def value(self, column: str, lane: int) -> float:
+        """The value of a column in a run, where it has ended."""
+        index, place = self._shape.place(column)
+        return float(self._memories[index][place, lane])
+
+    def _trajectory_parameters(self, component: str) -> list[str]:
+        variables = self._shape.models[component].variables
+        return [f"{component}.{name}" for name in variables if name.startswith("trajectory.")]
+
+    def _number(self, system: System, name: str) -> float:
+        variable = self._shape.variable(name)
+        given = system.components[component_of(name)].parameters.get(variable_of(name), variable.start)
+        return number_of(variable, given)
+
+    def _put_values(self, systems: Sequence[System], known: Mapping[Call, Floats]) -> None:
+        """Start values, parameters, and all that differs from lane to lane."""
+        shape = self._shape
+        for index, (name, kernel) in enumerate(shape.kernels.items()):
+            memory, variables = self._memories[index], shape.models[name].variables
+            kernel.lanes.begin(c.address(memory))
+            for lane, system in enumerate(systems):
+                component = system.components[name]
+                for parameter, value in component.parameters.items():
+                    variable = variables[parameter]
+                    memory[variable.reference, lane] = number_of(variable, taken(variable, value, parameter))
+                sampling = component.sampling
+                if sampling is not None:
+                    self._ratios[index][0, lane] = sampling.clock_ratio
+                    if SAMPLE_PERIOD in variables:
+                        own = sampling.clock == "fmu"
+                        memory[variables[SAMPLE_PERIOD].reference, lane] = sampling.period if own else 0.0
+                        memory[variables[SAMPLE_OFFSET].reference, lane] = sampling.offset if own else 0.0
+        for i, arrays in enumerate(self._of_channels):
+            for lane, system in enumerate(systems):
+                x = system.connections[i]
+                arrays["sigma"][:, lane], arrays["quantum"][:, lane] = changes_of(x)
+                arrays["scale"][0, lane], arrays["offset"][0, lane] = x.scale, x.offset
+        for lane, system in enumerate(systems):
+            for i, name in enumerate(shape.numbers):
+                self._numbers[i, lane] = self._number(system, name)
+            self._numbers[len(shape.numbers), lane] = nanoseconds(system.stop_time) / NANOSECONDS
+            for i, call in enumerate(shape.inner):
+                self._numbers[len(shape.numbers) + 1 + i, lane] = known[call][lane] if known else 0.0
+
+    def _initialise(self, runs: Sequence[_Run]) -> Lanes:
+        """The first exchange, as `Master` does it; lanes in which it fails."""
+        shape, wrong = self._shape, np.zeros(self._lanes, dtype=np.bool_)
+        for lane, run in enumerate(runs):
+            values = [value for source in run.given for value in source.each(np.zeros(1))[0].tolist()]
+            for index, name in enumerate(shape.names):
+                for number, place in shape.fed[name]:
+                    self._memories[index][place, lane] = values[number]
+        received = [np.zeros((len(ends.end), self._lanes)) for ends in self._ends]
+        for group in shape.first_exchange:
+            wrong |= self._exchange(group, received)
+        for index, name in enumerate(shape.names):
+            wrong |= self._compute(index)
+            connected = [shape.place(f"{name}.{output}")[1] for output in shape.board.outputs[name]]
+            connected = connected[: shape.board.connected[name]]
+            wrong |= ~np.isfinite(self._memories[index][connected]).all(axis=0)
+        for i, first in enumerate(received):
+            if self._channels[i].extrapolates:
+                self._of_channels[i]["applied"][: len(first)] = first
+                self._channels[i].applied_count[:] = [1] * self._lanes
+                self._channels[i].applied_time[:] = [0] * (2 * self._lanes)
+        return wrong
+
+    def _exchange(self, group: Sequence[int], received: Sequence[Floats]) -> Lanes:
+        connections = [self._shape.system.connections[i] for i in group]
+        open_, wrong = np.ones(self._lanes, dtype=np.bool_), np.zeros(self._lanes, dtype=np.bool_)
+        for _ in range(SWEEPS):
+            settled = np.ones(self._lanes, dtype=np.bool_)
+            for i, x in zip(group, connections):
+                sender, receiver = (self._shape.names.index(name) for name in (x.sender, x.receiver))
+                wrong |= self._compute(sender)
+                before = received[i].copy()
+                after = self._passed(i, self._memories[sender])
+                received[i][:, open_] = after[:, open_]
+                self._memories[receiver][self._ends[i].end[:, None], np.flatnonzero(open_)] = self._taken(i, after)[
+                    :, open_
+                ]
+                change = np.abs(received[i] - before) <= CONVERGED * np.maximum(1.0, np.abs(received[i]))
+                settled &= change.all(axis=0)
+            if len(group) == 1:
+                return wrong
+            open_ &= ~settled
+            if not open_.any():
+                return wrong
+        return wrong | open_
+
+    def _passed(self, i: int, sender: Floats) -> Floats:
+        values, arrays = sender[self._ends[i].start], self._of_channels[i]
+        if self._channels[i].converts:
+            values = values * arrays["scale"] + arrays["offset"]
+        return values
+
+    def _taken(self, i: int, values: Floats) -> Floats:
+        kinds = self._ends[i].kinds[:, None]
+        taken_: Floats = np.where(kinds == 1, values != 0.0, np.where(kinds == 2, np.rint(values), values))
+        return taken_
+
+    def _compute(self, index: int) -> Lanes:
+        """The outputs of a component in initialisation mode; lanes in which that fails."""
+        active, start = np.full(self._lanes, 2**64 - 1, dtype=np.uint64), np.zeros(self._lanes)
+        status = np.zeros(self._lanes, dtype=np.int32)
+        kernel = self._shape.kernels[self._shape.names[index]]
+        kernel.lanes.initialise(
+            c.address(self._memories[index]), c.address(active), c.address(start), c.address(status)
+        )  # fmt: skip
+        failed: Lanes = status != 0
+        return failed
+
+    # -- schedules -------------------------------------------------------------------------------------------------
+
+    def _tracks_of(self, runs: Sequence[_Run], timings: Sequence[Hashable]) -> list[_Track]:
+        found: dict[Hashable, list[int]] = {}
+        for lane, timing in enumerate(timings):
+            found.setdefault(timing, []).append(lane)
+        tracks = []
+        for timing, lanes in found.items():
+            windows = self._windows.of((timing, id(self._shape)), runs[lanes[0]].system)
+            keys = {self._sources_of(runs[lane].system) for lane in lanes}
+            tracks.append(_Track(lanes=lanes, windows=windows, ahead=next(windows, None), alike=len(keys) == 1))
+        return tracks
+
+    def _sources_of(self, system: System) -> Hashable:
+        """What the values of the sources follow from, where it is not the structure."""
+        found: list[Any] = []
+        for name, source in system.sources.items():
+            if name in self._shape.seen or source.to:
+                found += [source, system.seed if source.noise is not None else None]
+            if source.trajectory is not None:
+                found.append(
+                    tuple(self._number(system, each) for each in self._trajectory_parameters(source.trajectory))
+                )
+        return tuple(map(repr, found))
+
+    def _next_window(self, number: int, track: _Track, runs: Sequence[_Run]) -> None:
+        """Give the next window of a track to C."""
+        into = self._tracks[number]
+        if track.window is None:
+            track.now = np.zeros(len(self._shape.names), dtype=np.int64)
+            into.now, into.lanes = c.address(track.now), sum(1 << lane for lane in track.lanes)
+            into.stop = nanoseconds(runs[track.lanes[0]].system.stop_time)
+        window = track.window = track.ahead
+        into.at, into.last_window = 0, 0
+        if window is None:
+            into.count, into.last_window = 0, 1
+            return
+        track.ahead = next(track.windows, None)
+        into.count, into.last_window = len(window), track.ahead is None
+        for name in c.SCHEDULE:
+            setattr(into.schedule, name, c.address(getattr(window, name)))
+        t = window.times[:-1] / NANOSECONDS
+        into.one_for_all = track.alike
+        for lane in track.lanes[:1] if track.alike else track.lanes:
+            run = runs[lane]
+            run.arrays = [
+                np.ascontiguousarray(np.column_stack([values.over(t) for values in run.seen] or [t[:, None]])),
+                np.ascontiguousarray(np.column_stack([values.each(t) for values in run.given] or [t[:, None]])),
+            ]
+            into.seen[lane], into.given[lane] = map(c.address, run.arrays)
+        for lane in track.lanes:
+            self._draw_noise(lane, runs[lane], window)
+
+    def _draw_noise(self, lane: int, run: _Run, window: Schedule) -> None:
+        for i, stream in run.noise.items():
+            count, _ = window.of(i, self._table(i))
+            noise = stream.standard_normal((count, len(self._ends[i].start)))
+            run.arrays.append(noise)
+            self._channels[i].noise[lane] = c.address(noise)
+
+    def _table(self, index: int) -> str:
+        """Where a schedule has the messages of a connection, each when it takes its values."""
+        if index in self._shape.plan.posted:
+            return "posted"
+        return "measured" if index in self._shape.plan.read_ahead else "exchanged"
+
+    def _record(self, columns: Sequence[str], tracks: Sequence[_Track]) -> list[Floats]:
+        """Room for the rows of some columns."""
+        batch = self._batch
+        batch.recorded_count = len(columns)
+        if not columns:
+            return []
+        places = [self._shape.place(column) for column in columns]
+        self._recorded = np.array(
+            [c.address(self._memories[i]) + 8 * self._lanes * place for i, place in places], dtype=np.int64
+        )
+        batch.recorded, batch.record_limit = c.address(self._recorded), 2**20
+        rows = [np.empty((2**20, len(columns) + 1)) for _ in range(sum(len(track.lanes) for track in tracks))]
+        for lane, table in enumerate(rows):
+            batch.records[lane] = c.address(table)
+        return rows
+
+    # -- how it is made --------------------------------------------------------------------------------------------
+
+    def _array(self, count: int) -> Floats:
+        """A number for each of so many, in each lane, where vector registers like it."""
+        whole = np.zeros(max(count, 1) * self._lanes + 8)
+        first = (-whole.ctypes.data // 8) % 8
+        self._kept_arrays.append(whole)
+        return whole[first : first + max(count, 1) * self._lanes].reshape(-1, self._lanes)[: max(count, 1)]
+
+    def _indices(self, indices: Sequence[int]) -> c.List:
+        array = np.array(indices, dtype=np.int64)
+        self._kept_arrays.append(array)
+        return c.List(items=c.address(array), count=len(array))
+
+    def _arrays_of(self, size: int) -> dict[str, Floats]:
+        found = {name: self._array(size) for name in ("sigma", "quantum", "value")}
+        return {**found, "scale": self._array(1), "offset": self._array(1), "applied": self._array(2 * size)}
+
+    def _channel(self, i: int) -> Any:
+        x, ends, arrays = self._shape.system.connections[i], self._ends[i], self._of_channels[i]
+        sigma, quantum = changes_of(x)
+        names, converts = self._shape.names, x.scale != 1.0 or x.offset != 0.0
+        return self._channel_type(
+            sender=c.address(self._memories[names.index(x.sender)]),
+            receiver=c.address(self._memories[names.index(x.receiver)]),
+            from_=c.address(ends.start), to=c.address(ends.end), size=len(ends.start), kinds=c.address(ends.kinds),
+            low=c.address(ends.low), high=c.address(ends.high), noisy=bool(sigma.any()), rounds=bool(quantum.any()),
+            converts=converts, extrapolates=x.hold == "first", read_ahead=i in self._shape.plan.read_ahead,
+            plain=not converts and x.hold == "zero",
+            **{name: c.address(arrays[name]) for name in ("sigma", "quantum", "scale", "offset", "value", "applied")},
+        )  # fmt: skip
+
+    def _component(self, index: int) -> c.Component:
+        shape, name = self._shape, self._shape.names[index]
+        connections, plan = shape.system.connections, shape.plan
+        outputs = [shape.place(f"{name}.{output}")[1] for output in shape.board.outputs[name]]
+        outputs = outputs[: shape.board.connected[name]]
+        places = np.array(outputs, dtype=np.int64)
+        changing = shape.fed[name] if shape.fed_changes else []
+        fed = (c.Fed * max(1, len(changing)))(*(c.Fed(source=s, place=p) for s, p in changing))
+        wires = [i for i in plan.wires if connections[i].receiver == name]
+        order = list(plan.continuous)
+        ahead = [
+            i for i in wires
+            if connections[i].order == "gauss-seidel" and order.index(connections[i].sender) < order.index(name)
+        ]  # fmt: skip
+        held = [i for i, x in enumerate(connections) if x.receiver == name and x.hold == "first"]
+        behind = [i for i in wires if i not in ahead]
+        sampling = shape.system.components[name].sampling
+        self._kept_arrays += [places, fed]
+        return c.Component(
+            step=shape.kernels[name].step, memory=c.address(self._memories[index]), outputs=c.address(places),
+            connected=len(places), fed=ctypes.addressof(fed), fed_count=len(changing), held=self._indices(held),
+            ahead=self._indices(ahead), behind=self._indices(behind), ratio=c.address(self._ratios[index]),
+            by_itself=sampling is not None and sampling.clock == "fmu", settles=bool(held or behind or changing),
+        )  # fmt: skip

@@ -1,0 +1,141 @@
+"""Flies many systems as lanes of runs, and says of each what it came to, or that it is to be flown alone."""
+
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from orchestration import fmus
+from orchestration.batch.combining import combined
+from orchestration.batch.flight import DIVERGED, FLYING, Batch, Landed
+from orchestration.batch.kernels import lanes_here
+from orchestration.batch.shape import Shape, outline
+from orchestration.batch.windows import Windows, timing
+from orchestration.fmi.model import read_model
+from orchestration.master.streams import Streams
+from orchestration.master.watch import watch
+from orchestration.results.objectives import Metrics, told
+from orchestration.simulation import checked, run, source_values
+from orchestration.system.model import System
+from orchestration.system.times import NANOSECONDS, nanoseconds
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flown:
+    """What a run came to."""
+
+    metrics: Metrics
+    message: str | None
+    """what diverged"""
+
+
+def native_twins(system: System) -> System:
+    """`system` with the native FMUs of the slaves that its FMUs are made of."""
+    twins = {name: fmus.native_twin(component.fmu) for name, component in system.components.items()}
+    components = {name: replace(each, fmu=twins[name]) for name, each in system.components.items()}
+    return system if twins == system.fmus else replace(system, components=components)
+
+
+def fly(systems: Sequence[System]) -> Iterator[Metrics]:
+    """The metrics of systems in their order, by native FMUs, built if need be; divergence is a result.
+
+    Raises `UsageError` for a system that cannot be flown in lanes, naming the component and what it lacks, and what
+    `run` raises for one that cannot be flown at all.
+    """
+    twins = [native_twins(system) for system in systems]
+    paths: dict[str, str] = {}
+    for system in twins:
+        if not paths.keys() >= {*system.fmus.values()}:
+            paths |= {system.fmus[name]: str(path) for name, path in fmus.of_components(system.fmus).items()}
+    located = [_with_fmus(system, paths) for system in twins]
+    for system, flown in zip(located, Batches().fly(located)):
+        yield run(system).metrics if flown is None else flown.metrics
+
+
+def _with_fmus(system: System, paths: Mapping[str, str]) -> System:
+    components = {name: replace(each, fmu=paths[each.fmu]) for name, each in system.components.items()}
+    return replace(system, components=components)
+
+
+class Batches:
+    """The batches of this process, by the shape of what they fly; their FMUs are files."""
+
+    def __init__(self) -> None:
+        self._windows = Windows()
+        self._lanes = lanes_here()
+        self._batches: dict[Hashable, tuple[Shape, Batch]] = {}
+
+    def fly(self, systems: Sequence[System]) -> list[Flown | None]:
+        """What runs came to; None for one that is to be flown alone, by what flies anything.
+
+        Raises `UsageError` for what cannot be flown in lanes.
+        """
+        found: list[Flown | None] = [None] * len(systems)
+        shapes: dict[Hashable, list[int]] = {}
+        for index, system in enumerate(systems):
+            shapes.setdefault(outline(system), []).append(index)
+        for key, indices in shapes.items():
+            shape, batch = self._batch(key, systems[indices[0]])
+            timings = {index: timing(systems[index]) for index in indices}
+            for group in _groups(indices, timings, self._lanes):
+                landed = batch.fly([systems[i] for i in group], [timings[i] for i in group])
+                for index, flown in zip(group, _told(shape, batch, landed, [systems[i] for i in group])):
+                    found[index] = flown
+        return found
+
+    def _batch(self, key: Hashable, system: System) -> tuple[Shape, Batch]:
+        if key not in self._batches:
+            models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
+            shape = Shape(system=checked(system, models).system, models=models, lanes=self._lanes)
+            self._batches[key] = shape, Batch(shape, self._windows)
+        return self._batches[key]
+
+
+def _groups(indices: Sequence[int], timings: Mapping[int, Hashable], lanes: int) -> Iterator[list[int]]:
+    """Runs that fly together: of one timing as far as that goes."""
+    alike: dict[Hashable, list[int]] = {}
+    for index in indices:
+        alike.setdefault(timings[index], []).append(index)
+    rest: list[int] = []
+    for same in alike.values():
+        whole = len(same) - len(same) % lanes
+        for first in range(0, whole, lanes):
+            yield same[first : first + lanes]
+        rest += same[whole:]
+    for first in range(0, len(rest), lanes):
+        yield rest[first : first + lanes]
+
+
+def _told(shape: Shape, batch: Batch, landed: Landed, systems: Sequence[System]) -> Iterator[Flown | None]:
+    count = len(systems)
+    numbers = batch.numbers(systems)
+    values = {name: combined(node, landed.reductions, numbers, count) for name, node in shape.nodes.items()}
+    found = {name: (np.isfinite(value) & ~none, value.tolist()) for name, (value, none) in values.items()}
+    for lane, system in enumerate(systems):
+        known = replace(system, objectives=shape.system.objectives) if system.optional else system
+        steps = int(landed.steps[lane])
+        if landed.fate[lane] == FLYING and not landed.doubtful[lane]:
+            end = nanoseconds(system.stop_time) / NANOSECONDS
+            metrics = {name: value[lane] if there[lane] else None for name, (there, value) in found.items()}
+            yield Flown(metrics=told(known, metrics, end=end, divergence_time=None, steps=steps), message=None)
+        elif landed.fate[lane] == DIVERGED:
+            time = int(landed.time[lane]) / NANOSECONDS
+            message = _complaint(shape, batch, system, lane, time)
+            metrics = told(known, None, end=time, divergence_time=time, steps=steps)
+            yield None if message is None else Flown(metrics=metrics, message=message)
+        else:
+            yield None
+
+
+def _complaint(shape: Shape, batch: Batch, system: System, lane: int, t: float) -> str | None:
+    """How the values of a lane have diverged, as the look-out of a single run says it; None: it says they have not."""
+    streams, parameters = Streams(system.seed, system.streams), batch.parameters(system)
+    sources = {name: source_values(system, name, parameters, streams) for name in system.sources}
+    signals = {name: system.sources[name].signals(name) for name in sources}
+    look = watch(system.criterion.diverged, shape.board, sources, signals, parameters)
+    shape.board.row[0] = t
+    for column, place in shape.board.place.items():
+        if column != "time":
+            shape.board.row[place] = batch.value(column, lane)
+    return look(t)

@@ -1,0 +1,84 @@
+"""What a batch calls: components in lanes, out of the sources of FMUs, and batch.c with a system's expressions."""
+
+import ctypes
+import functools
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fmu_kit import native
+from fmu_kit.bundle import PackagingError
+from fmu_kit.native.compiler import FOR_THIS_PROCESSOR, OPTIONS, compiled_here
+from fmu_kit.native.lanes import MAIN, Lanes, compiled_lanes
+from fmu_kit.native.lanes import lanes_here as lanes_of_fmus
+from orchestration.errors import QuadcosimError, UsageError
+from orchestration.fmi.model import Model
+from orchestration.libraries import kept
+
+FILES = (Path(__file__).with_name("batch.c"),)
+"""What it is made of, beside what is written for a system and headers of native FMUs"""
+_HEADERS = ("lanes.h", "mathematics.h")
+_SOURCES = "sources/"
+
+
+def lanes_here() -> int:
+    """How many runs this machine flies at once in one thread; raises `QuadcosimError` without a compiler."""
+    try:
+        return lanes_of_fmus()
+    except PackagingError as error:
+        raise QuadcosimError(str(error)) from error
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """A component in lanes: functions that take addresses."""
+
+    lanes: Lanes
+    path: Path
+
+    @property
+    def step(self) -> int:
+        """The address of the function that advances it."""
+        return ctypes.cast(ctypes.CDLL(str(self.path)).quadcosim_do_step, ctypes.c_void_p).value or 0
+
+
+def component(name: str, model: Model, lanes: int) -> Kernel:
+    """The FMU of a component in lanes; raises `UsageError` naming it for one that has none."""
+    sources = _sources_of(model.path, model.path.stat().st_mtime_ns)
+    if MAIN not in sources or model.version != 2:
+        raise UsageError(
+            f"components.{name}: {model.path.name}: expected a native FMU of this project's kit, as quadcosim build "
+            "--native makes them, for --engine batch"
+        )
+    return _compiled(tuple(sorted(sources.items())), lanes)
+
+
+@functools.lru_cache(maxsize=64)
+def _sources_of(path: Path, changed: int) -> Mapping[str, bytes]:
+    with zipfile.ZipFile(path) as archive:
+        names = [name for name in archive.namelist() if name.startswith(_SOURCES) and not name.endswith("/")]
+        return {name.removeprefix(_SOURCES): archive.read(name) for name in names}
+
+
+@functools.lru_cache(maxsize=64)
+def _compiled(sources: tuple[tuple[str, bytes], ...], lanes: int) -> Kernel:
+    how = (OPTIONS, FOR_THIS_PROCESSOR, lanes)
+    path = kept("lanes", dict(sources), how, lambda: compiled_lanes(dict(sources), lanes))
+    return Kernel(Lanes(path), path)
+
+
+@functools.lru_cache(maxsize=256)
+def batch(sizes: str, expressions: str, lanes: int) -> Any:
+    """The functions of batch.c with the expressions of a system."""
+    headers = [Path(native.__file__).with_name(name) for name in _HEADERS]
+    sources = {path.name: path.read_bytes() for path in (*FILES, *headers)}
+    sources |= {"sizes.h": sizes.encode(), "expressions.h": expressions.encode()}
+    options = (*FOR_THIS_PROCESSOR, f"-DQUADCOSIM_LANES={lanes}", "-Wno-psabi")
+    compile_ = lambda: compiled_here(sources, "batch.c", options=options)  # noqa: E731
+    library = ctypes.CDLL(str(kept("batch", sources, (OPTIONS, options), compile_)))
+    for name in ("fly", "clear", "land"):
+        getattr(library, name).argtypes = (ctypes.c_void_p,)
+    library.grown.argtypes = (ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
+    return library

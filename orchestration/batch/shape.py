@@ -1,0 +1,280 @@
+"""What runs have in common that are flown in lanes of one batch: their components, connections and expressions."""
+
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from orchestration.batch.code import Written, written
+from orchestration.batch.kernels import Kernel, batch, component
+from orchestration.batch.writing import Kind, Leaf, scalars
+from orchestration.expressions.over_run import inlined, reductions
+from orchestration.expressions.recorded import STOP_TIME, TIME, vectors
+from orchestration.expressions.syntax import Call, Node, names, parse
+from orchestration.fmi.model import Model, Variable
+from orchestration.master import initial
+from orchestration.master.board import Board
+from orchestration.master.channel import of_each
+from orchestration.master.plan import Plan, is_plain
+from orchestration.results.objectives import GOOD
+from orchestration.system.check import recorded
+from orchestration.system.model import Connection, Source, System, component_of, variable_of
+
+Places = npt.NDArray[np.int64]
+_WHOLE = ("Integer", "Enumeration")
+
+
+def outline(system: System) -> Hashable:
+    """What two systems must have in common to be flown in lanes of one batch."""
+    return (
+        tuple((name, c.fmu, c.record, c.sampling and c.sampling.clock) for name, c in system.components.items()),
+        tuple(map(_outline_of, system.connections)),
+        tuple((name, source.to, _kind(source), source.trajectory) for name, source in system.sources.items()),
+        tuple(system.objectives.items()), system.optional, system.criterion,
+    )  # fmt: skip
+
+
+def _outline_of(x: Connection) -> Hashable:
+    late = bool(x.delay or x.delay_jitter)
+    return (
+        x.name, x.start, x.end, x.order, x.hold, is_plain(x), late, any(x.noise.values()), any(x.quantisation.values()),
+        x.scale == 1.0 and x.offset == 0.0,
+    )  # fmt: skip
+
+
+def _kind(source: Source) -> str:
+    return next(kind for kind in ("constant", "file", "noise", "trajectory") if getattr(source, kind) is not None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shape:
+    """A structure of systems, made from one of them that fits its FMUs."""
+
+    system: System
+    models: Mapping[str, Model]
+    lanes: int
+
+    # -- components and connections --------------------------------------------------------------------------------
+
+    @cached_property
+    def kernels(self) -> Mapping[str, Kernel]:
+        """Of each component; raises `UsageError` naming one that has none."""
+        return {name: component(name, model, self.lanes) for name, model in self.models.items()}
+
+    @cached_property
+    def plan(self) -> Plan:
+        """How connections are carried out."""
+        return Plan(self.system)
+
+    @cached_property
+    def board(self) -> Board:
+        """What is read of the components."""
+        return Board(self.system, recorded(self.system, self.models))
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Of the components."""
+        return tuple(self.system.components)
+
+    def variable(self, end: str) -> Variable:
+        """The variable of COMPONENT.VARIABLE."""
+        return self.models[component_of(end)].variables[variable_of(end)]
+
+    def place(self, end: str) -> tuple[int, int]:
+        """The component's index, and the place in its memory, of COMPONENT.VARIABLE."""
+        return self.names.index(component_of(end)), self.variable(end).reference
+
+    @cached_property
+    def first_exchange(self) -> tuple[tuple[int, ...], ...]:
+        """Connections in the order of the first exchange."""
+        return initial.groups(self.system.connections, lambda name, output: self.models[name].depends_on(output))
+
+    @cached_property
+    def fed(self) -> Mapping[str, list[tuple[int, int]]]:
+        """By component, what sources feed: which of all their signals, into which place of its memory."""
+        found: dict[str, list[tuple[int, int]]] = {name: [] for name in self.names}
+        number = 0
+        for source in self.system.sources.values():
+            for end in source.to:
+                found[component_of(end)].append((number, self.place(end)[1]))
+                number += 1
+        return found
+
+    @property
+    def fed_changes(self) -> bool:
+        """Whether what is fed is not the same in the whole run."""
+        return any(source.to and source.constant is None for source in self.system.sources.values())
+
+    # -- expressions -----------------------------------------------------------------------------------------------
+
+    @cached_property
+    def nodes(self) -> Mapping[str, Node]:
+        """Objectives and what is good, by name, with those that they name in place of their names."""
+        found: dict[str, Node] = {}
+        texts = dict(self.system.objectives)
+        if self.system.criterion.good is not None:
+            texts[GOOD] = self.system.criterion.good
+        for name, text in texts.items():
+            found[name] = inlined(parse(text), found)
+        return found
+
+    @cached_property
+    def condition(self) -> Node | None:
+        """By which a run has diverged."""
+        text = self.system.criterion.diverged
+        return None if text is None else parse(text)
+
+    @cached_property
+    def calls(self) -> Mapping[Call, Call]:
+        """Reductions in the objectives, by themselves over signals alone; those inside others first."""
+        found = {}
+        for node in self.nodes.values():
+            for call in sorted(reductions(node), key=_passes):
+                with_signals = scalars(call, self._vectors)[0]
+                assert isinstance(with_signals, Call)
+                found[call] = with_signals
+        return dict(sorted(found.items(), key=lambda pair: _passes(pair[0])))
+
+    @property
+    def passes(self) -> int:
+        """How often a run is to be flown: what is inside another reduction has to be known before."""
+        return max(map(_passes, self.calls), default=1)
+
+    @cached_property
+    def inner(self) -> tuple[Call, ...]:
+        """Reductions that others need to know at every row."""
+        return tuple(dict.fromkeys(part for call in self.calls for node in _at_rows(call) for part in reductions(node)))
+
+    @cached_property
+    def numbers(self) -> tuple[str, ...]:
+        """Parameters that expressions name, as COMPONENT.NAME."""
+        wanted = self._wanted
+        return tuple(name for name in sorted(wanted) if self._is_parameter(name))
+
+    @cached_property
+    def seen(self) -> Mapping[str, tuple[str, ...]]:
+        """The signals of the sources that expressions name, by source."""
+        return {
+            name: source.signals(name)
+            for name, source in self.system.sources.items()
+            if any(
+                signal in self._wanted or signal.rpartition(".")[0] in self._wanted for signal in source.signals(name)
+            )
+        }
+
+    @cached_property
+    def written(self) -> Written:
+        """The expressions in C; raises `UsageError` for what cannot be evaluated."""
+        known = {
+            scalars(call, self._vectors)[0]: f"NUMBER({len(self.numbers) + 1 + i})" for i, call in enumerate(self.inner)
+        }
+        condition = None
+        if self.condition is not None:
+            (condition,) = scalars(self.condition, self._vectors)
+        return written(
+            self._leaves,
+            self._lines,
+            known,
+            list(self.calls.values()),
+            condition,
+            connections=[x.name for x in self.system.connections],
+        )
+
+    @cached_property
+    def library(self) -> Any:
+        """What flies them."""
+        bits = ", ".join(f"1ull << {lane}" for lane in range(self.lanes))
+        sizes = {  # rounded up, so that systems that come to the same are flown by the same
+            "COMPONENTS": -8 * (-len(self.names) // 8), "CHANNELS": -8 * (-len(self.system.connections) // 8) or 8,
+            "HAS_CONDITION": int(self.condition is not None), "KEPT": len(self.written.folds.kept),
+            "LANE_BITS": f"{{{bits}}}",
+        }  # fmt: skip
+        lines = "".join(f"#define {name} {value}\n" for name, value in sizes.items())
+        return batch(lines, self.written.text, self.lanes)
+
+    @cached_property
+    def _wanted(self) -> set[str]:
+        nodes = [*self.nodes.values(), *([] if self.condition is None else [self.condition])]
+        return {name for node in nodes for name in names(node)}
+
+    def _is_parameter(self, name: str) -> bool:
+        model = self.models.get(component_of(name))
+        variable = None if model is None else model.variables.get(variable_of(name))
+        return variable is not None and variable.causality == "parameter"
+
+    @cached_property
+    def _signals(self) -> dict[str, Leaf]:
+        """What is recorded, and the signals of sources."""
+        held = {end: self._kind_of(x) for x in self.system.connections for end in x.end}
+        found = {}
+        for signal in self.board.columns[1:]:
+            index, place = self.place(signal)
+            sampled = self.system.components[component_of(signal)].sampling is not None
+            kind: Kind = "held" if sampled else held.get(signal, "continuous")
+            found[signal] = Leaf(code=f"SIGNAL({index}, {place})", kind=kind)
+        number = 0
+        for name, signals in self.seen.items():
+            source = self.system.sources[name]
+            kind = "held" if source.constant is not None or source.noise is not None else "continuous"
+            for signal in signals:
+                found[signal] = Leaf(code=f"SEEN({number})", kind=kind)
+                number += 1
+        return found
+
+    def _kind_of(self, x: Connection) -> Kind:
+        return "held" if x.hold == "zero" else "line"
+
+    @cached_property
+    def _vectors(self) -> Mapping[str, tuple[str, ...]]:
+        numbers = {*self.numbers, STOP_TIME, TIME}
+        return {name: parts for name, parts in vectors(self._signals).items() if name not in numbers}
+
+    @cached_property
+    def _lines(self) -> Mapping[str, int]:
+        return {end: i for i, x in enumerate(self.system.connections) if x.hold == "first" for end in x.end}
+
+    @property
+    def _leaves(self) -> dict[str, Leaf]:
+        numbers = {name: Leaf(code=f"NUMBER({i})", kind="number") for i, name in enumerate((*self.numbers, STOP_TIME))}
+        return {**self._signals, TIME: Leaf(code="t", kind="continuous"), **numbers}
+
+
+def _at_rows(call: Call) -> tuple[Node, ...]:
+    """What of a reduction has to be known row by row."""
+    return call.arguments[:1] if call.function == "growth_share" else call.arguments
+
+
+def _passes(call: Call) -> int:
+    """In which pass over the run a reduction can be found, counted from 1."""
+    return 1 + max((_passes(inner) for node in _at_rows(call) for inner in reductions(node)), default=0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ends:
+    """The ends of a connection in memories, and what its receiver takes."""
+
+    start: Places
+    end: Places
+    kinds: Places
+    low: npt.NDArray[np.float64]
+    high: npt.NDArray[np.float64]
+
+
+def ends_of(shape: Shape, x: Connection) -> Ends:
+    """The places of what a connection carries."""
+    receivers = [shape.variable(end) for end in x.end]
+    bounds = np.iinfo(np.int32)
+    return Ends(
+        start=np.array([shape.place(start)[1] for start in x.start], dtype=np.int64),
+        end=np.array([variable.reference for variable in receivers], dtype=np.int64),
+        kinds=np.array([1 if v.kind == "Boolean" else 2 if v.kind in _WHOLE else 0 for v in receivers], dtype=np.int64),
+        low=np.full(len(receivers), float(bounds.min)), high=np.full(len(receivers), float(bounds.max)),
+    )  # fmt: skip
+
+
+def changes_of(x: Connection) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Standard deviations of the noise and quanta, of each variable."""
+    return of_each(x, x.noise), of_each(x, x.quantisation)

@@ -1,0 +1,221 @@
+"""Expressions as C over lanes: at a row, just before the next one, and half-way, as in `expressions/over_span.py`."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from orchestration.errors import UsageError
+from orchestration.expressions.syntax import Call, Name, Node, Number, Operation, Sampled, is_over_run
+
+Place: TypeAlias = Literal["row", "end", "middle"]
+Kind: TypeAlias = Literal["number", "continuous", "held", "line"]
+"""What a value does from row to row: it is the same in the whole run, moves, stays, or follows a line"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Leaf:
+    """What a name is in C, and what it does."""
+
+    code: str
+    kind: Kind
+
+
+class Section:
+    """Lines of C, and the names in them of what they have found; those of a section `before` are known too."""
+
+    def __init__(self, prefix: str, before: "Section | None" = None) -> None:
+        self.lines: list[str] = []
+        self._prefix, self._before, self._found = prefix, before, dict[object, str]()
+
+    def named(self, key: object, code: Callable[[], str], kind: str = "q_real") -> str:
+        """The name of a value, which is computed once."""
+        known = self._known(key)
+        if known is None:
+            computed = code()
+            known = self._found[key] = f"{self._prefix}{len(self.lines)}"
+            self.lines.append(f"const {kind} {known} = {computed};")
+        return known
+
+    def _known(self, key: object) -> str | None:
+        before = None if self._before is None else self._before._known(key)
+        return self._found.get(key, before)
+
+
+class Writer:
+    """Writes expressions of one number at an instant, as `scalars` makes them; what they need is kept from row to row.
+
+    Its C calls `row` states STATE(i), and constants of a run CONSTANT(i).
+    """
+
+    def __init__(self, leaves: Mapping[str, Leaf], reductions: Mapping[Node, str]) -> None:
+        self._leaves, self._reductions = leaves, reductions
+        self.once = Section("c")
+        """what is the same in the whole run"""
+        self.now = Section("x")
+        """what is computed at every row"""
+        self.step = Section("e", self.now)
+        """what is computed of the step that ends at a row"""
+        self.states: list[float] = []
+        """of each, what it is at the beginning"""
+        self.constants: dict[Node, int] = {}
+        self._before: dict[Node, int] = {}
+        self.slopes: dict[str, str] = {}
+        """of signals on a line, where it is asked for"""
+
+    def state(self, begin: float = 0.0) -> str:
+        """A number of each lane that lasts from row to row."""
+        self.states.append(begin)
+        return f"STATE({len(self.states) - 1})"
+
+    def before(self, node: Node) -> str:
+        """What an expression was at the row before."""
+        if node not in self._before:
+            self.state()
+            self._before[node] = len(self.states) - 1
+            self.value(node, "row", self.now)
+        return f"STATE({self._before[node]})"
+
+    def remembered(self) -> dict[str, str]:
+        """What has been asked for by `before`: states, and the names of what they become."""
+        return {f"STATE({i})": self.value(node, "row", self.now) for node, i in self._before.items()}
+
+    def kinds(self, node: Node) -> set[Kind]:
+        """What the values in an expression do from row to row."""
+        if isinstance(node, Name):
+            return {self.leaf(node.text).kind}
+        if node in self._reductions:
+            return {"number"}
+        parts = node.operands if isinstance(node, Operation) else getattr(node, "arguments", ())
+        return {kind for part in parts for kind in self.kinds(part)}
+
+    def value(self, node: Node, place: Place, into: Section) -> str:
+        """The name, in C, of the value of an expression."""
+        kinds = self.kinds(node)
+        if isinstance(node, Number):
+            return f"q_all({node.value!r})"
+        if kinds <= {"number"} and into is not self.once:
+            self.value(node, "row", self.once)
+            return f"CONSTANT({self.constants.setdefault(node, len(self.constants))})"
+        if place == "end" and kinds <= {"number", "continuous"}:
+            place = "row"
+        if place != "row" and kinds <= {"number", "held"}:
+            return self.before(node)
+        return into.named((node, place), lambda: self._code(node, place, into))
+
+    def truth(self, node: Node, place: Place, into: Section) -> str:
+        """The mask of the lanes in which it is not zero."""
+        is_here = place == "row" or self.kinds(node) - {"number", "held"}
+        if isinstance(node, Operation) and node.sign in _TRUTHS and is_here and self.kinds(node) - {"number"}:
+            return into.named((node, place, "truth"), lambda: self._truth(node, place, into), "q_mask")
+        return f"Q_TEST({self.value(node, place, into)} != 0.0)"
+
+    def leaf(self, name: str) -> Leaf:
+        """What a name is; raises `UsageError` for one that is not there."""
+        if name not in self._leaves:
+            raise UsageError(
+                f"there is no {name}; expected a recorded signal, time, stop_time or an objective above it"
+            )
+        return self._leaves[name]
+
+    def _code(self, node: Node, place: Place, into: Section) -> str:
+        match node:
+            case Name(name):
+                return self._at(node, self.leaf(name), place)
+            case Operation(sign, operands) if sign in _TRUTHS:
+                return f"TRUE({self._truth(node, place, into)})"
+            case Operation("**", (base, Number(2.0))):
+                found = self.value(base, place, into)
+                return f"{found} * {found}"
+            case Operation(sign, operands):
+                return _OPERATIONS[sign](*(self.value(operand, place, into) for operand in operands))
+            case Sampled(connection, _):
+                expected = "inside max, mean, rms, share or growth_share"
+                raise UsageError(f"sampled({connection}, …): expected {expected}")
+            case Call(function, arguments) if node not in self._reductions:
+                return _FUNCTIONS[function](*(self.value(argument, place, into) for argument in arguments))
+        return self._reductions[node]
+
+    def _at(self, node: Name, leaf: Leaf, place: Place) -> str:
+        if place == "row":
+            return leaf.code
+        before = self.before(node)
+        if leaf.kind == "continuous":
+            return f"0.5 * ({before} + {self.value(node, 'row', self.now)})"
+        if node.text not in self.slopes:
+            self.slopes[node.text] = self.state()
+        end = f"({before} + {self.slopes[node.text]} * dt)"
+        return end if place == "end" else f"0.5 * ({before} + {end})"
+
+    def _truth(self, node: Operation, place: Place, into: Section) -> str:
+        if node.sign in ("and", "or", "not"):
+            sides = [self.truth(operand, place, into) for operand in node.operands]
+            return f"q_not({sides[0]})" if node.sign == "not" else {"and": " & ", "or": " | "}[node.sign].join(sides)
+        left, right = (self.value(operand, place, into) for operand in node.operands)
+        return f"Q_TEST({left} {node.sign} {right})"
+
+
+def scalars(node: Node, vectors: Mapping[str, Sequence[str]]) -> list[Node]:
+    """An expression whose names are signals alone: one, or several for a vector."""
+    match node:
+        case Name(name):
+            return [Name(part) for part in vectors.get(name, (name,))]
+        case Operation(sign, operands):
+            return [Operation(sign, parts) for parts in _side_by_side(sign, operands, vectors)]
+        case Call("norm" | "hypot", arguments):
+            return [Call("norm", tuple(part for argument in arguments for part in scalars(argument, vectors)))]
+        case Call(function, arguments) if is_over_run(node):
+            return [Call(function, tuple(_one(argument, vectors) for argument in arguments))]
+        case Call(function, arguments):
+            return [Call(function, parts) for parts in _side_by_side(function, arguments, vectors)]
+        case Sampled(connection, argument):
+            return [Sampled(connection, _one(argument, vectors))]
+    return [node]
+
+
+def _one(node: Node, vectors: Mapping[str, Sequence[str]]) -> Node:
+    found = scalars(node, vectors)
+    if len(found) > 1:
+        raise UsageError("it is a vector; expected a number, as norm(…)")
+    return found[0]
+
+
+def _side_by_side(what: str, nodes: Sequence[Node], vectors: Mapping[str, Sequence[str]]) -> list[tuple[Node, ...]]:
+    parts = [scalars(node, vectors) for node in nodes]
+    size = max(map(len, parts))
+    if any(len(each) not in (1, size) for each in parts):
+        raise UsageError(f"{what} of vectors of different sizes")
+    return [tuple(each[i if len(each) > 1 else 0] for each in parts) for i in range(size)]
+
+
+def _called(function: str) -> Callable[..., str]:
+    return lambda *arguments: f"{function}({', '.join(arguments)})"
+
+
+def _folded(function: str) -> Callable[..., str]:
+    def write(*arguments: str) -> str:
+        found = arguments[0]
+        for argument in arguments[1:]:
+            found = f"{function}({found}, {argument})"
+        return found
+
+    return write
+
+
+def _norm(*parts: str) -> str:
+    return f"q_sqrt({' + '.join(f'{part} * {part}' for part in parts)})"
+
+
+def _infix(sign: str) -> Callable[..., str]:
+    return lambda a, b: f"{a} {sign} {b}"
+
+
+_TRUTHS = ("<", "<=", ">", ">=", "==", "!=", "and", "or", "not")
+_OPERATIONS: dict[str, Callable[..., str]] = {
+    "+": _infix("+"), "-": _infix("-"), "*": _infix("*"), "/": _infix("/"), "**": _called("q_pow"),
+    "neg": lambda a: f"-{a}",
+}  # fmt: skip
+_FUNCTIONS: dict[str, Callable[..., str]] = {
+    "abs": _called("q_fabs"), "norm": _norm, "min": _folded("lowest"), "max": _folded("highest"),
+    **{name: _called(f"q_{name}") for name in ("sqrt", "exp", "log", "sin", "cos", "tan")},
+    **{name: _called(f"q_{name}") for name in ("asin", "acos", "atan2", "tanh")},
+}  # fmt: skip

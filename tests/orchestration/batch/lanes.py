@@ -1,0 +1,47 @@
+"""Systems flown in lanes with their signals, beside the same systems flown one after the other."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from orchestration import fmus
+from orchestration.batch.flight import FLYING, Batch, Landed
+from orchestration.batch.fly import native_twins
+from orchestration.batch.kernels import lanes_here
+from orchestration.batch.shape import Shape, outline
+from orchestration.batch.windows import Windows, timing
+from orchestration.fmi.model import read_model
+from orchestration.results.result import Result
+from orchestration.simulation import checked
+from orchestration.system.model import System
+
+
+def located(system: System) -> System:
+    """With the native twins of its FMUs, as paths."""
+    twins = native_twins(system)
+    paths = fmus.of_components(twins.fmus)
+    return checked(twins, {name: read_model(path) for name, path in paths.items()}).system
+
+
+def shape_of(system: System) -> Shape:
+    """What the batch makes of a system."""
+    models = {name: read_model(path) for name, path in fmus.of_components(system.fmus).items()}
+    return Shape(system=checked(system, models).system, models=models, lanes=lanes_here())
+
+
+def landed(shape: Shape, systems: Sequence[System]) -> Landed:
+    """Systems of one shape flown at once, everything recorded."""
+    assert len({outline(system) for system in systems}) == 1
+    return Batch(shape, Windows()).fly(systems, [timing(system) for system in systems], shape.board.columns[1:])
+
+
+def assert_the_same_signals(shape: Shape, found: Landed, lane: int, alone: Result) -> None:
+    """The rows of a lane are those of the run flown alone, to the byte."""
+    columns = ["time", *shape.board.columns[1:]]
+    own = np.ascontiguousarray(alone.rows[:, [alone.columns.index(column) for column in columns]])
+    rows = found.signals[lane]
+    assert rows.shape == own.shape, (lane, rows[-3:, 0], own[-3:, 0])
+    differing = [name for i, name in enumerate(columns) if rows[:, i].tobytes() != own[:, i].tobytes()]
+    assert differing == []
+    assert found.fate[lane] == FLYING or alone.metrics["divergence_time"] is not None
+    assert found.steps[lane] == alone.metrics["steps"]

@@ -1,0 +1,156 @@
+"""What runs in lanes come to is what the same runs come to alone: sums to 1e-12, all else to the last bit."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from orchestration import fmus
+from orchestration.batch.fly import Batches, fly
+from orchestration.errors import UsageError
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.timing import Timing
+from orchestration.quadrotor.translation import system_of
+from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
+from orchestration.system.paths import changed
+from tests.orchestration.batch.lanes import located
+from tests.orchestration.fmi.small import needs_compiler, small
+from tests.orchestration.master.moving import moving
+from tests.orchestration.master.test_compiled import Kept, of, ran
+
+pytestmark = needs_compiler
+SUMS = ("rmse", "iae", "itae", "effort", "variation", "mean", "rms", "integral", "saturation_share", "share_", "near")
+"""What is in the name of an objective that is a sum, or made of functions that have no one value to the last bit"""
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return moving(tmp_path_factory.mktemp("moving"))
+
+
+@pytest.fixture(scope="module")
+def kept() -> Iterator[Kept]:
+    instances = Kept()
+    yield instances
+    instances.close()
+
+
+def assert_the_same_numbers(found: Mapping[str, Any], alone: Mapping[str, Any]) -> None:
+    assert list(found) == list(alone)
+    for name, value in alone.items():
+        if value is not None and any(word in name for word in SUMS) and not name.startswith("growth"):
+            assert found[name] == pytest.approx(value, rel=1e-12, abs=0.0), name
+        else:
+            assert (name, found[name]) == (name, value)
+
+
+X = {
+    "continuous": "plant.y", "held": "controller.y", "on_a_line": "plant.u1y", "applied": "plant.u2y",
+    "mixed": "plant.z * controller.z + 0.3", "vector": "norm(plant.y, controller.z, 2)",
+    "measured": "sampled(measured, plant.y - controller.y)", "commanded": "sampled(commanded, controller.y ** 2)",
+}  # fmt: skip
+F = ("max({})", "min({})", "mean({})", "rms({})", "integral({})", "last({})", "first({})", "peak_time({})",
+     "settling_time({}, 0.7)", "total_variation({})", "share({} > 0.2)", "growth_share({}, 0.1)")  # fmt: skip
+MORE = {
+    "near_functions": "max(sqrt(abs(plant.y)) + exp(plant.y) * log(2 + plant.z) - sin(plant.y) / cos(plant.z))",
+    "near_more_functions": "max(tan(plant.y) + asin(plant.y / 2) - acos(plant.z / 2) + atan2(plant.y, 2))",
+    "near_tanh": "max(tanh(plant.z))",
+    "near_logic": "share(plant.y > 0 and not (controller.y < 0.1 or time >= stop_time / 2))",
+    "choice": "max(min(plant.y, controller.y, 0.4) ** 3)",
+    "near_power": "max((plant.y + 3) ** 1.5)",
+    "parameters": "last(plant.y) + plant.place * controller.place",
+    "never": "settling_time(plant.y, 1e-9)",
+    "near_two_passes": "settling_time(plant.y - last(plant.y), 0.5 * max(abs(plant.y)))",
+    "near_three_passes": "max(plant.y - mean(abs(plant.y - mean(plant.y))))",
+    "near_driven": "rms(plant.y - table.u4y) + integral(noise.u5y ** 2) + max(one.u6y)",
+    "combination": "last(plant.y) / max(plant.y) - peak_time(plant.z)",
+}
+LOOP = System(
+    stop_time=1.0,
+    components={
+        "plant": Component(fmu="stub", step=0.01),
+        "controller": Component(fmu="stub", sampling=Sampling(period=0.02, jitter=0.01)),
+    },
+    connections=(
+        Connection(name="measured", start=("plant.y",), end=("controller.u0y",), noise={"y": 0.1}, loss=0.2),
+        Connection(name="commanded", start=("controller.y",), end=("plant.u1y",), hold="first", delay=0.03),
+        Connection(name="applied", start=("controller.z",), end=("plant.u2y",), delay_jitter=0.01),
+    ),
+)
+
+
+def objectives() -> dict[str, str]:
+    """Every function of everything that goes on from row to row in its own way."""
+    every = {}
+    for kind, x in X.items():
+        for function in F:
+            name = function.partition("(")[0]
+            text = function.format(x)
+            if x.startswith("sampled") and name == "share":
+                text = f"share({x[:-1]} > 0.2))"
+            every[f"{name}_{kind}"] = text
+    return {**every, **MORE}
+
+
+def test_every_function_over_every_kind_of_signal(fmu: Path, kept: Kept, tmp_path: Path) -> None:
+    table = tmp_path / "table.csv"
+    table.write_text("time,u4y,u4z\n0,0.1,0.3\n0.37,1,7\n1,-2,0.7\n", encoding="utf-8")
+    sources = {
+        "table": Source(file=table, to=("plant.u4y", "controller.u4z")),
+        "noise": Source(noise=0.01, period=0.007, to=("plant.u5y", "plant.u5z")),
+        "one": Source(constant=0.3, to=("controller.u6y",)),
+    }
+    first = replace(of(LOOP, fmu), sources=sources, objectives=objectives(), criterion=Criterion(good="max_held > 0"))
+    crowd = [replace(first, seed=seed) for seed in range(3)] + [
+        changed(first, {"components.controller.sampling.period": 0.03, "stop_time": 0.7}),
+        changed(first, {"components.plant.parameters.place": 2.0, "sources.one.constant": 0.7}),
+    ]
+    for what, found in zip(crowd, Batches().fly(crowd)):
+        assert found is not None
+        alone = ran(what, "compiled", load=kept.load).metrics
+        assert_the_same_numbers(found.metrics, alone)
+
+
+CONDITIONS = ("plant.y > 0.9", "norm(plant.y, controller.y) >= 1.2 and time > 0.1", "plant.y < -5")
+
+
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_a_run_that_diverges_ends_as_it_does_alone_and_others_go_on(condition: str, fmu: Path, kept: Kept) -> None:
+    first = replace(of(LOOP, fmu), objectives={"peak": "max(plant.y)"}, criterion=Criterion(diverged=condition))
+    crowd = [replace(first, seed=seed) for seed in range(6)]
+    for what, found in zip(crowd, Batches().fly(crowd)):
+        alone = ran(what, "compiled", load=kept.load)
+        assert found is not None
+        assert (found.metrics, found.message) == (alone.metrics, alone.divergence)
+
+
+def test_what_a_component_refuses_or_makes_infinite_is_left_to_be_flown_alone(fmu: Path, kept: Kept) -> None:
+    habits: Sequence[dict[str, float]] = ({}, {"fails_at": 0.3}, {"nan_at": 0.4}, {})
+    crowd = [replace(of(LOOP, fmu, plant=habit), objectives={"peak": "max(plant.y)"}) for habit in habits]
+    found = Batches().fly(crowd)
+    assert [each is None for each in found] == [False, True, True, False]
+    alone = ran(crowd[3], "compiled", load=kept.load)
+    assert found[3] is not None
+    assert found[3].metrics == alone.metrics
+
+
+def test_more_runs_than_lanes_of_many_timings_come_back_in_their_order() -> None:
+    periods = [0.01, 0.02, 0.01, 0.015] * 4 + [0.05]
+    systems = [
+        changed(
+            system_of(Scenario(timing=Timing(period=period), stop_time=0.5)),
+            {"components.plant.parameters.mass": 1.0 + i / 50},
+        )
+        for i, period in enumerate(periods)
+    ]
+    for what, found in zip(systems, fly(systems)):
+        assert_the_same_numbers(found, ran(located(what), "compiled").metrics)
+
+
+def test_a_component_that_cannot_be_flown_in_lanes_is_named(tmp_path: Path) -> None:
+    parts = {"one": Component(fmu=str(small(tmp_path)), step=0.01)}
+    with pytest.raises(UsageError, match=r"components.one: small.fmu: expected a native FMU of this project's kit"):
+        list(fly([System(stop_time=0.1, components=parts)]))
+    assert fmus.native_twin(parts["one"].fmu) == parts["one"].fmu
