@@ -38,6 +38,12 @@ _INSTANT = 1e-12
 """[s]; shorter spans count as none"""
 _NO_EFFECT = 1e-9
 """of an actuator's state on the vehicle's, per unit: what differences leave of none"""
+_BENT = 1e-3
+"""of a derivative: by how much those to both sides of hover may differ"""
+
+
+class NotSmooth(UsageError):
+    """About hover the plant has no derivative."""
 
 
 def hover_of(scenario: Scenario) -> Scenario:
@@ -146,7 +152,7 @@ class PlantStep:
         self._hover, self._fleet, self._trim = hover, fleet, trim
         self._interval = hover.timing.plant_interval
         self._lags = True  # until the differences say otherwise
-        at_hover = self._saved({}, trim)
+        self._at_hover = at_hover = self._saved({}, trim)
         self._expect_equilibrium(at_hover)
         vehicle = [[(self._saved(_displaced(name, size), trim), trim) for size in _BOTH_WAYS] for name in COORDINATES]
         actuators = [[(self._saved({}, trim + size * unit), trim) for size in _BOTH_WAYS] for unit in _UNITS]
@@ -183,9 +189,16 @@ class PlantStep:
         return self._known[h]
 
     def _differences(self, h: float) -> Floats:
-        """d(vehicle after `h` [s])/d(what is moved), below it a plant interval later if the actuators lag."""
+        """d(vehicle after `h` [s])/d(what is moved), below it a plant interval later if the actuators lag.
+
+        Raises `NotSmooth` where there is none, as with motors that rise faster than they fall.
+        """
         with self._plant() as plant:
-            flown = [[self._after(plant, *start, h) for start in pair] for pair in self._moved]
+            still = self._after(plant, self._at_hover, self._trim, h)
+            flown = [[self._after(plant, *start, h) - still for start in pair] for pair in self._moved]
+        for plus, minus in flown:
+            if np.abs(plus + minus).max() > _BENT * np.abs(plus - minus).max() + STEP**2:
+                raise NotSmooth("the plant answers to a rise otherwise than to a fall, so hover has no linear loop")
         return np.column_stack([(plus - minus) / (2.0 * STEP) for plus, minus in flown])
 
     @contextmanager

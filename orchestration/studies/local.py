@@ -7,7 +7,7 @@ from orchestration.errors import SimulatorError, UsageError
 from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.studies.at_rest import NotAtRest
-from orchestration.studies.linear import HoverLoop, at_edge, at_hover
+from orchestration.studies.linear import HoverLoop, NotSmooth, at_edge, at_hover
 from orchestration.studies.ranges import Range, Varied, range_of
 from orchestration.studies.sampled_loop import growth_of_loop
 from orchestration.studies.search import first_failure
@@ -72,6 +72,8 @@ def local_limits(varied: Varied, span: Range) -> Local:
     try:
         if varied.of in ("period", "delay"):
             return about_hover(scenario, varied.of)
+    except NotSmooth as error:
+        return Local(reason=f"no local limit: {error}")
     except UsageError as error:
         why = str(error)
     return _without_hover_loop(scenario, varied, span, why)

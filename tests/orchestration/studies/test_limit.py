@@ -259,6 +259,32 @@ def test_powers_of_the_matrix_are_derivatives_of_whole_periods_of_flight(
     expect_powers(matrix, base, fleet)
 
 
+MOTORS = {"thrust_max": 9.0, "arm.x": 0.1, "arm.y": 0.2, "drag_to_thrust": 0.1, "time_constant.up": 0.05}
+
+
+def with_motors(down: float) -> Scenario:
+    """At 40 ms and 10 ms of delay, with motors of which each rises with a time constant of 50 ms."""
+    motors = {f"plant.motor.{name}": value for name, value in MOTORS.items()}
+    return scenario_of(period=0.04, delay=0.01).with_changes(
+        parameters={**motors, "plant.motor.time_constant.down": down}
+    )
+
+
+def test_motors_are_in_the_loop_as_lags_of_their_own() -> None:
+    lagging = scenario_of(period=0.04, delay=0.01).with_changes(parameters={"plant.actuator_time_constant": 0.05})
+    by_motors, by_box = (HoverLoop.of(scenario).matrix(0.04, 0.01) for scenario in (with_motors(0.05), lagging))
+    assert by_motors == pytest.approx(by_box, rel=1e-6, abs=1e-6)
+
+
+def test_motors_that_rise_otherwise_than_they_fall_have_no_local_limit() -> None:
+    scenario = with_motors(0.1)
+    found = local_limits(Varied(request=scenario, of="period"), range_of(scenario, "period"))
+    assert (found.limit, found.method) == (None, None)
+    assert found.reason == (
+        "no local limit: the plant answers to a rise otherwise than to a fall, so hover has no linear loop"
+    )
+
+
 def test_the_lag_that_an_fmu_has_by_itself_is_in_the_loop(tmp_path: Path) -> None:
     sources = source_tree.copy_sources(tmp_path)
     source_tree.replace(
