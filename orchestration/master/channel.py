@@ -46,9 +46,9 @@ class Channel:
         """messages on their way"""
         self.applied: list[tuple[int, Floats]] = []
         """the last two, with their times [ns], of a first-order hold"""
-        self._sent: Floats | None = None
+        self._told, self._sent = received.data, None
         if isinstance(places, slice) and self._plain and not (self._noisy or self._rounds or self._extrapolates):
-            self._sent = row[places]  # a view: what is sent at any time, and arrives as it is
+            self._sent = row[places].data  # a view: what is sent at any time, and arrives as it is
 
     def pass_on(self) -> None:
         """The sender's values as they are reach the receiver: at initialisation, and over a plain wire."""
@@ -81,7 +81,7 @@ class Channel:
         if lost:
             self.skip()
         elif self._sent is not None:
-            np.copyto(self.received, self._sent)
+            self._told[:] = self._sent
             self.write()
         else:
             self.apply(self.take(), time)

@@ -7,6 +7,8 @@ from orchestration.master.timetable import Timetable
 
 INSTANTS = 2**13
 """Of one schedule, about: so many are made at once"""
+TOGETHER = 2**9
+"""of these so many are made into objects, few enough to stay in the processor's cache"""
 
 
 class Position:
@@ -35,7 +37,7 @@ class Position:
     def instants(self) -> Iterator[Instant]:
         """Those to come, each past as soon as it is given."""
         while (schedule := self.schedule()) is not None:
-            for instant in schedule.part(self.at).instants():
+            for instant in schedule.part(self.at, self.at + TOGETHER).instants():
                 self.at += 1
                 yield instant
 

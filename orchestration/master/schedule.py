@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -73,13 +74,23 @@ class Schedule:
 
     def instants(self) -> Iterator[Instant]:
         """One by one."""
-        times = self.times.tolist()
-        parts = (_parts(getattr(self, table), getattr(self, f"{table}_at")) for table in TABLES[:-1])
-        return map(Instant._make, zip(times, times[1:], *parts, self._dues()))
+        times, messages = self.times.tolist(), self.exchanged.tolist()
+        dues = [
+            _made(Due, (component, next_time, messages[received:sent], messages[sent:end]))
+            for component, next_time, received, sent, end in self.dues.tolist()
+        ]
+        parts = (
+            _parts(self.halts.tolist(), self.halts_at),
+            _parts(self.arrivals.tolist(), self.arrivals_at),
+            _parts(self.posted.tolist(), self.posted_at),
+            _parts(self.measured.tolist(), self.measured_at),
+            _parts(dues, self.dues_at),
+        )
+        return map(partial(_made, Instant), zip(times, times[1:], *parts))
 
     def part(self, begin: int, end: int | None = None) -> "Schedule":
         """Instants from `begin` on, up to `end` of them without that one, as a schedule of their own."""
-        end = len(self) if end is None else end
+        end = len(self) if end is None else min(end, len(self))
         found = {"times": self.times[begin : end + 1]}
         for table in TABLES:
             at = getattr(self, f"{table}_at")[begin : end + 1]
@@ -108,23 +119,15 @@ class Schedule:
             kept &= messages[:, 3] != sampled
         return int(which.sum()), messages[kept, 1].tolist()
 
-    def _dues(self) -> Iterator[Sequence[Due]]:
-        """Of each instant."""
-        messages = self.exchanged.tolist()
-        for rows in _parts(self.dues, self.dues_at):
-            yield [
-                Due(component, next_time, messages[received:sent], messages[sent:end])
-                for component, next_time, received, sent, end in rows
-            ]
+
+TABLES = ("halts", "posted", "measured", "arrivals", "dues")
+
+_made = tuple.__new__
+"""Makes a named tuple from a tuple, as its class does by way of a Python function"""
 
 
-TABLES = ("halts", "arrivals", "posted", "measured", "dues")
-"""In the order of an `Instant`"""
-
-
-def _parts(table: Integers, at: Integers) -> Iterable[list[Any]]:
+def _parts(rows: list[Any], at: Integers) -> Iterable[list[Any]]:
     """What each instant has of a table."""
-    if not len(table):
-        return itertools.repeat([])
-    rows = table.tolist()
+    if not rows:
+        return itertools.repeat(rows)
     return [rows[begin:end] for begin, end in itertools.pairwise(at.tolist())]

@@ -1,5 +1,6 @@
 """Looks, while a run goes on, whether it has diverged: the condition of its system over the current row."""
 
+import operator
 from collections.abc import Callable, Mapping, Sequence
 
 from orchestration.errors import UsageError
@@ -30,18 +31,20 @@ def watch(
     columns = [c for c in board.columns if c != "time" and is_wanted(c, wanted)]
     used = [name for name, signals in signals_of.items() if any(is_wanted(signal, wanted) for signal in signals)]
     constants = [name for name in numbers if name in wanted]
-    order = ["time", *columns, *(signal for name in used for signal in signals_of[name]), *constants]
+    order = ["", "time", *columns, *(signal for name in used for signal in signals_of[name]), *constants]
     places = {name: i for i, name in enumerate(order)}
     try:
         clauses = [_Clause(clause, places) for clause in _alternatives(node)]
     except UsageError as error:
         raise UsageError(f"criterion.diverged: {error}") from None
-    where, row = board.places(columns) if columns else slice(0, 0), board.row
+    get = operator.itemgetter(0, 0, *(board.place[column] for column in columns))  # of one it would be no tuple
+    row = board.row.data
     feeds, fixed = [sources[name].at for name in used], [float(numbers[name]) for name in constants]
     conditions = [clause.holds for clause in clauses]
 
     def look(t: float) -> str | None:
-        values: list[float] = [t, *row[where].tolist()]
+        values: list[float] = [*get(row)]
+        values[1] = t
         for at in feeds:
             values += at(t)
         values += fixed
