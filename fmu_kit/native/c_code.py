@@ -13,7 +13,6 @@ from fmu_kit.native.symbols import Kind, Symbol, TraceError, closure, node, valu
 from fmu_kit.native.tracing import Program
 
 _BINARY = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
-_COMPARED = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
 _CALLED = {
     **{name: f"q_{name}" for name in (
         "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "tanh", "exp", "expm1", "log", "pow",
@@ -147,7 +146,7 @@ class Writer:
 
     def _load(self, symbol: Symbol) -> str:
         value = self._place(symbol.data[0])
-        return f"Q_TEST({value} != 0.0)" if symbol.kind == "bool" else value
+        return f"q_ne({value}, 0.0)" if symbol.kind == "bool" else value
 
     # -- lines and names -------------------------------------------------------------------------------------
 
@@ -211,10 +210,11 @@ class Writer:
 
     def _expression(self, symbol: Symbol) -> str:
         op, args = symbol.op, symbol.args
-        if op in _BINARY or op in _COMPARED:
+        if op in _BINARY:
             first = self._lanes(args[0]) if args[1].op == "constant" else self._real(args[0])
-            text = f"{first} {(_BINARY | _COMPARED)[op]} {self._real(args[1])}"
-            return f"Q_TEST({text})" if op in _COMPARED else text
+            return f"{first} {_BINARY[op]} {self._real(args[1])}"
+        if op in ("lt", "le", "gt", "ge", "eq", "ne"):
+            return f"q_{op}({self._real(args[0])}, {self._real(args[1])})"
         if op == "neg":
             return f"-{self._real(args[0])}"
         if op in ("and", "or"):
@@ -330,7 +330,7 @@ class Writer:
                 self._set(symbol, self._has_failed(status, 1 + ERRORS.index(symbol.data[0])))
             elif symbol.op == "result":
                 name = results[symbol.data[0]]
-                self._set(symbol, f"Q_TEST({name} != 0.0)" if symbol.kind == "bool" else name)
+                self._set(symbol, f"q_ne({name}, 0.0)" if symbol.kind == "bool" else name)
             else:
                 self._set(symbol, self._load(symbol))
 

@@ -6,6 +6,7 @@ number of its error behind. Nothing is said: texts are for instances.
 
 from __future__ import annotations
 
+import itertools
 from typing import ClassVar
 
 from fmu_kit.native.c_code import ERRORS, Writer, c_name, place_names
@@ -46,11 +47,6 @@ class LaneWriter(Writer):
 
     # -- lanes -----------------------------------------------------------------------------------------------
 
-    def _in_lanes(self, mask: str, block: Block) -> None:
-        self.masks.append(mask)
-        self._inner(block)
-        self.masks.pop()
-
     def _takes_out(self, block: Block) -> bool:
         """Whether lanes may leave a block before its end."""
         return any(
@@ -74,6 +70,31 @@ class LaneWriter(Writer):
 
     # -- statements ------------------------------------------------------------------------------------------
 
+    def _block(self, block: Block) -> None:
+        done = 0
+        while done < len(block):
+            checks = list(itertools.takewhile(_is_check, block[done:]))
+            if checks:
+                self._check(checks)
+            else:
+                getattr(self, f"_{block[done].op}")(block[done], block[done + 1 :])
+            done += max(len(checks), 1)
+
+    def _check(self, checks: list[Statement]) -> None:
+        """What may fail one after another: first whether any of it does."""
+        mask = self.masks[-1]
+        found: dict[str, Statement] = {}
+        for each in checks:
+            found.setdefault(self.value(each.symbols[0]), each)
+        self._line(f"Q_IF_EVER(q_any({mask} & ({' | '.join(found)}))) {{")
+        for condition, each in found.items():
+            self.masks.append(self._name("m"))
+            self._line(f"    const q_mask {self.masks[-1]} = {mask} & {condition};")
+            self._inner(each.blocks[0])
+            self.masks.pop()
+            self._line(f"    {mask} = {mask} & q_not({condition});")
+        self._line("}")
+
     def _if(self, each: Statement, rest: Block) -> None:
         (condition,), (then, otherwise) = each.symbols, each.blocks
         if _is_silent(then) and _is_silent(otherwise):
@@ -82,17 +103,15 @@ class LaneWriter(Writer):
         if not ends(then):
             self._hoist(then, otherwise, rest)
         ways = [(then, holds, f"q_not({holds})"), (otherwise, f"q_not({holds})", holds)]
-        masks = []
-        for block, condition_of_block, _ in ways:
-            masks.append(self._name("m"))
-            if not _is_silent(block):
-                self._line(f"q_mask {masks[-1]} = {mask} & {condition_of_block};")
+        ways = [way for way in ways if not _is_silent(way[0])]
+        masks = [self._name("m") for _ in ways]
+        for own, (_, condition_of_block, _) in zip(masks, ways):
+            self._line(f"q_mask {own} = {mask} & {condition_of_block};")
         for own, (block, _, others) in zip(masks, ways):
-            if _is_silent(block):
-                continue
-            seldom = ends(block) and block[-1].op == "raise"
-            self._line(f"if ({f'Q_SELDOM(q_any({own}))' if seldom else f'q_any({own})'}) {{")
-            self._in_lanes(own, block)
+            self._line(f"{'Q_IF_EVER' if block[-1].op == 'raise' else 'if '}(q_any({own})) {{")
+            self.masks.append(own)
+            self._inner(block)
+            self.masks.pop()
             if self._takes_out(block):
                 self._line(f"    {mask} = {mask} & {others if ends(block) else f'({others} | {own})'};")
             self._line("}")
@@ -121,12 +140,12 @@ class LaneWriter(Writer):
             self._line(f"{mask} = {text};")
 
     def _has_failed(self, status: str, number: int) -> str:
-        return f"{status} & Q_TEST(*failed == {number}.0)"
+        return f"{status} & q_eq(*failed, {number}.0)"
 
     def _goes_on(self, index: str, last: str) -> str:
         goes = self._name("m")
         self.declared.append(f"q_mask {goes};")
-        condition = f"q_any({goes} = {self.masks[-1]} & Q_TEST({index} < {last}))"
+        condition = f"q_any({goes} = {self.masks[-1]} & q_lt({index}, {last}))"
         self.masks.append(goes)
         return condition
 
@@ -155,6 +174,11 @@ class LaneWriter(Writer):
 
 def _returns(block: Block) -> bool:
     return any(each.op == "return" or any(map(_returns, each.blocks)) for each in block)
+
+
+def _is_check(each: Statement) -> bool:
+    """Whether a statement does nothing but fail, if a condition holds."""
+    return each.op == "if" and not each.blocks[1] and len(each.blocks[0]) == 1 and each.blocks[0][0].op == "raise"
 
 
 def _is_silent(block: Block) -> bool:

@@ -26,10 +26,10 @@
 #endif
 
 #if defined(__GNUC__)
-#define Q_SELDOM(condition) __builtin_expect(condition, 0)
+#define Q_IF_EVER(condition) if (__builtin_expect(condition, 0))
 typedef q_real q_place __attribute__((aligned(QUADCOSIM_LANES < 8 ? 8 * QUADCOSIM_LANES : 64)));
 #else
-#define Q_SELDOM(condition) (condition)
+#define Q_IF_EVER(condition) if (condition)
 typedef q_real q_place;
 #endif
 
@@ -39,9 +39,9 @@ enum { LANES = QUADCOSIM_LANES };
 
 static q_mask lanes_of(const uint64_t *active)
 {
-    q_mask mask = q_known(0);
-    memcpy(&mask, active, sizeof mask);
-    return mask;
+    q_bits bits;
+    memcpy(&bits, active, sizeof bits);
+    return q_has(bits, 1u);
 }
 
 static void tell_status(const uint64_t *active, q_mask through, q_real failed, int32_t *status)

@@ -34,9 +34,12 @@
 #endif
 
 #define Q_ONE static inline __attribute__((unused))
+#define Q_SELDOM static __attribute__((unused, noinline, cold))
 #if defined(_MSC_VER) && !defined(__clang__)
 #undef Q_ONE
+#undef Q_SELDOM
 #define Q_ONE static __inline
+#define Q_SELDOM static
 #endif
 
 /* -- the square root of one double, without libm --------------------------------------------------------------- */
@@ -118,13 +121,20 @@ typedef double q_real;
 typedef uint64_t q_bits;
 typedef int q_mask;
 
-#define Q_TEST(comparison) ((q_mask)(comparison))
+#define q_lt(a, b) ((q_mask)((a) < (b)))
+#define q_le(a, b) ((q_mask)((a) <= (b)))
+#define q_gt(a, b) ((q_mask)((a) > (b)))
+#define q_ge(a, b) ((q_mask)((a) >= (b)))
+#define q_eq(a, b) ((q_mask)((a) == (b)))
+#define q_ne(a, b) ((q_mask)((a) != (b)))
 
 Q_ONE q_real q_all(double x) { return x; }
 Q_ONE q_mask q_known(int holds) { return holds; }
+Q_ONE q_mask q_has(q_bits bits, uint64_t asked) { return (bits & asked) != 0; }
 Q_ONE q_real q_select(q_mask condition, q_real yes, q_real no) { return condition ? yes : no; }
 Q_ONE q_mask q_not(q_mask condition) { return !condition; }
 Q_ONE int q_any(q_mask condition) { return condition; }
+Q_ONE int q_every(q_mask condition) { return condition; }
 Q_ONE double q_lane(q_real x, int lane) { return (void)lane, x; }
 Q_ONE q_real q_with_lane(q_real x, int lane, double value) { return (void)x, (void)lane, value; }
 Q_ONE q_real q_sqrt(q_real x) { return q_sqrt_of_one(x); }
@@ -135,26 +145,78 @@ Q_ONE q_real q_sqrt(q_real x) { return q_sqrt_of_one(x); }
 
 typedef double q_real __attribute__((vector_size(8 * QUADCOSIM_LANES)));
 typedef uint64_t q_bits __attribute__((vector_size(8 * QUADCOSIM_LANES)));
-typedef q_bits q_mask; /* all bits of a lane where it holds */
-
-#define Q_TEST(comparison) ((q_mask)(comparison))
 
 Q_ONE q_real q_all(double x) { return x - (q_real){0.0}; } /* keeps the sign of a zero */
-Q_ONE q_mask q_known(int holds) { return (q_mask){0} - (uint64_t)holds; }
-Q_ONE q_mask q_not(q_mask condition) { return ~condition; }
 Q_ONE double q_lane(q_real x, int lane) { return x[lane]; }
-Q_ONE q_real q_select(q_mask condition, q_real yes, q_real no) {
-    return (q_real)((condition & (q_bits)yes) | (~condition & (q_bits)no));
-}
 Q_ONE q_real q_with_lane(q_real x, int lane, double value) {
     x[lane] = value;
     return x;
 }
+
+/* Of two numbers, either of which may be one for all lanes. */
+#define Q_LANES_OF(x) ((x) - (q_real){0.0})
+
+/* A mask is a bit a lane where the machine has registers for that, else all bits of the lane or none. */
+#if defined(__AVX512DQ__) && QUADCOSIM_LANES == 8
+
+typedef __mmask8 q_mask;
+
+#define Q_COMPARED(a, b, how) _mm512_cmp_pd_mask((__m512d)Q_LANES_OF(a), (__m512d)Q_LANES_OF(b), how)
+#define q_lt(a, b) Q_COMPARED(a, b, _CMP_LT_OQ)
+#define q_le(a, b) Q_COMPARED(a, b, _CMP_LE_OQ)
+#define q_gt(a, b) Q_COMPARED(a, b, _CMP_GT_OQ)
+#define q_ge(a, b) Q_COMPARED(a, b, _CMP_GE_OQ)
+#define q_eq(a, b) Q_COMPARED(a, b, _CMP_EQ_OQ)
+#define q_ne(a, b) Q_COMPARED(a, b, _CMP_NEQ_UQ)
+
+Q_ONE q_mask q_known(int holds) { return (q_mask)-holds; }
+Q_ONE q_mask q_has(q_bits bits, uint64_t asked) {
+    return _mm512_test_epi64_mask((__m512i)bits, _mm512_set1_epi64((long long)asked));
+}
+Q_ONE q_mask q_not(q_mask condition) { return (q_mask)~condition; }
+Q_ONE int q_any(q_mask condition) { return condition != 0; }
+Q_ONE int q_every(q_mask condition) { return condition == 0xff; }
+Q_ONE q_real q_select(q_mask condition, q_real yes, q_real no) {
+    return (q_real)_mm512_mask_blend_pd(condition, (__m512d)no, (__m512d)yes);
+}
+Q_ONE q_real q_sqrt(q_real x) { return (q_real)_mm512_sqrt_pd((__m512d)x); }
+
+#else
+
+typedef q_bits q_mask;
+
+#define q_lt(a, b) ((q_mask)(Q_LANES_OF(a) < Q_LANES_OF(b)))
+#define q_le(a, b) ((q_mask)(Q_LANES_OF(a) <= Q_LANES_OF(b)))
+#define q_gt(a, b) ((q_mask)(Q_LANES_OF(a) > Q_LANES_OF(b)))
+#define q_ge(a, b) ((q_mask)(Q_LANES_OF(a) >= Q_LANES_OF(b)))
+#define q_eq(a, b) ((q_mask)(Q_LANES_OF(a) == Q_LANES_OF(b)))
+#define q_ne(a, b) ((q_mask)(Q_LANES_OF(a) != Q_LANES_OF(b)))
+
+Q_ONE q_mask q_known(int holds) { return (q_mask){0} - (uint64_t)holds; }
+Q_ONE q_mask q_has(q_bits bits, uint64_t asked) { return (q_mask)((bits & asked) != 0u); }
+Q_ONE q_mask q_not(q_mask condition) { return ~condition; }
+
+#if defined(__AVX__) && QUADCOSIM_LANES == 4
+
+Q_ONE int q_any(q_mask condition) { return _mm256_movemask_pd((__m256d)condition) != 0; }
+Q_ONE int q_every(q_mask condition) { return _mm256_movemask_pd((__m256d)condition) == 15; }
+Q_ONE q_real q_select(q_mask condition, q_real yes, q_real no) {
+    return (q_real)_mm256_blendv_pd((__m256d)no, (__m256d)yes, (__m256d)condition);
+}
+Q_ONE q_real q_sqrt(q_real x) { return (q_real)_mm256_sqrt_pd((__m256d)x); }
+
+#else
+
 Q_ONE int q_any(q_mask condition) {
     uint64_t any = 0;
     for (int lane = 0; lane < QUADCOSIM_LANES; lane++) any |= condition[lane];
     return any != 0;
 }
+Q_ONE q_real q_select(q_mask condition, q_real yes, q_real no) {
+    return (q_real)((condition & (q_bits)yes) | (~condition & (q_bits)no));
+}
+
+Q_ONE int q_every(q_mask condition) { return !q_any(~condition); }
 
 /* As many lanes at once as the machine has in a register: gcc makes no vectors of a loop over a root. */
 #if defined(__AVX512F__) && QUADCOSIM_LANES >= 8
@@ -182,6 +244,8 @@ Q_ONE q_real q_sqrt(q_real x) {
     return x;
 }
 
+#endif
+#endif
 #endif
 
 /* -- bits ---------------------------------------------------------------------------------------------------------- */

@@ -30,25 +30,25 @@ Q_ONE q_real q_copysign(q_real magnitude, q_real sign) {
 }
 
 /* As fmu_kit.scalar has it: -1, 0 or 1; a zero of either sign gives 0. */
-Q_ONE q_real q_sign(q_real x) { return q_select(Q_TEST(x == 0.0), q_all(0.0), q_copysign(q_all(1.0), x)); }
+Q_ONE q_real q_sign(q_real x) { return q_select(q_eq(x, 0.0), q_all(0.0), q_copysign(q_all(1.0), x)); }
 
 /* Python's max(a, b) and min(a, b): the first where neither is larger, as where one is not a number. */
-Q_ONE q_real q_max(q_real a, q_real b) { return q_select(Q_TEST(b > a), b, a); }
-Q_ONE q_real q_min(q_real a, q_real b) { return q_select(Q_TEST(b < a), b, a); }
+Q_ONE q_real q_max(q_real a, q_real b) { return q_select(q_gt(b, a), b, a); }
+Q_ONE q_real q_min(q_real a, q_real b) { return q_select(q_lt(b, a), b, a); }
 
-Q_ONE q_mask q_isfinite(q_real x) { return Q_TEST(q_fabs(x) <= DBL_MAX); }
-Q_ONE q_mask q_isinf(q_real x) { return Q_TEST(q_fabs(x) > DBL_MAX); }
-Q_ONE q_mask q_isnan(q_real x) { return Q_TEST(x != x); }
+Q_ONE q_mask q_isfinite(q_real x) { return q_le(q_fabs(x), DBL_MAX); }
+Q_ONE q_mask q_isinf(q_real x) { return q_gt(q_fabs(x), DBL_MAX); }
+Q_ONE q_mask q_isnan(q_real x) { return q_ne(x, x); }
 
 /* To the nearest integer, ties to the even one, as Python's round. */
 Q_ONE q_real q_round(q_real x) {
     const q_real size = q_fabs(x), rounded = (size + 0x1p52) - 0x1p52; /* beyond 2^52 all are integers */
-    return q_copysign(q_select(Q_TEST(size < 0x1p52), rounded, size), x);
+    return q_copysign(q_select(q_lt(size, 0x1p52), rounded, size), x);
 }
 
 Q_ONE q_real q_floor(q_real x) {
     const q_real nearest = q_round(x);
-    return q_copysign(nearest - q_select(Q_TEST(nearest > x), q_all(1.0), q_all(0.0)), x);
+    return q_copysign(nearest - q_select(q_gt(nearest, x), q_all(1.0), q_all(0.0)), x);
 }
 
 Q_ONE q_real q_ceil(q_real x) { return -q_floor(-x); }
@@ -181,7 +181,7 @@ Q_ONE q_real q_atan_series(q_real z) {
 
 /* 2^-n for a number of about 2^n: it takes the number near to 1, however large or small it is. */
 Q_ONE q_real q_unit_for(q_real size) {
-    const q_real bounded = q_select(Q_TEST(size > 0x1p1000), q_all(0x1p1000), size);
+    const q_real bounded = q_select(q_gt(size, 0x1p1000), q_all(0x1p1000), size);
     return q_from_bits((2045u - (q_to_bits(bounded) >> 52)) << 52);
 }
 
@@ -204,15 +204,26 @@ Q_ONE q_octaves q_in_octaves(q_real x, q_real x_low) {
     return (q_octaves){n, q_fast_sum(x - n * Q_LN2_HIGH, x_low - n * Q_LN2_LOW)};
 }
 
+/* exp(r), for |r| < 0.3472. */
+Q_ONE q_real q_exp_of_rest(q_pair rest) {
+    const q_real r = rest.high;
+    const q_pair sum = q_fast_sum(q_all(1.0), r);
+    return sum.high + (sum.low + (rest.low * sum.high + r * r * (0.5 + r * q_exp_series(r))));
+}
+
 /* exp(x + x_low). */
 Q_ONE q_real q_exp_of_sum(q_real x, q_real x_low) {
-    const q_real bounded = q_select(Q_TEST(x > 710.0), q_all(710.0), q_select(Q_TEST(x < -746.0), q_all(-746.0), x));
-    const q_octaves part = q_in_octaves(bounded, q_select(Q_TEST(bounded == x), x_low, q_all(0.0)));
-    const q_real r = part.r.high, half = q_round(0.5 * part.n);
-    const q_pair sum = q_fast_sum(q_all(1.0), r);
-    const q_real mantissa = sum.high + (sum.low + (part.r.low * sum.high + r * r * (0.5 + r * q_exp_series(r))));
+    const q_real bounded = q_select(q_gt(x, 710.0), q_all(710.0), q_select(q_lt(x, -746.0), q_all(-746.0), x));
+    const q_octaves part = q_in_octaves(bounded, q_select(q_eq(bounded, x), x_low, q_all(0.0)));
+    const q_real half = q_round(0.5 * part.n);
     /* In two steps, so that the result may be subnormal, or infinite. */
-    return mantissa * q_power_of_two(half) * q_power_of_two(part.n - half);
+    return q_exp_of_rest(part.r) * q_power_of_two(half) * q_power_of_two(part.n - half);
+}
+
+/* The same, for |x| < 708: in one step. */
+Q_ONE q_real q_exp_of_small_sum(q_real x, q_real x_low) {
+    const q_octaves part = q_in_octaves(x, x_low);
+    return q_exp_of_rest(part.r) * q_power_of_two(part.n);
 }
 
 /* 2^-halvings (exp(x) - 1), for |x| < 710. */
@@ -230,14 +241,14 @@ Q_ONE q_pair q_expm1_pair(q_real x, double halvings) {
 Q_ONE q_real q_own_exp(q_real x) { return q_exp_of_sum(x, q_all(0.0)); }
 
 Q_ONE q_real q_own_expm1(q_real x) {
-    const q_real above = q_select(Q_TEST(x < -60.0), q_all(-60.0), x);
-    const q_pair half = q_expm1_pair(q_select(Q_TEST(x > 710.0), q_all(710.0), above), 1.0);
-    return q_select(Q_TEST(q_fabs(x) < 0x1p-54), x, 2.0 * (half.high + half.low));
+    const q_real above = q_select(q_lt(x, -60.0), q_all(-60.0), x);
+    const q_pair half = q_expm1_pair(q_select(q_gt(x, 710.0), q_all(710.0), above), 1.0);
+    return q_select(q_lt(q_fabs(x), 0x1p-54), x, 2.0 * (half.high + half.low));
 }
 
 Q_ONE q_real q_own_tanh(q_real x) {
     const q_real size = q_fabs(x);
-    const q_pair t = q_expm1_pair(2.0 * q_select(Q_TEST(size > 22.0), q_all(22.0), size), 0.0); /* 1 from there on */
+    const q_pair t = q_expm1_pair(2.0 * q_select(q_gt(size, 22.0), q_all(22.0), size), 0.0); /* 1 from there on */
     const q_pair sum = q_exact_sum(t.high, q_all(2.0));
     const q_pair ratio = q_quotient(t, (q_pair){sum.high, sum.low + t.low});
     return q_copysign(ratio.high + ratio.low, x);
@@ -251,7 +262,7 @@ typedef struct {
 } q_parts;
 
 Q_ONE q_parts q_in_parts(q_real x) {
-    const q_mask subnormal = Q_TEST(x < DBL_MIN);
+    const q_mask subnormal = q_lt(x, DBL_MIN);
     const q_bits bits = q_to_bits(q_select(subnormal, x * 0x1p54, x));
     const q_bits exponent = (bits + (0x3ff0000000000000u - 0x3fe6a09e667f3bcdu)) >> 52; /* 1023 more than n */
     const q_real n = q_from_bits(exponent | 0x4330000000000000u) - (0x1p52 + 1023.0);
@@ -265,8 +276,8 @@ Q_ONE q_real q_own_log(q_real x) {
     const q_pair sum = q_fast_sum(part.n * Q_LN2_HIGH, f);
     const q_real rest = s * (half + z * q_log_series(z)) + (part.n * Q_LN2_LOW + sum.low);
     const q_real log = sum.high - (half - rest);
-    const q_real limit = q_select(Q_TEST(x == 0.0), -Q_INFINITY, q_select(Q_TEST(x > 0.0), x, Q_NAN));
-    return q_select(Q_TEST(x > 0.0) & Q_TEST(x <= DBL_MAX), log, limit);
+    const q_real limit = q_select(q_eq(x, 0.0), -Q_INFINITY, q_select(q_gt(x, 0.0), x, Q_NAN));
+    return q_select(q_gt(x, 0.0) & q_le(x, DBL_MAX), log, limit);
 }
 
 /* The logarithm of a positive finite number as a short pair, to 2^-64 of it:
@@ -283,20 +294,30 @@ Q_ONE q_pair q_log_pair(q_real x) {
     return q_short_sum(part.n * Q_LN2_HIGH, log.high, low + part.n * Q_LN2_LOW);
 }
 
-Q_ONE q_real q_own_pow(q_real x, q_real y) {
+/* x^y, by the logarithm of |x|, whatever they are. */
+Q_SELDOM q_real q_any_power(q_real x, q_real y, q_pair log) {
     const q_real one = q_all(1.0), size = q_fabs(x), y_size = q_fabs(y);
     const q_real exponent = q_copysign(q_min(y_size, q_all(0x1p66)), y); /* enough for any number but 1 */
     const q_real head = q_head(exponent);
-    const q_pair log = q_log_pair(size);
     const q_real regular = q_exp_of_sum(head * log.high, (exponent - head) * log.high + exponent * log.low);
-    const q_real limit = q_select(Q_TEST(y > 0.0), size, 1.0 / size); /* of zero and infinity */
-    const q_mask whole = Q_TEST(q_round(y) == y), odd = whole & Q_TEST(q_round(0.5 * y) != 0.5 * y);
-    const q_mask inner = Q_TEST(size > 0.0) & Q_TEST(size <= DBL_MAX);
+    const q_real limit = q_select(q_gt(y, 0.0), size, 1.0 / size); /* of zero and infinity */
+    const q_mask whole = q_eq(q_round(y), y), odd = whole & q_ne(q_round(0.5 * y), 0.5 * y);
+    const q_mask inner = q_gt(size, 0.0) & q_le(size, DBL_MAX);
     const q_real signed_power = q_select(inner, regular, limit);
     const q_real power_of_x = q_select(odd, q_copysign(signed_power, x), signed_power);
-    const q_real known = q_select(inner & Q_TEST(x < 0.0) & q_not(whole), Q_NAN, power_of_x);
+    const q_real known = q_select(inner & q_lt(x, 0.0) & q_not(whole), Q_NAN, power_of_x);
     const q_real number = q_select(q_isnan(x) | q_isnan(y), x + y, known);
-    return q_select(Q_TEST(y == 0.0) | Q_TEST(x == 1.0), one, number);
+    return q_select(q_eq(y, 0.0) | q_eq(x, 1.0), one, number);
+}
+
+/* Of a positive x, and without overflow, there is nothing else to be thought of. */
+Q_ONE q_real q_own_pow(q_real x, q_real y) {
+    const q_real head = q_head(y);
+    const q_pair log = q_log_pair(q_fabs(x));
+    const q_real product = head * log.high;
+    const q_mask usual = q_gt(x, 0.0) & q_le(x, DBL_MAX) & q_lt(q_fabs(y), 0x1p66) & q_lt(q_fabs(product), 708.0);
+    if (!q_every(usual)) return q_any_power(x, y, log);
+    return q_exp_of_small_sum(product, (y - head) * log.high + y * log.low);
 }
 
 /* -- angles --------------------------------------------------------------------------------------------------------- */
@@ -371,7 +392,7 @@ Q_ONE q_turn q_in_quadrants(q_real x) {
     const q_pair second = q_exact_sum(first.high, -(n * 0x1.3198a2ep-69));
     const q_pair r = q_fast_sum(second.high, second.low + (first.low - n * 0x1.b839a252049c1p-104));
     const q_turn turn = {q_to_bits(n + Q_INTEGER), r};
-    return q_any(Q_TEST(q_fabs(x) > Q_NEAR)) ? q_far_turn(x, turn) : turn;
+    return q_any(q_gt(q_fabs(x), Q_NEAR)) ? q_far_turn(x, turn) : turn;
 }
 
 /* sin r and cos r, for |r| < 0.7855. */
@@ -387,7 +408,7 @@ Q_ONE q_pair q_cos_pair(q_pair r) {
 }
 
 /* The quadrant's bits as a mask and a sign. */
-Q_ONE q_mask q_is_odd(q_bits quadrant) { return Q_TEST((quadrant & 1u) != 0u); }
+Q_ONE q_mask q_is_odd(q_bits quadrant) { return q_has(quadrant, 1u); }
 Q_ONE q_real q_signed_by(q_real x, q_bits bit_one) { return q_from_bits(q_to_bits(x) ^ ((bit_one & 2u) << 62)); }
 
 typedef struct {
@@ -401,7 +422,7 @@ Q_ONE q_sines q_own_sin_cos(q_real x) {
     const q_mask odd = q_is_odd(turn.quadrant);
     const q_real sine = q_signed_by(q_select(odd, near_one, near_zero), turn.quadrant);
     const q_real cosine = q_signed_by(q_select(odd, near_zero, near_one), turn.quadrant + 1u);
-    return (q_sines){q_select(Q_TEST(x == 0.0), x, sine), cosine};
+    return (q_sines){q_select(q_eq(x, 0.0), x, sine), cosine};
 }
 
 Q_ONE q_real q_own_sin(q_real x) { return q_own_sin_cos(x).sin; }
@@ -414,7 +435,7 @@ Q_ONE q_real q_own_tan(q_real x) {
     const q_pair above = {q_select(odd, -cosine.high, sine.high), q_select(odd, -cosine.low, sine.low)};
     const q_pair below = {q_select(odd, sine.high, cosine.high), q_select(odd, sine.low, cosine.low)};
     const q_pair ratio = q_quotient(above, below);
-    return q_select(Q_TEST(q_fabs(x) < 0x1p-27), x, ratio.high + ratio.low);
+    return q_select(q_lt(q_fabs(x), 0x1p-27), x, ratio.high + ratio.low);
 }
 
 /* asin s = s + s^3 series(s^2) below 1/2; from there on asin x = pi/2 - 2 asin sqrt((1 - x) / 2). */
@@ -429,11 +450,11 @@ typedef struct {
 } q_arc;
 
 Q_ONE q_arc q_arc_of(q_real size) {
-    const q_mask large = Q_TEST(size >= 0.5);
+    const q_mask large = q_ge(size, 0.5);
     const q_real z = q_select(large, 0.5 * (1.0 - size), size * size), s = q_select(large, q_sqrt(z), size);
     const q_pair square = q_exact_product(s, s);
     const q_real missing = ((z - square.high) - square.low) / (s + s);
-    const q_real low = q_select(large & Q_TEST(s > 0.0), missing, q_all(0.0)), factor = q_select(large, q_all(2.0), q_all(1.0));
+    const q_real low = q_select(large & q_gt(s, 0.0), missing, q_all(0.0)), factor = q_select(large, q_all(2.0), q_all(1.0));
     return (q_arc){large, factor * s, factor * (low + s * z * q_asin_series(z))};
 }
 
@@ -447,7 +468,7 @@ Q_ONE q_real q_own_asin(q_real x) {
 Q_ONE q_real q_own_acos(q_real x) {
     const q_arc arc = q_arc_of(q_fabs(x));
     const q_real zero = q_all(0.0), one = q_all(1.0);
-    const q_real turns = q_select(arc.large, q_select(Q_TEST(x < 0.0), q_all(2.0), zero), one); /* in pi/2 */
+    const q_real turns = q_select(arc.large, q_select(q_lt(x, 0.0), q_all(2.0), zero), one); /* in pi/2 */
     const q_real sign = q_copysign(one, x) * q_select(arc.large, one, -one);
     const q_pair most = q_fast_sum(turns * Q_HALF_PI, sign * arc.s);
     return most.high + (most.low + (turns * Q_HALF_PI_LOW + sign * arc.rest));
@@ -457,22 +478,22 @@ Q_ONE q_real q_own_acos(q_real x) {
    above tan(pi/8), then its place among the eight octants. */
 Q_ONE q_real q_own_atan2(q_real y, q_real x) {
     const q_real zero = q_all(0.0), one = q_all(1.0), x_size = q_fabs(x), y_size = q_fabs(y);
-    const q_mask steep = Q_TEST(y_size > x_size), back = Q_TEST(q_copysign(one, x) < 0.0);
+    const q_mask steep = q_gt(y_size, x_size), back = q_lt(q_copysign(one, x), 0.0);
     const q_real larger = q_select(steep, y_size, x_size), smaller = q_select(steep, x_size, y_size);
-    const q_mask none = Q_TEST(larger > DBL_MAX) | Q_TEST(larger == 0.0);
+    const q_mask none = q_gt(larger, DBL_MAX) | q_eq(larger, 0.0);
     /* Scaled so that nothing overflows, and that no product is subnormal but that of a tiny angle. */
-    const q_real shrunk = q_select(Q_TEST(larger > 0x1p1000), q_all(0x1p-100), one);
-    const q_real unit = q_select(Q_TEST(larger < 1.0), q_unit_for(larger), shrunk);
-    const q_real corner = q_select(Q_TEST(smaller == Q_INFINITY), one, zero); /* as if both were 1 */
+    const q_real shrunk = q_select(q_gt(larger, 0x1p1000), q_all(0x1p-100), one);
+    const q_real unit = q_select(q_lt(larger, 1.0), q_unit_for(larger), shrunk);
+    const q_real corner = q_select(q_eq(smaller, Q_INFINITY), one, zero); /* as if both were 1 */
     const q_real b = q_select(none, one, larger * unit), a = q_select(none, corner, smaller * unit);
-    const q_mask diagonal = Q_TEST(a > 0x1.a827999fcef32p-2 * b);
+    const q_mask diagonal = q_gt(a, 0x1.a827999fcef32p-2 * b);
     const q_pair difference = q_fast_sum(-b, a), sum = q_fast_sum(b, a);
     const q_pair above = {q_select(diagonal, difference.high, a), q_select(diagonal, difference.low, zero)};
     const q_pair below = {q_select(diagonal, sum.high, b), q_select(diagonal, sum.low, zero)};
     const q_real t = above.high / below.high, z = t * t;
     const q_pair again = q_exact_product(t, below.high);
     const q_real missing = ((above.high - again.high) - again.low) + (above.low - t * below.low);
-    const q_real t_low = q_select(Q_TEST(q_fabs(t) > 0x1p-900), missing / below.high, zero);
+    const q_real t_low = q_select(q_gt(q_fabs(t), 0x1p-900), missing / below.high, zero);
     const q_real rest = t_low + t * z * q_atan_series(z);
     /* angle = sign (t + rest) + eighths pi/4 */
     const q_real eighth = q_select(diagonal, one, zero), up = q_select(steep, 2.0 - eighth, eighth);
@@ -488,8 +509,8 @@ Q_ONE q_real q_own_atan(q_real x) { return q_own_atan2(x, q_all(1.0)); }
 
 /* As CPython's, which is its own and not libm's, so in both modes. (Of a subnormal length, as from CPython 3.12.) */
 Q_ONE q_real q_hypot(q_real x, q_real y) {
-    const q_real x_size = q_fabs(x), y_size = q_fabs(y), larger = q_select(Q_TEST(y_size > x_size), y_size, x_size);
-    const q_real smaller = q_select(Q_TEST(y_size > x_size), x_size, y_size);
+    const q_real x_size = q_fabs(x), y_size = q_fabs(y), larger = q_select(q_gt(y_size, x_size), y_size, x_size);
+    const q_real smaller = q_select(q_gt(y_size, x_size), x_size, y_size);
     const q_real unit = q_unit_for(larger), a = larger * unit, b = smaller * unit;
     const q_pair a_square = q_exact_product(a, a), b_square = q_exact_product(b, b);
     const q_pair square = q_fast_sum(a_square.high, b_square.high);
@@ -497,9 +518,9 @@ Q_ONE q_real q_hypot(q_real x, q_real y) {
     const q_pair again = q_exact_product(root, root);
     const q_real missing = ((square.high - again.high) - again.low) + (square.low + (a_square.low + b_square.low));
     const q_real length = (root + missing / (root + root)) / unit;
-    const q_real regular = q_select(Q_TEST(larger > 0.0) & Q_TEST(larger <= DBL_MAX), length, larger);
+    const q_real regular = q_select(q_gt(larger, 0.0) & q_le(larger, DBL_MAX), length, larger);
     const q_real number = q_select(q_isnan(x) | q_isnan(y), x + y, regular);
-    return q_select(Q_TEST(x_size == Q_INFINITY) | Q_TEST(y_size == Q_INFINITY), Q_INFINITY, number);
+    return q_select(q_eq(x_size, Q_INFINITY) | q_eq(y_size, Q_INFINITY), Q_INFINITY, number);
 }
 
 /* A positive number as 53 bits, the first of them set, times 2^(exponent - 1075). */
@@ -548,17 +569,17 @@ Q_ONE q_real q_fmod(q_real x, q_real y) {
 /* Python's x % y, for a y that is not zero (there Python raises): the sign is that of y. */
 Q_ONE q_real q_modulo(q_real x, q_real y) {
     const q_real rest = q_fmod(x, y);
-    const q_real moved = q_select(Q_TEST(y < 0.0) ^ Q_TEST(rest < 0.0), rest + y, rest);
-    return q_select(Q_TEST(rest == 0.0), q_copysign(q_all(0.0), y), moved);
+    const q_real moved = q_select(q_lt(y, 0.0) ^ q_lt(rest, 0.0), rest + y, rest);
+    return q_select(q_eq(rest, 0.0), q_copysign(q_all(0.0), y), moved);
 }
 
 /* Python's x // y, likewise. */
 Q_ONE q_real q_floor_divide(q_real x, q_real y) {
     const q_real zero = q_all(0.0), one = q_all(1.0), rest = q_fmod(x, y);
-    const q_mask moved = q_not(Q_TEST(rest == 0.0)) & (Q_TEST(y < 0.0) ^ Q_TEST(rest < 0.0));
+    const q_mask moved = q_not(q_eq(rest, 0.0)) & (q_lt(y, 0.0) ^ q_lt(rest, 0.0));
     const q_real quotient = (x - rest) / y - q_select(moved, one, zero), below = q_floor(quotient);
-    const q_real whole = below + q_select(Q_TEST(quotient - below > 0.5), one, zero);
-    return q_select(Q_TEST(quotient == 0.0), q_copysign(zero, x / y), whole);
+    const q_real whole = below + q_select(q_gt(quotient - below, 0.5), one, zero);
+    return q_select(q_eq(quotient, 0.0), q_copysign(zero, x / y), whole);
 }
 
 /* -- whose functions ---------------------------------------------------------------------------------------------------- */

@@ -24,7 +24,12 @@ typedef struct {
     q_real sin, cos;
 } q_sines;
 
-#define Q_TEST(comparison) ((q_mask)(comparison))
+#define q_lt(a, b) ((q_mask)((a) < (b)))
+#define q_le(a, b) ((q_mask)((a) <= (b)))
+#define q_gt(a, b) ((q_mask)((a) > (b)))
+#define q_ge(a, b) ((q_mask)((a) >= (b)))
+#define q_eq(a, b) ((q_mask)((a) == (b)))
+#define q_ne(a, b) ((q_mask)((a) != (b)))
 #define Q_INFINITY INFINITY
 #define Q_NAN NAN
 
@@ -34,9 +39,9 @@ Q_ONE q_real q_select(q_mask condition, q_real yes, q_real no) { return conditio
 Q_ONE q_mask q_not(q_mask condition) { return !condition; }
 Q_ONE q_real q_fabs(q_real x) { return fabsf(x); }
 Q_ONE q_real q_copysign(q_real magnitude, q_real sign) { return copysignf(magnitude, sign); }
-Q_ONE q_mask q_isfinite(q_real x) { return Q_TEST(q_fabs(x) <= FLT_MAX); }
-Q_ONE q_mask q_isinf(q_real x) { return Q_TEST(q_fabs(x) > FLT_MAX); }
-Q_ONE q_mask q_isnan(q_real x) { return Q_TEST(x != x); }
+Q_ONE q_mask q_isfinite(q_real x) { return q_le(q_fabs(x), FLT_MAX); }
+Q_ONE q_mask q_isinf(q_real x) { return q_gt(q_fabs(x), FLT_MAX); }
+Q_ONE q_mask q_isnan(q_real x) { return q_ne(x, x); }
 Q_ONE q_real q_floor(q_real x) { return floorf(x); }
 Q_ONE q_real q_ceil(q_real x) { return ceilf(x); }
 Q_ONE q_real q_sqrt(q_real x) { return sqrtf(x); }
