@@ -22,6 +22,7 @@ def main() -> None:
     for place, draw in (
         ("controller_fmu/sliding_mode/UnifiedController", controller),
         ("controller_fmu/geometric/GeometricController", geometric),
+        ("controller_fmu/cascaded/CascadedController", cascade),
         ("plant_fmu/QuadrotorPlant", plant),
     ):
         figure = Figure(figsize=(1.0, 1.0), dpi=PIXELS)
@@ -63,6 +64,20 @@ def geometric(axes: Axes) -> None:
     axes.plot(x, y, color=ORANGE, linewidth=2.2)
     axes.plot((0.0, x[-1]), (0.0, y[-1]), color=ORANGE, linewidth=2.2)
     axes.plot(x[-1], y[-1], "o", color=ORANGE, markersize=5.0, markeredgecolor=PALE, markeredgewidth=0.8)
+
+
+def cascade(axes: Axes) -> None:
+    """Loops one above the other, each sampled oftener than the one above it."""
+    _tile(axes, BLUE)
+    t = np.linspace(-0.74, 0.74, 200)
+    for height, count in ((0.5, 3), (0.0, 6), (-0.5, 14)):
+        samples = np.linspace(-0.74, 0.74, count + 1)
+        signal = height + 0.2 * np.sin(4.2 * t + 0.5)
+        held = np.interp(samples, t, signal)
+        held[-1] = held[-2]
+        axes.plot(t, signal, color="white", linewidth=0.8, alpha=0.5)
+        axes.step(samples, held, where="post", color=PALE, linewidth=1.8)
+        axes.plot(samples[:-1], held[:-1], "o", color=ORANGE, markersize=2.8)
 
 
 def plant(axes: Axes) -> None:

@@ -237,20 +237,25 @@ class PlantStep:
 
 _UNITS = np.eye(_COMMANDS)
 _BOTH_WAYS = (STEP, -STEP)
+_FORGOTTEN = 1e-9
+"""of a command: how far it may be from what it was before the controller measured something else"""
 
 
 def _controller_at_hover(hover: Scenario, fleet: Instances) -> tuple[Floats, Floats]:
-    """The command at hover and its derivative by the coordinates, shape (4, 12)."""
+    """The command at hover and its derivative by the coordinates, shape (4, 12).
+
+    Raises `UsageError` for a controller with a memory: its command is no function of the vehicle's state.
+    """
     with prepared(hover, load=fleet.load) as flight:
         controller = flight.instances["controller"]
         at_rest = _measurement({})
         _initialise(controller, wiring.MEASUREMENT, at_rest)
         step = min(STEP, 1e-3 * _value(controller, wiring.BOUNDARY_LAYER, absent=1.0))
 
-        def command(measurement: Floats) -> Floats:
+        def command(measurement: Floats, t: float = 0.0) -> Floats:
             result: Floats = np.zeros(_COMMANDS)
             controller.writer(wiring.MEASUREMENT, measurement)()
-            controller.step(0.0, hover.timing.period)
+            controller.step(t, hover.timing.period)
             controller.reader(wiring.COMMAND, result)()
             return result
 
@@ -258,7 +263,12 @@ def _controller_at_hover(hover: Scenario, fleet: Instances) -> tuple[Floats, Flo
         for name in COORDINATES:
             plus, minus = (command(_measurement(_displaced(name, size))) for size in (step, -step))
             columns.append((plus - minus) / (2.0 * step))
-        return command(at_rest), np.column_stack(columns)
+        trim = command(at_rest)
+        away = at_rest + 1e3 * step
+        later = [command(x, (k + 1) * hover.timing.period) for k, x in enumerate((away, away, at_rest))]
+        if np.abs(later[-1] - trim).max() > _FORGOTTEN * max(1.0, float(np.abs(trim).max())):
+            raise UsageError("the controller's command depends on what it measured before")
+        return trim, np.column_stack(columns)
 
 
 def _value(fmu: Instance, name: str, *, absent: float) -> float:

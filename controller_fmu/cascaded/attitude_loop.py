@@ -1,0 +1,78 @@
+"""From the force to exert to an attitude, and from attitude errors to angular velocities.
+
+PX4: ControlMath.cpp, AttitudeControl.cpp.
+"""
+
+import math
+from dataclasses import dataclass
+
+from controller_fmu.cascaded.filters import clamped_axes
+from fmu_kit.algebra import Quaternion, Vec3
+from fmu_kit.scalar import FLOAT
+
+SMALLEST_SINE = 1e-5
+"""Thrust axes that are opposite up to it have no shortest way from one to the other."""
+SMALLEST_WEIGHT = 1e-4
+"""A yaw weight up to it is none."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class AttitudeLoop:
+    """P on quaternions, with less weight on yaw than on tilt; the defaults are PX4's."""
+
+    gain: Vec3 = Vec3(6.5, 6.5, 2.8)
+    """K [1/s] (MC_ROLL_P, MC_PITCH_P, MC_YAW_P)"""
+    yaw_weight: float = 0.4
+    """w [1], in [0, 1] (MC_YAW_WEIGHT)"""
+    rate_limit: Vec3 = Vec3(math.radians(220.0), math.radians(220.0), math.radians(200.0))
+    """[rad/s], body (MC_ROLLRATE_MAX, MC_PITCHRATE_MAX, MC_YAWRATE_MAX)"""
+
+    def angular_velocity(self, attitude: Quaternion, desired: Quaternion) -> Vec3:
+        """The desired angular velocity [rad/s], body: 2 K ∘ q of Q⁻¹ ⊙ Q_d with its yaw weighted, within the limits."""
+        error = attitude.inverse() * with_less_yaw(attitude, desired, self.yaw_weight)
+        sign = FLOAT.where(error.scalar < 0.0, -2.0, 2.0)  # Q and -Q are one attitude: the short way round
+        weighted = self.yaw_weight > SMALLEST_WEIGHT
+        yaw_gain = self.gain.z / FLOAT.where(weighted, self.yaw_weight, 1.0)  # so the weight leaves small yaw errors be
+        return clamped_axes(Vec3(self.gain.x, self.gain.y, yaw_gain) * (sign * error.vector), self.rate_limit)
+
+
+def attitude_of(force: Vec3) -> Quaternion:
+    """The attitude whose thrust axis exerts `force` [N], inertial, with the nose to the north: z of `force` < 0."""
+    z = -force / force.norm()
+    along = math.sqrt(z.x * z.x + z.z * z.z)
+    x = Vec3(z.z / along, 0.0, -z.x / along)  # the axis of the body in the plane of north and down
+    y = z.cross(x)
+    q0 = 0.5 * math.sqrt(1.0 + x.x + y.y + z.z)  # at least 1/2: the thrust points upwards
+    return Quaternion(Vec3(y.z - z.y, z.x - x.z, x.y - y.x) / (4.0 * q0), q0)
+
+
+def with_less_yaw(attitude: Quaternion, desired: Quaternion, weight: float) -> Quaternion:
+    """`desired` with its turn about the thrust axis times `weight` [1]: Q_d = Q_tilt ⊙ Q_yaw becomes Q_tilt ⊙ Q_yaw^w.
+
+    Q_tilt is `attitude` turned the shortest way until its thrust axis is that of `desired`.
+    """
+    tilted = tilted_to(attitude, desired)
+    yaw = tilted.inverse() * desired  # about z alone
+    sign = FLOAT.where(yaw.scalar < 0.0, -1.0, 1.0)
+    half = weight * math.atan2(sign * yaw.vector.z, sign * yaw.scalar)
+    return tilted * Quaternion(Vec3(0.0, 0.0, math.sin(half)), math.cos(half))
+
+
+def tilted_to(attitude: Quaternion, desired: Quaternion) -> Quaternion:
+    """`attitude` turned the shortest way until its thrust axis is that of `desired`.
+
+    Where the two axes are opposite there is no shortest way: it is `desired`.
+    """
+    now, then = attitude.z_axis(), desired.z_axis()
+    axis, cosine = now.cross(then), now @ then
+    opposite = (cosine < 0.0) & (axis @ axis < SMALLEST_SINE * SMALLEST_SINE)
+    turn = Quaternion(axis, FLOAT.where(opposite, 1.0, 1.0 + cosine)).normalised()
+    tilted = turn * attitude
+    return Quaternion(
+        Vec3(
+            FLOAT.where(opposite, desired.vector.x, tilted.vector.x),
+            FLOAT.where(opposite, desired.vector.y, tilted.vector.y),
+            FLOAT.where(opposite, desired.vector.z, tilted.vector.z),
+        ),
+        FLOAT.where(opposite, desired.scalar, tilted.scalar),
+    )
