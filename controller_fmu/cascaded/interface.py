@@ -1,7 +1,5 @@
 """The variables of the cascade's FMU: those of every controller, and what its loops add, with PX4's names for them."""
 
-from dataclasses import replace
-
 from controller_fmu.cascaded.airframe import Airframe
 from controller_fmu.cascaded.attitude_loop import AttitudeLoop
 from controller_fmu.cascaded.position_loop import PositionLoop
@@ -18,9 +16,8 @@ from controller_fmu.interface import (
 from fmu_kit.algebra import Vec3
 from fmu_kit.variables import Variable, discrete_local, fixed_parameter, tunable_parameter, vector
 
-SAMPLE_PERIOD = 0.001
-"""[s], of the rate loop; with the ratios the others have 4 and 20 ms"""
 VELOCITY_RATIO, ATTITUDE_RATIO = 20, 4
+"""With a `sample_period` of 1 ms these are PX4's 50 and 250 Hz below a rate loop of 1000 Hz."""
 STEEPEST = 89.0 / 90.0 * 1.5707963267948966
 """[rad]; a tilt limit is no larger, as with PX4"""
 
@@ -166,16 +163,22 @@ LOOP_LOCALS = (
 
 RATIOS = (
     fixed_parameter(
-        "velocity_ratio", "samples from one run of the position and velocity loops to the next", None, VELOCITY_RATIO
+        "velocity_ratio",
+        "samples from one run of the position and velocity loops to the next",
+        None,
+        VELOCITY_RATIO,
+        minimum=1,
     ),
-    fixed_parameter("attitude_ratio", "samples from one run of the attitude loop to the next", None, ATTITUDE_RATIO),
+    fixed_parameter(
+        "attitude_ratio", "samples from one run of the attitude loop to the next", None, ATTITUDE_RATIO, minimum=1
+    ),
 )
 
 CASCADED = (
     *MEASUREMENT,
     *REFERENCE,
     *COMMAND,
-    *(replace(v, start=SAMPLE_PERIOD) if v.name == "sample_period" else v for v in COMMON_PARAMETERS),
+    *COMMON_PARAMETERS,
     *AIRFRAME,
     *TRANSLATION,
     *ROTATION,

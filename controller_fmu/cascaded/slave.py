@@ -1,10 +1,8 @@
 """The cascade as an FMU: runs each loop when its turn is, holds what it has come to, and keeps what it remembers."""
 
-from pythonfmu.default_experiment import DefaultExperiment
-
 from controller_fmu.cascaded.airframe import Airframe
 from controller_fmu.cascaded.attitude_loop import AttitudeLoop, attitude_of
-from controller_fmu.cascaded.interface import CASCADED, SAMPLE_PERIOD
+from controller_fmu.cascaded.interface import CASCADED
 from controller_fmu.cascaded.position_loop import PositionLoop
 from controller_fmu.cascaded.rate_loop import RateLoop, RateState, control_rate, rate_state_at
 from controller_fmu.cascaded.velocity_loop import VelocityLoop, VelocityState, control_velocity, velocity_state_at
@@ -25,7 +23,6 @@ class CascadedController(SampledController):
     description = (
         "Cascade of position, velocity, attitude and rate loops for a quadrotor, with PX4's structure, sampled"
     )
-    default_experiment = DefaultExperiment(start_time=0.0, stop_time=30.0, step_size=SAMPLE_PERIOD)
 
     def read_gains(self) -> None:
         """Take over the loops, the airframe and the ratios."""
@@ -37,8 +34,8 @@ class CascadedController(SampledController):
         )
         self._read_translation()
         self._read_rotation()
-        self._velocity_ratio = self._ratio("velocity_ratio")
-        self._attitude_ratio = self._ratio("attitude_ratio")
+        self._velocity_ratio = self.count("velocity_ratio")
+        self._attitude_ratio = self.count("attitude_ratio")
 
     def initialise(self, t: float) -> None:
         """Hold the command for the initial inputs; nothing of them is remembered, as this is not a sample."""
@@ -189,11 +186,6 @@ class CascadedController(SampledController):
     def _plane(self, name: str) -> Vec3:
         horizontal = self.real(f"{name}.horizontal")
         return Vec3(horizontal, horizontal, self.real(f"{name}.vertical"))
-
-    def _ratio(self, name: str) -> int:
-        ratio = self.count(name)
-        require(ratio >= 1, name, ratio, "at least 1")
-        return ratio
 
 
 def _vector(values: list[float]) -> Vec3:
