@@ -163,7 +163,8 @@ def dependencies(slave: Any) -> tuple[list[int], list[int]]:
     outputs, inputs = (
         [i for i, v in enumerate(slave.variables) if v.causality == causality] for causality in ("output", "input")
     )
-    return outputs, inputs if slave.initial_outputs_depend_on_inputs else []
+    moving = [i for i in inputs if slave.variables[i].name not in slave.initially_idle]
+    return outputs, moving if slave.initial_outputs_depend_on_inputs else []
 
 
 def _simple_type(types: Element, name: str) -> Element:

@@ -66,6 +66,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     description: ClassVar[str]
     initial_outputs_depend_on_inputs: ClassVar[bool] = True
     """Whether outputs depend on the inputs when initialisation ends; at no other time they do."""
+    initially_idle: ClassVar[frozenset[str]] = frozenset()
+    """Inputs on which no output depends even then."""
 
     author = "The quadcosim authors"
     license = "MIT"

@@ -28,7 +28,7 @@ class Airframe:
     """a_x [m], from the centre to each motor along x of the body"""
     arm_y: float = 0.2 / 0.025
     """a_y [m], along y"""
-    drag_to_thrust: float = 0.02 / 0.03
+    drag_to_thrust: float = 2.0 / 3.0
     """κ_τ [m], torque about z by thrust of a propeller"""
 
     @property

@@ -41,9 +41,7 @@ def attitude_of(force: Vec3) -> Quaternion:
     z = -force / force.norm()
     along = math.sqrt(z.x * z.x + z.z * z.z)
     x = Vec3(z.z / along, 0.0, -z.x / along)  # the axis of the body in the plane of north and down
-    y = z.cross(x)
-    q0 = 0.5 * math.sqrt(1.0 + x.x + y.y + z.z)  # at least 1/2: the thrust points upwards
-    return Quaternion(Vec3(y.z - z.y, z.x - x.z, x.y - y.x) / (4.0 * q0), q0)
+    return Quaternion.from_axes(x, z.cross(x), z)
 
 
 def with_less_yaw(attitude: Quaternion, desired: Quaternion, weight: float) -> Quaternion:

@@ -3,24 +3,20 @@
 An elapsed time of 0 leaves each as it is, which makes the first run of a loop no special case.
 """
 
-import math
-
 from fmu_kit.algebra import Vec3
 
 
-def time_constant(cutoff: float) -> float:
-    """τ = 1/(2π f) [s] of a low-pass with cutoff f [Hz], f > 0."""
-    return 1.0 / (2.0 * math.pi * cutoff)
-
-
 def low_pass(filtered: float, sample: float, elapsed: float, cutoff: float) -> float:
-    """x + dt (sample - x)/(τ + dt): the backward difference, dt = `elapsed` [s] after x was `filtered`."""
-    return filtered + elapsed * (sample - filtered) / (time_constant(cutoff) + elapsed)
+    """x + dt (sample - x)/(τ + dt): the backward difference, dt = `elapsed` [s] after x was `filtered`.
+
+    τ = 1/`cutoff`, in rad/s and larger than 0.
+    """
+    return filtered + elapsed * (sample - filtered) / (1.0 / cutoff + elapsed)
 
 
 def filtered_derivative(derivative: Vec3, change: Vec3, elapsed: float, cutoff: float) -> Vec3:
     """The low-pass of change/elapsed, each axis, `elapsed` [s] after it was `derivative`; no division by 0."""
-    return derivative + (change - elapsed * derivative) / (time_constant(cutoff) + elapsed)
+    return derivative + (change - elapsed * derivative) / (1.0 / cutoff + elapsed)
 
 
 def clamped(value: float, lowest: float, highest: float) -> float:

@@ -75,7 +75,11 @@ TRANSLATION = (
         ("MPC_XY_VEL_D_ACC", "MPC_Z_VEL_D_ACC"),
     ),
     tunable_parameter(
-        "cutoff.velocity_derivative", "of its low-pass (MPC_VELD_LP)", "Hz", _VELOCITY.derivative_cutoff, above=0.0
+        "cutoff.velocity_derivative",
+        "of its low-pass (MPC_VELD_LP: 5 Hz)",
+        "rad/s",
+        _VELOCITY.derivative_cutoff,
+        above=0.0,
     ),
     tunable_parameter("limit.velocity.horizontal", "(MPC_XY_VEL_MAX)", "m/s", _POSITION.horizontal_limit, above=0.0),
     tunable_parameter("limit.velocity.up", "(MPC_Z_VEL_MAX_UP)", "m/s", _POSITION.upward_limit, minimum=0.0),
@@ -138,10 +142,18 @@ ROTATION = (
         _RATE.feedforward,
     ),
     tunable_parameter(
-        "cutoff.rate_derivative", "of its low-pass (IMU_DGYRO_CUTOFF)", "Hz", _RATE.derivative_cutoff, above=0.0
+        "cutoff.rate_derivative",
+        "of its low-pass (IMU_DGYRO_CUTOFF: 30 Hz)",
+        "rad/s",
+        _RATE.derivative_cutoff,
+        above=0.0,
     ),
     tunable_parameter(
-        "cutoff.yaw_torque", "of the low-pass of the yaw command (MC_YAW_TQ_CUTOFF)", "Hz", _RATE.yaw_cutoff, above=0.0
+        "cutoff.yaw_torque",
+        "of the low-pass of the yaw command (MC_YAW_TQ_CUTOFF: 2 Hz)",
+        "rad/s",
+        _RATE.yaw_cutoff,
+        above=0.0,
     ),
     *vector(
         tunable_parameter(

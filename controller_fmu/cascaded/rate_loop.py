@@ -33,10 +33,10 @@ class RateLoop:
     """of the desired angular velocity [1/s] (MC_ROLLRATE_FF, MC_PITCHRATE_FF, MC_YAWRATE_FF)"""
     integral_limit: Vec3 = Vec3(0.3, 0.3, 0.3)
     """of a full command [1] (MC_RR_INT_LIM, MC_PR_INT_LIM, MC_YR_INT_LIM)"""
-    derivative_cutoff: float = 30.0
-    """[Hz] (IMU_DGYRO_CUTOFF)"""
-    yaw_cutoff: float = 2.0
-    """[Hz], of the yaw command (MC_YAW_TQ_CUTOFF)"""
+    derivative_cutoff: float = 2.0 * math.pi * 30.0
+    """[rad/s] (IMU_DGYRO_CUTOFF: 30 Hz)"""
+    yaw_cutoff: float = 2.0 * math.pi * 2.0
+    """[rad/s], of the yaw command (MC_YAW_TQ_CUTOFF: 2 Hz)"""
 
 
 class RateState(NamedTuple):

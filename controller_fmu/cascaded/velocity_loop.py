@@ -23,8 +23,8 @@ class VelocityLoop:
     """I [1/s²] (MPC_XY_VEL_I_ACC, MPC_Z_VEL_I_ACC)"""
     derivative: Vec3 = Vec3(0.2, 0.2, 0.0)
     """D [1] (MPC_XY_VEL_D_ACC, MPC_Z_VEL_D_ACC)"""
-    derivative_cutoff: float = 5.0
-    """[Hz] (MPC_VELD_LP)"""
+    derivative_cutoff: float = 2.0 * math.pi * 5.0
+    """[rad/s] (MPC_VELD_LP: 5 Hz)"""
     tilt_limit: float = math.radians(45.0)
     """[rad] (MPC_TILTMAX_AIR)"""
     least_thrust: float = 0.12

@@ -1,9 +1,11 @@
 """What people wire to: names, causalities, variabilities, units and starts, written down apart from the sources."""
 
+import math
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 XYZ, XYZW, INERTIA = ("x", "y", "z"), ("x", "y", "z", "w"), ("xx", "yy", "zz", "xy", "xz", "yz")
+PLANES = ("horizontal", "vertical")
 
 
 class Row(NamedTuple):
@@ -137,4 +139,50 @@ GEOMETRIC = (
     *row("energy", "local discrete", "J"),
 )
 
-TABLES = {"QuadrotorPlant": PLANT, "UnifiedController": UNIFIED, "GeometricController": GEOMETRIC}
+_FULL = 2.0 * math.sqrt(2.0) * 5.0 * 0.2 / 0.025
+_FULL_YAW = 4.0 * 5.0 * (2.0 / 3.0)
+"""[rad/s²] of a full command, about x and y, and about z"""
+_RATES = (math.radians(220.0), math.radians(220.0), math.radians(200.0))
+
+CASCADED = (
+    *_COMMON,
+    *row("motor.thrust_max", "parameter fixed", "N", 5.0),
+    *row("motor.arm.x", "parameter fixed", "m", 8.0),
+    *row("motor.arm.y", "parameter fixed", "m", 8.0),
+    *row("motor.drag_to_thrust", "parameter fixed", "m", 2.0 / 3.0),
+    *row("gain.position", "parameter tunable", "1/s", axes=PLANES, starts=(0.95, 1.0)),
+    *row("gain.velocity", "parameter tunable", "1/s", axes=PLANES, starts=(1.8, 4.0)),
+    *row("gain.velocity_integral", "parameter tunable", "1/s2", axes=PLANES, starts=(0.4, 2.0)),
+    *row("gain.velocity_derivative", "parameter tunable", "1", axes=PLANES, starts=(0.2, 0.0)),
+    *row("cutoff.velocity_derivative", "parameter tunable", "rad/s", 10.0 * math.pi),
+    *row("limit.velocity", "parameter tunable", "m/s", axes=("horizontal", "up", "down"), starts=(12.0, 3.0, 1.5)),
+    *row("limit.tilt", "parameter tunable", "rad", math.radians(45.0)),
+    *row(
+        "limit.thrust", "parameter tunable", "1", axes=("least", "most", "horizontal_margin"), starts=(0.12, 1.0, 0.3)
+    ),
+    *row("gain.attitude", "parameter tunable", "1/s", axes=XYZ, starts=(6.5, 6.5, 2.8)),
+    *row("yaw_weight", "parameter tunable", "1", 0.4),
+    *row("limit.angular_velocity", "parameter tunable", "rad/s", axes=XYZ, starts=_RATES),
+    *row("gain.rate", "parameter tunable", "1/s", axes=XYZ, starts=(0.15 * _FULL, 0.15 * _FULL, 0.2 * _FULL_YAW)),
+    *row(
+        "gain.rate_integral", "parameter tunable", "1/s2", axes=XYZ, starts=(0.2 * _FULL, 0.2 * _FULL, 0.1 * _FULL_YAW)
+    ),
+    *row("gain.rate_derivative", "parameter tunable", "1", axes=XYZ, starts=(0.003 * _FULL, 0.003 * _FULL, 0.0)),
+    *row("gain.rate_feedforward", "parameter tunable", "1/s", 0.0, axes=XYZ),
+    *row("cutoff.rate_derivative", "parameter tunable", "rad/s", 60.0 * math.pi),
+    *row("cutoff.yaw_torque", "parameter tunable", "rad/s", 4.0 * math.pi),
+    *row("limit.rate_integral", "parameter tunable", "1", 0.3, axes=XYZ),
+    *row("desired_velocity", "local discrete", "m/s", axes=XYZ),
+    *row("velocity_integral", "local discrete", "m/s2", axes=XYZ),
+    *row("desired_angular_velocity", "local discrete", "rad/s", axes=XYZ),
+    *row("rate_integral", "local discrete", "rad/s2", axes=XYZ),
+    *row("velocity_ratio", "parameter fixed", None, 20, type="Integer"),
+    *row("attitude_ratio", "parameter fixed", None, 4, type="Integer"),
+)
+
+TABLES = {
+    "QuadrotorPlant": PLANT,
+    "UnifiedController": UNIFIED,
+    "GeometricController": GEOMETRIC,
+    "CascadedController": CASCADED,
+}

@@ -29,6 +29,7 @@ from tests.fmus.source_tree import copy_sources, python
 SOURCES = {
     "UnifiedController": "controller_fmu/sliding_mode/law.py",
     "GeometricController": "controller_fmu/geometric/law.py",
+    "CascadedController": "controller_fmu/cascaded/rate_loop.py",
     "QuadrotorPlant": "fmu_kit/rigid_body.py",
 }
 """Where the equations of each FMU are."""
@@ -111,7 +112,7 @@ def test_the_page_links_to_the_readable_equations(of: Documented) -> None:
     (link,) = (link for link in of.links if link.endswith(SOURCES[of.model]))
     bundled = of.files[posixpath.normpath(posixpath.join("documentation", link))].decode()
     functions = {node.name for node in ast.walk(ast.parse(bundled)) if isinstance(node, ast.FunctionDef)}
-    assert functions & {"evaluate", "derivative"}
+    assert functions & {"evaluate", "derivative", "control_rate"}
 
 
 @pytest.mark.parametrize("of", PAIR, indirect=True)  # those whose sources number them
