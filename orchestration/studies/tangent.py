@@ -25,6 +25,8 @@ NOISE = 100.0 * np.finfo(float).eps
 """of an output, likewise: what rounding may make of it"""
 SEEN = 1e-11
 """of the largest singular value: what is smaller is none"""
+TURN = 1e-3
+"""of the answer to a pulse on all inputs: what may differ from sample to sample"""
 FEWEST = 6
 """points of the ladder at which states are made at least"""
 
@@ -75,6 +77,7 @@ class Tangent:
         self._weight = np.maximum(1.0, np.abs(self._found))
         self._ladder = list(ladder)
         self._known: dict[int, tuple[Floats, Floats]] = {}
+        self._expect_one_rate()
         self._find_coordinates()
         self.state: Floats = np.zeros(len(self._axes.T))
         self.input: Floats = np.zeros(len(rest.inputs))
@@ -122,6 +125,19 @@ class Tangent:
     def restore(self, state: bytes) -> None:
         """Put them back."""
         self.state[:], self.input[:] = np.split(np.frombuffer(state), [len(self.state)])
+
+    def _expect_one_rate(self) -> None:
+        """Raise `UsageError` where samples answer a pulse differently: there are loops of several rates in it."""
+        if len(set(self._ladder)) > 1:  # no samples
+            return
+        rest, first, h = self._rest, None, self._ladder[0]
+        for _ in self._ladder:
+            up, down = (self._stepped(rest, self._held + sign * self._pulse, h)[0] for sign in (1, -1))
+            answer = (up - down) / (2.0 * PULSE)
+            first = answer if first is None else first
+            if np.abs(answer - first).max(initial=0.0) > TURN * max(1.0, np.abs(first).max(initial=0.0)):
+                raise UsageError(f"{self._fmu.name}: answers a pulse at some samples otherwise than at others")
+            rest = self._stepped(rest, self._held, h)[1]
 
     # -- what it is made of --------------------------------------------------------------------------------------
 

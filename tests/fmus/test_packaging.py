@@ -15,12 +15,11 @@ from fmu_kit import bundle, packaging
 from fmu_kit.loader import BESIDE, GUID_FILE
 from orchestration import fmus
 from orchestration.checks.doctor import binaries
-from orchestration.documents import tomllib
 from orchestration.errors import QuadcosimError
 from orchestration.quadrotor.wiring import MODELS
 from tests.fmus.archive import files_of
 from tests.fmus.instance import Instance
-from tests.fmus.process import ROOT, run
+from tests.fmus.process import run
 from tests.fmus.source_tree import build, copy_sources, python, replace, try_to_build
 
 EPOCH = 1_000_000_000  # 2001-09-09T01:46:40Z
@@ -323,15 +322,6 @@ def test_the_source_hash_changes_with_the_files_beside_the_slave(file: str, sour
     assert hash_of(sources, "UnifiedController") == before["UnifiedController"]
     path.unlink()
     assert hash_of(sources, "QuadrotorPlant") not in (changed, before["QuadrotorPlant"])
-
-
-@pytest.mark.parametrize("package", ["fmu_kit", *(target.rpartition(".")[0] for target in MODELS.values())])
-def test_an_installed_package_has_every_file_that_packaging_reads(package: str) -> None:
-    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    declared = settings["tool"]["setuptools"]["package-data"][package]
-    folder = ROOT.joinpath(*package.split("."))
-    files = {path.name for path in folder.iterdir() if path.is_file() and path.suffix != ".py"}
-    assert sorted(declared) == sorted(files)
 
 
 def test_fresh_fmus_are_up_to_date(built: dict[str, Path]) -> None:

@@ -6,11 +6,16 @@ import pytest
 
 import orchestration
 from fmu_kit.bundle import Target
-from orchestration import Result, Scenario, Timing
+from orchestration import Result, Scenario, Timing, UsageError
+from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor.wiring import MODELS
+from orchestration.studies.linear import HoverLoop, at_hover
+from orchestration.studies.sampled_loop import growth_of_loop
+from orchestration.system.model import System
 from tests.native import assert_the_same, natives
 
 NAME, PLANT = "CascadedController", "QuadrotorPlant"
+ONE_RATE = {"controller.velocity_ratio": 1, "controller.attitude_ratio": 1}
 
 
 def flown(controller: Path | str, parameters: dict[str, float], timing: Timing, stop_time: float = 30.0) -> Result:
@@ -25,9 +30,28 @@ def test_the_papers_flight_settles_at_the_rates_of_px4() -> None:
 
 
 def test_with_all_loops_at_one_period_it_flies_at_85_ms_and_not_at_95() -> None:
-    one_rate = {"controller.velocity_ratio": 1, "controller.attitude_ratio": 1}
-    found = [flown(f"native/{NAME}", one_rate, Timing(period=period)).metrics["good"] for period in (0.085, 0.095)]
+    found = [flown(f"native/{NAME}", ONE_RATE, Timing(period=period)).metrics["good"] for period in (0.085, 0.095)]
     assert found == [True, False]
+
+
+def hovering(period: float, parameters: dict[str, float]) -> System:
+    scenario = Scenario(timing=Timing(period=period)).with_changes(parameters=parameters)
+    return at_hover(scenario.with_fmus(plant=f"native/{PLANT}", controller=f"native/{NAME}"))
+
+
+def test_about_hover_it_is_stable_to_89_ms_where_all_loops_run_at_one_period() -> None:
+    instances = Instances()
+    growths = [growth_of_loop(hovering(period, ONE_RATE), instances) for period in (0.088, 0.09)]
+    assert growths[0] < 0.0 < growths[1]
+    with pytest.raises(UsageError, match="answers a pulse at some samples otherwise than at others"):
+        growth_of_loop(hovering(0.001, {}), instances)
+    instances.close()
+
+
+def test_a_controller_that_remembers_has_no_loop_about_hover_of_the_vehicle_alone() -> None:
+    scenario = Scenario().with_changes(parameters=ONE_RATE)
+    with pytest.raises(UsageError, match="the controller's command depends on what it measured before"):
+        HoverLoop.of(scenario.with_fmus(plant=f"native/{PLANT}", controller=f"native/{NAME}"))
 
 
 def test_in_c_it_flies_as_in_python_to_the_byte(built: dict[str, Path], tmp_path: Path) -> None:
