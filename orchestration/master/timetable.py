@@ -7,141 +7,23 @@ into instants.
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from orchestration.errors import UsageError
-from orchestration.master.chance import Flags, lateness, losses
-from orchestration.master.fixed_step import FixedStep, Refusal, seconds
+from orchestration.master.chance import Flags
+from orchestration.master.drawn import MESSAGES, NEXT, TIME, Link, Task
+from orchestration.master.fixed_step import FixedStep, Refusal
 from orchestration.master.plan import Plan
 from orchestration.master.recording import Integers
 from orchestration.master.schedule import Schedule
-from orchestration.master.streams import DELAY_JITTER, JITTER, LOSS, Streams
-from orchestration.system.model import Connection, System
+from orchestration.master.streams import Streams
+from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS, Grid, exact_nanoseconds, nanoseconds
 
 LONGEST = 2**60
 """[ns], 36 years: a few of them together still are a whole number of 64 bits"""
-
-
-class _Link:
-    """A connection, and the random numbers that it has not used."""
-
-    def __init__(
-        self, index: int, x: Connection, streams: Streams, fixed: FixedStep | None, refused: list[Refusal]
-    ) -> None:
-        """`fixed` is who halts for its messages, if that takes steps of one length only."""
-        owner, jitter = f"connections.{x.name}", nanoseconds(x.delay_jitter)
-        self.index, self.delay, self.jacobi = index, nanoseconds(x.delay), x.order == "jacobi"
-        self.longest = self.delay + jitter
-        self._name, self._fixed, self._refused = owner, fixed, refused
-        self._late = lateness(jitter, x.jitter_distribution, partial(streams.of, owner, DELAY_JITTER))
-        self._lost = losses(x.loss, x.burst_length, partial(streams.of, owner, LOSS))
-        self._last = 0
-
-    def messages(self, sent: Integers) -> Integers:
-        """Arrivals of the next messages, sent at these times; -1 for one that is lost."""
-        lost, own = self._lost(len(sent)), sent + self.delay + self._late(len(sent))
-        arrivals = self._in_order(np.where(lost, 0, own), "an arrival")
-        result: Integers = np.where(lost, -1, arrivals)
-        return result
-
-    def measurements(self, samples: Integers) -> tuple[Integers, Integers]:
-        """When the next messages are measured, for samples at these times, and their arrivals as in `messages`."""
-        lost, own = self._lost(len(samples)), samples - self.delay - self._late(len(samples))
-        return self._in_order(own, "a measurement"), np.where(lost, -1, samples)
-
-    def _in_order(self, times: Integers, what: str) -> Integers:
-        """Messages never overtake."""
-        times = np.maximum.accumulate(np.append(self._last, times))[1:]
-        if self._fixed is not None:
-            times = self._fixed.aligned(times, f"{what} over {self._name}", self._refused)
-        self._last = int(times[-1]) if len(times) else self._last
-        return times
-
-
-class _Task:
-    """A sampled component: its samples that are drawn and not past, a row each.
-
-    Columns: k, time, time of the next, then for each incoming link when it is measured and arrives, and for each
-    outgoing one when it is sent and arrives.
-    """
-
-    def __init__(
-        self,
-        name: str,
-        plan: Plan,
-        links: Sequence[_Link],
-        streams: Streams,
-        fixed: Mapping[str, FixedStep],
-        refused: list[Refusal],
-    ) -> None:
-        connections, sampling = plan.system.connections, plan.system.components[name].sampling
-        assert sampling is not None
-        ratio = Fraction(repr(float(sampling.clock_ratio)))
-        self.index, self.rank = list(plan.system.components).index(name), plan.sampled.index(name)
-        self.incoming = [links[i] for i in plan.measured if connections[i].receiver == name]
-        self.outgoing = [links[i] for i in plan.commanded if connections[i].sender == name]
-        self._ahead = max((link.longest for link in self.incoming), default=0)
-        self._grid = Grid(exact_nanoseconds(sampling.offset) / ratio, exact_nanoseconds(sampling.period) / ratio)
-        jitter, owner = nanoseconds(sampling.jitter), f"components.{name}"
-        self._late = lateness(jitter, sampling.jitter_distribution, partial(streams.of, owner, JITTER))
-        self._name, self._refused, self._stop = owner, refused, nanoseconds(plan.system.stop_time)
-        self._fixed = [fixed[x] for x in sorted({connections[link.index].sender for link in self.incoming} & {*fixed})]
-        self._k, self._next = 0, self._times(0, 1, -1)
-        self.rows: Integers = np.zeros((0, 3 + 2 * (len(self.incoming) + len(self.outgoing))), dtype=np.int64)
-
-    def _times(self, first: int, end: int, before: int) -> Integers:
-        """Of samples `first` up to `end`, without that one; `before` is that of the one before them [ns]."""
-        times = self._grid.between(first, end) + self._late(end - first)
-        if not self._fixed:
-            return times
-        found = []
-        for k, time in enumerate(times.tolist(), first):
-            found.append(self._aligned(time))
-            if found[-1] == before < self._stop:
-                text = (
-                    f"samples {k - 1} and {k} of {self._name} both move to t = {seconds(before)} s, the next point of "
-                    f"components.{self._fixed[-1].name}: expected a period that leaves one for each"
-                )
-                self._refused.append(Refusal(before, text))
-            before = found[-1]
-        return np.array(found, dtype=np.int64)
-
-    def _aligned(self, time: int) -> int:
-        """The next point from `time` [ns] of all that it reads and that take steps of one length only."""
-        before = None
-        while time < self._stop + self._ahead and time != before:
-            before = time
-            for fixed in self._fixed:
-                time = int(fixed.aligned(np.array([time]), f"a sample of {self._name}", self._refused)[0])
-        return time
-
-    def drawn_to(self, end: int) -> None:
-        """Draw until no sample that is still to be drawn has anything to do with what is before `end` [ns]."""
-        while self._next[0] - self._ahead < end:
-            last = max(self._grid.index_from(end + self._ahead), self._k + 1)
-            times = np.append(self._next, self._times(self._k + 1, last + 1, int(self._next[0])))
-            now, then, k = times[:-1], times[1:], np.arange(self._k, last)
-            columns: list[Integers] = [k, now, then]
-            for link in self.incoming:
-                columns += link.measurements(now)
-            for link in self.outgoing:
-                sent = then if link.jacobi else now
-                columns += [sent, link.messages(sent)]
-            self.rows = np.vstack([self.rows, np.column_stack(columns)])
-            self._k, self._next = last, times[-1:]
-
-    def messages(self, rows: Integers) -> Integers:
-        """Of these samples, in the order in which they are exchanged, shape (n, number, 4)."""
-        links = [*self.incoming, *self.outgoing]
-        result = np.empty((len(rows), len(links), 4), dtype=np.int64)
-        for i, link in enumerate(links):
-            result[:, i, 0], result[:, i, 1] = link.index, rows[:, 0]
-            result[:, i, 2:] = rows[:, _MESSAGES + 2 * i : _MESSAGES + 2 * i + 2]
-        return result
 
 
 class _Collected:
@@ -192,7 +74,7 @@ class Timetable:
         links = []
         for i, x in enumerate(system.connections):
             halting = fixed.get(x.sender if i in plan.measured else x.receiver)
-            links.append(_Link(i, x, streams, halting, self._refused))
+            links.append(Link(i, x, streams, halting, self._refused))
         self._bodies = np.array([names.index(name) for name in plan.continuous], dtype=np.int64)
         self._place = np.full(len(names) + 1, -1)  # the last one for nobody
         self._place[self._bodies] = np.arange(len(self._bodies))
@@ -200,7 +82,7 @@ class Timetable:
             i: Grid(Fraction(0), exact_nanoseconds(system.components[names[i]].step or 0.0))
             for i in sorted(self._bodies.tolist())
         }
-        self._tasks = [_Task(name, plan, links, streams, fixed, self._refused) for name in plan.sampled]
+        self._tasks = [Task(name, plan, links, streams, fixed, self._refused) for name in plan.sampled]
         self._sender = np.array([names.index(x.sender) for x in system.connections], dtype=np.int64)
         self._receiver = np.array([names.index(x.receiver) for x in system.connections], dtype=np.int64)
         self._posted = {i: [links[j] for j in plan.posted if self._sender[j] == i] for i in self._points}
@@ -251,7 +133,7 @@ class Timetable:
         arrivals = self._arrive(end, [later, sent], found)
         self._halt_by_themselves(begin, end, found)
         for task in self._tasks:
-            task.rows = task.rows[task.rows[:, _TIME] >= end]
+            task.rows = task.rows[task.rows[:, TIME] >= end]
         instants = found.instants()
         halts, halts_at = found.halts(instants, self._bodies, self._place)
         times = np.append(instants, end)
@@ -303,7 +185,7 @@ class Timetable:
         for task in self._tasks:
             for i, link in enumerate(task.incoming):
                 if link.index in self._plan.read_ahead:
-                    taken = task.rows[:, _MESSAGES + 2 * i]
+                    taken = task.rows[:, MESSAGES + 2 * i]
                     now = (taken >= begin) & (taken < end)
                     tables.append(task.messages(task.rows[now])[:, i])
                     found.add(taken[now], int(self._sender[link.index]))
@@ -315,15 +197,15 @@ class Timetable:
         later = [np.zeros((0, _ORDER + 4), dtype=np.int64)]
         drawn, exchanged = [np.zeros((0, 6), dtype=np.int64)], [np.zeros((0, 0, 4), dtype=np.int64)]
         for task in self._tasks:  # those that come first at one instant come first
-            times = task.rows[:, _TIME]
+            times = task.rows[:, TIME]
             found.add(times[(times >= begin) & (times < end)])
             rows = task.rows[(times >= begin) & (times < min(end, self.stop))]
             for link in task.incoming:
                 if link.index not in self._plan.read_ahead:
-                    found.add(rows[:, _TIME], int(self._sender[link.index]))
+                    found.add(rows[:, TIME], int(self._sender[link.index]))
             messages, middle = task.messages(rows), len(task.incoming)
             dues = np.empty((len(rows), 6), dtype=np.int64)
-            dues[:, 0], dues[:, 1], dues[:, 2], dues[:, 3] = rows[:, _TIME], task.index, rows[:, _NEXT], 0
+            dues[:, 0], dues[:, 1], dues[:, 2], dues[:, 3] = rows[:, TIME], task.index, rows[:, NEXT], 0
             dues[:, 4:] = middle, messages.shape[1]
             drawn.append(dues)
             exchanged.append(messages)
@@ -372,8 +254,6 @@ def _pace(system: System) -> float:
     return 1.0 / sum(rates)
 
 
-_TIME, _NEXT, _MESSAGES = 1, 2, 3
-"""Columns of a row of `_Task`"""
 _ORDER = 4
 """Columns by which messages are put in order: the instant at which they were sent, whether by a sample, by whom, and
 which of those of one sender they are"""
@@ -382,7 +262,7 @@ which of those of one sender they are"""
 class _Sent(NamedTuple):
     """Messages of a link, and by what they are put in order."""
 
-    link: _Link
+    link: Link
     k: Integers
     sent: Integers
     arrival: Integers
