@@ -9,6 +9,7 @@ import typer
 
 from orchestration.command.flags import EngineFlag, FlightFlags, Timing, flies, request_from
 from orchestration.command.terminal import progress_bar, runs_bar, say
+from orchestration.errors import UsageError
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file.", metavar="STUDY.toml", show_default=False)]
 Out = Annotated[
@@ -169,6 +170,31 @@ def limit(
         print(f"{name:<19}  {value}")
 
 
+@flies
+def margin(
+    scenario: Annotated[
+        Path | None, typer.Argument(help="Scenario file; without one, the paper's flight.", show_default=False)
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    *,
+    flags: FlightFlags,
+) -> None:
+    """Tell what delay the loop about hover stands: a constant one exactly, one that varies by bounds from theory."""
+    from orchestration.quadrotor.scenario import Scenario
+    from orchestration.studies.margin import margin_of
+
+    chosen = request_from(scenario, flags)
+    if not isinstance(chosen, Scenario):
+        raise UsageError("margin: expected a scenario of the quadrotor")
+    found = dataclasses.asdict(margin_of(chosen))
+    if as_json:
+        print(json.dumps(found, indent=2))
+        return
+    for name, value in found.items():
+        shown = " ".join(f"{share:g}" for share in value) if isinstance(value, tuple) else value
+        print(f"{name:<17}  {f'{value:.6g} s' if isinstance(value, float) else '-' if value is None else shown}")
+
+
 def _current_store(study: Path, out: Path | None) -> Path:
     """The store of a study file that has not changed since it was flown."""
     from orchestration.studies.store import open_for_reading
@@ -184,5 +210,5 @@ def _current_store(study: Path, out: Path | None) -> Path:
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the command line."""
-    for command in (sweep, status, export, draw, tune, limit):
+    for command in (sweep, status, export, draw, tune, limit, margin):
         app.command()(command)

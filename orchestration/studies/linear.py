@@ -121,6 +121,16 @@ class HoverLoop:
         _, feedback = _controller_at_hover(_located(hover_of(scenario)), Instances())
         return HoverLoop(feedback, self._step)
 
+    def continuous(self) -> tuple[Floats, Floats, Floats]:
+        """A and B of the plant in continuous time, dx = A x + B u, and F of its controller, u = F x."""
+        from scipy.linalg import logm
+
+        size = self._step.size
+        generator = np.real(logm(self._step.one_interval())) / self._step.interval
+        feedback = np.zeros((_COMMANDS, size))
+        feedback[:, : len(COORDINATES)] = self._feedback
+        return generator[:size, :size], generator[:size, size:], feedback
+
     def spectral_radius(self, period: float, delay: float) -> float:
         """The largest modulus of the eigenvalues of one sample period [s] with a delay [s]."""
         return float(np.abs(np.linalg.eigvals(self.matrix(period, delay))).max())
@@ -150,7 +160,7 @@ class PlantStep:
 
     def __init__(self, hover: Scenario, fleet: Instances, trim: Floats) -> None:
         self._hover, self._fleet, self._trim = hover, fleet, trim
-        self._interval = hover.timing.plant_interval
+        self.interval = hover.timing.plant_interval
         self._lags = True  # until the differences say otherwise
         self._at_hover = at_hover = self._saved({}, trim)
         self._expect_equilibrium(at_hover)
@@ -159,7 +169,7 @@ class PlantStep:
         command = [[(at_hover, trim + size * unit) for size in _BOTH_WAYS] for unit in _UNITS]
         self._moved = [*vehicle, *actuators, *command]
         self._known: dict[float, Floats] = {}
-        self._next = self._differences(self._interval)[: len(COORDINATES), : len(COORDINATES) + _COMMANDS]
+        self._next = self._differences(self.interval)[: len(COORDINATES), : len(COORDINATES) + _COMMANDS]
         by_actuators = self._next[:, len(COORDINATES) :]
         self._lags = bool(np.abs(by_actuators).max() > _NO_EFFECT)
         if not self._lags:
@@ -169,12 +179,16 @@ class PlantStep:
 
     def over(self, duration: float) -> tuple[Floats, Floats]:
         """d(state)/d(state before) and d(state)/d(command) over `duration` [s]."""
-        count = math.floor(duration / self._interval + 1e-9)
-        rest = duration - count * self._interval
-        total = np.linalg.matrix_power(self._one(self._interval), count) if count else np.eye(self.size + _COMMANDS)
+        count = math.floor(duration / self.interval + 1e-9)
+        rest = duration - count * self.interval
+        total = np.linalg.matrix_power(self._one(self.interval), count) if count else np.eye(self.size + _COMMANDS)
         if rest > _INSTANT:
             total = self._one(rest) @ total
         return total[: self.size, : self.size], total[: self.size, self.size :]
+
+    def one_interval(self) -> Floats:
+        """The derivative of a plant interval, the command as further states that stay."""
+        return self._one(self.interval)
 
     def _one(self, h: float) -> Floats:
         """The derivative of one step of `h` [s], the command as further states that stay."""
@@ -217,7 +231,7 @@ class PlantStep:
         """The vehicle after `h` [s] under `command`, and if the actuators lag a plant interval later under the trim."""
         plant.restore(state)
         found = []
-        for start, duration, held in ((0.0, h, command), (h, self._interval, self._trim))[: 1 + self._lags]:
+        for start, duration, held in ((0.0, h, command), (h, self.interval, self._trim))[: 1 + self._lags]:
             plant.writer(wiring.COMMAND, held)()
             plant.step(start, duration)
             measured: Floats = np.zeros(len(wiring.MEASUREMENT))
@@ -227,7 +241,7 @@ class PlantStep:
 
     def _expect_equilibrium(self, at_hover: bytes) -> None:
         with self._plant() as plant:
-            drift = float(np.abs(self._after(plant, at_hover, self._trim, self._interval)).max())
+            drift = float(np.abs(self._after(plant, at_hover, self._trim, self.interval)).max())
         if drift > 1e-9:
             raise UsageError(
                 f"hover is no equilibrium, the vehicle drifts by {drift:.2g} in a plant interval; expected a "
