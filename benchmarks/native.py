@@ -1,7 +1,8 @@
 """How long a step takes inside a native FMU, without any master: `python -m benchmarks.native`.
 
 CPU time of fmi2DoStep, called from C, the smallest of nine repetitions: of the controller with a sample in every step,
-of the plant with one internal step in every step, each with both mathematics.
+of the plant with one internal step in every step, each with both mathematics. Then a step in each of several lanes,
+compiled for this processor from the sources in the FMU.
 """
 
 import shutil
@@ -12,10 +13,12 @@ from pathlib import Path
 
 import fmpy
 
+from fmu_kit.native.lanes import compiled_lanes
 from orchestration import subprocesses
 from orchestration.quadrotor.wiring import MODELS
 
 STEPS = 100_000
+LANES = (1, 4, 8, 16)
 CASES = {"UnifiedController": ("law, 10 ms", 0.01), "QuadrotorPlant": ("plant, one internal step of 1 ms", 0.001)}
 
 
@@ -29,20 +32,38 @@ def built(folder: Path, mathematics: str) -> dict[str, Path]:
     return {name: Path(fmpy.extract(str(folder / f"{name}.fmu"), str(folder / name))) for name in MODELS}
 
 
+def program(name: str, folder: Path) -> Path:
+    """A program in C beside this file, compiled."""
+    path = folder / name
+    source = Path(__file__).with_name(f"{name}.c")
+    subprocess.run([shutil.which("cc") or "cc", "-O2", source, "-o", path, "-ldl"], check=True)
+    return path
+
+
+def printed(*command: str | Path) -> str:
+    """What a program prints."""
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+
+
 def main() -> None:
     """Print a line for each."""
     with tempfile.TemporaryDirectory() as temporary:
-        program = Path(temporary, "steps")
-        source = Path(__file__).with_name("steps.c")
-        subprocess.run([shutil.which("cc") or "cc", "-O2", source, "-o", program, "-ldl"], check=True)
+        folder = Path(temporary)
+        alone, in_lanes = program("steps", folder), program("lane_steps", folder)
         for mathematics in ("own", "libm"):
-            folders = built(Path(temporary, mathematics), mathematics)
+            folders = built(folder / mathematics, mathematics)
             for name, (what, h) in CASES.items():
                 description = fmpy.read_model_description(str(folders[name]))
                 library = folders[name] / "binaries" / fmpy.platform / f"{name}.so"
-                command = [program, library, description.guid, repr(h), str(STEPS)]
-                taken = subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+                taken = printed(alone, library, description.guid, repr(h), str(STEPS))
                 print(f"{what}, {mathematics} mathematics: {taken} us a step")
+        for name, (what, h) in CASES.items():
+            sources = {file.name: file.read_bytes() for file in (folder / "own" / name / "sources").iterdir()}
+            for lanes in LANES:
+                library = folder / f"{name}_{lanes}.so"
+                library.write_bytes(compiled_lanes(sources, lanes))
+                taken = printed(in_lanes, library, repr(h), str(STEPS // lanes))
+                print(f"{what}, {lanes} lanes: {taken} ns a step and lane")
 
 
 if __name__ == "__main__":
