@@ -41,7 +41,7 @@ def test_breaking_jitter_of_delays_that_are_all_late_is_the_constant_limit() -> 
 def test_no_sequence_breaks_a_jitter_that_is_certain_and_one_breaks_more() -> None:
     random = np.random.default_rng(4)
     for loop in (integrator(0.5), integrator(1.2), integrator(0.3, 0.7), SampledLoop(**DOUBLE, period=1.0)):
-        certain, broken = certain_jitter(loop), breaking_jitter(loop, 3.0)
+        certain, broken = certain_jitter(loop), breaking_jitter(loop, 5.0)
         assert broken is not None
         assert 0.0 < certain < broken[0]
         assert delay_bounds._radius(loop, [1.001 * broken[0] * share for share in broken[1]]) > 1.0
