@@ -4,7 +4,7 @@ import functools
 import os
 import subprocess
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -16,6 +16,7 @@ from fmu_kit.packaging import read_source_hash
 from orchestration import subprocesses
 from orchestration.errors import QuadcosimError, UsageError
 from orchestration.quadrotor.wiring import MODELS
+from orchestration.system.model import System
 
 
 def default_folder() -> Path:
@@ -107,6 +108,15 @@ def native_twin(fmu: str) -> str:
     if path.suffix == ".fmu" and _slave_of(path)[0] is IN_PYTHON and IN_PYTHON.slave_of(path) is not None:
         return str(path.parent / NATIVE.folder / path.name)
     return fmu
+
+
+def native_twins(system: System) -> System:
+    """`system` with the native twins of its FMUs."""
+    twins = {name: native_twin(fmu) for name, fmu in system.fmus.items()}
+    if twins == system.fmus:
+        return system
+    components = {name: replace(each, fmu=twins[name]) for name, each in system.components.items()}
+    return replace(system, components=components)
 
 
 def _slave_of(path: Path) -> tuple[Packing, Target | None]:

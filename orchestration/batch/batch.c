@@ -101,7 +101,7 @@ typedef struct {
     Lanes alive, full;
     int64_t seen_count, given_count;
     double *seen, *given, *state, *constants, *numbers;
-    uint64_t *doubtful; /* lanes in which a value was not a number */
+    Lanes doubtful; /* in which a value was not a number */
     Kept *kept;
     int64_t fate[L], fate_component[L], fate_time[L], steps[L];
     int32_t *status;
@@ -122,13 +122,20 @@ typedef struct {
 
 static const q_bits lane_bits = LANE_BITS;
 
-Q_ONE q_mask mask_of(Lanes lanes) { return Q_TEST(((lane_bits & lanes)) != 0); }
+/* As functions of components are told of lanes: all bits of each, or none. */
+Q_ONE q_bits bits_of(Lanes lanes) { return (q_bits)((lane_bits & lanes) != 0); }
 
+#if defined(__AVX512DQ__) && L == 8
+Q_ONE q_mask mask_of(Lanes lanes) { return (q_mask)lanes; }
+Q_ONE Lanes lanes_of(q_mask mask) { return mask; }
+#else
+Q_ONE q_mask mask_of(Lanes lanes) { return bits_of(lanes); }
 Q_ONE Lanes lanes_of(q_mask mask) {
     Lanes lanes = 0;
     for (int lane = 0; lane < L; lane++) lanes |= (mask[lane] & 1) << lane;
     return lanes;
 }
+#endif
 
 typedef q_real Place __attribute__((may_alias));
 #define AT(memory, place) (*(Place *)((memory) + (place) * L))
@@ -161,8 +168,8 @@ static int keep(Kept *kept, q_real value) {
 #define SEEN(i) READ(b->seen, i)
 #define SIGNAL(component, place) READ(memory##component, place)
 #define TRUE(mask) q_select(mask, q_all(1.0), q_all(0.0))
-Q_ONE q_real lowest(q_real a, q_real b) { return q_select(Q_TEST(a < b) | q_isnan(a), a, b); }
-Q_ONE q_real highest(q_real a, q_real b) { return q_select(Q_TEST(a > b) | q_isnan(a), a, b); }
+Q_ONE q_real lowest(q_real a, q_real b) { return q_select(q_lt(a, b) | q_isnan(a), a, b); }
+Q_ONE q_real highest(q_real a, q_real b) { return q_select(q_gt(a, b) | q_isnan(a), a, b); }
 
 #include "expressions.h"
 
@@ -202,7 +209,7 @@ static void take(Channel *c, Lanes lanes) {
         }
         if (c->rounds) {
             q_real quantum = READ(c->quantum, i);
-            x = q_select(Q_TEST(quantum != 0.0), q_round(x / quantum) * quantum, x);
+            x = q_select(q_ne(quantum, 0.0), q_round(x / quantum) * quantum, x);
         }
         AT(c->value, i) = converted(c, x);
     }
@@ -211,13 +218,13 @@ static void take(Channel *c, Lanes lanes) {
 
 /* Set the receiver's inputs; a value that it cannot be set to is for the FMU itself to refuse. */
 static void set(Batch *b, Channel *c, Lanes lanes, const double *value, const int64_t *time) {
-    q_mask mask = mask_of(lanes), wrong = mask & 0;
+    q_mask mask = mask_of(lanes), wrong = q_known(0);
     for (int64_t i = 0; i < c->size; i++) {
         q_real x = READ(value, i);
-        if (c->kinds[i] == TRUTH) x = TRUE(Q_TEST(x != 0.0));
+        if (c->kinds[i] == TRUTH) x = TRUE(q_ne(x, 0.0));
         if (c->kinds[i] == WHOLE) {
             x = q_round(x);
-            wrong |= q_not(Q_TEST(x >= c->low[i]) & Q_TEST(x <= c->high[i]));
+            wrong |= q_not(q_ge(x, c->low[i]) & q_le(x, c->high[i]));
         } else if (!c->plain)
             wrong |= q_not(q_isfinite(x));
         AT(c->receiver, c->to[i]) = q_select(mask, x, READ(c->receiver, c->to[i]));
@@ -312,7 +319,7 @@ static void expect_finite(Batch *b, int64_t index, Lanes lanes, const int64_t *t
 
 static void advance(Batch *b, int64_t index, Lanes lanes, q_real start, q_real length, const int64_t *time) {
     const Component *c = &b->components[index];
-    q_mask active = mask_of(lanes);
+    q_bits active = bits_of(lanes);
     int32_t any = 0;
     c->step(c->memory, (const uint64_t *)&active, (const double *)&start, (const double *)&length, b->status);
     for (int lane = 0; lane < L; lane++) any |= b->status[lane];
@@ -637,7 +644,7 @@ EXPORT void grown(const Batch *b, int64_t number, const double *floor, double *f
     q_real count = q_all(0.0);
     for (int64_t i = 1; i < kept->count; i++) {
         q_real before = READ(kept->values, i - 1), x = READ(kept->values, i);
-        count = count + TRUE(Q_TEST(x - before > 0.0) & Q_TEST(x > READ(floor, 0)));
+        count = count + TRUE(q_gt(x - before, 0.0) & q_gt(x, READ(floor, 0)));
     }
     AT(found, 0) = count;
 }

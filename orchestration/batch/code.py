@@ -43,7 +43,7 @@ def written(
         folds.add(call)
     after = _Slopes(writer, lines)
     watched = Section("w")
-    over = "mask_of(0)" if condition is None else writer.truth(condition, "row", watched)
+    over = "q_known(0)" if condition is None else writer.truth(condition, "row", watched)
     rows = folds.rows[None]
     sampled: list[str] = []
     for connection, each in folds.rows.items():
@@ -60,8 +60,8 @@ def written(
     known.append("const double *const constants_ = b->constants;")
     unused = [*(f"(void)memory{i};" for i in used), "(void)constants_;", "(void)t;"]
     here = [*known, "double *const state = b->state;", "const q_real t = now->t;",
-            "q_mask doubtful = m & q_not(m);", *unused]  # fmt: skip
-    done = [*kept, "*(q_mask *)b->doubtful |= doubtful;", "return 1;"]
+            "q_mask doubtful = q_known(0);", *unused]  # fmt: skip
+    done = [*kept, "if (q_any(doubtful)) b->doubtful |= lanes_of(doubtful);", "return 1;"]
     step = [f"const q_real dt = q_select(m, t - {time}, q_all(0.0));"]
     return Written(
         text="\n".join([

@@ -97,7 +97,6 @@ class Batch:
         self._given_count = fed if shape.fed_changes else 0
         self._state = self._array(len(self._written.states))
         self._numbers = self._array(len(shape.numbers) + 1 + len(shape.inner))
-        self._doubtful: npt.NDArray[np.uint64] = self._array(1).view(np.uint64)
         self._status = np.zeros(self._lanes, dtype=np.int32)
         self._kept = (c.Kept * max(1, len(self._written.folds.kept)))()
         self._batch: Any = c.batch_of(self._lanes, self._channel_type, self._track_type)(
@@ -108,7 +107,7 @@ class Batch:
             tracks=self._tracks, seen_count=seen, given_count=self._given_count,
             seen=c.address(self._array(seen)), given=c.address(self._array(self._given_count)),
             state=c.address(self._state), constants=c.address(self._array(len(self._written.folds.writer.constants))),
-            numbers=c.address(self._numbers), doubtful=c.address(self._doubtful), kept=self._kept,
+            numbers=c.address(self._numbers), kept=self._kept,
             status=c.address(self._status),
         )  # fmt: skip
 
@@ -137,7 +136,7 @@ class Batch:
         runs = [self._run(system) for system in systems]
         self._library.clear(ctypes.addressof(batch))
         self._state[:] = np.array(self._written.states)[:, None]
-        self._doubtful[:] = 0
+        batch.doubtful = 0
         for name in ("fate", "fate_component", "fate_time", "steps", "record_counts"):
             getattr(batch, name)[:] = [0] * self._lanes
         batch.alive = batch.full = (1 << count) - 1
@@ -171,8 +170,9 @@ class Batch:
                 values[call] = self._growth(call, own, values)
         arrays = [np.array(getattr(batch, name)[:count]) for name in ("fate", "fate_time", "fate_component", "steps")]
         fate, time, component, steps = arrays
+        doubtful = np.array([batch.doubtful >> lane & 1 for lane in range(count)], dtype=np.bool_)
         return Landed(
-            fate=fate, time=time, component=component, steps=steps, doubtful=self._doubtful[0, :count] != 0,
+            fate=fate, time=time, component=component, steps=steps, doubtful=doubtful,
             reductions={call: np.where(np.isfinite(found), found, np.nan) for call, found in values.items()},
             signals=[rows[: batch.record_counts[lane]] for lane, rows in enumerate(recorded)],
         )  # fmt: skip

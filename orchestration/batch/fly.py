@@ -30,20 +30,13 @@ class Flown:
     """what diverged"""
 
 
-def native_twins(system: System) -> System:
-    """`system` with the native FMUs of the slaves that its FMUs are made of."""
-    twins = {name: fmus.native_twin(component.fmu) for name, component in system.components.items()}
-    components = {name: replace(each, fmu=twins[name]) for name, each in system.components.items()}
-    return system if twins == system.fmus else replace(system, components=components)
-
-
 def fly(systems: Sequence[System]) -> Iterator[Metrics]:
     """The metrics of systems in their order, by native FMUs, built if need be; divergence is a result.
 
     Raises `UsageError` for a system that cannot be flown in lanes, naming the component and what it lacks, and what
     `run` raises for one that cannot be flown at all.
     """
-    twins = [native_twins(system) for system in systems]
+    twins = [fmus.native_twins(system) for system in systems]
     paths: dict[str, str] = {}
     for system in twins:
         if not paths.keys() >= {*system.fmus.values()}:

@@ -102,19 +102,19 @@ class _Fold:
 
     def max(self) -> Value:
         """The largest value, also just before a held signal changes."""
-        return self._extreme(">", -np.inf)
+        return self._extreme("q_gt", -np.inf)
 
     def min(self) -> Value:
         """The smallest value."""
-        return self._extreme("<", np.inf)
+        return self._extreme("q_lt", np.inf)
 
     def _extreme(self, sign: str, begin: float) -> Value:
         state, i = self._state(begin)
         self.rows.always.append(f"doubtful |= {self.rows.mask} & q_isnan({self.x});")
-        self.rows.always.append(self._set(state, self.x, f"Q_TEST({self.x} {sign} {state})"))
+        self.rows.always.append(self._set(state, self.x, f"{sign}({self.x}, {state})"))
         if self._is_mixed:
             end = self._at("end")
-            self.rows.next.append(self._set(state, end, f"Q_TEST({end} {sign} {state})"))
+            self.rows.next.append(self._set(state, end, f"{sign}({end}, {state})"))
         return lambda states, end: states[i]
 
     def integral(self) -> Value:
@@ -147,7 +147,7 @@ class _Fold:
 
     def _of_value(self, x: str, node: Node | None) -> str:
         if self.call.function == "share":
-            return f"TRUE(Q_TEST({x} != 0.0))"
+            return f"TRUE(q_ne({x}, 0.0))"
         return f"({x} * {x})" if self.call.function == "rms" else x
 
     def _rooted(self, mean: Value) -> Value:
@@ -160,7 +160,7 @@ class _Fold:
             self.rows.first.append(self._set(state, self.x))
             return lambda states, end: states[i]
         seen, j = self._state()
-        where = f"Q_TEST({seen} == 0.0)"
+        where = f"q_eq({seen}, 0.0)"
         self.rows.always += [self._set(state, self.x, where), self._set(seen, "q_all(1.0)")]
         return lambda states, end: np.where(states[j] > 0, states[i], np.nan)
 
@@ -174,7 +174,7 @@ class _Fold:
         """When the largest value is there first."""
         best, _ = self._state(-np.inf)
         time, i = self._state(np.nan)
-        more = f"Q_TEST({self.x} > {best})"
+        more = f"q_gt({self.x}, {best})"
         self.rows.always.append(f"doubtful |= {self.rows.mask} & q_isnan({self.x});")
         self.rows.always += [self._set(time, "t", more), self._set(best, self.x, more)]
         return lambda states, end: states[i]
@@ -183,8 +183,8 @@ class _Fold:
         """From when on |x| stays within the band."""
         since, i = self._state(-1.0)
         band = self.folds.writer.value(self.call.arguments[1], "row", self.folds.writer.now)
-        inside = f"Q_TEST(q_fabs({self.x}) <= {band})"
-        value = f"q_select({inside}, q_select(Q_TEST({since} < 0.0), t, {since}), q_all(-1.0))"
+        inside = f"q_le(q_fabs({self.x}), {band})"
+        value = f"q_select({inside}, q_select(q_lt({since}, 0.0), t, {since}), q_all(-1.0))"
         self.rows.always.append(self._set(since, value))
         return lambda states, end: np.where(states[i] < 0.0, np.nan, states[i])
 
@@ -195,7 +195,7 @@ class _Fold:
             last, _ = self._state(np.nan)
             step = f"q_fabs({self.x} - {last})"
             self.rows.always += [
-                self._set(total, f"{total} + {step}", f"Q_TEST({last} == {last})"),
+                self._set(total, f"{total} + {step}", f"q_eq({last}, {last})"),
                 self._set(last, self.x),
             ]
             return lambda states, end: states[i]

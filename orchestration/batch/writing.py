@@ -107,7 +107,7 @@ class Writer:
         is_here = place == "row" or self.kinds(node) - {"number", "held"}
         if isinstance(node, Operation) and node.sign in _TRUTHS and is_here and self.kinds(node) - {"number"}:
             return into.named((node, place, "truth"), lambda: self._truth(node, place, into), "q_mask")
-        return f"Q_TEST({self.value(node, place, into)} != 0.0)"
+        return f"q_ne({self.value(node, place, into)}, 0.0)"
 
     def leaf(self, name: str) -> Leaf:
         """What a name is; raises `UsageError` for one that is not there."""
@@ -151,7 +151,7 @@ class Writer:
             sides = [self.truth(operand, place, into) for operand in node.operands]
             return f"q_not({sides[0]})" if node.sign == "not" else {"and": " & ", "or": " | "}[node.sign].join(sides)
         left, right = (self.value(operand, place, into) for operand in node.operands)
-        return f"Q_TEST({left} {node.sign} {right})"
+        return f"{_COMPARED[node.sign]}({left}, {right})"
 
 
 def scalars(node: Node, vectors: Mapping[str, Sequence[str]]) -> list[Node]:
@@ -209,7 +209,8 @@ def _infix(sign: str) -> Callable[..., str]:
     return lambda a, b: f"{a} {sign} {b}"
 
 
-_TRUTHS = ("<", "<=", ">", ">=", "==", "!=", "and", "or", "not")
+_COMPARED = {"<": "q_lt", "<=": "q_le", ">": "q_gt", ">=": "q_ge", "==": "q_eq", "!=": "q_ne"}
+_TRUTHS = (*_COMPARED, "and", "or", "not")
 _OPERATIONS: dict[str, Callable[..., str]] = {
     "+": _infix("+"), "-": _infix("-"), "*": _infix("*"), "/": _infix("/"), "**": _called("q_pow"),
     "neg": lambda a: f"-{a}",

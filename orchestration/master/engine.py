@@ -14,10 +14,10 @@ from orchestration.system.times import nanoseconds
 Engine = Literal["python", "compiled"]
 
 
-def engine_named(name: str | None) -> Engine | None:
-    """The engine of that name; raises `UsageError` for another name than those that there are."""
+def engine_named(name: str | None, *others: str) -> Engine | None:
+    """The engine of that name; raises `UsageError` for another name than those that there are, `others` beside."""
     if name is not None and name not in get_args(Engine):
-        raise UsageError(f"--engine {name}: expected {' or '.join(get_args(Engine))}")
+        raise UsageError(f"--engine {name}: expected {' or '.join((*get_args(Engine), *others))}")
     return cast(Engine | None, name)
 
 

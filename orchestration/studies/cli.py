@@ -25,7 +25,15 @@ def sweep(
         str | None, typer.Option("--dask", help="A dask scheduler instead, e.g. tcp://host:8786.", metavar="URL")
     ] = None,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Fly failed runs again.")] = False,
-    engine: EngineFlag = None,
+    engine: Annotated[
+        str | None,
+        typer.Option(
+            "--engine",
+            help="What flies them; batch: many at once, as lanes of native FMUs, a sample of them by FMUs too.",
+            metavar="python|compiled|batch",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Fly the runs of a study that are missing; kill it and start it again as you like."""
     from orchestration.master.engine import engine_named
@@ -35,27 +43,33 @@ def sweep(
     with runs_bar() as progress:
         summary = fly(
             load_study(study), folder=out, workers=workers, dask=dask, retry_failed=retry_failed,
-            engine=engine_named(engine), progress=progress, announce=say,
+            engine="batch" if engine == "batch" else engine_named(engine, "batch"), progress=progress, announce=say,
         )  # fmt: skip
     failed = f", {summary.failed} failed (quadcosim export shows why; --retry-failed)" if summary.failed else ""
     print(f"{summary.path}: {summary.total} runs, {summary.flown} flown now{failed}")
+    if summary.agreement is not None:
+        print(f"--engine batch: {summary.agreement}")
     if summary.failed:
         raise typer.Exit(1)
 
 
 def status(study: StudyFile, out: Out = None) -> None:
     """Tell how far a study is, also while it runs in another process."""
+    from orchestration.studies.lanes import Agreement
     from orchestration.studies.store import open_for_reading
     from orchestration.studies.study_file import load_study
-    from orchestration.studies.sweep import TOTAL, expect_current, store_path
+    from orchestration.studies.sweep import AGREEMENT, TOTAL, expect_current, store_path
 
     chosen = load_study(study)
     path = store_path(chosen.name, out)
     with open_for_reading(path) as opened:
         expect_current(opened, chosen)
-        total, counts = int(opened.about().get(TOTAL, "0")), opened.counts()
+        about, counts = opened.about(), opened.counts()
+        total = int(about.get(TOTAL, "0"))
     done, failed = counts.get("done", 0), counts.get("failed", 0)
     print(f"{path}: {done + failed} of {total} runs, {failed} failed, {total - done - failed} missing")
+    if AGREEMENT in about:
+        print(f"--engine batch: {Agreement(**json.loads(about[AGREEMENT]))}")
 
 
 def export(study: StudyFile, out: Out = None) -> None:

@@ -17,9 +17,9 @@ from typing import Any
 
 from orchestration import scratch, subprocesses
 from orchestration.errors import QuadcosimError
-from orchestration.studies.files import Files, with_files
+from orchestration.studies.files import Files, all_with_files, with_files
 from orchestration.studies.identity import versions
-from orchestration.studies.worker import Broken, BrokenPlaceError, Outcome, Ready, Task, row_of
+from orchestration.studies.worker import Broken, BrokenPlaceError, Chunk, Outcome, Ready, Task, row_of
 
 ATTEMPTS = 3
 """How often a run is flown, the later times first in a new process, before the death of its worker is its result."""
@@ -79,8 +79,8 @@ class WorkerProcess:
             env=subprocesses.environment(**dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder)), start_new_session=True,
         )  # fmt: skip
 
-    def ask(self, task: Task) -> Any:
-        """The answer to a task; raises `Died`."""
+    def ask(self, task: Task | Chunk) -> Any:
+        """The answer to a task, or to many; raises `Died`."""
         assert self.process.stdin is not None
         try:
             pickle.dump(task, self.process.stdin)
@@ -158,6 +158,23 @@ class Pilot:
             assert isinstance(answer, Outcome)
             return answer
 
+    def fly_chunk(self, chunk: Chunk) -> list[Outcome]:
+        """The outcomes of many runs; they are flown one by one if they end their process together.
+
+        Raises `QuadcosimError` for what is no run's own failure.
+        """
+        try:
+            answer = self._ready().ask(chunk)
+        except Died as death:
+            self._drop()
+            if death.code == -signal.SIGINT:
+                raise InterruptedWorker("a worker process was interrupted") from None
+            return [self.fly(task) for task in chunk.tasks]
+        if isinstance(answer, Broken):
+            raise BrokenPlaceError(f"no run's own failure: {answer.message}")
+        assert isinstance(answer, list)
+        return answer
+
     def close(self) -> None:
         """End the process; whoever waits for it is told."""
         with self._lock:
@@ -215,15 +232,19 @@ class Crew:
         self._idle: queue.SimpleQueue[Pilot] = queue.SimpleQueue()
         self._pilots: list[Pilot] = []
 
-    def fly(self, task: Task) -> Outcome:
-        """The outcome of a run; called from any number of threads, each of which gets a process of its own."""
+    def fly(self, task: Task | Chunk) -> list[Outcome]:
+        """The outcomes of runs; called from any number of threads, each of which gets a process of its own."""
         try:
             pilot = self._idle.get_nowait()
         except queue.Empty:
             pilot = Pilot(self._root, self._package)
             self._pilots.append(pilot)
         try:
-            return pilot.fly(replace(task, system=with_files(task.system, self._paths)))
+            if isinstance(task, Chunk):
+                systems = all_with_files([each.system for each in task.tasks], self._paths)
+                each = tuple(replace(one, system=system) for one, system in zip(task.tasks, systems))
+                return pilot.fly_chunk(Chunk(tasks=each))
+            return [pilot.fly(replace(task, system=with_files(task.system, self._paths)))]
         finally:
             self._idle.put(pilot)
 

@@ -16,10 +16,10 @@ from orchestration.errors import QuadcosimError, UsageError
 from orchestration.master.engine import Engine
 from orchestration.studies.crew import Crew, InterruptedWorker, Package
 from orchestration.studies.files import Files
-from orchestration.studies.worker import Outcome, Task
+from orchestration.studies.worker import Chunk, Outcome, Task
 from orchestration.system.model import System
 
-Submit = Callable[[Task], "Future[Outcome]"]
+Submit = Callable[[Task | Chunk], "Future[list[Outcome]]"]
 _PATIENCE = 10.0
 """[s], for a scheduler that is there, and its workers"""
 _ADDRESS = re.compile(r"(?:(?:tcp|tls|ws|wss)://)?(\[[0-9a-fA-F:.]+\]|[^\s:/\[\]]+):(\d{1,5})")
@@ -57,7 +57,8 @@ class Pool:
         found = []
         try:
             for future in futures:
-                row = future.result().row
+                (outcome,) = future.result()
+                row = outcome.row
                 if row.metrics is None:
                     raise QuadcosimError(str(row.message))
                 found.append(row.metrics)
@@ -69,7 +70,7 @@ class Pool:
         return found
 
 
-def run_locally(tasks: Iterable[Task], package: Package, workers: int) -> Generator[Outcome, None, None]:
+def run_locally(tasks: Iterable[Task | Chunk], package: Package, workers: int) -> Generator[list[Outcome], None, None]:
     """Outcomes of `tasks` from `workers` processes, in any order.
 
     Raises `QuadcosimError` for what is not a run's own failure, `KeyboardInterrupt` if a worker is interrupted.
@@ -81,7 +82,7 @@ def run_locally(tasks: Iterable[Task], package: Package, workers: int) -> Genera
             raise KeyboardInterrupt from error
 
 
-def run_on_dask(tasks: Iterable[Task], package: Package, address: str) -> Generator[Outcome, None, None]:
+def run_on_dask(tasks: Iterable[Task | Chunk], package: Package, address: str) -> Generator[list[Outcome], None, None]:
     """Outcomes of `tasks` from the workers of a dask scheduler, in any order.
 
     Raises `QuadcosimError` if the scheduler cannot be reached or has no workers, or for what is not a run's own
@@ -119,8 +120,8 @@ def expect_scheduler(address: str) -> None:
         raise QuadcosimError(f"--dask {address}: expected a dask scheduler with workers there: {error}") from error
 
 
-def fly_on_cluster(task: Task, package: Package) -> Outcome:
-    """The outcome of a run, called in a dask worker: flown in a process of its own there too."""
+def fly_on_cluster(task: Task | Chunk, package: Package) -> list[Outcome]:
+    """The outcomes of runs, called in a dask worker: flown in a process of its own there too."""
     with _CREWS_LOCK:
         if package.digest not in _CREWS:
             _CREWS[package.digest] = crew = Crew(package)
@@ -142,7 +143,7 @@ def _local_submit(stack: ExitStack, package: Package, workers: int) -> Submit:
     return lambda task: executor.submit(crew.fly, task)
 
 
-def _drain(tasks: Iterable[Task], submit: Submit, most: int) -> Generator[Outcome, None, None]:
+def _drain(tasks: Iterable[Task | Chunk], submit: Submit, most: int) -> Generator[list[Outcome], None, None]:
     """Keep `most` tasks under way until none is left; yield what is finished."""
     waiting = iter(tasks)
     under_way = {submit(task) for task in islice(waiting, most)}

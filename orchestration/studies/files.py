@@ -5,11 +5,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any, TypeVar
 
 from orchestration import fmus
 from orchestration.errors import QuadcosimError
 from orchestration.fmi.model import Model, read_model
-from orchestration.system.model import System
+from orchestration.system.model import Component, Source, System
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,13 +75,31 @@ def tables_of(system: System) -> dict[str, Path]:
 
 def with_files(system: System, paths: Mapping[str, Path]) -> System:
     """`system` with its files at these paths, by what it calls them, so that none is looked for."""
-    return replace(
-        system,
-        components={
-            name: replace(component, fmu=str(paths[component.fmu])) for name, component in system.components.items()
-        },
-        sources={
-            name: source if source.file is None else replace(source, file=paths[str(source.file)])
-            for name, source in system.sources.items()
-        },
-    )
+    return next(iter(all_with_files([system], paths)))
+
+
+def all_with_files(systems: Iterable[System], paths: Mapping[str, Path]) -> list[System]:
+    """Systems with their files at these paths; what they have in common stays in common."""
+    made: dict[int, Any] = {}
+    return [
+        replace(
+            system,
+            components={name: _at(each, paths, made) for name, each in system.components.items()},
+            sources={name: _at(each, paths, made) for name, each in system.sources.items()},
+        )
+        for system in systems
+    ]
+
+
+Part = TypeVar("Part", Component, Source)
+
+
+def _at(part: Part, paths: Mapping[str, Path], made: dict[int, Any]) -> Part:
+    if isinstance(part, Source) and part.file is None:
+        return part
+    if id(part) not in made:
+        of_file = {"fmu": str(paths[part.fmu])} if isinstance(part, Component) else {"file": paths[str(part.file)]}
+        fields: dict[str, Any] = dict(of_file)
+        made[id(part)] = replace(part, **fields)
+    found: Part = made[id(part)]
+    return found

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from fmu_kit.syntax_trees import parsed
+from orchestration.batch import kernels
 from orchestration.master import loop
 from orchestration.quadrotor import translation
 from orchestration.quadrotor.scenario import Scenario
@@ -52,7 +53,7 @@ def flight_sources() -> dict[str, Path]:
                 waiting += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
             elif isinstance(node, ast.Import):
                 waiting += [alias.name for alias in node.names]
-    return found | {path.name: path for path in (QUADROTOR, *loop.FILES)}
+    return found | {path.name: path for path in (QUADROTOR, *loop.FILES, *kernels.FILES)}
 
 
 def sources_hash(sources: Mapping[str, Path]) -> str:

@@ -1,4 +1,4 @@
-"""A worker process: flies the runs that come through its pipe one by one, and ends when the pipe does."""
+"""A worker process: flies the runs that come through its pipe, one by one or in chunks, and ends when the pipe does."""
 
 import os
 import pickle
@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 
 from orchestration import scratch
 from orchestration.studies.identity import machine, versions
-from orchestration.studies.worker import Broken, BrokenPlaceError, Hangar, Outcome, Ready, Task
+from orchestration.studies.worker import Broken, BrokenPlaceError, Chunk, Hangar, Outcome, Ready, Task
 from orchestration.subprocesses import private_pipes
 
 
@@ -23,7 +23,7 @@ def main() -> None:
     own_folder = Path(sys.argv[1])
     tempfile.tempdir = str(own_folder)  # and no other if it is full
     tasks, answers = private_pipes()
-    waiting: queue.SimpleQueue[Task] = queue.SimpleQueue()
+    waiting: queue.SimpleQueue[Task | Chunk] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(tasks, waiting, own_folder), daemon=True).start()
     _send(answers, Ready(versions=versions(), machine=machine()))
     hangar = Hangar(machine())
@@ -31,14 +31,14 @@ def main() -> None:
         _send(answers, _fly(hangar, waiting.get()))
 
 
-def _fly(hangar: Hangar, task: Task) -> Outcome | Broken:
+def _fly(hangar: Hangar, task: Task | Chunk) -> Outcome | list[Outcome] | Broken:
     try:
-        return hangar.fly(task)
+        return hangar.fly_chunk(task) if isinstance(task, Chunk) else hangar.fly(task)
     except BrokenPlaceError as error:
         return Broken(message=str(error))
 
 
-def _listen(tasks: BinaryIO, waiting: "queue.SimpleQueue[Task]", own_folder: Path) -> None:
+def _listen(tasks: BinaryIO, waiting: "queue.SimpleQueue[Task | Chunk]", own_folder: Path) -> None:
     """Hand on what comes; the end of the pipe is the end of the process, also in the middle of a flight."""
     try:
         while True:

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any
 
 from orchestration.errors import UsageError
+from orchestration.fmus import native_twin, native_twins
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import in_its_own_words, paths_of
 from orchestration.request import Request, system_meant
@@ -33,6 +34,8 @@ class Study:
     """whether each run has a seed of its own: made of that of the base and the values of the axes"""
     keep_signals: tuple[int, ...] | bool = False
     """indices of the runs whose signals are kept, or all"""
+    native: bool = False
+    """whether it is flown by the native twins of its FMUs"""
 
     def __post_init__(self) -> None:
         names = [axis.name for axis in self.axes]
@@ -52,7 +55,8 @@ class Study:
     def origin(self) -> System:
         """The system that the base means."""
         with in_its_own_words(self.base):
-            return system_meant(self.base)
+            system = system_meant(self.base)
+        return native_twins(system) if self.native else system
 
     @cached_property
     def points(self) -> Sequence[Mapping[str, Value]]:
@@ -81,7 +85,13 @@ class Study:
                 value = point[axis.name]
                 for path in self._paths[axis.name]:
                     changes[path] = _product(value, path, self.origin, starts) if axis.multiplies else value
-            return changed(self.origin, changes)
+            system = changed(self.origin, changes)
+        return native_twins(system) if self._varies_fmu else system
+
+    @cached_property
+    def _varies_fmu(self) -> bool:
+        """Whether it is native, and an axis names FMUs that may not be."""
+        return self.native and any(names_fmu(path) for paths in self._paths.values() for path in paths)
 
     def keeps_signals(self, index: int) -> bool:
         """Whether the signals of a run are kept."""
@@ -92,7 +102,7 @@ class Study:
         values = [(path, str(v)) for axis in self.axes for path in self._paths[axis.name] for v in axis.values or ()]
         return files_of(
             self.origin,
-            fmus_too=[value for path, value in values if names_fmu(path)],
+            fmus_too=[native_twin(value) if self.native else value for path, value in values if names_fmu(path)],
             tables_too=[value for path, value in values if names_table(path)],
         )
 

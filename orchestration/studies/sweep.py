@@ -2,10 +2,10 @@
 
 import contextlib
 import json
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from orchestration.errors import UsageError
 from orchestration.interrupt import Interrupted
@@ -24,15 +24,21 @@ from orchestration.studies.identity import (
     study_parts,
     versions,
 )
+from orchestration.studies.lanes import Agreement, chunks, expect_lanes, sample
+from orchestration.studies.store import Row
 from orchestration.studies.study import Study
-from orchestration.studies.worker import Outcome, Task
+from orchestration.studies.worker import Chunk, Outcome, Task
 
 Progress = Callable[[int, int], None]
 """Hears how many of how many runs are done."""
 Announce = Callable[[str], None]
 """Hears of a run that failed."""
+Fly = Callable[[Iterable[Task | Chunk]], Generator[list[Outcome], None, None]]
+"""The outcomes of tasks as they come."""
 
 TOTAL, STUDY_PARTS, DESIGN_PARTS, PLACE_PARTS, AXES = "total", "study", "design", "place", "axes"
+AGREEMENT = "agreement"
+"""What a store says by this name of runs flown in lanes: how they agree with their FMUs"""
 _TOLD = 3
 """failed runs that are announced one by one"""
 
@@ -47,6 +53,8 @@ class Summary:
     failed: int
     """failed runs in the store"""
     path: Path
+    agreement: Agreement | None = None
+    """of runs flown in lanes with their FMUs"""
 
 
 def store_path(study: str, folder: Path | None = None) -> Path:
@@ -61,38 +69,64 @@ def sweep(
     workers: int = 1,
     dask: str | None = None,
     retry_failed: bool = False,
-    engine: Engine | None = None,
+    engine: Engine | Literal["batch"] | None = None,
     progress: Progress | None = None,
     announce: Announce | None = None,
 ) -> Summary:
     """Fly the runs of `study` that its store does not have, writing each row as it comes.
 
     Raises `UsageError`, before anything is flown, for a design with a run that cannot be, or if the store holds
-    another study, saying what differs; `QuadcosimError` for what is not a run's own failure, without a row.
+    another study, saying what differs; `QuadcosimError` for what is not a run's own failure, without a row. By the
+    engine `batch` runs are flown as lanes of native FMUs, and some of them by the FMUs too, to compare.
     """
     if workers < 1:
         raise UsageError(f"--workers {workers}: expected at least 1")
     if dask is not None:
         expect_scheduler(dask)
+    in_lanes = engine == "batch"
+    study = replace(study, native=True) if in_lanes else study
     path = store_path(study.name, folder)
     files = study.files()
     expect_flyable(study, files)
+    if in_lanes:
+        expect_lanes(study.system(0, files.starts_of(study.origin)), files)
     with store.open_for_writing(path, study.origin.objectives) as opened:
         _describe(opened, study, files)
         missing = _missing(opened, study, retry_failed)
         counted = _Counted(len(study.points), opened, progress, announce)
-        package = Package.of(files)
-        tasks = (_task(study, index, files, engine) for index in missing)
-        outcomes = run_on_dask(tasks, package, dask) if dask is not None else run_locally(tasks, package, workers)
+        fly = _flying(Package.of(files), workers, dask)
+        tasks = (_task(study, index, files, None if engine == "batch" else engine) for index in missing)
+        lanes: dict[str, Row] = {}
         try:
-            with contextlib.closing(outcomes):
-                for outcome in outcomes if missing else ():
-                    _keep(outcome, opened)
-                    counted.add(outcome)
+            with contextlib.closing(fly(chunks(tasks, len(missing), workers) if in_lanes else tasks)) as outcomes:
+                for some in outcomes if missing else ():
+                    _keep(some, opened)
+                    counted.add(some)
+                    lanes |= {each.row.key: each.row for each in some if each.in_lanes}
+            agreement = _compared(lanes, study, files, fly) if in_lanes else None
         except KeyboardInterrupt:
             raise Interrupted(f"with {counted.done} of {counted.total} runs done") from None
+        if agreement is not None:
+            opened.describe({AGREEMENT: agreement.as_text()})
+            agreement.expect()
         failed = opened.counts().get("failed", 0)
-    return Summary(total=counted.total, flown=len(missing), failed=failed, path=path)
+    return Summary(total=counted.total, flown=len(missing), failed=failed, path=path, agreement=agreement)
+
+
+def _flying(package: Package, workers: int, dask: str | None) -> Fly:
+    """Flies tasks in worker processes, here or on a cluster."""
+    if dask is not None:
+        return lambda tasks: run_on_dask(tasks, package, dask)
+    return lambda tasks: run_locally(tasks, package, workers)
+
+
+def _compared(lanes: Mapping[str, Row], study: Study, files: Files, fly: Fly) -> Agreement | None:
+    """A sample of the runs that were flown in lanes, beside the same flown by FMUs; None if there were none."""
+    chosen = sample(lanes)
+    tasks = [_task(study, lanes[key].index, files, None) for key in sorted(chosen)]
+    alone = [outcome.row for some in fly(tasks) for outcome in some] if tasks else []
+    found = [(row.index, lanes[row.key].metrics or {}, row.metrics or {"status": row.message}) for row in alone]
+    return Agreement.of(found) if found else None
 
 
 def expect_current(opened: store.Store, study: Study) -> None:
@@ -120,14 +154,14 @@ class _Counted:
         self.done = 0
         self._recount()
 
-    def add(self, outcome: Outcome) -> None:
-        """One more run has a row."""
-        row = outcome.row
-        if row.status == "failed":
-            self.failed += 1
-            if self._announce is not None and self.failed <= _TOLD:
-                more = "; further ones are not told" if self.failed == _TOLD else ""
-                self._announce(f"{described(row.index, row.settings)} failed: {row.message}{more}")
+    def add(self, outcomes: Iterable[Outcome]) -> None:
+        """More runs have a row."""
+        for row in (outcome.row for outcome in outcomes):
+            if row.status == "failed":
+                self.failed += 1
+                if self._announce is not None and self.failed <= _TOLD:
+                    more = "; further ones are not told" if self.failed == _TOLD else ""
+                    self._announce(f"{described(row.index, row.settings)} failed: {row.message}{more}")
         self._recount()
 
     def _recount(self) -> None:
@@ -163,15 +197,16 @@ def _signals_path(opened: store.Store, key: str) -> Path:
     return opened.path.parent / "signals" / f"{key[:16]}.parquet"
 
 
-def _keep(outcome: Outcome, opened: store.Store) -> None:
-    """Signals first, then the row, so that a row never lacks what it promises."""
-    if outcome.signals is not None:
-        target = _signals_path(opened, outcome.row.key)
-        target.parent.mkdir(exist_ok=True)
-        partial = target.with_suffix(".partial")
-        partial.write_bytes(outcome.signals)
-        partial.replace(target)
-    opened.add([outcome.row])
+def _keep(outcomes: Sequence[Outcome], opened: store.Store) -> None:
+    """Signals first, then the rows, so that a row never lacks what it promises."""
+    for outcome in outcomes:
+        if outcome.signals is not None:
+            target = _signals_path(opened, outcome.row.key)
+            target.parent.mkdir(exist_ok=True)
+            partial = target.with_suffix(".partial")
+            partial.write_bytes(outcome.signals)
+            partial.replace(target)
+    opened.add([outcome.row for outcome in outcomes])
 
 
 def _describe(opened: store.Store, study: Study, files: Files) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from orchestration.batch.fly import Batches
 from orchestration.errors import QuadcosimError, SimulatorError, UsageError
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.model import read_model
@@ -33,11 +34,20 @@ class Task:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Chunk:
+    """Runs of a study that are flown as lanes of a batch; all of native FMUs, of none are signals kept."""
+
+    tasks: tuple[Task, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Outcome:
     """The row of a run, and its signals as the bytes of a Parquet file if they are kept."""
 
     row: Row
     signals: bytes | None = None
+    in_lanes: bool = False
+    """whether a batch has flown it"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,6 +75,7 @@ class Hangar:
     def __init__(self, machine: str | None = None) -> None:
         self._fleet = Instances()
         self._machine = machine
+        self._batches: Batches | None = None
 
     def fly(self, task: Task) -> Outcome:
         """Fly one run; what is wrong with it is its row.
@@ -90,6 +101,27 @@ class Hangar:
         return Outcome(
             row=row_of(task, metrics, message, time.perf_counter() - started, self._machine), signals=signals
         )
+
+    def fly_chunk(self, chunk: Chunk) -> list[Outcome]:
+        """Fly many runs at once, those alone that a batch leaves.
+
+        Raises `BrokenPlaceError` for what is no run's own failure.
+        """
+        started = time.perf_counter()
+        if self._batches is None:
+            self._batches = Batches()
+        _expect_files(chunk.tasks[0].system)
+        try:
+            flown = self._batches.fly([task.system for task in chunk.tasks])
+        except (QuadcosimError, OSError, MemoryError) as error:
+            raise BrokenPlaceError(str(error) or type(error).__name__) from error
+        duration = (time.perf_counter() - started) / len(chunk.tasks)
+        return [
+            self.fly(task)
+            if each is None
+            else Outcome(row=row_of(task, each.metrics, each.message, duration, self._machine), in_lanes=True)
+            for task, each in zip(chunk.tasks, flown, strict=True)
+        ]
 
     @contextmanager
     def _load(self, path: Path, instance_name: str) -> Iterator[Instance]:

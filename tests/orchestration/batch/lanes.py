@@ -6,7 +6,6 @@ import numpy as np
 
 from orchestration import fmus
 from orchestration.batch.flight import FLYING, Batch, Landed
-from orchestration.batch.fly import native_twins
 from orchestration.batch.kernels import lanes_here
 from orchestration.batch.shape import Shape, outline
 from orchestration.batch.windows import Windows, timing
@@ -18,7 +17,7 @@ from orchestration.system.model import System
 
 def located(system: System) -> System:
     """With the native twins of its FMUs, as paths."""
-    twins = native_twins(system)
+    twins = fmus.native_twins(system)
     paths = fmus.of_components(twins.fmus)
     return checked(twins, {name: read_model(path) for name, path in paths.items()}).system
 

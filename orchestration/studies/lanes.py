@@ -1,0 +1,104 @@
+"""What of a sweep is flown in lanes: runs in chunks for the workers, and a sample of them by FMUs, to compare."""
+
+import hashlib
+import json
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass
+from itertools import islice
+from typing import Any
+
+from orchestration.batch.kernels import lanes_here
+from orchestration.batch.shape import Shape, outline
+from orchestration.batch.windows import timing
+from orchestration.errors import QuadcosimError
+from orchestration.simulation import checked
+from orchestration.studies.files import Files
+from orchestration.studies.worker import Chunk, Task
+from orchestration.system.model import System
+
+SAMPLE = 8
+"""Runs that are flown by FMUs too"""
+TOLERATED = 1e-9
+"""relative difference of a metric"""
+CHUNK, SORTED = 256, 4096
+"""Runs of a chunk, at most, and runs that are put in order so that those of a chunk are alike"""
+
+
+def expect_lanes(system: System, files: Files) -> None:
+    """Compile what flies a system in lanes; raises `UsageError` for one that cannot be, naming what it lacks."""
+    models = files.models_of(system)
+    shape = Shape(system=checked(system, models).system, models=models, lanes=lanes_here())
+    assert shape.kernels
+    assert shape.library
+
+
+def chunks(tasks: Iterable[Task], total: int, workers: int) -> Iterator[Task | Chunk]:
+    """Tasks in chunks, of which each of so many workers gets a few; those whose signals are kept by themselves."""
+    size = max(lanes_here(), min(CHUNK, total // (4 * workers) // lanes_here() * lanes_here()))
+    waiting = iter(tasks)
+    while some := list(islice(waiting, SORTED)):
+        yield from (task for task in some if task.keep_signals)
+        places: dict[Any, int] = {}
+        rest = [(task, (outline(task.system), timing(task.system))) for task in some if not task.keep_signals]
+        for _, key in rest:
+            places.setdefault(key, len(places))
+        ordered = [task for task, _ in sorted(rest, key=lambda pair: places[pair[1]])]
+        for first in range(0, len(ordered), size):
+            yield Chunk(tasks=tuple(ordered[first : first + size]))
+
+
+def sample(keys: Iterable[str]) -> set[str]:
+    """Which of some runs are flown by FMUs too: chosen by their content alone."""
+    return set(sorted(keys, key=lambda key: hashlib.sha256(f"sample {key}".encode()).digest())[:SAMPLE])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Agreement:
+    """How a sample of runs that were flown in lanes compares with the same runs flown by FMUs."""
+
+    runs: int
+    difference: float
+    """the largest one of any metric, relative"""
+    metric: str | None
+    index: int | None
+    """where it is; None if there is none"""
+
+    def __str__(self) -> str:
+        at = "" if self.metric is None else f" ({self.metric} of run {self.index})"
+        return f"{self.runs} runs flown by FMUs too: largest relative difference {self.difference:.1g}{at}"
+
+    def as_text(self) -> str:
+        """As a store keeps it."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def of(cls, pairs: Iterable[tuple[int, Mapping[str, Any], Mapping[str, Any]]]) -> "Agreement":
+        """Of runs by their index: the metrics in lanes, and those of FMUs."""
+        found = [
+            (_difference(lanes.get(name), value), name, index)
+            for index, lanes, alone in pairs
+            for name, value in alone.items()
+        ]
+        largest, name, index = max(found, key=lambda each: each[0], default=(0.0, "", 0))
+        runs = len({index for _, _, index in found})
+        if largest == 0.0:
+            return cls(runs=runs, difference=0.0, metric=None, index=None)
+        return cls(runs=runs, difference=largest, metric=name, index=index)
+
+    def expect(self) -> None:
+        """Raise `QuadcosimError` naming run and metric if they differ by more than is tolerated."""
+        if self.difference > TOLERATED:
+            raise QuadcosimError(
+                f"run {self.index}: {self.metric} by --engine batch differs by {self.difference:.3g} from that by its "
+                f"FMUs; expected at most {TOLERATED:g}"
+            )
+
+
+def _difference(one: Any, other: Any) -> float:
+    if one == other:
+        return 0.0
+    numbers = [value for value in (one, other) if isinstance(value, (int, float)) and not isinstance(value, bool)]
+    if len(numbers) < 2:
+        return math.inf
+    return abs(one - other) / max(abs(one), abs(other))  # type: ignore[no-any-return]

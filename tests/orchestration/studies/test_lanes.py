@@ -1,0 +1,142 @@
+"""A sweep by lanes writes the rows that the FMUs of its runs would have written, and says how far they agree."""
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from orchestration.errors import QuadcosimError, UsageError
+from orchestration.studies.crew import Died, Package, Pilot
+from orchestration.studies.lanes import SAMPLE, Agreement, chunks, sample
+from orchestration.studies.store import open_for_reading
+from orchestration.studies.study import Study
+from orchestration.studies.study_file import load_study
+from orchestration.studies.sweep import AGREEMENT, sweep
+from orchestration.studies.worker import Chunk, Task
+from tests.orchestration.fmi.small import needs_compiler, small
+from tests.orchestration.studies.common import NOISY, RUNS, axis, bits, quadcosim, short, study, swept
+
+pytestmark = needs_compiler
+OWN = ("duration", "machine")
+
+
+def noisy(folder: Path) -> Study:
+    (folder / "study.toml").write_text(NOISY, encoding="utf-8")
+    return load_study(folder / "study.toml")
+
+
+def assert_alike(lanes: list[dict[str, Any]], alone: list[dict[str, Any]]) -> None:
+    """The same rows, numbers to 1e-12, without what is a run's own."""
+    assert len(lanes) == len(alone)
+    for one, other in zip(lanes, alone):
+        assert one.keys() == other.keys()
+        for name in one.keys() - {*OWN}:
+            if _is_hex(one[name]) and _is_hex(other[name]):
+                number = float.fromhex(other[name])
+                assert float.fromhex(one[name]) == pytest.approx(number, rel=1e-12, abs=0.0), name
+            else:
+                assert (name, one[name]) == (name, other[name])
+
+
+def _is_hex(value: Any) -> bool:
+    return isinstance(value, str) and value.lstrip("-").startswith("0x")
+
+
+def test_rows_are_those_of_the_fmus_in_a_store_of_the_same_runs(tmp_path: Path) -> None:
+    chosen = noisy(tmp_path)
+    alone = bits(swept(dataclasses.replace(chosen, native=True), tmp_path / "alone"))
+    lanes = bits(swept(chosen, tmp_path / "lanes", engine="batch"))
+    assert len(lanes) == RUNS
+    assert_alike(lanes, alone)
+    with open_for_reading(tmp_path / "lanes" / "study.sqlite") as opened:
+        agreement = Agreement(**json.loads(opened.about()[AGREEMENT]))
+    assert agreement.runs == SAMPLE
+    assert agreement.difference < 1e-12
+
+
+def test_a_sweep_goes_on_where_it_was_and_flies_nothing_twice(tmp_path: Path) -> None:
+    few = study(axis("timing.period", 0.01, 0.02))
+    more = study(axis("timing.period", 0.01, 0.02, 0.03))
+    assert sweep(few, folder=tmp_path, engine="batch").flown == 2
+    summary = sweep(more, folder=tmp_path, engine="batch")
+    assert (summary.flown, summary.total) == (1, 3)
+    assert sweep(more, folder=tmp_path, engine="batch").agreement is None
+
+
+def test_a_run_that_its_fmus_refuse_has_the_row_that_it_has_alone(tmp_path: Path) -> None:
+    chosen = study(axis("plant.inertia.xy", 0.0, 1.0), axis("plant.mass", 0.9, 1.1))
+    alone = bits(swept(dataclasses.replace(chosen, native=True), tmp_path / "alone"))
+    assert {row["status"] for row in alone} == {"done", "failed"}
+    assert_alike(bits(swept(chosen, tmp_path / "lanes", engine="batch")), alone)
+
+
+def test_a_system_without_lanes_is_refused_before_anything_is_flown(tmp_path: Path) -> None:
+    path = small(tmp_path)
+    text = f"""
+    axes = [{{ name = "x", sets = ["components.one.parameters.gain"], values = [1.0, 2.0] }}]
+    [base]
+    stop_time = 0.1
+    [base.components.one]
+    fmu = "{path}"
+    step = 0.01
+    """
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(UsageError, match=r"components.one: small.fmu: expected a native FMU"):
+        sweep(load_study(tmp_path / "study.toml"), folder=tmp_path / "out", engine="batch")
+    assert not (tmp_path / "out" / "study.sqlite").exists()
+
+
+def test_the_command_says_how_far_they_agree(tmp_path: Path) -> None:
+    noisy(tmp_path)
+    done = quadcosim("sweep", "study.toml", "--engine", "batch", cwd=tmp_path)
+    assert "8 runs flown by FMUs too: largest relative difference" in done.stdout
+    assert done.stdout.splitlines()[-1] in quadcosim("status", "study.toml", cwd=tmp_path).stdout
+
+
+def test_a_difference_names_run_and_metric() -> None:
+    found = Agreement.of([(3, {"a": 1.0, "b": None}, {"a": 1.0, "b": None}), (7, {"a": 2.0}, {"a": 2.0 + 1e-6})])
+    assert (found.runs, found.metric, found.index) == (2, "a", 7)
+    with pytest.raises(QuadcosimError, match=r"run 7: a by --engine batch differs by 5e-07"):
+        found.expect()
+    with pytest.raises(QuadcosimError, match="run 1: outcome"):
+        Agreement.of([(1, {"outcome": "good"}, {"outcome": "bad"})]).expect()
+    Agreement.of([(3, {"a": 1.0}, {"a": 1.0 + 1e-12})]).expect()
+
+
+def test_a_sample_is_chosen_by_content_alone() -> None:
+    keys = [f"{i:064x}" for i in range(100)]
+    assert sample(keys) == sample(reversed(keys))
+    assert len(sample(keys)) == SAMPLE
+    assert sample(keys) != set(keys[:SAMPLE])
+
+
+def tasks(count: int, keep: tuple[int, ...] = ()) -> list[Task]:
+    chosen = study(axis("timing.period", 0.01, 0.02), base=short())
+    return [
+        Task(index=i, key=str(i), settings={}, system=chosen.system(i % 2, {}), keep_signals=i in keep)
+        for i in range(count)
+    ]
+
+
+def test_chunks_have_runs_that_are_alike_and_leave_alone_whose_signals_are_kept() -> None:
+    found = list(chunks(tasks(64, keep=(5,)), 64, 1))
+    assert [each.index for each in found if isinstance(each, Task)] == [5]
+    lanes = [each.tasks for each in found if isinstance(each, Chunk)]
+    assert sorted(task.index for each in lanes for task in each) == [i for i in range(64) if i != 5]
+    assert [len({task.index % 2 for task in each}) for each in lanes].count(2) <= 1
+
+
+def test_runs_that_end_their_process_together_are_flown_one_by_one(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    class Dying:
+        def ask(self, what: Any) -> Any:
+            raise Died(-6)
+
+    flown: list[int] = []
+    monkeypatch.setattr(Pilot, "_ready", lambda self: Dying())
+    monkeypatch.setattr(Pilot, "fly", lambda self, task: flown.append(task.index))
+    Pilot(tmp_path, Package(contents={}, versions={})).fly_chunk(Chunk(tasks=tuple(tasks(3))))
+    assert flown == [0, 1, 2]
