@@ -60,7 +60,8 @@ def test_in_a_lane_are_the_bits_of_the_fmu(model: str, tmp_path: Path) -> None:
     (tmp_path / "lanes.so").write_bytes(compiled_lanes(sources, 8))
     target = Target.parse(MODELS[model])
     shutil.copy(path / "binaries" / fmpy.platform / f"{model}.so", tmp_path / "alone.so")
-    assert _come_to(tmp_path, target, guid) >= {0, FMU_ERROR, DIVERGENCE}
+    may_diverge = {DIVERGENCE} if model in ("QuadrotorPlant", "UnifiedController") else set()
+    assert _come_to(tmp_path, target, guid) >= {0, FMU_ERROR} | may_diverge
 
 
 @pytest.mark.parametrize("name", PROBES)
