@@ -16,6 +16,16 @@ Out = Annotated[
     Path | None, typer.Option("--out", help="Folder of the store; results/NAME unless told.", metavar="DIR")
 ]
 
+BatchFlag = Annotated[
+    str | None,
+    typer.Option(
+        "--engine",
+        help="What flies them; batch: many at once, as lanes of native FMUs, a sample of them by FMUs too.",
+        metavar="python|compiled|batch",
+        show_default=False,
+    ),
+]
+
 
 def sweep(
     study: StudyFile,
@@ -25,15 +35,7 @@ def sweep(
         str | None, typer.Option("--dask", help="A dask scheduler instead, e.g. tcp://host:8786.", metavar="URL")
     ] = None,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Fly failed runs again.")] = False,
-    engine: Annotated[
-        str | None,
-        typer.Option(
-            "--engine",
-            help="What flies them; batch: many at once, as lanes of native FMUs, a sample of them by FMUs too.",
-            metavar="python|compiled|batch",
-            show_default=False,
-        ),
-    ] = None,
+    engine: BatchFlag = None,
 ) -> None:
     """Fly the runs of a study that are missing; kill it and start it again as you like."""
     from orchestration.master.engine import engine_named
@@ -105,7 +107,7 @@ def tune(
     ],
     out: Annotated[Path, typer.Option("--out", help="Folder for the files of tuned parameters.", metavar="DIR")],
     workers: Annotated[int, typer.Option("--workers", help="Processes on this machine.", metavar="N")] = 1,
-    engine: EngineFlag = None,
+    engine: BatchFlag = None,
 ) -> None:
     """Tune a controller on an ensemble of starts, and judge it on others; goes on where it was stopped."""
     from orchestration.master.engine import engine_named
@@ -113,11 +115,13 @@ def tune(
     from orchestration.studies.tune import tune as search_all
     from orchestration.studies.tuning_file import load_tuning
 
-    asked = load_tuning(tuning)
-    files = asked.files()
-    with progress_bar("searching") as progress, Pool(files, workers, engine_named(engine)) as pool:
+    in_lanes = engine == "batch"
+    asked = dataclasses.replace(load_tuning(tuning), native=in_lanes)
+    files, alone = asked.files(), None if in_lanes else engine_named(engine, "batch")
+    with progress_bar("searching") as progress, Pool(files, workers, alone) as pool:
         written = search_all(
-            asked, files, Path("results") / asked.name, out, pool.fly_all,
+            asked, files, Path("results") / asked.name, out,
+            lambda systems: pool.fly_all(systems, in_lanes=in_lanes), pool.fly_all,
             command=f"quadcosim tune {tuning} --out {out}", progress=progress, announce=say,
         )  # fmt: skip
     for path in written:

@@ -16,6 +16,7 @@ from orchestration.errors import QuadcosimError, UsageError
 from orchestration.master.engine import Engine
 from orchestration.studies.crew import Crew, InterruptedWorker, Package
 from orchestration.studies.files import Files
+from orchestration.studies.lanes import chunks
 from orchestration.studies.worker import Chunk, Outcome, Task
 from orchestration.system.model import System
 
@@ -41,33 +42,47 @@ class Pool:
     def __exit__(self, *exception: object) -> None:
         self._stack.close()
 
-    def fly_all(self, systems: Sequence[System]) -> list[Any]:
-        """The metrics of all runs in their order; raises `QuadcosimError` if a run fails."""
-        return self.fly(systems, stop=lambda metrics: False)
+    def fly_all(self, systems: Sequence[System], *, in_lanes: bool = False) -> list[Any]:
+        """The metrics of all runs in their order, by native FMUs many at once if they are to fly `in_lanes`.
+
+        Raises `QuadcosimError` if a run fails.
+        """
+        if not in_lanes:
+            return self.fly(systems, stop=lambda metrics: False)
+        tasks = (self._task(i, system) for i, system in enumerate(systems))
+        found: list[Any] = [None] * len(systems)
+        for future in [self._submit(some) for some in chunks(tasks, len(systems), self._workers)]:
+            for outcome in future.result():
+                found[outcome.row.index] = _metrics(outcome)
+        return found
 
     def fly(self, systems: Sequence[System], stop: Callable[[Any], bool]) -> list[Any]:
         """The metrics of the runs in their order, up to the first whose metrics `stop`, with any number of workers.
 
         Raises `QuadcosimError` if a run fails.
         """
-        futures = [
-            self._submit(Task(index=i, key="", settings={}, system=system, keep_signals=False, engine=self._engine))
-            for i, system in enumerate(systems)
-        ]
+        futures = [self._submit(self._task(i, system)) for i, system in enumerate(systems)]
         found = []
         try:
             for future in futures:
                 (outcome,) = future.result()
-                row = outcome.row
-                if row.metrics is None:
-                    raise QuadcosimError(str(row.message))
-                found.append(row.metrics)
+                found.append(_metrics(outcome))
                 if stop(found[-1]):
                     break
         finally:
             for future in futures:
                 future.cancel()
         return found
+
+    def _task(self, index: int, system: System) -> Task:
+        return Task(index=index, key="", settings={}, system=system, keep_signals=False, engine=self._engine)
+
+
+def _metrics(outcome: Outcome) -> Any:
+    """Of a run; raises `QuadcosimError` if it has failed."""
+    if outcome.row.metrics is None:
+        raise QuadcosimError(str(outcome.row.message))
+    return outcome.row.metrics
 
 
 def run_locally(tasks: Iterable[Task | Chunk], package: Package, workers: int) -> Generator[list[Outcome], None, None]:

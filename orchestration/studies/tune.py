@@ -19,6 +19,7 @@ def tune(
     folder: Path,
     out: Path,
     fly: Fly,
+    judge: Fly,
     *,
     command: str,
     progress: Callable[[float], None],
@@ -34,7 +35,7 @@ def tune(
     for i, (period, seed) in enumerate(searches):
         if any((one.period, one.seed) == (period, seed) for one in done):
             continue
-        one = search(tuning, period, seed, fly, _part(progress, i, len(searches)))
+        one = search(tuning, period, seed, fly, judge, _part(progress, i, len(searches)))
         done.append(one)
         announce(
             f"period {period:g} s, seed {seed}: cost {one.cost:.5g}, on other starts {one.judged_cost:.5g}, "

@@ -9,6 +9,7 @@ import numpy as np
 
 from fmu_kit.trajectory import Trajectory
 from orchestration.errors import UsageError
+from orchestration.fmus import native_twins
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import in_its_own_words
 from orchestration.request import system_meant
@@ -16,6 +17,7 @@ from orchestration.simulator import Floats
 from orchestration.statistics import wilson
 from orchestration.studies.axes import Axis
 from orchestration.studies.files import Files, files_of
+from orchestration.studies.lanes import expect_lanes
 from orchestration.studies.starts import Starts
 from orchestration.studies.study import paths_in
 from orchestration.studies.trials import is_good
@@ -51,6 +53,8 @@ class Tuning:
     """[s]; tuned for each by itself"""
     evaluations: int
     """of the mean cost, for each parameter"""
+    native: bool = False
+    """whether native FMUs fly"""
     seeds: tuple[int, ...]
     """of the optimiser, each a search of its own; the best by its cost on the starts that it is tuned on is taken"""
 
@@ -69,8 +73,9 @@ class Tuning:
 
     @cached_property
     def origin(self) -> System:
-        """The system that the base means."""
-        return system_meant(self.base)
+        """The system that the base means, by native FMUs if these are to fly."""
+        system = system_meant(self.base)
+        return native_twins(system) if self.native else system
 
     @cached_property
     def _paths(self) -> dict[str, tuple[str, ...]]:
@@ -86,7 +91,11 @@ class Tuning:
 
     def files(self) -> Files:
         """The files of all flights, FMUs built if need be."""
-        return files_of(self.origin)
+        found = files_of(self.origin)
+        if self.native:
+            middle = self.values([0.5] * len(self.parameters))
+            expect_lanes(self.systems(self.periods[0], middle, replace(self.starts, count=1))[0], found)
+        return found
 
     def values(self, shares: Sequence[float]) -> dict[str, float]:
         """What each target is set to, at a share in [0, 1] of the range of each parameter."""
@@ -140,8 +149,11 @@ class Found:
     evaluations: int
 
 
-def search(tuning: Tuning, period: float, seed: int, fly: Fly, progress: Callable[[float], None]) -> Found:
-    """The best of one search by CMA-ES (Hansen, arXiv:1604.00772), begun at a point that the seed draws."""
+def search(tuning: Tuning, period: float, seed: int, fly: Fly, judge: Fly, progress: Callable[[float], None]) -> Found:
+    """The best of one search by CMA-ES (Hansen, arXiv:1604.00772), begun at a point that the seed draws.
+
+    `fly` flies what is searched through, `judge` what the best is judged by.
+    """
     import cma  # with it comes matplotlib
 
     first = np.random.default_rng(seed).uniform(0.25, 0.75, len(tuning.parameters))
@@ -158,7 +170,7 @@ def search(tuning: Tuning, period: float, seed: int, fly: Fly, progress: Callabl
             best, lowest = candidates[place], costs[place]
         progress(min(1.0, count / tuning.budget))
     values = tuning.values(list(best))
-    judged = fly(tuning.systems(period, values, tuning.judging()))
+    judged = judge(tuning.systems(period, values, tuning.judging()))
     flown = sum(map(is_good, judged))
     return Found(
         period=period,

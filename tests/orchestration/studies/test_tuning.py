@@ -64,7 +64,7 @@ def bowl(systems):
 
 
 def test_a_search_finds_the_bottom_of_a_bowl(tuning):
-    found = search(tuning, 0.01, 1, bowl, lambda share: None)
+    found = search(tuning, 0.01, 1, bowl, bowl, lambda share: None)
     assert found.values["controller.gain.attitude"] == pytest.approx(10.0, rel=0.02)
     assert found.values["controller.gain.surface"] == pytest.approx(5.0, rel=0.02)
     assert found.values["controller.gain.theta"] == found.values["controller.gain.attitude"]
@@ -73,7 +73,7 @@ def test_a_search_finds_the_bottom_of_a_bowl(tuning):
 
 
 def test_the_same_seed_searches_the_same_way_and_another_another(tuning):
-    one, again, other = (search(tuning, 0.01, seed, bowl, lambda share: None) for seed in (1, 1, 2))
+    one, again, other = (search(tuning, 0.01, seed, bowl, bowl, lambda share: None) for seed in (1, 1, 2))
     assert one == again
     assert one.values != other.values
 
@@ -97,7 +97,7 @@ def test_no_start_is_both_tuned_on_and_judged_on(tuning):
         )
         return bowl(systems)
 
-    search(tuning, 0.01, 1, fly, lambda share: None)
+    search(tuning, 0.01, 1, fly, fly, lambda share: None)
     trained, judged = set(itertools.chain(*seen[:-1])), set(seen[-1])
     assert len(trained) == 3
     assert len(judged) == 4
@@ -110,7 +110,7 @@ def test_flights_have_the_period_that_is_tuned_for(tuning):
 
 
 def test_the_best_is_the_one_that_costs_least_where_it_was_tuned(tuning):
-    one = search(tuning, 0.01, 1, bowl, lambda share: None)
+    one = search(tuning, 0.01, 1, bowl, bowl, lambda share: None)
     worse = replace(one, seed=2, cost=one.cost + 1.0, judged_cost=0.0)
     assert list(best_by_period([worse, one])) == [one]
 
@@ -127,13 +127,17 @@ def test_a_tuning_goes_on_where_it_was_stopped(tuning, tmp_path):
 
     how = {"command": "quadcosim tune", "progress": lambda share: None, "announce": told.append}
     with pytest.raises(KeyboardInterrupt):
-        tune(tuning, files, tmp_path / "kept", tmp_path / "gains", fly, **how)
+        tune(tuning, files, tmp_path / "kept", tmp_path / "gains", fly, fly, **how)
     before = list(told)
     assert 0 < len(before) < 4
-    written = tune(tuning, files, tmp_path / "kept", tmp_path / "gains", bowl, **how)
+    written = tune(tuning, files, tmp_path / "kept", tmp_path / "gains", bowl, bowl, **how)
     assert len(told) == 4
     assert [path.name for path in written] == ["bowl_10ms.toml", "bowl_20ms.toml"]
-    tune(tuning, files, tmp_path / "kept", tmp_path / "gains", lambda systems: pytest.fail("flown again"), **how)
+
+    def fail(systems):
+        pytest.fail("flown again")
+
+    tune(tuning, files, tmp_path / "kept", tmp_path / "gains", fail, fail, **how)
     gains = read_toml(written[0], "gains")["controller"]
     assert set(gains) == {"gain.attitude", "gain.theta", "gain.surface"}
     assert "of 2 searches" in written[0].read_text()
