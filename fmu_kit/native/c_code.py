@@ -75,7 +75,7 @@ class Writer:
         if not ends(f.body):
             self._line(self.through)
         parameters = [f"{c_type(symbol)} {name}" for symbol, name in zip(f.parameters, self.parameters)]
-        parameters += [f"q_real *r{k}" for k in range(f.results)]
+        parameters += ["q_real *out"] if f.results else []
         head = f"static {self.type} {c_name(f.name)}({', '.join([*self.first, *parameters])})\n{{\n"
         doc = f"/* {f.doc.replace('*/', '* /')} */\n" if f.doc else ""
         before = self._memory()
@@ -137,7 +137,7 @@ class Writer:
         tangents = any(name.startswith(TANGENT) for name in read | self.function.stores)
         return [
             "q_real *const v = m->state.memory;",
-            *(["q_real *const d = m->tangents;"] if tangents else []),
+            *(["q_real *const d = m->tangents;", "(void)d;"] if tangents else []),
         ]
 
     def _place(self, name: str) -> str:
@@ -315,21 +315,22 @@ class Writer:
 
     def _return(self, each: Statement, rest: Block) -> None:
         for k, symbol in enumerate(each.symbols):
-            self._line(f"*r{k} = {self._lanes(symbol)};")
+            self._line(f"out[{k}] = {self._lanes(symbol)};")
         self._line("return 0;")
 
     def _call(self, each: Statement, rest: Block) -> None:
         call: Call = each.data
         given = [self._as(p.kind, symbol) for symbol, p in zip(each.symbols, call.function.parameters)]
-        results = [self._name("r") for _ in range(call.function.results)]
-        self.declared += [f"q_real {name} = q_all(0.0);" for name in results]
+        results = [self._name("r")] if call.function.results else []
+        zeros = ", ".join(["q_all(0.0)"] * call.function.results)
+        self.declared += [f"q_real {name}[{call.function.results}] = {{{zeros}}};" for name in results]
         status = self._name("status")
-        self._called(each, [*given, *(f"&{name}" for name in results)], status)
+        self._called(each, [*given, *results], status)
         for symbol in self._coming_of(each):
             if symbol.op == "failed":
                 self._set(symbol, self._has_failed(status, 1 + ERRORS.index(symbol.data[0])))
             elif symbol.op == "result":
-                name = results[symbol.data[0]]
+                name = f"{results[0]}[{symbol.data[0]}]"
                 self._set(symbol, f"q_ne({name}, 0.0)" if symbol.kind == "bool" else name)
             else:
                 self._set(symbol, self._load(symbol))

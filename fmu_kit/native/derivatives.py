@@ -163,6 +163,8 @@ class _Body:
         if symbol.op == "outcome":
             k, loop = data
             size = (len(loop.symbols) - 1) // 2
+            if loop not in self.loops:  # of a branch that is to come
+                self._loop(loop)
             made = self.loops[loop]
             value = node("outcome", (), symbol.kind, (k, made))
             return value, node("outcome", (), "real", (k + size, made)) if symbol.kind == "real" else None

@@ -123,7 +123,8 @@ class LaneWriter(Writer):
     def _return(self, each: Statement, rest: Block) -> None:
         for k, symbol in enumerate(each.symbols):
             value = self._lanes(symbol)
-            self._line(f"*r{k} = {f'q_select({self.masks[-1]}, {value}, *r{k})' if self.returns_early else value};")
+            kept = f"q_select({self.masks[-1]}, {value}, out[{k}])" if self.returns_early else value
+            self._line(f"out[{k}] = {kept};")
         if len(self.masks) == 1:
             self._line(self.through)
         else:

@@ -166,7 +166,9 @@ class _Body:
         if id(symbol) in self._known:
             return self._known[id(symbol)]
         if symbol.op == "outcome":
-            return node("outcome", (), symbol.kind, (symbol.data[0], self._loops[symbol.data[1]]))
+            k, loop = symbol.data
+            made = self._loops[loop] if loop in self._loops else self._made(loop)  # of a branch that is to come
+            return node("outcome", (), symbol.kind, (k, made))
         if not symbol.args:
             return symbol
         if self._after_taking and self.whole.is_worth_it(symbol):

@@ -340,6 +340,12 @@ def _clipped(x: float) -> float:
     return 10.0 if x > 10.0 else x
 
 
+def _either_way(times: int, x: float, by: float) -> float:
+    if x > 1.0:
+        return repeat(times, lambda i, y: y - by, x)
+    return repeat(times, lambda i, y: y * by, x)
+
+
 class Loops(Probe):
     """Loops of a computed number of times."""
 
@@ -371,6 +377,10 @@ class Loops(Probe):
         self.put("y3", repeat(times, root, abs(b)))
         self.put("y4", repeat(times, lambda i, x: self._nearer(x, i + self._nearer(x, 1.0)), a))
         self.put("y5", self._nearer(b, 2.0))
+        self.put("y6", self._turned(times, a))
+
+    def _turned(self, times: int, x: float) -> float:
+        return _either_way(times, x, math.exp(0.01 * self.real("p")))
 
     def _nearer(self, x: float, far: float) -> float:
         """Half of the way from one number to another, by what this step has put."""
