@@ -50,7 +50,7 @@ class SampledController(Slave):
         """Hold the command for the initial inputs; this is not a sample."""
         self._clock = SampleClock(self.real("sample_period"), self.real("sample_offset"))
         self._clock.start(t)
-        self._sample(t)
+        self.sample(t, 0.0)
 
     def step(self, t: float, h: float) -> None:
         """Sample at `t` if it is time, and hold over [t, t + h]."""
@@ -60,7 +60,7 @@ class SampledController(Slave):
                 "long step", f"communication step {h} s is longer than sample_period {period} s: one sample a step"
             )
         if self._clock.is_due(t):
-            self._sample(t)
+            self.sample(t, h)
             self.put_count("sample_count", self.count("sample_count") + 1)
 
     def internal_state(self) -> State:
@@ -71,7 +71,8 @@ class SampledController(Slave):
         """Put the clock back."""
         self._clock = SampleClock(self.real("sample_period"), self.real("sample_offset"), int(state["next_index"]))
 
-    def _sample(self, t: float) -> None:
+    def sample(self, t: float, h: float) -> None:
+        """Hold a command for what is measured at `t`, over [t, t + h]; of no length at initialisation."""
         quaternion = self.quaternion("quaternion")
         if not any(quaternion):
             self._hover()
@@ -82,6 +83,10 @@ class SampledController(Slave):
             quaternion.unit(),
             self.vec3("angular_velocity"),
         )
+        self.respond(t, h, measurement)
+
+    def respond(self, t: float, h: float, measurement: Measurement) -> None:
+        """Write the command for a measurement at `t`, and the locals."""
         self.control(measurement, self._reference(t))
 
     def _reference(self, t: float) -> Reference:

@@ -25,6 +25,18 @@ class Reference:
     snap: Vec3 = ZERO
     """S_d [m/s⁴]"""
 
+    def after(self, time: Scalar) -> "Reference":
+        """The desired motion `time` [s] later: its Taylor series, as far as there are terms."""
+        v, a, j, s = self.velocity, self.acceleration, self.jerk, self.snap
+        second, third, fourth = time / 2.0, time / 3.0, time / 4.0
+        return Reference(
+            position=self.position.plus(time, v.plus(second, a.plus(third, j.plus(fourth, s)))),
+            velocity=v.plus(time, a.plus(second, j.plus(third, s))),
+            acceleration=a.plus(time, j.plus(second, s)),
+            jerk=j.plus(time, s),
+            snap=s,
+        )
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Trajectory:

@@ -9,6 +9,7 @@ from controller_fmu.interface import (
     MEASUREMENT,
     REFERENCE,
 )
+from controller_fmu.redesign.interface import CHOICES, REDESIGN
 from fmu_kit.variables import discrete_local, tunable_parameter, vector
 
 GAINS = (
@@ -49,10 +50,12 @@ UNIFIED = (
     *REFERENCE,
     *COMMAND,
     *COMMON_PARAMETERS,
+    *REDESIGN,
     *GAINS,
     *COMMON_LOCALS,
     *LAW_LOCALS,
     *COUNT_AND_SWITCH,
     *GAIN_SCALING,
+    *CHOICES,
 )
 """All variables of the unified controller; the place in this list is the value reference."""

@@ -16,11 +16,13 @@ from controller_fmu.gain_scaling import feedback
 from controller_fmu.vehicle import Measurement, Model
 from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.errors import DivergenceError
-from fmu_kit.scalar import FLOAT, Scalar, ScalarOps
+from fmu_kit.scalar import FLOAT, Scalar, ScalarOps, repeat
 from fmu_kit.trajectory import Reference
 
 SMALLEST_ACCELERATION = 1e-9
 """Below this, n [m/s²] or n + g - F_z [m/s²] counts as zero and (12) as unsolvable."""
+NEWTON_STEPS = 8
+"""Of `settled`: enough for all digits where time k is up to 100 m/s."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -176,14 +178,39 @@ class DesiredRate:
         )
 
 
+def settled(s: Vec3, time: Scalar, k: Vec3, ops: ScalarOps = FLOAT) -> Vec3:
+    """σ [m/s] with σ + time k tanh σ = s: where ds/dt = -k tanh s leads in `time` [s], by the implicit Euler method.
+
+    On each axis by Newton's method for |s|, from below: the left side is concave there, so that no step is too long.
+    """
+    if time == 0.0:
+        return s
+
+    def next_one(x: Scalar, size: Scalar, a: Scalar) -> Scalar:
+        tanh = ops.tanh(x)
+        return x - (x + a * tanh - size) / (1.0 + a * (1.0 - tanh * tanh))
+
+    a, size = time * k, s.map(abs)
+    start = Vec3(*(ops.maximum(s / (1.0 + a), s - a) for s, a in zip(size, a)))
+    found = repeat(NEWTON_STEPS, lambda i, x: Vec3(*map(next_one, x, size, a)), start)
+    sigma: Vec3 = s.map(ops.sign) * found
+    return sigma
+
+
 def evaluate(
-    state: Measurement, reference: Reference, gains: Gains, model: Model, ops: ScalarOps = FLOAT
+    state: Measurement,
+    reference: Reference,
+    gains: Gains,
+    model: Model,
+    ops: ScalarOps = FLOAT,
+    implicit: Scalar = 0.0,
 ) -> Evaluation:
     """Thrust and torque that track `reference` from `state`, with all that they are made of.
 
     Scalars may be floats or batches; every component of the result has the (broadcast) shape of the
     inputs. `state.quaternion` must have unit length. Rates are the model's predictions: they do not
     know wind. The law is not invariant under Q → -Q: it turns to q̃_0 = +1, the long way round if q̃_0 < 0.
+    With `implicit` > 0 [s], it is taken at the sliding variable that is `settled` over this time.
 
     Raises `DivergenceError` where the desired attitude does not exist (12).
     """
@@ -192,8 +219,8 @@ def evaluate(
     e = state.position - reference.position
     ev = state.velocity - reference.velocity
     gamma, gamma_prime, gamma_second = surface(e, gains, ops)
-    s = gamma * e + ev  # (19)-(21)
     k = gains.k_t + Vec3(gains.beta, gains.beta, gains.beta)  # Υ = -β tanh(s) folded in (32)
+    s = settled(gamma * e + ev, implicit, k, ops)  # (19)-(21)
     tanh_s = s.map(ops.tanh)  # (23)
     F = reference.acceleration - k * tanh_s  # (22)
     u = Vec3(-F.x, -F.y, g - F.z)

@@ -73,5 +73,9 @@ FLIGHTS = {
     "controller between samples": Flight(
         "UnifiedController", {"sample_offset": 0.002, "use_reference_inputs": True, "mass": 1.2}, 0.004
     ),
+    # Commands on their way: those of three steps, under which the model runs ahead.
+    "controller that predicts": Flight(
+        "UnifiedController", {"prediction": 0.03, "discretisation": 4, "sample_period": 0.0, "stages": 2}, 0.01
+    ),
 }
 """By name; together they use every kind of state that the FMUs have."""

@@ -1,0 +1,158 @@
+"""A controller whose command may be redesigned for the time that it is held, and for a known delay."""
+
+import math
+from abc import abstractmethod
+from typing import ClassVar
+
+from controller_fmu.redesign.interface import Discretisation
+from controller_fmu.redesign.matching import matched
+from controller_fmu.redesign.nominal import closed_loop, held
+from controller_fmu.redesign.prediction import MOST_ON_THEIR_WAY, Sent, at_rest, predicted, with_newest
+from controller_fmu.sampled import SHORTEST_PERIOD, SampledController
+from controller_fmu.vehicle import Measurement
+from fmu_kit.algebra import Vec3
+from fmu_kit.errors import require, require_finite_state
+from fmu_kit.rigid_body import RigidState, Wrench
+from fmu_kit.saved_state import State
+from fmu_kit.trajectory import Reference
+
+_COMMAND = ("thrust", "torque.x", "torque.y", "torque.z")
+
+
+def _of(condition: bool, one: float, other: float) -> float:
+    """One of two values; in C, what is done with it is written out once."""
+    return one if condition else other
+
+
+class RedesignedController(SampledController):
+    """Holds what a redesign makes of a law that is a pure function: laws define `command` beside `control`.
+
+    Thrust and torque are the redesign's; all else that `control` writes is the law's at the sample.
+    """
+
+    offers_semi_implicit: ClassVar[bool] = False
+    """Whether `command` knows a time that is not zero."""
+
+    @abstractmethod
+    def command(self, measurement: Measurement, reference: Reference, implicit: float) -> Wrench:
+        """The command of the law; with `implicit` > 0 [s] that of its semi-implicit form over this time."""
+
+    def read_parameters(self) -> None:
+        """Take over the redesign too."""
+        super().read_parameters()
+        self._discretisation = self.enumeration("discretisation")
+        self._stages = self.count("stages")
+        self._prediction = self.real("prediction")
+        period = self.real("hold_period")
+        require(period == 0.0 or period >= SHORTEST_PERIOD, "hold_period", period, f"0 or at least {SHORTEST_PERIOD} s")
+        self._hold_period = period if period > 0.0 else self.real("sample_period")
+        require(
+            self.offers_semi_implicit or self._discretisation != Discretisation.SEMI_IMPLICIT,
+            "discretisation",
+            "semi_implicit",
+            "another: this law has no semi-implicit form",
+        )
+
+    def initialise(self, t: float) -> None:
+        """Hold the command for the initial inputs: it acts at once, and until the first sample's does."""
+        self._pending = at_rest(t, self._held_command())  # which is none yet; nothing is predicted from it
+        super().initialise(t)
+        self._pending = at_rest(t - self._prediction, self._held_command())
+
+    def internal_state(self) -> State:
+        """The clock, and the commands on their way."""
+        pending = [[sent.time, sent.command.thrust, *sent.command.torque] for sent in self._pending]
+        return {**super().internal_state(), "pending": pending}
+
+    def restore(self, state: State) -> None:
+        """Put clock and commands back."""
+        super().restore(state)
+        pending = [[float(number) for number in sent] for sent in state["pending"]]
+        self._pending = tuple(Sent(t, Wrench(thrust, Vec3(x, y, z))) for t, thrust, x, y, z in pending)
+        if len(self._pending) != MOST_ON_THEIR_WAY:
+            raise ValueError(len(self._pending))
+
+    def sample(self, t: float, h: float) -> None:
+        """Hold the redesigned command, and remember it if it is to be on its way."""
+        super().sample(t, h)
+        if self._prediction > 0.0 and h > 0.0:
+            self._remember(t)
+
+    def respond(self, t: float, h: float, measurement: Measurement) -> None:
+        """Write what the law says here and now; then, if asked for, another command."""
+        super().respond(t, h, measurement)
+        if self._discretisation != Discretisation.EXPLICIT or self._prediction > 0.0:
+            self._redesign(t, h, measurement)
+
+    def _remember(self, t: float) -> None:
+        self._pending = with_newest(self._pending, t, self._held_command())
+
+    def _held_command(self) -> Wrench:
+        return Wrench(self.real("thrust"), self.vec3("torque"))
+
+    def _redesign(self, t: float, h: float, measurement: Measurement) -> None:
+        """Hold the redesigned command; at initialisation (`h` = 0) none is on its way, and this one acts at once."""
+        hold = self._hold_period if self._hold_period > 0.0 else h
+        state, start = RigidState(*measurement), t
+        if self._prediction > 0.0 and h > 0.0:
+            state, start = self._predicted(t, state, hold), t + self._prediction
+        elif hold == 0.0:
+            return
+        command = self._discretised(t, start, state, hold)
+        require_finite_state(_COMMAND, (command.thrust, *command.torque))
+        self.put("thrust", command.thrust)
+        self.put_vec3("torque", command.torque)
+
+    def _discretised(self, sampled: float, t: float, state: RigidState, hold: float) -> Wrench:
+        """The command to be held over [t, t + hold] from `state`, known at the time `sampled`."""
+        kind, count = self._discretisation, self._stages
+        if kind <= Discretisation.SEMI_IMPLICIT:
+            return self._law(sampled, t, state, _of(kind == Discretisation.SEMI_IMPLICIT, hold, 0.0))
+        horizon = _of(kind == Discretisation.MIDPOINT, 0.5 * hold, hold)
+        flight = closed_loop(
+            lambda time, x: self._law(sampled, time, x, 0.0), self._model, t, state, horizon / count, count
+        )
+        if kind == Discretisation.MIDPOINT:
+            return self._law(sampled, t + horizon, flight.state, 0.0)
+        mean = Wrench(flight.impulse.thrust / hold, flight.impulse.torque / hold)
+        if kind == Discretisation.MEAN:
+            return mean
+        return self._matched(state, flight.state, mean, hold)
+
+    def _matched(self, state: RigidState, target: RigidState, first: Wrench, hold: float) -> Wrench:
+        def flight(command: Wrench) -> RigidState:
+            return self._advanced(state, command, hold / self._stages, self._stages)
+
+        return matched(flight, self._model, target, first, self.real("weight") / hold)
+
+    def _predicted(self, t: float, state: RigidState, hold: float) -> RigidState:
+        """Where the vehicle is when a command given at `t` acts."""
+        oldest, delay = self._pending[0].time, self._prediction
+        require(
+            oldest + delay <= t + 1e-6 * delay,
+            "prediction",
+            delay,
+            f"at most {t - oldest:g} s: {MOST_ON_THEIR_WAY} commands can be on their way",
+        )
+        longest = hold / self._stages
+
+        def advanced(x: RigidState, command: Wrench, time: float) -> RigidState:
+            count = math.ceil(time / longest - 1e-6)
+            return self._advanced(x, command, time / max(count, 1), count)
+
+        return predicted(advanced, state, t, delay, self._pending)
+
+    def _advanced(self, state: RigidState, command: Wrench, step: float, count: int) -> RigidState:
+        """The nominal model after some steps under a held command."""
+        return held(self._model, state, command, step, count)
+
+    def _law(self, sampled: float, t: float, state: RigidState, implicit: float) -> Wrench:
+        """The law's command at `t` in a state of the nominal model, with the reference as known when `sampled`."""
+        measurement = Measurement(state.position, state.velocity, state.quaternion, state.angular_velocity)
+        return self.command(measurement, self._reference_ahead(sampled, t), implicit)
+
+    def _reference_ahead(self, sampled: float, t: float) -> Reference:
+        """The built-in trajectory at `t`; else what follows from the inputs as they are."""
+        if not self._use_reference_inputs:
+            return self._trajectory.at(t)
+        return self._reference(sampled).after(t - sampled)

@@ -1,0 +1,58 @@
+"""The parameters of every controller whose command may be redesigned for the time that it is held."""
+
+import enum
+
+from fmu_kit.variables import fixed_parameter
+
+
+class Discretisation(enum.IntEnum):
+    """How a law in continuous time becomes a command that is held."""
+
+    EXPLICIT = 1
+    """the law at the sample"""
+    SEMI_IMPLICIT = 2
+    """the law at the sliding variable that it leads to by the end of the hold period"""
+    MIDPOINT = 3
+    """the law in the middle of the hold period"""
+    MEAN = 4
+    """the mean of the law over the hold period"""
+    MATCH = 5
+    """the command that leads where the law leads"""
+
+
+REDESIGN = (
+    fixed_parameter(
+        "hold_period",
+        "T for which a command is held, as the redesign has it; 0: sample_period, and with that 0 the communication "
+        "step",
+        "s",
+        0.0,
+        minimum=0.0,
+    ),
+    fixed_parameter(
+        "weight",
+        "w of discretisation match: of the attitude at the end of T, in (w/T)^2 |dtheta|^2",
+        "1",
+        1.0,
+        minimum=0.0,
+    ),
+    fixed_parameter(
+        "prediction",
+        "delay to make up for, from sample to effect: the nominal model runs ahead; 0: none",
+        "s",
+        0.0,
+        minimum=0.0,
+    ),
+)
+
+CHOICES = (
+    fixed_parameter(
+        "discretisation",
+        "what is held: the law at the sample (explicit), at the sliding variable that it leads to (semi_implicit), in "
+        "the middle of T (midpoint), its mean over T (mean), or what leads where the law leads (match)",
+        None,
+        Discretisation.EXPLICIT,
+    ),
+    fixed_parameter("stages", "steps of the nominal model over T", None, 3, minimum=1, maximum=100),
+)
+"""Those that are no Reals."""

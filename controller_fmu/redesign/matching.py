@@ -1,0 +1,106 @@
+"""The constant command under which the nominal model ends a hold period nearest to a given state."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from fmu_kit.algebra import Quaternion, Vec3
+from fmu_kit.rigid_body import Body, RigidState, Wrench
+from fmu_kit.scalar import FLOAT, Scalar, ScalarOps, repeat
+
+ITERATIONS = 4
+"""Of Gauss-Newton: see `matched`."""
+DIFFERENCE = 1e-5
+"""[m/s²], [rad/s²]: between the commands that the Jacobian is found from."""
+TINY = 1e-150
+"""[1]: below this, the vector part of a quaternion counts as zero."""
+
+
+class _Try(NamedTuple):
+    """A command, and what it comes to."""
+
+    command: tuple[Scalar, ...]
+    """T/m [m/s²] and J⁻¹ Γ [rad/s²]: of one size whatever the vehicle"""
+    misses: tuple[Scalar, ...]
+
+
+def matched(
+    flight: Callable[[Wrench], RigidState],
+    model: Body,
+    target: RigidState,
+    first: Wrench,
+    weight: Scalar,
+    ops: ScalarOps = FLOAT,
+) -> Wrench:
+    """The constant command that minimises ‖δv‖² + ‖δΩ‖² + ‖`weight` δθ‖² between where `flight` ends and `target`.
+
+    Gauss-Newton from the command `first`, in a fixed number of iterations; a step that does not improve is not taken.
+    The Jacobian is that of forward differences: the model is one function more to call, not a second set of equations,
+    and an error in it delays the descent but does not move the minimum by more than the error times what is missed.
+    """
+
+    def tried(command: tuple[Scalar, ...]) -> _Try:
+        return _Try(command, misses(flight(_wrench(command, model)), target, weight, ops))
+
+    def improved(i: int, now: _Try) -> _Try:
+        columns = [
+            [(there - here) / DIFFERENCE for there, here in zip(tried(_moved(now.command, k)).misses, now.misses)]
+            for k in range(4)
+        ]
+        matrix = [[_inner(a, b) for b in columns] for a in columns]
+        step = solved(matrix, [-_inner(column, now.misses) for column in columns])
+        then = tried(tuple(x + dx for x, dx in zip(now.command, step)))
+        better = _inner(then.misses, then.misses) < _inner(now.misses, now.misses)
+        return _Try(*(tuple(ops.where(better, a, b) for a, b in zip(*parts)) for parts in zip(then, now)))
+
+    start = (first.thrust / model.mass, *model.inertia.solve(first.torque))
+    return _wrench(repeat(ITERATIONS, improved, tried(start)).command, model)
+
+
+def misses(state: RigidState, target: RigidState, weight: Scalar, ops: ScalarOps = FLOAT) -> tuple[Scalar, ...]:
+    """δv [m/s], δΩ [rad/s] and `weight` δθ."""
+    attitude = rotation_vector(target.quaternion.inverse() * state.quaternion, ops)
+    return (
+        *(state.velocity - target.velocity),
+        *(state.angular_velocity - target.angular_velocity),
+        *(weight * attitude),
+    )
+
+
+def rotation_vector(Q: Quaternion, ops: ScalarOps = FLOAT) -> Vec3:
+    """The shortest rotation [rad] from no rotation to the unit quaternion `Q`, along its axis."""
+    size = Q.vector.norm(ops)
+    angle = 2.0 * ops.atan2(size, abs(Q.scalar))
+    vector: Vec3 = (ops.where(Q.scalar < 0.0, -angle, angle) / ops.maximum(size, TINY)) * Q.vector
+    return vector
+
+
+def solved(matrix: list[list[Scalar]], right: list[Scalar]) -> list[Scalar]:
+    """x with `matrix` x = `right`, for a symmetric positive definite matrix: by elimination, in place."""
+    size = len(right)
+    for k in range(size):
+        for i in range(k + 1, size):
+            factor = matrix[i][k] / matrix[k][k]
+            for j in range(k, size):
+                matrix[i][j] = matrix[i][j] - factor * matrix[k][j]
+            right[i] = right[i] - factor * right[k]
+    for k in reversed(range(size)):
+        for j in range(k + 1, size):
+            right[k] = right[k] - matrix[k][j] * right[j]
+        right[k] = right[k] / matrix[k][k]
+    return right
+
+
+def _moved(command: tuple[Scalar, ...], k: int) -> tuple[Scalar, ...]:
+    return tuple(x + DIFFERENCE if i == k else x for i, x in enumerate(command))
+
+
+def _wrench(command: tuple[Scalar, ...], model: Body) -> Wrench:
+    return Wrench(model.mass * command[0], model.inertia @ Vec3(*command[1:]))
+
+
+def _inner(a: list[Scalar] | tuple[Scalar, ...], b: list[Scalar] | tuple[Scalar, ...]) -> Scalar:
+    first, *others = (x * y for x, y in zip(a, b))
+    total = first
+    for other in others:
+        total = total + other
+    return total
