@@ -94,9 +94,10 @@ class CascadedController(SampledController):
 
     # -- the loops --------------------------------------------------------------------------------------------
 
-    def _sample(self, t: float) -> None:
+    def sample(self, t: float, h: float) -> None:
+        """As any controller; the loops know the time."""
         self._now = t
-        super()._sample(t)
+        super().sample(t, h)
 
     def _begin(self, measurement: Measurement) -> None:
         """The first measurement: from here on there are changes and elapsed times."""

@@ -1,0 +1,56 @@
+"""What the redesigns of the unified law fly, by their native FMUs: the paper's start and wind, plant steps of 5 ms."""
+
+from pathlib import Path
+
+import pytest
+
+import orchestration
+from orchestration import fmus
+from orchestration.quadrotor.scenario_file import scenario_from_tables
+
+MEAN = {"discretisation": "mean", "stages": 3}
+
+
+def flies(period: float, *, delay: float = 0.0, plant: dict[str, float] | None = None, **controller: object) -> bool:
+    tables = {
+        "controller": {"fmu": str(fmus.locate("native/UnifiedController")), **controller},
+        "plant": {"fmu": str(fmus.locate("native/QuadrotorPlant")), **(plant or {})},
+        "timing": {"period": period, "delay": delay, "plant_interval": 0.005},
+    }
+    metrics = orchestration.run(scenario_from_tables(tables, Path())).metrics
+    return not metrics["diverged"] and metrics["ultimate_bound"] < 0.05
+
+
+@pytest.mark.parametrize("period", [0.1, 0.15, 0.2])
+def test_the_mean_flies_where_the_explicit_law_does_not(period: float) -> None:
+    assert flies(period, **MEAN)
+    assert not flies(period)
+
+
+def test_the_mean_does_not_fly_at_220_ms() -> None:
+    assert not flies(0.22, **MEAN)
+
+
+@pytest.mark.parametrize(
+    ("kind", "there", "no_more"),
+    [("semi_implicit", 0.072, 0.076), ("midpoint", 0.129, 0.135), ("match", 0.235, 0.255)],
+)
+def test_each_redesign_flies_up_to_its_first_limit(kind: str, there: float, no_more: float) -> None:
+    assert flies(there, discretisation=kind)
+    assert not flies(no_more, discretisation=kind)
+
+
+def test_the_predictor_makes_up_for_a_delay_of_200_ms() -> None:
+    assert flies(0.02, delay=0.2, prediction=0.2)
+    assert not flies(0.02, delay=0.2)
+
+
+def test_predictor_and_mean_fly_with_a_delay_of_a_period_of_100_ms() -> None:
+    assert flies(0.1, delay=0.1, prediction=0.1, **MEAN)
+    assert not flies(0.1, delay=0.1, prediction=0.1)
+
+
+def test_with_twice_the_inertia_the_mean_loses_to_the_explicit_law() -> None:
+    heavy = {f"inertia.{axis}": 2.0 for axis in ("xx", "yy", "zz")}
+    assert flies(0.12, plant=heavy)
+    assert not flies(0.12, plant=heavy, **MEAN)
