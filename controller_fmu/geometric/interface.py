@@ -9,6 +9,7 @@ from controller_fmu.interface import (
     MEASUREMENT,
     REFERENCE,
 )
+from controller_fmu.redesign.interface import CHOICES, REDESIGN
 from fmu_kit.variables import discrete_local, tunable_parameter, vector
 
 GAINS = (
@@ -37,10 +38,12 @@ GEOMETRIC = (
     *REFERENCE,
     *COMMAND,
     *COMMON_PARAMETERS,
+    *REDESIGN,
     *GAINS,
     *COMMON_LOCALS,
     *LAW_LOCALS,
     *COUNT_AND_SWITCH,
+    *CHOICES,
     *GAIN_SCALING,
 )
 """All variables of the geometric controller; the place in this list is the value reference."""

@@ -107,8 +107,17 @@ _COMMON = (
 
 _SCALING = (*row("gain_scaling", "parameter fixed", None, 1.0, type="Enumeration"),)
 
+_REDESIGN = (
+    *row("hold_period", "parameter fixed", "s", 0.0),
+    *row("weight", "parameter fixed", "1", 1.0),
+    *row("prediction", "parameter fixed", "s", 0.0),
+    *row("discretisation", "parameter fixed", None, 1.0, type="Enumeration"),
+    *row("stages", "parameter fixed", None, 3, type="Integer"),
+)
+
 UNIFIED = (
     *_COMMON,
+    *_REDESIGN,
     *_SCALING,
     *row("gain.translation", "parameter tunable", "m/s2", 2.0, axes=XYZ),
     *row("gain.disturbance", "parameter tunable", "m/s2", 0.99),
@@ -127,6 +136,7 @@ UNIFIED = (
 
 GEOMETRIC = (
     *_COMMON,
+    *_REDESIGN,
     *_SCALING,
     *row("gain.position", "parameter tunable", "1/s2", 4.0),
     *row("gain.velocity", "parameter tunable", "1/s", 2.8),

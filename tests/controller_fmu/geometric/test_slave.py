@@ -98,3 +98,30 @@ def test_the_flight_of_its_c_is_that_of_its_python() -> None:
         for folder in ("", "native/")
     ]
     assert_near(*flights, 1e-9)
+
+
+def outcome(period: float, delay: float = 0.0, **redesign: object) -> str:
+    """Of 12 s from the paper's start, each command held for `period` [s] and late by `delay` [s]."""
+    timing = quadcosim.Timing(period=period, plant_interval=0.005, delay=delay)
+    parameters = {f"controller.{name}": value for name, value in {"hold_period": period, **redesign}.items()}
+    scenario = quadcosim.Scenario(stop_time=12.0, timing=timing).with_changes(parameters=parameters)
+    result = quadcosim.run(scenario.with_fmus(plant="native/QuadrotorPlant", controller="GeometricController"))
+    return str(result.metrics["outcome"])
+
+
+def test_redesigned_it_flies_where_the_law_at_the_sample_does_not() -> None:
+    assert outcome(0.06) == "settled"
+    assert outcome(0.08) == "diverged"
+    assert outcome(0.08, discretisation="midpoint") == "settled"
+    assert outcome(0.15, discretisation="mean") == "settled"
+    assert outcome(0.15, discretisation="match") == "settled"
+    assert outcome(0.02, delay=0.06) == "diverged"
+    assert outcome(0.02, delay=0.06, prediction=0.06) == "settled"
+
+
+def test_it_says_that_it_has_no_semi_implicit_form() -> None:
+    slave = GeometricController(instance_name="c")
+    slave.set_integer([slave._index["discretisation"]], [2])
+    slave.setup_experiment(0.0)
+    slave.enter_initialization_mode()
+    assert_fails(slave.exit_initialization_mode, "discretisation = semi_implicit", "no semi-implicit form")
