@@ -167,6 +167,7 @@ def design_parts(study: Study) -> dict[str, str]:
         "design": [study.method, study.samples, study.design_seed] if sampled else None,
         "vary_seed": study.vary_seed,
         **{f"axis {axis.name}": dataclasses.asdict(axis) for axis in study.axes},
+        **{f"what {', '.join(each.axes)} stands for": each.as_lists() for each in study.together},
     }
     return {name: json.dumps(value, sort_keys=True) for name, value in parts.items()}
 

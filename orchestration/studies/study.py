@@ -3,7 +3,7 @@
 import hashlib
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -16,6 +16,7 @@ from orchestration.request import Request, system_meant
 from orchestration.studies.axes import Axis, Method, Points, Value
 from orchestration.studies.files import Files, files_of
 from orchestration.studies.store import is_column
+from orchestration.studies.together import Together
 from orchestration.system.model import System
 from orchestration.system.paths import changed, names_table, value_at
 
@@ -27,6 +28,8 @@ class Study:
     name: str
     base: Request
     axes: tuple[Axis, ...]
+    together: tuple[Together, ...] = ()
+    """what values of the axes stand for beside their own targets, each on top of what was before"""
     method: Method = "sobol"
     samples: int = 0
     design_seed: int = 0
@@ -49,6 +52,9 @@ class Study:
             is_of_seeds = (axis.name, axis.targets, axis.multiplies) == ("seed", ("seed",), False)
             if is_column(axis.name, self.origin.objectives) and not is_of_seeds:
                 raise UsageError(f"axis {axis.name}: the table of runs has a column of that name, expected another")
+        for each in self.together:
+            if not set(each.axes) <= set(names):
+                raise UsageError(f"axes = {', '.join(names)}: expected {', '.join(each.axes)} among them")
         assert self._paths is not None  # every target is known, or said not to be
 
     @cached_property
@@ -65,11 +71,10 @@ class Study:
 
     @cached_property
     def _paths(self) -> dict[str, tuple[str, ...]]:
-        """By axis, the paths that it sets or multiplies."""
-        return {
-            axis.name: tuple(path for target in axis.targets for path in paths_in(self.base, target))
-            for axis in self.axes
-        }
+        """By target, the paths that it is."""
+        listed = [target for axis in self.axes for target in axis.targets]
+        listed += [target for each in self.together for target in each.targets]
+        return {target: paths_in(self.base, target) for target in dict.fromkeys(listed)}
 
     def system(self, index: int, starts: Mapping[str, float]) -> System:
         """The system of one run; `starts` are the FMUs' own parameters, as COMPONENT.NAME.
@@ -83,8 +88,14 @@ class Study:
         with in_its_own_words(self.base):
             for axis in self.axes:
                 value = point[axis.name]
-                for path in self._paths[axis.name]:
-                    changes[path] = _product(value, path, self.origin, starts) if axis.multiplies else value
+                for path in self._paths_of(axis.targets):
+                    changes[path] = _product(value, path, {}, self.origin, starts) if axis.multiplies else value
+            for each in self.together:
+                sets, multiplies = each.of(point)
+                changes |= {path: value for target, value in sets.items() for path in self._paths[target]}
+                for target, factor in multiplies.items():
+                    for path in self._paths[target]:
+                        changes[path] = _product(factor, path, changes, self.origin, starts)
             system = changed(self.origin, changes)
         return native_twins(system) if self._varies_fmu else system
 
@@ -93,13 +104,20 @@ class Study:
         """Whether it is native, and an axis names FMUs that may not be."""
         return self.native and any(names_fmu(path) for paths in self._paths.values() for path in paths)
 
+    def _paths_of(self, targets: Iterable[str]) -> Iterator[str]:
+        return (path for target in targets for path in self._paths[target])
+
     def keeps_signals(self, index: int) -> bool:
         """Whether the signals of a run are kept."""
         return self.keep_signals if isinstance(self.keep_signals, bool) else index in self.keep_signals
 
     def files(self) -> Files:
         """The files of all runs, FMUs built if need be."""
-        values = [(path, str(v)) for axis in self.axes for path in self._paths[axis.name] for v in axis.values or ()]
+        values = [
+            (path, str(v)) for axis in self.axes for path in self._paths_of(axis.targets) for v in axis.values or ()
+        ]
+        given = [item for each in self.together for sets in each.sets.values() for item in sets.items()]
+        values += [(path, str(value)) for target, value in given for path in self._paths[target]]
         return files_of(
             self.origin,
             fmus_too=[native_twin(value) if self.native else value for path, value in values if names_fmu(path)],
@@ -129,10 +147,11 @@ def _own_seed(seed: int, point: Mapping[str, Value]) -> int:
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:6], "big")
 
 
-def _product(value: Value, path: str, origin: System, starts: Mapping[str, float]) -> float:
+def _product(value: Value, path: str, changes: Mapping[str, Any], origin: System, starts: Mapping[str, float]) -> float:
+    """`value` times what a path is changed to, else in the base, else in its FMU."""
     if not isinstance(value, (int, float)):
         raise UsageError(f"{path}: expected a number to multiply with, got {value}")
-    base = value_at(origin, path)
+    base = changes[path] if path in changes else value_at(origin, path)
     if base is None:
         base = starts.get(path.removeprefix("components.").replace(".parameters.", ".", 1))
     if isinstance(base, bool) or not isinstance(base, (int, float)):
