@@ -128,6 +128,46 @@ def tune(
         print(path)
 
 
+def compare(
+    comparison: Annotated[
+        Path, typer.Argument(help="What is compared, on what.", metavar="COMPARISON.toml", show_default=False)
+    ],
+    out: Out = None,
+    workers: Annotated[int, typer.Option("--workers", help="Processes on this machine.", metavar="N")] = 1,
+    native: Annotated[
+        bool, typer.Option("--native", help="The native twins of this project's FMUs, built if need be.")
+    ] = False,
+    engine: BatchFlag = None,
+    cell: Annotated[
+        int | None,
+        typer.Option("--cell", help="Fly this cell again, and nothing else.", metavar="K", show_default=False),
+    ] = None,
+    start: Annotated[
+        int | None,
+        typer.Option("--start", help="Of that cell one flight, kept in --out DIR.", metavar="I", show_default=False),
+    ] = None,
+    figures: Annotated[bool, typer.Option(help="Draw the pictures beside the tables.")] = True,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Fly controllers against each other from the same starts: who flies, how far, how well, at what effort."""
+    from orchestration.master.engine import engine_named
+    from orchestration.studies.comparison import command
+    from orchestration.studies.comparison.file import load_comparison
+
+    native = native or engine == "batch"
+    chosen = dataclasses.replace(load_comparison(comparison), native=native)
+    alone = None if engine == "batch" else engine_named(engine, "batch")
+    if start is not None:
+        command.flight(chosen, cell, start, out, engine=alone)
+    elif cell is not None:
+        command.cell(chosen, cell, out, workers=workers, engine=alone, as_json=as_json)
+    else:
+        command.all_cells(
+            chosen, out, workers=workers, engine="batch" if engine == "batch" else alone, as_json=as_json,
+            figures=figures, again=f"quadcosim compare {comparison}{' --native' if native else ''} --cell",
+        )  # fmt: skip
+
+
 @flies
 def limit(
     scenario: Annotated[
@@ -228,5 +268,5 @@ def _current_store(study: Path, out: Path | None) -> Path:
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the command line."""
-    for command in (sweep, status, export, draw, tune, limit, margin):
+    for command in (sweep, status, export, draw, tune, compare, limit, margin):
         app.command()(command)

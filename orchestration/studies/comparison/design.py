@@ -1,0 +1,223 @@
+"""What is compared, and the study that it is: every controller on every vehicle from the same starts."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from fmu_kit.trajectory import Trajectory
+from orchestration import fmus
+from orchestration.errors import UsageError
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.translation import paths_of
+from orchestration.quadrotor.vehicles import Vehicle
+from orchestration.quadrotor.wiring import TRAJECTORY
+from orchestration.studies.axes import Axis, Value
+from orchestration.studies.starts import Start, Starts
+from orchestration.studies.study import Study
+from orchestration.studies.together import Key, Together
+from orchestration.system.paths import value_at
+
+VEHICLE, CONDITION, CONTROLLER, START = "vehicle", "condition", "controller", "start"
+FMU = "controller.fmu"
+Changes = Mapping[str, Value]
+"""Values by target, as axes of studies name them"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Controller:
+    """One that is compared: an FMU with parameters."""
+
+    name: str
+    sets: Changes = field(default_factory=dict)
+    tuned: Mapping[Key, Changes] = field(default_factory=dict)
+    """what it is set to beside, by vehicle and value of the axis"""
+    bandwidth: float | None = None
+    """of its attitude loop [rad/s]; None: that of the FMU about hover"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Craft:
+    """A vehicle that they fly."""
+
+    name: str
+    vehicle: Vehicle = field(default_factory=lambda: Vehicle(name="base"))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Condition:
+    """What differs from what a controller believes, or goes wrong: mass, lag, wind, losses."""
+
+    name: str
+    sets: Changes = field(default_factory=dict)
+    multiplies: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Front:
+    """What is weighed against each other, both the less the better."""
+
+    error: str = "position_rmse"
+    effort: str = "total_variation.torque"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell:
+    """One controller on one vehicle under one condition at one value of the axis: a run from each start."""
+
+    index: int
+    vehicle: str
+    condition: str
+    controller: str
+    value: Value
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """Controllers on vehicles under conditions over an axis, each from all starts; raises `UsageError`."""
+
+    name: str
+    base: Scenario
+    controllers: tuple[Controller, ...]
+    vehicles: tuple[Craft, ...]
+    conditions: tuple[Condition, ...]
+    axis: Axis
+    starts: Starts
+    front: Front = field(default_factory=Front)
+    native: bool = False
+    """whether it is flown by the native twins of its FMUs"""
+
+    def __post_init__(self) -> None:
+        for kind in ("controllers", "vehicles", "conditions"):
+            names = [one.name for one in getattr(self, kind)]
+            if not names or len(set(names)) != len(names):
+                raise UsageError(f"{kind} = {', '.join(names)}: expected at least one, each with a name of its own")
+        if self.axis.values is None or any(isinstance(v, str) for v in self.axis.values):
+            raise UsageError(f"axis {self.axis.name}: expected values, or start, stop and number")
+        if sorted(self.axis.values) != [*self.axis.values]:
+            raise UsageError(f"axis {self.axis.name}: expected values that grow: what flies is told up to a value")
+        if self.axis.name in (VEHICLE, CONDITION, CONTROLLER, START):
+            raise UsageError(f"axis {self.axis.name}: expected another name")
+        objectives = self.study.origin.objectives
+        for key in ("error", "effort"):
+            if getattr(self.front, key) not in objectives:
+                raise UsageError(f"front.{key} = {getattr(self.front, key)}: expected one of {', '.join(objectives)}")
+
+    @property
+    def values(self) -> tuple[Value, ...]:
+        """Of the axis."""
+        return self.axis.values or ()
+
+    @cached_property
+    def drawn(self) -> tuple[Start, ...]:
+        """The starts, around the beginning of the base's trajectory."""
+        given = self.base.controller.parameters
+        fields: dict[str, Any] = {field: given[name] for name, field in TRAJECTORY.items() if name in given}
+        return self.starts.drawn(Trajectory(**fields))
+
+    @cached_property
+    def study(self) -> Study:
+        """Its runs, cell after cell; in a cell start after start. A start has a seed of its own, for all alike."""
+        return Study(
+            name=self.name,
+            base=self.base,
+            native=self.native,
+            axes=(
+                _named(VEHICLE, self.vehicles),
+                _named(CONDITION, self.conditions),
+                _named(CONTROLLER, self.controllers),
+                self.axis,
+                Axis(name=START, targets=(), values=tuple(range(len(self.drawn)))),
+            ),
+            together=(
+                Together(axes=(VEHICLE, CONTROLLER), sets=self._told()),
+                Together(axes=(CONTROLLER,), sets={(one.name,): one.sets for one in self.controllers}),
+                Together(axes=(CONTROLLER, VEHICLE, self.axis.name), sets=self._tuned()),
+                Together(
+                    axes=(CONDITION,),
+                    sets={(one.name,): one.sets for one in self.conditions},
+                    multiplies={(one.name,): one.multiplies for one in self.conditions},
+                ),
+                Together(axes=(START,), sets={(i,): self._begun(i, start) for i, start in enumerate(self.drawn)}),
+            ),
+        )
+
+    def fmu_of(self, controller: Controller) -> str:
+        """The FMU of a controller, by name or path."""
+        fmu = str(controller.sets.get(FMU, self.base.controller.fmu))
+        return fmus.native_twin(fmu) if self.native else fmu
+
+    def told(self, craft: Craft, controller: Controller) -> dict[str, Value]:
+        """What the plant is made of on a vehicle, and what this controller is told of it."""
+        sides = {"plant": craft.vehicle.plant, "controller": craft.vehicle.for_controller(self.fmu_of(controller))}
+        return {f"{side}.{name}": value for side, table in sides.items() for name, value in table.items()}
+
+    def _told(self) -> dict[Key, Changes]:
+        return {(v.name, one.name): self.told(v, one) for v in self.vehicles for one in self.controllers}
+
+    def _tuned(self) -> dict[Key, Changes]:
+        return {(one.name, *key): changes for one in self.controllers for key, changes in one.tuned.items()}
+
+    def _begun(self, index: int, start: Start) -> dict[str, Value]:
+        seed = self.base.seed + self.starts.first + index
+        return {**{f"plant.{name}": value for name, value in start.parameters.items()}, "seed": seed}
+
+    def cells(self) -> Iterator[Cell]:
+        """All, in the order of their indices."""
+        grid = (
+            (vehicle, condition, controller, value)
+            for vehicle in self.vehicles
+            for condition in self.conditions
+            for controller in self.controllers
+            for value in self.values
+        )
+        for index, (vehicle, condition, controller, value) in enumerate(grid):
+            yield Cell(
+                index=index,
+                vehicle=vehicle.name,
+                condition=condition.name,
+                controller=controller.name,
+                value=value,
+            )
+
+    def cell(self, index: int) -> Cell:
+        """One of them; raises `UsageError` for an index that there is not."""
+        cells = [*self.cells()]
+        if not 0 <= index < len(cells):
+            raise UsageError(f"--cell {index}: expected a number from 0 to {len(cells) - 1}")
+        return cells[index]
+
+    def runs_of(self, cell: Cell) -> range:
+        """The indices of its runs in the study."""
+        return range(cell.index * len(self.drawn), (cell.index + 1) * len(self.drawn))
+
+    def scenario(self, index: int, starts: Mapping[str, float]) -> Scenario:
+        """A run of the study as the scenario that it is; `starts` are the FMUs' own parameters, as COMPONENT.NAME."""
+        system = self.study.system(index, starts)
+        targets = [*self.axis.targets, *(target for each in self.study.together for target in each.targets)]
+        values = {target: value_at(system, path) for target in targets for path in paths_of(target)[:1]}
+        timing, parameters, fields = _by_table({target: v for target, v in values.items() if v is not None}, self.base)
+        return self.base.with_changes(timing=timing, parameters=parameters, **fields).with_fmus(**system.fmus)
+
+
+def _by_table(values: Mapping[str, Any], base: Scenario) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+    """Timing keys, parameters and the fields of a scenario, from values by target."""
+    timing: dict[str, Any] = {}
+    parameters: dict[str, Any] = {}
+    fields: dict[str, Any] = {}
+    for target, value in values.items():
+        table, _, key = target.partition(".")
+        if table == "timing":
+            kind, _, name = key.partition(".")
+            alike = ("measurement_loss", "command_loss") if key == "loss" else (kind,)
+            given = {**getattr(base.timing, kind), **timing.get(kind, {}), name: value} if name else value
+            timing |= dict.fromkeys(alike, given)
+        elif key and target != FMU:
+            parameters[target] = value
+        elif not key:
+            fields[target] = value
+    return timing, parameters, fields
+
+
+def _named(name: str, ones: Sequence[Controller] | Sequence[Craft] | Sequence[Condition]) -> Axis:
+    return Axis(name=name, targets=(), values=tuple(one.name for one in ones))

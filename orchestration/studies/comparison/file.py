@@ -1,0 +1,214 @@
+"""Reads comparison files, and the files of parameters that they name."""
+
+import dataclasses
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pydantic
+
+from orchestration.documents import read_toml
+from orchestration.errors import UsageError
+from orchestration.quadrotor.parameters import parameters_in
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.scenario_file import first_problem
+from orchestration.quadrotor.vehicles import Vehicle, load_vehicle
+from orchestration.request import load_request, request_from_tables
+from orchestration.studies.axes import Value
+from orchestration.studies.comparison.design import FMU, Comparison, Condition, Controller, Craft, Front
+from orchestration.studies.starts import Starts
+from orchestration.studies.study_file import AxisTable, axis_of
+from orchestration.studies.together import Key
+
+_FORBID: dict[str, str] = {"extra": "forbid"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControllerTable:
+    """`[[controllers]]`: an FMU, a file of parameters, and parameters on top of that."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
+
+    name: str
+    fmu: str | None = None
+    file: str | None = None
+    parameters: dict[str, Any] = field(default_factory=dict)
+    bandwidth: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class VehicleTable:
+    """`[[vehicles]]`: one by its name or its file, and parameters on top of that."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
+
+    name: str
+    vehicle: str | None = None
+    plant: dict[str, Any] = field(default_factory=dict)
+    controller: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConditionTable:
+    """`[[conditions]]`: what is set, and what is multiplied, by the names of axes of studies."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
+
+    name: str
+    sets: dict[str, Any] = field(default_factory=dict)
+    multiplies: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrontTable(Front):
+    """`[front]`: the objectives that are weighed against each other."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
+
+
+@dataclass(frozen=True, kw_only=True)
+class StartsTable(Starts):
+    """`[starts]`: the ensemble."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
+
+
+@dataclass(frozen=True, kw_only=True)
+class ComparisonFile:
+    """The file: a scenario, or the path of one, and what is compared on it."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
+
+    controllers: list[ControllerTable]
+    axis: AxisTable
+    vehicles: list[VehicleTable] = field(default_factory=list)
+    conditions: list[ConditionTable] = field(default_factory=lambda: [ConditionTable(name="nominal")])
+    starts: StartsTable = field(default_factory=StartsTable)
+    front: FrontTable = field(default_factory=FrontTable)
+    name: str | None = None
+    scenario: str | None = None
+    base: dict[str, Any] = field(default_factory=dict)
+
+
+def load_comparison(path: str | Path) -> Comparison:
+    """Read such a file; paths in it are relative to its folder.
+
+    Raises `UsageError` for a file that cannot be read, a key that does not exist (naming those that do) or a value
+    that cannot be.
+    """
+    path = Path(path)
+    tables = read_toml(path, "comparison file")
+    try:
+        return _comparison(tables, path)
+    except UsageError as error:
+        raise UsageError(f"{path}: {error}") from error
+
+
+def _comparison(tables: dict[str, Any], path: Path) -> Comparison:
+    try:
+        file = pydantic.TypeAdapter(ComparisonFile).validate_json(json.dumps(tables, default=str), strict=True)
+    except pydantic.ValidationError as error:
+        raise UsageError(first_problem(error, ComparisonFile)) from error
+    if file.scenario is not None and file.base:
+        raise UsageError("scenario and base: expected one of them")
+    folder = path.parent
+    base = load_request(folder / file.scenario) if file.scenario else request_from_tables(file.base, folder)
+    if not isinstance(base, Scenario):
+        raise UsageError("base: expected a scenario of the quadrotor, whose starts are known")
+    axis = axis_of(file.axis, folder)
+    crafts = _crafts(file.vehicles, base, folder)
+    keys = [(craft.name, value) for craft in crafts for value in axis.values or ()]
+    return Comparison(
+        name=file.name or path.stem,
+        base=dataclasses.replace(base, vehicle=None),
+        controllers=tuple(_controller(table, keys, folder) for table in file.controllers),
+        vehicles=crafts,
+        conditions=tuple(_condition(table) for table in file.conditions),
+        axis=axis,
+        starts=Starts(**_fields(file.starts, Starts)),
+        front=Front(**_fields(file.front, Front)),
+    )
+
+
+def _crafts(tables: list[VehicleTable], base: Scenario, folder: Path) -> tuple[Craft, ...]:
+    if base.vehicle is None:
+        return tuple(_craft(table, folder) for table in tables or [VehicleTable(name="base")])
+    if tables:
+        raise UsageError("base.vehicle and vehicles: expected one of them")
+    return (Craft(name=base.vehicle.name, vehicle=base.vehicle),)
+
+
+def _fields(table: Any, of: type) -> dict[str, Any]:
+    return {f.name: getattr(table, f.name) for f in dataclasses.fields(of)}
+
+
+def _controller(table: ControllerTable, keys: list[tuple[str, Value]], folder: Path) -> Controller:
+    place = f"controllers.{table.name}"
+    sets: dict[str, Value] = {}
+    if table.fmu is not None:
+        sets[FMU] = str(folder / table.fmu) if table.fmu.endswith(".fmu") else table.fmu
+    own = _of_controller(parameters_in(table.parameters, f"{place}.parameters"))
+    tuned: dict[Key, Mapping[str, Value]] = {}
+    if table.file is not None and "{" in table.file:  # a file for each vehicle, or value of the axis
+        for vehicle, value in keys:
+            name = _filled(table.file, vehicle, value)
+            tuned[vehicle, value] = {**_read(folder / name), **own}
+    elif table.file is not None:
+        sets |= _read(folder / table.file)
+    return Controller(name=table.name, sets={**sets, **own}, tuned=tuned, bandwidth=table.bandwidth)
+
+
+def _filled(name: str, vehicle: str, value: Value) -> str:
+    """A file's name for one vehicle and value of the axis."""
+    known = {"vehicle": vehicle, "value": value}
+    if isinstance(value, int | float):
+        known |= {"value": f"{value:g}", "milli": f"{1e3 * value:g}"}
+    try:
+        return name.format(**known)
+    except (LookupError, ValueError):
+        raise UsageError(
+            f"{name}: expected a file, with {{vehicle}}, {{value}} of the axis or {{milli}} times it"
+        ) from None
+
+
+def _craft(table: VehicleTable, folder: Path) -> Craft:
+    given = Vehicle(name=table.name) if table.vehicle is None else load_vehicle(table.vehicle, folder)
+    place = f"vehicles.{table.name}"
+    plant, own = parameters_in(table.plant, f"{place}.plant"), parameters_in(table.controller, f"{place}.controller")
+    controllers = {fmu: {**parameters, **own} for fmu, parameters in given.controllers.items()}
+    vehicle = Vehicle(
+        name=given.name,
+        plant={**given.plant, **plant},
+        controller={**given.controller, **own},
+        controllers=controllers,
+    )
+    return Craft(name=table.name, vehicle=vehicle)
+
+
+def _condition(table: ConditionTable) -> Condition:
+    place = f"conditions.{table.name}"
+    sets, multiplies = (parameters_in(getattr(table, kind), f"{place}.{kind}") for kind in ("sets", "multiplies"))
+    factors = {target: value for target, value in multiplies.items() if _is_number(value)}
+    for target in multiplies.keys() - factors.keys():
+        raise UsageError(f"{place}.multiplies.{target} = {multiplies[target]}: expected a number")
+    return Condition(
+        name=table.name, sets=dict(sets), multiplies={target: float(value) for target, value in factors.items()}
+    )
+
+
+def _is_number(value: Value) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _read(path: Path) -> dict[str, Value]:
+    """The parameters of a controller in a file."""
+    tables = read_toml(path, "file of parameters")
+    if tables.keys() != {"controller"} or not isinstance(tables["controller"], Mapping):
+        raise UsageError(f"{path}: {', '.join(tables) or 'nothing'}: expected parameters in [controller] only")
+    return _of_controller(parameters_in(tables["controller"], f"{path}: controller"))
+
+
+def _of_controller(parameters: Mapping[str, Value]) -> dict[str, Value]:
+    return {f"controller.{name}": value for name, value in parameters.items()}

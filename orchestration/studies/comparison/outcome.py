@@ -1,0 +1,85 @@
+"""What a comparison comes to, as one value, and as the files in its folder."""
+
+import dataclasses
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from orchestration.studies.comparison import fronts, slices
+from orchestration.studies.comparison.bandwidth import Bandwidths
+from orchestration.studies.comparison.cells import Result, judged, results
+from orchestration.studies.comparison.design import Comparison
+from orchestration.studies.comparison.limits import Limit, limits
+from orchestration.studies.comparison.pairs import Pair, pairs
+from orchestration.studies.ranges import is_in_seconds
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+CELLS, OUTCOME = "cells", "comparison.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """All that is concluded from the runs of a comparison."""
+
+    cells: list[Result]
+    limits: list[Limit]
+    fronts: list[fronts.Point]
+    pairs: list[Pair]
+    at_equal_bandwidth: list[slices.AtPhase]
+    at_equal_torque: list[slices.WithinTorque]
+
+
+def concluded(comparison: Comparison, table: "pd.DataFrame", bandwidths: Bandwidths) -> Outcome:
+    """From the rows of the study of a comparison, and the bandwidths of its controllers."""
+    cells = results(comparison, table)
+    in_seconds = all(is_in_seconds(target) for target in comparison.axis.targets) and not comparison.axis.multiplies
+    return Outcome(
+        cells=cells,
+        limits=limits(comparison, table, bandwidths),
+        fronts=[*fronts.points(comparison, table)],
+        pairs=[*pairs(comparison, table)],
+        at_equal_bandwidth=[*slices.at_equal_bandwidth(cells, bandwidths)] if in_seconds else [],
+        at_equal_torque=[*slices.at_equal_torque(comparison, table)],
+    )
+
+
+def as_json(comparison: Comparison, outcome: Outcome, bandwidths: Bandwidths) -> dict[str, Any]:
+    """In JSON types; what is not finite or not known is null."""
+    content = {
+        "name": comparison.name,
+        "axis": comparison.axis.name,
+        "starts": len(comparison.drawn),
+        "bandwidths": [
+            {"controller": controller, "vehicle": vehicle, "value": value, "bandwidth": bandwidth}
+            for (controller, vehicle, value), bandwidth in bandwidths.items()
+        ],
+        **dataclasses.asdict(outcome),
+    }
+    found: dict[str, Any] = _finite(content)
+    return found
+
+
+def write(comparison: Comparison, outcome: Outcome, bandwidths: Bandwidths, folder: Path) -> list[Path]:
+    """Write the cells as Parquet and CSV, and everything as JSON; the paths."""
+    import pandas as pd
+
+    table = pd.DataFrame([cell.row(comparison.axis.name) for cell in outcome.cells])
+    medians = [name for name in table if name.startswith(judged(comparison))]
+    table = table.astype(dict.fromkeys(medians, float))
+    written = [folder / f"{CELLS}.parquet", folder / f"{CELLS}.csv", folder / OUTCOME]
+    table.to_parquet(written[0], index=False)
+    table.to_csv(written[1], index=False)
+    written[2].write_text(json.dumps(as_json(comparison, outcome, bandwidths), indent=2) + "\n", encoding="utf-8")
+    return written
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

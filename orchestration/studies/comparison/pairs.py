@@ -1,0 +1,71 @@
+"""Each controller against the first, start by start: the same starts make for differences that medians hide."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from orchestration.studies.axes import Value
+from orchestration.studies.comparison.cells import Median
+from orchestration.studies.comparison.design import CONDITION, CONTROLLER, START, VEHICLE, Comparison
+from orchestration.studies.figures import flew
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pair:
+    """A controller and the first one of the file, at one value of the axis."""
+
+    vehicle: str
+    condition: str
+    value: Value
+    controller: str
+    against: str
+    both: int
+    """starts that both fly"""
+    only_it: int
+    only_other: int
+    neither: int
+    error: Median
+    effort: Median
+    """its value over that of the first, start by start, where both fly"""
+
+
+def pairs(comparison: Comparison, table: "pd.DataFrame") -> Iterator[Pair]:
+    """All controllers but the first, at each value of the axis."""
+    first, *others = (one.name for one in comparison.controllers)
+    done = table[table["status"] == "done"]
+    for (vehicle, condition, value), rows in done.groupby([VEHICLE, CONDITION, comparison.axis.name], sort=False):
+        by_name = {name: one.set_index(START) for name, one in rows.groupby(CONTROLLER, sort=False)}
+        if first not in by_name:
+            continue
+        for name in others:
+            if name in by_name:
+                place = {"vehicle": vehicle, "condition": condition, "value": value}
+                yield _pair(comparison, place, name, by_name[name], by_name[first])
+
+
+def _pair(
+    comparison: Comparison, place: dict[str, Value], name: str, it: "pd.DataFrame", other: "pd.DataFrame"
+) -> Pair:
+    known = it.index.intersection(other.index)
+    mine, its = flew(it.loc[known]), flew(other.loc[known])
+    both = known[mine & its]
+    ratios = [
+        Median.of((it.loc[both, metric] / other.loc[both, metric]).to_numpy(float))
+        for metric in (comparison.front.error, comparison.front.effort)
+    ]
+    return Pair(
+        vehicle=str(place["vehicle"]),
+        condition=str(place["condition"]),
+        value=place["value"],
+        controller=name,
+        against=comparison.controllers[0].name,
+        both=len(both),
+        only_it=int((mine & ~its).sum()),
+        only_other=int((~mine & its).sum()),
+        neither=int((~mine & ~its).sum()),
+        error=ratios[0],
+        effort=ratios[1],
+    )

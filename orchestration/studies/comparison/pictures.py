@@ -1,0 +1,242 @@
+"""Pictures of a comparison: basins side by side, shares and limits with intervals, fronts."""
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
+
+from orchestration.results.plots import BLUE, GREEN, GREY, ORANGE, RED
+from orchestration.simulator import Floats
+from orchestration.studies.comparison.cells import Median, Result, sizes
+from orchestration.studies.comparison.design import CONDITION, CONTROLLER, VEHICLE, Comparison
+from orchestration.studies.comparison.fronts import Point
+from orchestration.studies.comparison.limits import Limit
+from orchestration.studies.comparison.outcome import Outcome
+from orchestration.studies.figures import flew, save
+from orchestration.studies.ranges import is_in_seconds
+from orchestration.units import in_brackets
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+BINS = 8
+"""of the size of the initial error"""
+MOST_PANELS = 6
+COLORS = (BLUE, ORANGE, GREEN, RED, "#6f4f9f", "#8a6d3b", "#c05f9a", GREY)
+
+
+def draw(comparison: Comparison, outcome: Outcome, table: "pd.DataFrame", folder: Path) -> list[Path]:
+    """Draw all pictures into a folder; the paths."""
+    done = table[table["status"] == "done"]
+    written = [
+        path
+        for (vehicle, condition), rows in done.groupby([VEHICLE, CONDITION], sort=False)
+        for path in _of_one(comparison, outcome, rows, (vehicle, condition), folder)
+    ]
+    if outcome.limits:
+        written.append(save(lambda: limits_of(comparison, outcome.limits), folder / "limits.png"))
+    return written
+
+
+def _of_one(
+    comparison: Comparison, outcome: Outcome, rows: "pd.DataFrame", of: tuple[str, str], folder: Path
+) -> Iterator[Path]:
+    """The pictures of one vehicle under one condition."""
+    cells = [cell for cell in outcome.cells if (cell.vehicle, cell.condition) == of]
+    fronts = [point for point in outcome.fronts if (point.vehicle, point.condition) == of and _is_known(point)]
+    title, end = ", ".join(of), "_".join(re.sub(r"[^\w.-]+", "_", name) for name in of) + ".png"
+    yield save(lambda: basins(comparison, rows, title), folder / f"basin_{end}")
+    yield save(lambda: shares(comparison, cells, title), folder / f"shares_{end}")
+    if fronts:
+        yield save(lambda: fronts_of(comparison, fronts, title), folder / f"front_{end}")
+
+
+def basins(comparison: Comparison, rows: "pd.DataFrame", title: str) -> Figure:
+    """The share that flies over size of the initial error and axis, a panel for each controller; white: half."""
+    names = [one.name for one in comparison.controllers if (rows[CONTROLLER] == one.name).any()]
+    figure, panels = _panels(len(names), height=3.0)
+    edges = np.linspace(0.0, 1.0, BINS + 1)
+    at, factor = _axis(comparison)
+    for panel, name in zip(panels, names):
+        shown = rows[rows[CONTROLLER] == name]
+        share = _by_size(comparison, shown, edges)
+        mesh = panel.pcolormesh(
+            _edges(at), edges, share, vmin=0.0, vmax=1.0, cmap="viridis", shading="flat", rasterized=True
+        )
+        middles = 0.5 * (edges[1:] + edges[:-1])
+        if np.nanmin(share) < 0.5 < np.nanmax(share) and min(share.shape) > 1:
+            panel.contour(at, middles, share, levels=[0.5], colors="white", linewidths=1.5)
+        panel.set_title(name, fontsize=10)
+        panel.set(ylim=(0.0, 1.0), xlim=(_edges(at)[0], _edges(at)[-1]))
+        panel.grid(False)
+    figure.colorbar(mesh, ax=panels.tolist(), label="share that flies")
+    figure.supxlabel(_label(comparison, factor), fontsize=10)
+    figure.supylabel("size of the initial error", fontsize=10)
+    figure.suptitle(f"{title}; white: half of the starts fly", fontsize=10)
+    return figure
+
+
+def shares(comparison: Comparison, cells: Sequence[Result], title: str) -> Figure:
+    """The share of all starts that flies over the axis, with Wilson intervals, a line for each controller."""
+    figure = Figure(figsize=(8.0, 4.4))
+    panel = figure.add_subplot()
+    _, factor = _axis(comparison)
+    for color, name in _colored(comparison):
+        group = [cell for cell in cells if cell.controller == name]
+        at = [factor * float(cell.value) for cell in group]
+        panel.plot(at, [cell.share for cell in group], ".-", color=color, label=name)
+        panel.fill_between(
+            at, [cell.low for cell in group], [cell.high for cell in group], color=color, alpha=0.15, linewidth=0.0
+        )
+    runs = max((cell.runs for cell in cells), default=0)
+    panel.set(xlabel=_label(comparison, factor), ylabel="share that flies", ylim=(-0.02, 1.02))
+    panel.set_title(f"{title}; {runs} starts, 95 % intervals", fontsize=10)
+    panel.legend(fontsize=8)
+    return figure
+
+
+def limits_of(comparison: Comparison, limits: Sequence[Limit]) -> Figure:
+    """Up to where half and nine in ten of the starts fly, with intervals, an arrow for those that go beyond the axis.
+
+    Beside it the same times the bandwidth.
+    """
+    last = float(comparison.values[-1])
+    groups = [
+        (key, [*group]) for key, group in groupby(limits, lambda one: (one.vehicle, one.condition, one.controller))
+    ]
+    in_seconds = _in_seconds(comparison)
+    figure = Figure(figsize=(8.0, 0.35 * len(groups) + 1.6))
+    panels = figure.subplots(1, 2 if in_seconds else 1, sharey=True, squeeze=False).ravel()
+    _, factor = _axis(comparison)
+    for row, (_, group) in enumerate(groups):
+        for limit, color, shift in zip(group, (BLUE, ORANGE), (-0.15, 0.15)):
+            label = f"{limit.share} of the starts fly" if row == 0 else None
+            _bar(panels[0], limit, last, factor, row + shift, color, label)
+            if in_seconds and limit.bandwidth is not None:
+                _bar(panels[1], limit, last, limit.bandwidth, row + shift, color, None)
+    several = len(comparison.vehicles) * len(comparison.conditions) > 1
+    names = [", ".join((key[2], *key[:2])) if several else key[2] for key, _ in groups]
+    panels[0].set(yticks=range(len(names)), yticklabels=names, xlabel=f"up to {_label(comparison, factor)}")
+    panels[0].tick_params(axis="y", labelsize=8)
+    panels[0].invert_yaxis()
+    if in_seconds:
+        panels[1].set(xlabel=f"{comparison.axis.name} · bandwidth of the attitude loop [rad]")
+    figure.legend(loc="outside upper center", ncols=2, fontsize=8)
+    return figure
+
+
+def fronts_of(comparison: Comparison, points: Sequence[Point], title: str) -> Figure:
+    """Error against effort at values of the axis; the line joins what nothing beats."""
+    values = [*dict.fromkeys(point.value for point in points)]
+    chosen = [values[round(i)] for i in np.linspace(0, len(values) - 1, min(len(values), MOST_PANELS))]
+    figure, panels = _panels(len(chosen), height=2.8)
+    _, factor = _axis(comparison)
+    colors = {name: color for color, name in _colored(comparison)}
+    for panel, value in zip(panels, chosen):
+        here = [point for point in points if point.value == value]
+        for point in here:
+            effort, error = _sides(point.effort), _sides(point.error)
+            panel.errorbar(
+                *effort[0], *error[0], xerr=effort[1], yerr=error[1], fmt="o",
+                mfc=colors[point.controller] if point.on_front else "none", color=colors[point.controller],
+                markersize=5, elinewidth=0.8,
+            )  # fmt: skip
+        line = sorted((p.effort.value or 0.0, p.error.value or 0.0) for p in here if p.on_front)
+        panel.plot(*np.transpose(line), color=GREY, linewidth=0.8, zorder=0)
+        starts = here[0].starts
+        panel.set_title(f"{factor * float(value):g}{' ms' if factor != 1.0 else ''}, {starts} starts", fontsize=9)
+        panel.set(xscale="log", yscale="log")
+        for ticks in (panel.xaxis, panel.yaxis):
+            ticks.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+            ticks.set_major_formatter("{x:g}")
+            ticks.set_minor_formatter(NullFormatter())
+        panel.tick_params(labelsize=8)
+    for name, color in colors.items():
+        if any(point.controller == name for point in points):
+            panels[0].plot([], [], "o", color=color, label=name)
+    figure.legend(loc="outside right center", fontsize=8)
+    figure.supxlabel(comparison.front.effort, fontsize=9)
+    figure.supylabel(comparison.front.error, fontsize=9)
+    figure.suptitle(f"{title}: medians over the starts that all fly; filled: on the front", fontsize=10)
+    return figure
+
+
+def _by_size(comparison: Comparison, rows: "pd.DataFrame", edges: Floats) -> Floats:
+    """The share that flies, by bin of the size and value of the axis."""
+    bins = np.clip(np.digitize(sizes(comparison, rows).to_numpy(float), edges) - 1, 0, BINS - 1)
+    counted = rows.assign(bin=bins, flew=flew(rows).astype(float))
+    found = counted.pivot_table(index="bin", columns=comparison.axis.name, values="flew")
+    share: Floats = found.reindex(index=range(BINS), columns=[*comparison.values]).to_numpy(float)
+    return share
+
+
+def _bar(panel: Axes, limit: Limit, last: float, factor: float, at: float, color: str, label: str | None) -> None:
+    high = last if limit.high is None else limit.high
+    ends = [[factor * (limit.value - limit.low)], [factor * (high - limit.value)]]
+    panel.errorbar(factor * limit.value, at, xerr=ends, fmt="o", color=color, markersize=5, capsize=2, label=label)
+    if limit.high is None:
+        panel.plot(factor * high, at, ">", color=color, markersize=6)
+
+
+def _sides(median: Median) -> tuple[list[float], list[list[float]]]:
+    """A median and how far its interval reaches to both sides; not at all where it is not known."""
+    value = median.value or 0.0
+    low = value if median.low is None else median.low
+    high = value if median.high is None else median.high
+    return [value], [[value - low], [high - value]]
+
+
+def _is_known(point: Point) -> bool:
+    return point.error.value is not None and point.effort.value is not None
+
+
+def _panels(count: int, height: float) -> tuple[Figure, "np.ndarray[tuple[int], np.dtype[np.object_]]"]:
+    """A figure with so many panels, at most three in a row, that share their axes."""
+    columns = min(3, count)
+    rows = math.ceil(count / columns)
+    figure = Figure(figsize=(2.6 * columns + 1.4, height * rows + 0.8))
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for panel in panels[count:]:
+        panel.set_visible(False)
+    return figure, panels[:count]
+
+
+def _colored(comparison: Comparison) -> Iterator[tuple[str, str]]:
+    """The colour and the name of each controller."""
+    names = [one.name for one in comparison.controllers]
+    if len(names) <= len(COLORS):
+        yield from zip(COLORS, names)
+        return
+    for color, name in zip(matplotlib.colormaps["turbo"](np.linspace(0.05, 0.95, len(names))), names):
+        yield matplotlib.colors.to_hex(color), name
+
+
+def _axis(comparison: Comparison) -> tuple[list[float], float]:
+    """The values of the axis as they are drawn, and the factor on them: milliseconds for times."""
+    factor = 1e3 if _in_seconds(comparison) else 1.0
+    return [factor * float(value) for value in comparison.values], factor
+
+
+def _in_seconds(comparison: Comparison) -> bool:
+    axis = comparison.axis
+    return not axis.multiplies and bool(axis.targets) and all(map(is_in_seconds, axis.targets))
+
+
+def _label(comparison: Comparison, factor: float) -> str:
+    return in_brackets(comparison.axis.name, "ms" if factor != 1.0 else None)
+
+
+def _edges(at: Sequence[float]) -> Floats:
+    """Of cells around values that grow."""
+    if len(at) == 1:
+        return np.array([at[0] - 0.5, at[0] + 0.5])
+    inner = 0.5 * (np.array(at[1:]) + np.array(at[:-1]))
+    return np.array([2.0 * at[0] - inner[0], *inner, 2.0 * at[-1] - inner[-1]])

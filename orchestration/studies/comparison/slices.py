@@ -1,0 +1,96 @@
+"""Controllers side by side at equal bandwidth and at equal peak torque, from the runs and cells that there are."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from orchestration.statistics import wilson
+from orchestration.studies.axes import Value
+from orchestration.studies.comparison.bandwidth import Bandwidths
+from orchestration.studies.comparison.cells import PEAK, Result
+from orchestration.studies.comparison.design import CONDITION, CONTROLLER, VEHICLE, Comparison
+from orchestration.studies.figures import flew
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PHASES = (0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.5, 2.0, 3.0)
+"""Values of the axis [s] times the bandwidth of the attitude loop [rad/s], at which controllers are side by side."""
+BUDGETS = 8
+"""Peak torques at which controllers are side by side."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class AtPhase:
+    """The share that flies where the axis is a given part of the time scale of the attitude loop."""
+
+    vehicle: str
+    condition: str
+    controller: str
+    phase: float
+    """axis times bandwidth [rad]"""
+    share: float
+    low: float
+    high: float
+    """between those of the two cells beside it, by the logarithm of the axis"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class WithinTorque:
+    """The share of the starts that fly with no more than a given peak torque."""
+
+    vehicle: str
+    condition: str
+    controller: str
+    value: Value
+    torque: float
+    """[N.m]"""
+    share: float
+    low: float
+    high: float
+    """Wilson interval at 95 %"""
+
+
+def at_equal_bandwidth(cells: Sequence[Result], bandwidths: Bandwidths) -> Iterator[AtPhase]:
+    """For an axis in seconds: each controller at the same values of axis times its own bandwidth."""
+    groups: dict[tuple[str, str, str], list[Result]] = {}
+    for cell in cells:
+        groups.setdefault((cell.vehicle, cell.condition, cell.controller), []).append(cell)
+    for (vehicle, condition, controller), group in groups.items():
+        phases = [(cell, bandwidths[controller, vehicle, cell.value] * float(cell.value)) for cell in group]
+        known = [cell for cell, phase in phases if 0.0 < phase < math.inf]
+        at = np.log([phase for _, phase in phases if 0.0 < phase < math.inf])
+        if not (np.diff(at) > 0.0).all():  # tuned for each value, so that the bandwidth falls faster than that grows
+            continue
+        for phase in PHASES:
+            if len(at) and at[0] <= math.log(phase) <= at[-1]:
+                share, low, high = (
+                    float(np.interp(math.log(phase), at, [getattr(cell, key) for cell in known]))
+                    for key in ("share", "low", "high")
+                )
+                yield AtPhase(
+                    vehicle=vehicle, condition=condition, controller=controller,
+                    phase=phase, share=share, low=low, high=high,
+                )  # fmt: skip
+
+
+def at_equal_torque(comparison: Comparison, table: "pd.DataFrame") -> Iterator[WithinTorque]:
+    """Each cell at the same peak torques, those that its vehicle's flights under its condition have."""
+    done = table[table["status"] == "done"]
+    for (vehicle, condition), group in done.groupby([VEHICLE, CONDITION], sort=False):
+        peaks = group.loc[flew(group), PEAK].dropna().to_numpy(float)
+        if not len(peaks):
+            continue
+        budgets = [float(f"{q:.2g}") for q in np.quantile(peaks, np.linspace(0.1, 1.0, BUDGETS))]
+        for (controller, value), rows in group.groupby([CONTROLLER, comparison.axis.name], sort=False):
+            within = rows.loc[flew(rows), PEAK].to_numpy(float)
+            for torque in dict.fromkeys(budgets):
+                count = int((within <= torque).sum())
+                low, high = wilson(count, len(rows))
+                yield WithinTorque(
+                    vehicle=vehicle, condition=condition, controller=controller, value=value,
+                    torque=torque, share=count / len(rows), low=low, high=high,
+                )  # fmt: skip
