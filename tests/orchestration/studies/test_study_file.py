@@ -151,7 +151,7 @@ def test_without_a_base_it_is_the_flight_of_the_paper(tmp_path: Path) -> None:
         (
             "[base]\nduration = 3\n" + ONE,
             "duration",
-            "stop_time, seed, model_mismatch, controller, plant, timing, reference, record",
+            "stop_time, seed, model_mismatch, vehicle, controller, plant, timing, reference, record",
         ),
         ("[base.timing]\nrate = 3\n" + ONE, "timing.rate", ", ".join(TIMING_KEYS)),
     ],
