@@ -106,16 +106,20 @@ def _told(shape: Shape, batch: Batch, landed: Landed, systems: Sequence[System])
     values = {name: combined(node, landed.reductions, numbers, count) for name, node in shape.nodes.items()}
     found = {name: (np.isfinite(value) & ~none, value.tolist()) for name, (value, none) in values.items()}
     for lane, system in enumerate(systems):
-        known = replace(system, objectives=shape.system.objectives) if system.optional else system
         steps = int(landed.steps[lane])
         if landed.fate[lane] == FLYING and not landed.doubtful[lane]:
             end = nanoseconds(system.stop_time) / NANOSECONDS
             metrics = {name: value[lane] if there[lane] else None for name, (there, value) in found.items()}
-            yield Flown(metrics=told(known, metrics, end=end, divergence_time=None, steps=steps), message=None)
+            yield Flown(
+                metrics=told(
+                    shape.system, metrics, end=end, stop_time=system.stop_time, divergence_time=None, steps=steps
+                ),
+                message=None,
+            )
         elif landed.fate[lane] == DIVERGED:
             time = int(landed.time[lane]) / NANOSECONDS
             message = _complaint(shape, batch, system, lane, time)
-            metrics = told(known, None, end=time, divergence_time=time, steps=steps)
+            metrics = told(shape.system, None, end=time, stop_time=system.stop_time, divergence_time=time, steps=steps)
             yield None if message is None else Flown(metrics=metrics, message=message)
         else:
             yield None

@@ -31,17 +31,26 @@ def compute(system: System, spans: Spans, *, end: float, divergence_time: float 
     ended. Raises `UsageError` for an objective that cannot be evaluated, naming it.
     """
     if divergence_time is not None:
-        return told(system, None, end=end, divergence_time=divergence_time, steps=steps)
+        return told(system, None, end=end, stop_time=system.stop_time, divergence_time=divergence_time, steps=steps)
     nodes = {name: parse(text) for name, text in system.objectives.items()}
     if system.criterion.good is not None:
         nodes[GOOD] = parse(system.criterion.good)
-    return told(system, evaluate(nodes, spans), end=end, divergence_time=None, steps=steps)
+    return told(system, evaluate(nodes, spans), end=end, stop_time=system.stop_time, divergence_time=None, steps=steps)
 
 
 def told(
-    system: System, found: Mapping[str, float | None] | None, *, end: float, divergence_time: float | None, steps: int
+    system: System,
+    found: Mapping[str, float | None] | None,
+    *,
+    end: float,
+    stop_time: float,
+    divergence_time: float | None,
+    steps: int,
 ) -> Metrics:
-    """The metrics of a run, from what its expressions, `GOOD` with them, have come to; None: it diverged."""
+    """The metrics of a run, from what its expressions, `GOOD` with them, have come to; None: it diverged.
+
+    Of `system` are what the expressions are called, and the outcomes.
+    """
     objectives: dict[str, float | None] = dict.fromkeys((*system.objectives, *system.optional))
     good = None if system.criterion.good is None else False
     if found is not None:
@@ -51,7 +60,7 @@ def told(
     return {
         "outcome": outcome(system, good=good, diverged=found is None),
         "good": good,
-        "horizon": system.stop_time if found is None else end,
+        "horizon": stop_time if found is None else end,
         **objectives,
         "diverged": found is None,
         "divergence_time": divergence_time,

@@ -1,8 +1,9 @@
 """Checks a whole design before anything is flown: names, types and ranges against the FMUs' descriptions."""
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from typing import Any
 
+from orchestration.batch.shape import outline
 from orchestration.errors import UsageError
 from orchestration.master.table_file import read_table
 from orchestration.quadrotor.translation import in_its_own_words
@@ -10,6 +11,7 @@ from orchestration.simulation import checked
 from orchestration.studies.files import Files
 from orchestration.studies.store import expect_columns
 from orchestration.studies.study import Study
+from orchestration.system.check import check_parameter
 from orchestration.system.model import System, variable_of
 
 
@@ -17,12 +19,12 @@ def expect_flyable(study: Study, files: Files) -> None:
     """Raise `UsageError` for the first run of `study` that cannot be, saying how many more there are."""
     expect_columns(study.origin.objectives)
     first, wrong = "", 0
-    starts, longest = files.starts_of(study.origin), study.origin
+    starts, longest, alike = files.starts_of(study.origin), study.origin, _Alike(files)
     for index, point in enumerate(study.points):
         try:
             with in_its_own_words(study.base):
                 system = study.system(index, starts)
-                checked(system, files.models_of(system))
+                alike.expect(system)
             longest = max(longest, system, key=lambda one: one.stop_time)
         except UsageError as error:
             first = first or f"{described(index, point)}: {error}"
@@ -31,6 +33,29 @@ def expect_flyable(study: Study, files: Files) -> None:
         raise UsageError(first + (f" ({wrong - 1} more runs cannot be)" if wrong > 1 else ""))
     with in_its_own_words(study.base):
         expect_tables(longest)
+
+
+class _Alike:
+    """Holds systems to what their FMUs say: of those of one structure the first, of others what is new in them."""
+
+    def __init__(self, files: Files) -> None:
+        self._files = files
+        self._known: dict[Hashable, set[tuple[str, str, Any]]] = {}
+
+    def expect(self, system: System) -> None:
+        """Raise `UsageError` for what the FMUs do not have, or cannot take."""
+        given = [(name, key, value) for name, one in system.components.items() for key, value in one.parameters.items()]
+        structure = outline(system), tuple((name, key) for name, key, _ in given)
+        if structure not in self._known:
+            checked(system, self._files.models_of(system))
+            self._known[structure] = set(given)
+            return
+        known, models = self._known[structure], None
+        for name, key, value in given:
+            if (name, key, value) not in known:
+                models = models or self._files.models_of(system)
+                check_parameter(system, models, name, key)
+                known.add((name, key, value))
 
 
 def expect_tables(system: System) -> None:

@@ -7,7 +7,8 @@ import hashlib
 import importlib.metadata
 import json
 import platform
-from collections.abc import Container, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -95,17 +96,44 @@ def run_key(system: System, files: Files) -> str:
     A parameter that has the value with which its FMU starts counts as not given.
     """
     content = {
-        **{key: getattr(system, key) for key in ("stop_time", "seed", "objectives", "streams")},
-        "components": [_component_of(name, component, files) for name, component in system.components.items()],
-        "connections": [_values_of(x) for x in system.connections],
-        "sources": [[name, _source_of(source, files)] for name, source in system.sources.items()],
-        "criterion": dataclasses.asdict(system.criterion),
-        "versions": versions(),
+        **{key: _text_of(getattr(system, key), dict) for key in ("objectives", "streams")},
+        **{key: json.dumps(getattr(system, key)) for key in ("stop_time", "seed")},
+        "components": _listed(
+            _text_of(component, partial(_component_of, name, files), name, id(files))
+            for name, component in system.components.items()
+        ),
+        "connections": _listed(_text_of(x, _values_of) for x in system.connections),
+        "sources": _listed(
+            _text_of(source, partial(_named_source_of, name, files), name, id(files))
+            for name, source in system.sources.items()
+        ),
+        "criterion": _text_of(system.criterion, dataclasses.asdict),
+        "versions": _text_of(versions(), dict),
     }
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    text = ", ".join(f'"{key}": {content[key]}' for key in sorted(content))
+    return hashlib.sha256(f"{{{text}}}".encode()).hexdigest()
 
 
-def _component_of(name: str, component: Component, files: Files) -> dict[str, Any]:
+_TEXTS: dict[tuple[Any, ...], tuple[Any, str]] = {}
+_MOST_TEXTS = 256
+
+
+def _text_of(part: Any, content: Callable[[Any], Any], *more: Any) -> str:
+    """The JSON of a part of a system; runs of a study have most of them in common, which are written once."""
+    key = (id(part), *more)
+    found = _TEXTS.get(key)
+    if found is None or found[0] is not part:
+        if len(_TEXTS) >= _MOST_TEXTS:
+            _TEXTS.clear()
+        found = _TEXTS[key] = (part, json.dumps(content(part), sort_keys=True))
+    return found[1]
+
+
+def _listed(parts: Iterable[str]) -> str:
+    return f"[{', '.join(parts)}]"
+
+
+def _component_of(name: str, files: Files, component: Component) -> dict[str, Any]:
     starts = files.starts[component.fmu]
     return {
         **_values_of(component),
@@ -114,6 +142,10 @@ def _component_of(name: str, component: Component, files: Files) -> dict[str, An
         "parameters": {key: v for key, v in component.parameters.items() if key not in starts or v != starts[key]},
         "sampling": None if component.sampling is None else dataclasses.asdict(component.sampling),
     }
+
+
+def _named_source_of(name: str, files: Files, source: Source) -> list[Any]:
+    return [name, _source_of(source, files)]
 
 
 def _source_of(source: Source, files: Files) -> dict[str, Any]:

@@ -17,9 +17,8 @@ def check(system: System, models: Mapping[str, Model]) -> None:
     """Raise `UsageError` for the first thing that cannot be, in one line that names the place and what is valid."""
     for name, component in system.components.items():
         place = f"components.{name}"
-        fed = {variable_of(end) for x in system.connections for end in x.end if component_of(end) == name}
-        for parameter, value in component.parameters.items():
-            _check_parameter(f"{place}.parameters.{parameter}", models[name], parameter, value, parameter in fed)
+        for parameter in component.parameters:
+            check_parameter(system, models, name, parameter)
         for recorded in component.record or ():
             variable = models[name].variables.get(recorded)
             if variable is None:
@@ -46,6 +45,13 @@ def check(system: System, models: Mapping[str, Model]) -> None:
             raise UsageError(f"sources.{name}.trajectory = {source.trajectory}: expected one of the components {known}")
     if system.criterion.diverged is not None:
         _check_divergence(system.criterion.diverged, models)
+
+
+def check_parameter(system: System, models: Mapping[str, Model], name: str, parameter: str) -> None:
+    """Raise `UsageError` for a parameter that a component's FMU does not have, or a value that it cannot take."""
+    value, fed = system.components[name].parameters[parameter], f"{name}.{parameter}"
+    is_fed = any(fed in x.end for x in system.connections)
+    _check_parameter(f"components.{name}.parameters.{parameter}", models[name], parameter, value, is_fed)
 
 
 def _check_divergence(condition: str, models: Mapping[str, Model]) -> None:
