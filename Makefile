@@ -43,6 +43,7 @@ bench: .venv/.test
 	$(BIN)/python -m benchmarks.mathematics
 	$(BIN)/python -m benchmarks.native
 	$(BIN)/python -m benchmarks.engines
+	$(BIN)/python -m benchmarks.batch
 
 figures: .venv/.base
 	$(BIN)/python docs/make_figures.py

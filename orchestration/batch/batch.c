@@ -49,7 +49,7 @@ typedef struct {
     int64_t size;
     const int64_t *kinds; /* of what is received */
     const double *low, *high;
-    int32_t noisy, rounds, converts, extrapolates, read_ahead, plain;
+    int32_t noisy, rounds, converts, extrapolates, read_ahead, plain, as_they_are, unused; /* the last but one: into Reals */
     const double *sigma, *quantum, *scale, *offset; /* of each lane, the first two of each variable too */
     const double *noise[L];                         /* what is drawn, message by message */
     double *value;                                  /* of the message at hand */
@@ -218,6 +218,10 @@ static void take(Channel *c, Lanes lanes) {
 
 /* Set the receiver's inputs; a value that it cannot be set to is for the FMU itself to refuse. */
 static void set(Batch *b, Channel *c, Lanes lanes, const double *value, const int64_t *time) {
+    if (lanes == FULL && c->as_they_are) {
+        for (int64_t i = 0; i < c->size; i++) AT(c->receiver, c->to[i]) = READ(value, i);
+        return;
+    }
     q_mask mask = mask_of(lanes), wrong = q_known(0);
     for (int64_t i = 0; i < c->size; i++) {
         q_real x = READ(value, i);
@@ -308,12 +312,19 @@ static void deliver(Batch *b, Channel *c, Lanes lanes, const int64_t *time) {
 
 static void expect_finite(Batch *b, int64_t index, Lanes lanes, const int64_t *time) {
     const Component *c = &b->components[index];
-    q_real none = q_all(0.0);
-    for (int64_t i = 0; i < c->connected; i++) {
-        q_real x = READ(c->memory, c->outputs[i]);
+    const double *memory = c->memory;
+    const int64_t *outputs = c->outputs, count = c->connected;
+    q_real none = q_all(0.0), other = q_all(0.0), third = q_all(0.0);
+    int64_t i = 0;
+    for (; i + 2 < count; i += 3) { /* three sums at once take a third of the time */
+        q_real x = READ(memory, outputs[i]), y = READ(memory, outputs[i + 1]), z = READ(memory, outputs[i + 2]);
+        none = none + (x - x), other = other + (y - y), third = third + (z - z);
+    }
+    for (; i < count; i++) {
+        q_real x = READ(memory, outputs[i]);
         none = none + (x - x);
     }
-    q_mask wrong = q_isnan(none) & mask_of(lanes);
+    q_mask wrong = q_isnan(none + (other + third)) & mask_of(lanes);
     if (q_any(wrong)) end_some(b, lanes_of(wrong), NOT_FINITE, index, time);
 }
 
@@ -367,15 +378,20 @@ static void gather(Batch *b, Instant *now, Lanes moving) {
         Lanes lanes = track->lanes & b->alive;
         now->lanes |= lanes;
         now->t = q_select(mask_of(lanes), q_all((double)time / NANOSECONDS), now->t);
-        EACH(lane, lanes) now->time[lane] = time;
+        if (lanes == FULL)
+            for (int lane = 0; lane < L; lane++) now->time[lane] = time;
+        else
+            EACH(lane, lanes) now->time[lane] = time;
         for (int64_t i = s->halts_at[at]; i < s->halts_at[at + 1]; i++) now->halts[s->halts[i]] |= lanes;
         if (track->one_for_all) {
             int lane = __builtin_ctzll(track->lanes);
             q_mask mask = mask_of(lanes);
+            const double *seen = track->seen[lane] + at * b->seen_count;
+            const double *given = track->given[lane] + at * b->given_count;
             for (int64_t i = 0; i < b->seen_count; i++)
-                AT(b->seen, i) = q_select(mask, q_all(track->seen[lane][at * b->seen_count + i]), READ(b->seen, i));
+                AT(b->seen, i) = q_select(mask, q_all(seen[i]), READ(b->seen, i));
             for (int64_t i = 0; i < b->given_count; i++)
-                AT(b->given, i) = q_select(mask, q_all(track->given[lane][at * b->given_count + i]), READ(b->given, i));
+                AT(b->given, i) = q_select(mask, q_all(given[i]), READ(b->given, i));
         } else
             EACH(lane, lanes) {
                 for (int64_t i = 0; i < b->seen_count; i++)
@@ -407,7 +423,10 @@ static void step_bodies(Batch *b, const Instant *now, Lanes moving) {
         pass_on_each(b, &body->ahead, lanes, now->time);
         lanes &= b->alive;
         advance(b, index, lanes, start, length, now->time);
-        for (int lane = 0; lane < L; lane++) b->steps[lane] += lanes >> lane & 1;
+        q_bits steps;
+        memcpy(&steps, b->steps, sizeof steps);
+        steps -= bits_of(lanes); /* all bits are -1 */
+        memcpy(b->steps, &steps, sizeof steps);
         moved |= lanes;
     }
     moved &= b->alive;

@@ -29,6 +29,8 @@ Lanes = npt.NDArray[np.bool_]
 ALL_ENDED, NEXT_WINDOW, NO_MEMORY = range(3)
 FLYING, STATUS, NOT_FINITE, DIVERGED, REFUSED = range(5)
 """What has become of a run"""
+_SAID = 64
+"""Windows for which values of sources are kept"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,6 +68,7 @@ class _Track:
     """Runs that share a schedule."""
 
     lanes: list[int]
+    timing: Hashable
     windows: Iterator[Schedule]
     ahead: Schedule | None
     window: Schedule | None = None
@@ -80,10 +83,19 @@ class Batch:
     def __init__(self, shape: Shape, windows: Windows) -> None:
         self._shape, self._windows, self._lanes = shape, windows, shape.lanes
         self._library = shape.library
+        self._said: dict[Hashable, tuple[Floats, Floats]] = {}
         self._written = shape.written
         self._kept_arrays: list[Any] = []
+        owners = [source.trajectory for source in shape.system.sources.values() if source.trajectory is not None]
+        self._trajectories = {owner: self._trajectory_parameters(owner) for owner in owners}
+        self._starts = {
+            name: (component_of(name), variable_of(name), variable, number_of(variable, variable.start))
+            for name in (*shape.numbers, *(each for names in self._trajectories.values() for each in names))
+            for variable in [shape.variable(name)]
+        }
         kernels = list(shape.kernels.values())
-        self._memories = [self._array(kernel.lanes.places) for kernel in kernels]
+        self.memories = [self._array(kernel.lanes.places) for kernel in kernels]
+        """of the components, shape (places, lanes)"""
         self._ends: list[Ends] = [ends_of(shape, x) for x in shape.system.connections]
         self._channel_type = c.channel_of(self._lanes)
         self._track_type = c.track_of(self._lanes)
@@ -215,29 +227,28 @@ class Batch:
 
     def parameters(self, system: System) -> dict[str, float]:
         """Those that its look-out or its sources may name."""
-        owners = [source.trajectory for source in system.sources.values() if source.trajectory is not None]
-        names = [*self._shape.numbers, *(each for owner in owners for each in self._trajectory_parameters(owner))]
+        names = [*self._shape.numbers, *(each for names in self._trajectories.values() for each in names)]
         return {name: self._number(system, name) for name in names}
 
     def value(self, column: str, lane: int) -> float:
         """The value of a column in a run, where it has ended."""
         index, place = self._shape.place(column)
-        return float(self._memories[index][place, lane])
+        return float(self.memories[index][place, lane])
 
     def _trajectory_parameters(self, component: str) -> list[str]:
         variables = self._shape.models[component].variables
         return [f"{component}.{name}" for name in variables if name.startswith("trajectory.")]
 
     def _number(self, system: System, name: str) -> float:
-        variable = self._shape.variable(name)
-        given = system.components[component_of(name)].parameters.get(variable_of(name), variable.start)
-        return number_of(variable, given)
+        owner, parameter, variable, start = self._starts[name]
+        given = system.components[owner].parameters.get(parameter)
+        return start if given is None else number_of(variable, given)
 
     def _put_values(self, systems: Sequence[System], known: Mapping[Call, Floats]) -> None:
         """Start values, parameters, and all that differs from lane to lane."""
         shape = self._shape
         for index, (name, kernel) in enumerate(shape.kernels.items()):
-            memory, variables = self._memories[index], shape.models[name].variables
+            memory, variables = self.memories[index], shape.models[name].variables
             kernel.lanes.begin(c.address(memory))
             for lane, system in enumerate(systems):
                 component = system.components[name]
@@ -270,7 +281,7 @@ class Batch:
             values = [value for source in run.given for value in source.each(np.zeros(1))[0].tolist()]
             for index, name in enumerate(shape.names):
                 for number, place in shape.fed[name]:
-                    self._memories[index][place, lane] = values[number]
+                    self.memories[index][place, lane] = values[number]
         received = [np.zeros((len(ends.end), self._lanes)) for ends in self._ends]
         for group in shape.first_exchange:
             wrong |= self._exchange(group, received)
@@ -278,7 +289,7 @@ class Batch:
             wrong |= self._compute(index)
             connected = [shape.place(f"{name}.{output}")[1] for output in shape.board.outputs[name]]
             connected = connected[: shape.board.connected[name]]
-            wrong |= ~np.isfinite(self._memories[index][connected]).all(axis=0)
+            wrong |= ~np.isfinite(self.memories[index][connected]).all(axis=0)
         for i, first in enumerate(received):
             if self._channels[i].extrapolates:
                 self._of_channels[i]["applied"][: len(first)] = first
@@ -295,9 +306,9 @@ class Batch:
                 sender, receiver = (self._shape.names.index(name) for name in (x.sender, x.receiver))
                 wrong |= self._compute(sender)
                 before = received[i].copy()
-                after = self._passed(i, self._memories[sender])
+                after = self._passed(i, self.memories[sender])
                 received[i][:, open_] = after[:, open_]
-                self._memories[receiver][self._ends[i].end[:, None], np.flatnonzero(open_)] = self._taken(i, after)[
+                self.memories[receiver][self._ends[i].end[:, None], np.flatnonzero(open_)] = self._taken(i, after)[
                     :, open_
                 ]
                 change = np.abs(received[i] - before) <= CONVERGED * np.maximum(1.0, np.abs(received[i]))
@@ -326,7 +337,7 @@ class Batch:
         status = np.zeros(self._lanes, dtype=np.int32)
         kernel = self._shape.kernels[self._shape.names[index]]
         kernel.lanes.initialise(
-            c.address(self._memories[index]), c.address(active), c.address(start), c.address(status)
+            c.address(self.memories[index]), c.address(active), c.address(start), c.address(status)
         )  # fmt: skip
         failed: Lanes = status != 0
         return failed
@@ -341,7 +352,9 @@ class Batch:
         for timing, lanes in found.items():
             windows = self._windows.of((timing, id(self._shape)), runs[lanes[0]].system)
             keys = {self._sources_of(runs[lane].system) for lane in lanes}
-            tracks.append(_Track(lanes=lanes, windows=windows, ahead=next(windows, None), alike=len(keys) == 1))
+            tracks.append(
+                _Track(lanes=lanes, timing=timing, windows=windows, ahead=next(windows, None), alike=len(keys) == 1)
+            )
         return tracks
 
     def _sources_of(self, system: System) -> Hashable:
@@ -351,9 +364,7 @@ class Batch:
             if name in self._shape.seen or source.to:
                 found += [source, system.seed if source.noise is not None else None]
             if source.trajectory is not None:
-                found.append(
-                    tuple(self._number(system, each) for each in self._trajectory_parameters(source.trajectory))
-                )
+                found.append(tuple(self._number(system, each) for each in self._trajectories[source.trajectory]))
         return tuple(map(repr, found))
 
     def _next_window(self, number: int, track: _Track, runs: Sequence[_Run]) -> None:
@@ -376,13 +387,22 @@ class Batch:
         into.one_for_all = track.alike
         for lane in track.lanes[:1] if track.alike else track.lanes:
             run = runs[lane]
-            run.arrays = [
-                np.ascontiguousarray(np.column_stack([values.over(t) for values in run.seen] or [t[:, None]])),
-                np.ascontiguousarray(np.column_stack([values.each(t) for values in run.given] or [t[:, None]])),
-            ]
+            run.arrays = list(self._values_over(run, t, track, window))
             into.seen[lane], into.given[lane] = map(c.address, run.arrays)
         for lane in track.lanes:
             self._draw_noise(lane, runs[lane], window)
+
+    def _values_over(self, run: _Run, t: Floats, track: _Track, window: Schedule) -> tuple[Floats, Floats]:
+        """What sources say at the instants of a window; what many runs have in common is found once."""
+        key = (track.timing, self._sources_of(run.system), int(window.times[0]), len(window))
+        if key not in self._said:
+            while len(self._said) >= _SAID:
+                del self._said[next(iter(self._said))]
+            self._said[key] = (
+                np.ascontiguousarray(np.column_stack([values.over(t) for values in run.seen] or [t[:, None]])),
+                np.ascontiguousarray(np.column_stack([values.each(t) for values in run.given] or [t[:, None]])),
+            )
+        return self._said[key]
 
     def _draw_noise(self, lane: int, run: _Run, window: Schedule) -> None:
         for i, stream in run.noise.items():
@@ -405,7 +425,7 @@ class Batch:
             return []
         places = [self._shape.place(column) for column in columns]
         self._recorded = np.array(
-            [c.address(self._memories[i]) + 8 * self._lanes * place for i, place in places], dtype=np.int64
+            [c.address(self.memories[i]) + 8 * self._lanes * place for i, place in places], dtype=np.int64
         )
         batch.recorded, batch.record_limit = c.address(self._recorded), 2**20
         rows = [np.empty((2**20, len(columns) + 1)) for _ in range(sum(len(track.lanes) for track in tracks))]
@@ -436,12 +456,13 @@ class Batch:
         sigma, quantum = changes_of(x)
         names, converts = self._shape.names, x.scale != 1.0 or x.offset != 0.0
         return self._channel_type(
-            sender=c.address(self._memories[names.index(x.sender)]),
-            receiver=c.address(self._memories[names.index(x.receiver)]),
+            sender=c.address(self.memories[names.index(x.sender)]),
+            receiver=c.address(self.memories[names.index(x.receiver)]),
             from_=c.address(ends.start), to=c.address(ends.end), size=len(ends.start), kinds=c.address(ends.kinds),
             low=c.address(ends.low), high=c.address(ends.high), noisy=bool(sigma.any()), rounds=bool(quantum.any()),
             converts=converts, extrapolates=x.hold == "first", read_ahead=i in self._shape.plan.read_ahead,
             plain=not converts and x.hold == "zero",
+            as_they_are=not converts and x.hold == "zero" and not ends.kinds.any(),
             **{name: c.address(arrays[name]) for name in ("sigma", "quantum", "scale", "offset", "value", "applied")},
         )  # fmt: skip
 
@@ -464,7 +485,7 @@ class Batch:
         sampling = shape.system.components[name].sampling
         self._kept_arrays += [places, fed]
         return c.Component(
-            step=shape.kernels[name].step, memory=c.address(self._memories[index]), outputs=c.address(places),
+            step=shape.kernels[name].step, memory=c.address(self.memories[index]), outputs=c.address(places),
             connected=len(places), fed=ctypes.addressof(fed), fed_count=len(changing), held=self._indices(held),
             ahead=self._indices(ahead), behind=self._indices(behind), ratio=c.address(self._ratios[index]),
             by_itself=sampling is not None and sampling.clock == "fmu", settles=bool(held or behind or changing),

@@ -43,7 +43,8 @@ def channel_of(lanes: int) -> Any:
         _fields_: ClassVar = [
             ("sender", c_void_p), ("receiver", c_void_p), ("from_", c_void_p), ("to", c_void_p), ("size", c_int64),
             *((name, c_void_p) for name in ("kinds", "low", "high")),
-            *((name, c_int32) for name in ("noisy", "rounds", "converts", "extrapolates", "read_ahead", "plain")),
+            *((name, c_int32) for name in ("noisy", "rounds", "converts", "extrapolates")),
+            *((name, c_int32) for name in ("read_ahead", "plain", "as_they_are", "unused")),
             *((name, c_void_p) for name in ("sigma", "quantum", "scale", "offset")),
             ("noise", c_void_p * lanes), ("value", c_void_p), ("flight", c_void_p), ("capacity", c_int64),
             ("first", c_int64 * lanes), ("last", c_int64 * lanes), ("applied", c_void_p),

@@ -1,0 +1,139 @@
+"""What flights cost as lanes of a batch: `python -m benchmarks.batch`.
+
+CPU time of one core, the smallest of several repetitions in turns; under other load it grows, and the ratios within one
+run of this program are what can be compared. The bare kernels are plant and controller alone, called in turns with
+nothing around them. End to end is a sweep into its store, coordinator, worker process and the sample flown by FMUs
+included.
+"""
+
+import ctypes
+import os
+import resource
+import tempfile
+import time
+from collections import defaultdict
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from orchestration import fmus
+from orchestration.batch.flight import Batch
+from orchestration.batch.kernels import lanes_here
+from orchestration.batch.shape import Shape
+from orchestration.batch.windows import Windows, timing
+from orchestration.fmi.model import read_model
+from orchestration.master.structures import address
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.timing import Timing
+from orchestration.quadrotor.translation import system_of
+from orchestration.simulation import checked, prepared
+from orchestration.studies.axes import Axis
+from orchestration.studies.study import Study
+from orchestration.studies.sweep import sweep
+from orchestration.system.model import System
+from orchestration.system.paths import changed
+
+REPETITIONS = 7
+CASES = {"1 kHz both": (0.001, 20.0), "10 ms / 1 ms": (0.01, 20.0), "20 ms / 1 ms": (0.02, 20.0)}
+"""Period and stop time [s]"""
+RUNS = 2048
+"""of the sweeps"""
+X = "components.plant.parameters.initial.position.x"
+
+
+def systems(period: float, stop_time: float) -> tuple[Shape, list[System]]:
+    """The paper's flight from as many places as there are lanes."""
+    one = fmus.native_twins(system_of(Scenario(timing=Timing(period=period), stop_time=stop_time)))
+    models = {name: read_model(path) for name, path in fmus.of_components(one.fmus).items()}
+    one = checked(one, models).system
+    places = np.linspace(0.0, 1.0, lanes_here()).tolist()
+    return Shape(system=one, models=models, lanes=lanes_here()), [changed(one, {X: place}) for place in places]
+
+
+def bare(shape: Shape, batch: Batch, period: float, stop_time: float) -> float:
+    """CPU time of a step of the plant [s], with the law where it is due, and nothing else; after a flight."""
+    plant, law = (shape.kernels[name] for name in ("plant", "controller"))
+    memory = dict(zip(shape.names, batch.memories))
+    lanes, steps, each = shape.lanes, round(stop_time / 0.001), round(period / 0.001)
+    active, status = np.full(lanes, 2**64 - 1, dtype=np.uint64), np.zeros(lanes, dtype=np.int32)
+    times, step, longer = np.zeros(lanes), np.full(lanes, 0.001), np.full(lanes, period)
+    calls = [ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 5)(kernel.step) for kernel in (plant, law)]
+    begin = time.process_time()
+    of_plant = (address(memory["plant"]), address(active), address(times), address(step), address(status))
+    of_law = (address(memory["controller"]), address(active), address(times), address(longer), address(status))
+    for k in range(steps):
+        calls[0](*of_plant)
+        if k % each == 0:
+            calls[1](*of_law)
+    called = time.process_time() - begin
+    begin = time.process_time()
+    empty = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 5)(
+        ctypes.cast(ctypes.CDLL(None).abs, ctypes.c_void_p).value or 0
+    )
+    for k in range(steps):
+        empty(*of_plant)
+        if k % each == 0:
+            empty(*of_law)
+    return (called - (time.process_time() - begin)) / (steps * lanes)
+
+
+def flown(batch: Batch, runs: list[System]) -> float:
+    """CPU time of a step of the plant [s], events and objectives on."""
+    timings = [timing(system) for system in runs]
+    begin = time.process_time()
+    landed = batch.fly(runs, timings)
+    return (time.process_time() - begin) / float(landed.steps.sum())
+
+
+def compiled(system: System) -> float:
+    """The same by the compiled loop."""
+    with prepared(system, engine="compiled") as flight:
+        flight.master.initialise()
+        begin = time.process_time()
+        flight.master.run()
+        return (time.process_time() - begin) / flight.master.steps
+
+
+def end_to_end(period: float) -> float:
+    """CPU time of a run of a study [s], 20 s long."""
+    axis = Axis(name="x", targets=("plant.initial.position.x",), low=0.0, high=1.0)
+    base = Scenario(timing=Timing(period=period), stop_time=20.0)
+    study = Study(name="bench", base=base, axes=(axis,), method="random", samples=RUNS)
+    with tempfile.TemporaryDirectory() as folder:
+        begin = _cpu()
+        sweep(study, folder=Path(folder), engine="batch")
+        return (_cpu() - begin) / RUNS
+
+
+def _cpu() -> float:
+    """Of this process and of those that it has waited for [s]."""
+    whose = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    return sum(used.ru_utime + used.ru_stime for used in map(resource.getrusage, whose))
+
+
+def main() -> None:
+    """Print steps a second and ratios, then runs a second of sweeps into their stores."""
+    found: dict[tuple[str, str], list[float]] = defaultdict(list)
+    made = {case: systems(*times) for case, times in CASES.items()}
+    batches = {case: Batch(shape, Windows()) for case, (shape, _) in made.items()}
+    for _ in range(REPETITIONS):
+        for case, (period, stop_time) in CASES.items():
+            shape, runs = made[case]
+            found[case, "batch"].append(flown(batches[case], runs))
+            found[case, "bare"].append(bare(shape, batches[case], period, stop_time))
+            found[case, "compiled"].append(compiled(replace(runs[0], stop_time=5.0)))
+    print(f"load {os.getloadavg()[0]:.1f}; {lanes_here()} lanes; the smallest of {REPETITIONS}, in turns")
+    for case in CASES:
+        batch, kernels, loop = (min(found[case, what]) for what in ("batch", "bare", "compiled"))
+        print(
+            f"{case:<14} batch {1e-6 / batch:6.2f} M steps/s   bare kernels {1e-6 / kernels:6.2f} M steps/s   "
+            f"{100 * kernels / batch:3.0f} % of them   {loop / batch:5.1f} times the compiled loop"
+        )
+    for period in (0.02, 0.01):
+        cost = min(end_to_end(period) for _ in range(2))
+        print(f"sweep of {RUNS} flights of 20 s at {1 / period:.0f} Hz: {1 / cost:6.0f} runs/s of CPU time, end to end")
+
+
+if __name__ == "__main__":
+    main()
