@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import keyword
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Container, Iterable, Mapping
 from typing import ClassVar
 
 from fmu_kit.native.statements import Block, Call, Function, Place, Statement, ends
@@ -62,6 +63,7 @@ class Writer:
         self.count = 0
         self.parameters = [f"{_identifier(name)}_" for name in function.names]
         self.used = self._used(function.body)
+        self.gives: dict[int, set[tuple[str, int]]] = {}
 
     def text(self) -> str:
         """The function."""
@@ -268,33 +270,40 @@ class Writer:
     def _hoist(self, then: Block, otherwise: Block, rest: Block) -> None:
         """Compute before a branch what is needed in more than one of its ways, or in one and after it."""
         a, b, after = (closure(self._named_in(block)) for block in (then, otherwise, rest))
-        for key, symbol in {**a, **b}.items():
-            if (key in a) + (key in b) + (key in after) > 1:
-                self._compute_unless_given_in(symbol, (*then, *otherwise))
+        several = {key for key in {**a, **b} if (key in a) + (key in b) + (key in after) > 1}
+        self._compute_unless_given_in({**a, **b}, (*then, *otherwise), several)
 
-    def _compute_unless_given_in(self, symbol: Symbol, block: Block) -> None:
-        """Compute a value now, if nothing that it depends on gets its own in a block, or in a loop that is to come."""
-        if symbol.args and not self._is_known(symbol):
-            below = closure([symbol]).values()
-            if not any(self._is_of_loop_to_come(each) or self._is_given(each, block) for each in below):
+    def _compute_unless_given_in(self, needed: Mapping[int, Symbol], block: Block, chosen: Container[int]) -> None:
+        """Compute now what does not depend on what gets its value in a block, or in a loop that is to come.
+
+        Of what is `needed`, each after its operands, those that are `chosen`.
+        """
+        given, waiting = self._given_in(block), set[int]()
+        for key, symbol in needed.items():
+            operands = () if symbol.op == "phi" else symbol.args
+            own = self._is_of_loop_to_come(symbol) or _giver(symbol) in given
+            if own or any(id(operand) in waiting for operand in operands):
+                waiting.add(key)
+            elif key in chosen and symbol.args and not self._is_known(symbol):
                 self.value(symbol)
 
     def _is_of_loop_to_come(self, symbol: Symbol) -> bool:
         return symbol.op in ("index", "variable") and not any(id(symbol) in scope for scope in self.scopes)
 
-    def _is_given(self, symbol: Symbol, block: Block) -> bool:
-        """Whether a statement of a block gives a symbol its value."""
+    def _given_in(self, block: Block) -> set[tuple[str, int]]:
+        """What the statements of a block give their values to, as `_giver` has it."""
+        found: set[tuple[str, int]] = set()
         for each in block:
-            if symbol.op == "phi" and each.op == "assign" and each.symbols[0] is symbol:
-                return True
-            if symbol.op == "outcome" and symbol.data[1] is each:
-                return True
-            after = self.program.versions[each.data.memory, each] if each.op == "call" else None
-            if symbol.op in ("load", "result", "failed") and symbol.data[1] == after:
-                return True
-            if any(self._is_given(symbol, inner) for inner in each.blocks):
-                return True
-        return False
+            if id(each) not in self.gives:
+                inner = self._given_in(tuple(itertools.chain(*each.blocks)))
+                inner.add(("loop", id(each)))
+                if each.op == "assign":
+                    inner.add(("choice", id(each.symbols[0])))
+                if each.op == "call":
+                    inner.add(("call", self.program.versions[each.data.memory, each]))
+                self.gives[id(each)] = inner
+            found |= self.gives[id(each)]
+        return found
 
     def _inner(self, block: Block) -> None:
         self.scopes.append({})
@@ -360,8 +369,7 @@ class Writer:
         size = (len(each.symbols) - 1) // 2
         count, starts, nexts = each.symbols[0], each.symbols[1 : 1 + size], each.symbols[1 + size :]
         needed = closure([*self._named_in(body), *nexts])
-        for symbol in needed.values():
-            self._compute_unless_given_in(symbol, body)
+        self._compute_unless_given_in(needed, body, needed)
         states = []
         for start in starts:
             states.append(self._name("s"))
@@ -480,6 +488,17 @@ def _constant(symbol: Symbol) -> str:
     if math.isinf(value):
         return "Q_INFINITY" if value > 0.0 else "(-Q_INFINITY)"
     return f"({value!r})" if value < 0 or repr(value).startswith("-") else repr(value)
+
+
+def _giver(symbol: Symbol) -> tuple[str, int] | None:
+    """What gives a symbol its value, if a statement does."""
+    if symbol.op == "phi":
+        return "choice", id(symbol)
+    if symbol.op == "outcome":
+        return "loop", id(symbol.data[1])
+    if symbol.op in ("load", "result", "failed"):
+        return "call", symbol.data[1]
+    return None
 
 
 def _unknown_below(symbol: Symbol, is_known: object) -> list[Symbol]:
