@@ -15,7 +15,7 @@ from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.translation import system_of
 from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
 from orchestration.system.paths import changed
-from tests.orchestration.batch.lanes import located
+from tests.orchestration.batch.lanes import landed, located, shape_of
 from tests.orchestration.fmi.small import needs_compiler, small
 from tests.orchestration.master.moving import moving
 from tests.orchestration.master.test_compiled import Kept, of, ran
@@ -134,6 +134,18 @@ def test_what_a_component_refuses_or_makes_infinite_is_left_to_be_flown_alone(fm
     alone = ran(crowd[3], "compiled", load=kept.load)
     assert found[3] is not None
     assert found[3].metrics == alone.metrics
+
+
+@pytest.mark.parametrize("lanes", [2, 4])
+def test_narrower_registers_give_the_same_bits(lanes: int, fmu: Path) -> None:
+    first = replace(of(LOOP, fmu), objectives={"peak": "max(plant.y)", "rms": "rms(plant.y * controller.z)"})
+    crowd = [replace(first, seed=seed) for seed in range(lanes)]
+    wide = shape_of(first)
+    narrow = replace(wide, lanes=lanes)
+    found, expected = landed(narrow, crowd), landed(wide, crowd)
+    for call, values in expected.reductions.items():
+        assert found.reductions[call].tobytes() == values.tobytes()
+    assert [rows.tobytes() for rows in found.signals] == [rows.tobytes() for rows in expected.signals]
 
 
 def test_more_runs_than_lanes_of_many_timings_come_back_in_their_order() -> None:
