@@ -1,6 +1,6 @@
 """The names of both FMUs and what is connected to what; no other file of this package knows them."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 MODELS = {
     "UnifiedController": "controller_fmu.sliding_mode.slave:UnifiedController",
@@ -54,6 +54,8 @@ DISTURBANCE = components("wind.amplitude") + EXTERNAL_FORCE
 BOUNDARY_LAYER = "boundary_layer"
 SURFACE_GAIN, SURFACE_EXPONENT = "gain.surface", "surface_exponent"
 """Parameters of the controller: its gain is constant for position errors below ε, a power of them beyond."""
+UNREDESIGNED: Mapping[str, tuple[object, ...]] = {"discretisation": ("explicit", 1), "prediction": (0.0,)}
+"""Parameters of the controller, and the values with which it holds what its law says at the sample."""
 
 RIGID_BODY = ("mass", *components("inertia", ("xx", "yy", "zz", "xy", "xz", "yz")))
 """Parameters of the plant and, by the same names, of the controller's nominal model."""

@@ -102,6 +102,14 @@ def _located(hover: Scenario) -> Scenario:
     return hover.with_fmus(plant=fmus.locate(hover.plant.fmu), controller=fmus.locate(hover.controller.fmu))
 
 
+def _expect_one_feedback(scenario: Scenario) -> None:
+    """Raise `UsageError` for a controller whose feedback is another for each period, or remembers commands."""
+    for name, plain in wiring.UNREDESIGNED.items():
+        value = scenario.controller.parameters.get(name, plain[0])
+        if value not in plain:
+            raise UsageError(f"the loop about hover is for controllers with {name} = {plain[0]} only")
+
+
 class HoverLoop:
     """The linear closed loop of a scenario about hover, for any period and delay."""
 
@@ -111,7 +119,8 @@ class HoverLoop:
 
     @classmethod
     def of(cls, scenario: Scenario) -> "HoverLoop":
-        """The loop of `scenario`; raises `UsageError` if hover is not an equilibrium of it."""
+        """The loop of `scenario`; raises `UsageError` if hover is not an equilibrium of it, or its feedback not one."""
+        _expect_one_feedback(scenario)
         hover, fleet = _located(hover_of(scenario)), Instances()
         trim, feedback = _controller_at_hover(hover, fleet)
         return cls(feedback, PlantStep(hover, fleet, trim))

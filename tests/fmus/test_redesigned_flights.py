@@ -1,23 +1,35 @@
 """What the redesigns of the unified law fly, by their native FMUs: the paper's start and wind, plant steps of 5 ms."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import orchestration
 from orchestration import fmus
+from orchestration.errors import UsageError
+from orchestration.fmi.reuse import Instances
+from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.scenario_file import scenario_from_tables
+from orchestration.studies.linear import HoverLoop, at_hover
+from orchestration.studies.sampled_loop import growth_of_loop
 
 MEAN = {"discretisation": "mean", "stages": 3}
 
 
-def flies(period: float, *, delay: float = 0.0, plant: dict[str, float] | None = None, **controller: object) -> bool:
+def scenario(
+    period: float, *, delay: float = 0.0, plant: dict[str, float] | None = None, **controller: object
+) -> Scenario:
     tables = {
         "controller": {"fmu": str(fmus.locate("native/UnifiedController")), **controller},
         "plant": {"fmu": str(fmus.locate("native/QuadrotorPlant")), **(plant or {})},
         "timing": {"period": period, "delay": delay, "plant_interval": 0.005},
     }
-    metrics = orchestration.run(scenario_from_tables(tables, Path())).metrics
+    return scenario_from_tables(tables, Path())
+
+
+def flies(period: float, **given: Any) -> bool:
+    metrics = orchestration.run(scenario(period, **given)).metrics
     return not metrics["diverged"] and metrics["ultimate_bound"] < 0.05
 
 
@@ -54,3 +66,20 @@ def test_with_twice_the_inertia_the_mean_loses_to_the_explicit_law() -> None:
     heavy = {f"inertia.{axis}": 2.0 for axis in ("xx", "yy", "zz")}
     assert flies(0.12, plant=heavy)
     assert not flies(0.12, plant=heavy, **MEAN)
+
+
+@pytest.mark.parametrize(("kind", "limit"), [("explicit", 0.0801), ("midpoint", 0.1357), ("mean", 0.2054)])
+def test_about_hover_what_is_small_decays_up_to_the_limit(kind: str, limit: float) -> None:
+    instances = Instances()
+    below, above = (
+        growth_of_loop(at_hover(scenario(period, discretisation=kind)), instances)
+        for period in (round(0.99 * limit, 4), round(1.01 * limit, 4))
+    )
+    instances.close()
+    assert below < 0.0 < above
+
+
+@pytest.mark.parametrize(("name", "value"), [("discretisation", "mean"), ("prediction", 0.02)])
+def test_the_loop_of_one_feedback_for_all_periods_is_not_for_redesigns(name: str, value: object) -> None:
+    with pytest.raises(UsageError, match=f"controllers with {name} = "):
+        HoverLoop.of(scenario(0.02, **{name: value}))
