@@ -84,12 +84,11 @@ def parse(text: str) -> Node:
     return _node(tree.body, text, 0)
 
 
-def names(node: Node) -> Iterator[str]:
+@functools.lru_cache(maxsize=4096)
+def names(node: Node) -> tuple[str, ...]:
     """Every name in an expression, as often as it is there."""
-    if isinstance(node, Name):
-        yield node.text
-    for child in children(node):
-        yield from names(child)
+    own = (node.text,) if isinstance(node, Name) else ()
+    return own + tuple(name for child in children(node) for name in names(child))
 
 
 def text(node: Node) -> str:

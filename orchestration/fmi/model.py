@@ -53,9 +53,9 @@ class Variable:
         return self.causality in ("parameter", "input", "structuralParameter")
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Model:
-    """An FMU file and what its description says."""
+    """An FMU file and what its description says; read once, it is told from others by identity."""
 
     path: Path
     description: ModelDescription

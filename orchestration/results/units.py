@@ -1,13 +1,13 @@
 """The units of what a run comes to, from those that its FMUs declare."""
 
-from collections.abc import Mapping
+import functools
+from collections.abc import Mapping, Sequence
 
 from orchestration.errors import UsageError
 from orchestration.expressions.syntax import names, parse
 from orchestration.expressions.units import unit_of
 from orchestration.fmi.model import Model
 from orchestration.system.model import System, component_of, variable_of
-from orchestration.system.system_file import expressions
 from orchestration.units import METRE, SECOND, Unit
 
 OF_EVERY_RUN = dict.fromkeys(("horizon", "divergence_time"), str(SECOND))
@@ -19,13 +19,31 @@ def units(system: System, models: Mapping[str, Model]) -> dict[str, str]:
 
     Raises `UsageError`, naming the expression, where values of different units are added or compared.
     """
-    known = _of_signals(system, models)
-    for name, text in system.objectives.items():
+    sources = tuple((s.signals(name), s.to, s.trajectory is not None) for name, s in system.sources.items())
+    criterion = (system.criterion.good, system.criterion.diverged)
+    return dict(_units(tuple(system.objectives.items()), criterion, sources, tuple(models.items())))
+
+
+Sources = tuple[tuple[tuple[str, ...], tuple[str, ...], bool], ...]
+"""Of each: its signals, where they go, and whether it is a trajectory"""
+
+
+@functools.lru_cache(maxsize=256)
+def _units(
+    objectives: tuple[tuple[str, str], ...],
+    criterion: tuple[str | None, str | None],
+    sources: Sources,
+    models: tuple[tuple[str, Model], ...],
+) -> dict[str, str]:
+    """Of all that it depends on: the runs of a study, which are checked one by one, have it in common."""
+    texts = [text for _, text in objectives] + [text for text in criterion if text is not None]
+    known = _of_signals(texts, sources, dict(models))
+    for name, text in objectives:
         known[name] = _unit(f"objectives.{name}", text, known)
-    for place, expression in (("good", system.criterion.good), ("diverged", system.criterion.diverged)):
+    for place, expression in zip(("good", "diverged"), criterion):
         if expression is not None:
             _unit(f"criterion.{place}", expression, known)
-    return OF_EVERY_RUN | {name: str(unit) for name in system.objectives if (unit := known[name]) is not None}
+    return OF_EVERY_RUN | {name: str(unit) for name, _ in objectives if (unit := known[name]) is not None}
 
 
 def _unit(place: str, expression: str, known: Mapping[str, Unit | None]) -> Unit | None:
@@ -35,17 +53,16 @@ def _unit(place: str, expression: str, known: Mapping[str, Unit | None]) -> Unit
         raise UsageError(f"{place}: {error}") from error
 
 
-def _of_signals(system: System, models: Mapping[str, Model]) -> dict[str, Unit | None]:
+def _of_signals(texts: Sequence[str], sources: Sources, models: Mapping[str, Model]) -> dict[str, Unit | None]:
     """Of all that expressions name, by COMPONENT.VARIABLE and SOURCE.VARIABLE."""
-    wanted = {name for _, expression in expressions(system) for name in names(parse(expression))}
+    wanted = {name for expression in texts for name in names(parse(expression))}
     found: dict[str, Unit | None] = {}
     for name, model in models.items():
         for variable in model.variables:
             signal = f"{name}.{variable}"
             if signal in wanted or signal.rpartition(".")[0] in wanted:
                 found[signal] = model.units.get(variable)
-    for name, source in system.sources.items():
-        fed = [models[component_of(end)].units.get(variable_of(end)) for end in source.to]
-        signals = source.signals(name)
-        found |= zip(signals, fed if source.trajectory is None else [METRE] * len(signals), strict=True)
+    for signals, to, is_trajectory in sources:
+        fed = [models[component_of(end)].units.get(variable_of(end)) for end in to]
+        found |= zip(signals, [METRE] * len(signals) if is_trajectory else fed, strict=True)
     return found

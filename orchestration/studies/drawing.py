@@ -62,7 +62,7 @@ def draw_study(study: Study, folder: Path | None, metric: str | None = None) -> 
 
 def judged(system: System) -> str:
     """The objective that the criterion is about, or the first one; `horizon` where there is none."""
-    named = names(parse(system.criterion.good)) if system.criterion.good is not None else iter(())
+    named = names(parse(system.criterion.good)) if system.criterion.good is not None else ()
     return next((name for name in named if name in system.objectives), next(iter(system.objectives), "horizon"))
 
 
