@@ -6,7 +6,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from docs import experiments
+from docs import experiments, theory
 from docs.experiments import CASES, DIRECTIONS, PERIODS, SIZES
 from orchestration.results.plots import BLUE, GREY, ORANGE, RED
 from orchestration.statistics import wilson
@@ -100,4 +100,63 @@ def sobol(names: list[str], outcome: Array, rank: Array) -> Figure:
         panel.axvline(0.0, color=GREY, linewidth=0.8)
     panels[0].set_yticks(range(len(names)), names)
     panels[0].invert_yaxis()
+    return figure
+
+
+def decay(curves: dict[float, tuple[Array, Array]], medians: Array) -> Figure:
+    """Left the error over time by exponent; right median rates, shape (exponents, periods, decades)."""
+    figure = Figure(figsize=(10.0, 4.2))
+    left, right = figure.subplots(1, 2)
+    colors = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, len(curves)))
+    for (exponent, (time, error)), color in zip(curves.items(), colors, strict=True):
+        left.plot(time, 1e3 * error, color=color, linewidth=1.0, label=f"β_t = {exponent:g}")
+    left.axhline(1e3 * theory.LAYER, color=GREY, linestyle="--", linewidth=0.8)
+    left.set(yscale="log", xlabel="time [s]", ylabel="position error, largest axis [mm]", ylim=(1e-5, 1e4))
+    left.legend(fontsize=8)
+    marks = {0: ("o", "100 to 10 mm"), 1: ("s", "10 to 1 mm"), 2: ("^", "1 to 0.1 mm"), 3: ("v", "0.1 to 0.01 mm")}
+    for i, (marker, label) in marks.items():
+        filled = BLUE if i < 2 else "none"
+        right.plot(
+            theory.EXPONENTS, medians[:, 0, i], marker, color=BLUE, markerfacecolor=filled, markersize=6, label=label
+        )
+    right.plot(
+        theory.EXPONENTS, [theory.expected_rate(b) for b in theory.EXPONENTS], "-", color=GREY, label="2k/(3 + β_t)"
+    )
+    right.set(xlabel="β_t", ylabel="rate of the error at 1 ms [1/s]", ylim=(0.0, 2.5))
+    right.legend(fontsize=8, title="median over the starts", title_fontsize=8)
+    return figure
+
+
+def loop_gains(found: dict[str, Array]) -> Figure:
+    """Local limits over the factor on a gain or a loop's gains, and the attitude loop's by itself."""
+    figure = Figure(figsize=(10.0, 4.2))
+    panels = figure.subplots(1, 2, sharey=True)
+    for panel, names in zip(panels, (tuple(theory.GAINS), ("attitude", "translation")), strict=True):
+        for name, color, marker in zip(names, (RED, ORANGE, GREY, BLUE, "black"), "osv^x"):
+            panel.plot(theory.FACTORS, 1e3 * found[name], f"{marker}-", color=color, markersize=5, label=name)
+        panel.set(xscale="log", yscale="log", xlabel="factor")
+        panel.set_xticks((0.25, 0.5, 1.0, 2.0, 4.0), ("0.25", "0.5", "1", "2", "4"))
+        panel.set_xticks([], minor=True)
+        panel.set_yticks((20, 40, 80, 160, 320), ("20", "40", "80", "160", "320"))
+        panel.set_yticks([], minor=True)
+    alone = [theory.of_attitude_alone(*(15.0 * factor,) * 2, 15.0 * factor) for factor in theory.FACTORS]
+    panels[1].plot(theory.FACTORS, 1e3 * np.array(alone), "--", color=GREY, label="attitude loop by itself")
+    panels[0].set_ylabel("local limit of the period [ms]")
+    for panel in panels:
+        panel.legend(fontsize=8)
+    return figure
+
+
+def margins(periods: Array, constant: Array, certain: Array, breaking: Array, flown: dict[str, Array]) -> Figure:
+    """Over the period: what delay is stood constantly, how much jitter certainly, how much not, how much was flown."""
+    figure = Figure(figsize=(8.0, 4.4))
+    panel = figure.add_subplot()
+    panel.fill_between(1e3 * periods, 1e3 * certain, 1e3 * breaking, color=GREY, alpha=0.15, linewidth=0.0)
+    panel.plot(1e3 * periods, 1e3 * constant, "--", color=GREY, label="constant delay: exact limit")
+    panel.plot(1e3 * periods, 1e3 * breaking, "v-", color=RED, label="jitter: a sequence breaks hover")
+    panel.plot(1e3 * periods, 1e3 * certain, "^-", color=BLUE, label="jitter: no sequence can (Kao and Lincoln)")
+    for (name, values), marker in zip(flown.items(), "ox"):
+        panel.plot(1e3 * periods, 1e3 * values, marker, color="black", label=f"random jitter flown, {name}")
+    panel.set(xlabel="period [ms]", ylabel="delay, or jitter of the delay [ms]", ylim=(0.0, None))
+    panel.legend(fontsize=8)
     return figure

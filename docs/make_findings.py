@@ -1,6 +1,7 @@
 """Flies what is behind `docs/findings.md`, draws its figures and prints its numbers: run as `make findings`.
 
-It continues where it was if it is stopped. What it has flown is in `results/findings`.
+`python -m docs.make_findings NAME …` does some sections only, by the names of their functions. It continues where it
+was if it is stopped. What it has flown is in `results/findings`.
 """
 
 import dataclasses
@@ -19,14 +20,16 @@ import matplotlib
 import numpy as np
 import pandas as pd
 
-from docs import batch, charts, experiments
+from docs import batch, charts, experiments, theory
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import system_of
 from orchestration.statistics import quantile, wilson
 from orchestration.studies import drawing, figures, limit
 from orchestration.studies.engine import Pool
 from orchestration.studies.files import files_of
+from orchestration.studies.linear import HoverLoop
 from orchestration.studies.local import about_hover
+from orchestration.studies.margin import margin_of
 from orchestration.studies.study_file import load_study
 from orchestration.studies.sweep import store_path, sweep
 from orchestration.studies.table import frame
@@ -52,7 +55,10 @@ def main() -> None:
     matplotlib.rcParams["savefig.dpi"] = 80
     RESULTS.mkdir(parents=True, exist_ok=True)
     began = time.perf_counter()
-    for section in (period, limits, starts, delay, gains, monte_carlo, sensitivity, agreement):
+    sections = (
+        period, limits, starts, delay, bounds, gains, bandwidth, finite_time, monte_carlo, sensitivity, agreement,
+    )  # fmt: skip
+    for section in [one for one in sections if one.__name__ in sys.argv[1:] or not sys.argv[1:]]:
         print(f"\n## {section.__name__}", flush=True)
         for line in section():
             print(line, flush=True)
@@ -147,6 +153,77 @@ def gains() -> list[str]:
     ideal = kept("continuous_gains", lambda: _listed(experiments.continuous_gains(factors.tolist())), factors.tolist())
     for held, one in ideal.items():
         lines.append(f"continuous, kappa {held}: largest error from 20 to 30 s {np.round(one['ultimate_bound'], 4)} m")
+    return lines
+
+
+def finite_time() -> list[str]:
+    """How error and energy decay over the exponent, inside and outside of the boundary layer."""
+    flights = theory.decays()
+    found = kept("decays", lambda: _in_processes(theory.decay_of, flights), flights)
+    shape = (len(theory.EXPONENTS), len(theory.DECAY_PERIODS), theory.DECAY_STARTS + 1)
+    inside = np.array([np.nan if one["inside"] is None else one["inside"] for one in found]).reshape(shape)
+    remains = np.array([np.nan if one["remains"] is None else one["remains"] for one in found]).reshape(shape)
+    rates, energy = (
+        np.array([one[kind] for one in found], float).reshape(*shape, len(theory.DECADES))
+        for kind in ("rates", "energy_rates")
+    )
+    lines = []
+    for i, exponent in enumerate(theory.EXPONENTS):
+        for j, period in enumerate(theory.DECAY_PERIODS):
+            reached = inside[i, j][~np.isnan(inside[i, j])]
+            low, high = wilson(len(reached), shape[2])
+            share = f"{len(reached)} of {shape[2]} [{low:.0%}, {high:.0%}] stay inside 1 mm"
+            line = f"beta_t {exponent:<4g} {_ms(period)}: {share}"
+            if len(reached) == shape[2]:
+                line += f", median from {_interval(reached)} s, paper's start from {inside[i, j, 0]:.4g} s"
+            lines.append(f"{line}; largest error of the last 5 s: median {1e3 * np.median(remains[i, j]):.3g} mm")
+            for name, of in (("error", rates), ("L", energy)):
+                whole = [k for k in range(len(theory.DECADES)) if not np.isnan(of[i, j, :, k]).any()]
+                lines.append(f"    rates of {name}: " + "; ".join(_interval(of[i, j, :, k]) for k in whole))
+        lines.append(f"    theory, attitude at once: {theory.expected_rate(exponent):.3g} 1/s")
+    loop = {kappa: HoverLoop.of(_sampled(kappa, 0.01, 30.0)) for kappa in (0.0, 1.0)}
+    for kappa, one in loop.items():
+        slowest = [round(-float(np.log(one.spectral_radius(T, 0.0))) / T, 3) for T in theory.DECAY_PERIODS]
+        lines.append(f"hover, kappa {kappa:g}: slowest mode {slowest} 1/s")
+    curves = {
+        b: theory.error_over_time(theory.Decay(exponent=b, period=0.001, start=(0.0, 0.0, 0.0)))[:2]
+        for b in theory.EXPONENTS
+    }
+    _save(lambda: charts.decay(curves, np.median(rates, axis=2)), "decay")
+    return lines
+
+
+def bandwidth() -> list[str]:
+    """Which gains set the local limit of the period: exponents, one gain and one loop at a time."""
+    lines = []
+    for kappa in (0.0, 1.0):
+        found = kept(f"loop_gains_{kappa:g}", lambda k=kappa: theory.limits_over_gains(k), theory.LOOPS, theory.FACTORS)
+        limits = {name: np.array(values, float) for name, values in found.items()}
+        for name, values in limits.items():
+            slope, low, high = theory.exponent_of(theory.FACTORS, values)
+            lines.append(f"kappa {kappa:g}, {name}: exponent {slope:.3f} [{low:.3f}, {high:.3f}]; {_all_ms(values)}")
+        if kappa == 0.0:
+            _save(lambda limits=limits: charts.loop_gains(limits), "loop_gains")
+    alone = [theory.of_attitude_alone(15.0 * f, 15.0 * f, 15.0 * f) for f in theory.FACTORS]
+    return [*lines, f"attitude loop by itself: {_all_ms(alone)}"]
+
+
+def bounds() -> list[str]:
+    """Delays that hover stands, by theory, beside random jitter that was flown."""
+    scenarios = [theory.NATIVE.with_changes(timing={"period": T}) for T in theory.MARGIN_PERIODS]
+    found = kept("margins", lambda: [dataclasses.asdict(one) for one in map(margin_of, scenarios)], scenarios)
+    cases = [(T, near) for near in (True, False) for T in theory.MARGIN_PERIODS]
+    last = kept("jitter_flown", lambda: _in_processes(theory.jitter_flown, cases), cases, theory.JITTERS, theory.SEEDS)
+    near, paper = np.array(last).reshape(2, -1)
+    lines = [
+        f"{_ms(one['period'])}: constant {_ms(one['delay_limit'])}, certain {_ms(one['certain_jitter'])}, breaking "
+        f"{_ms(one['breaking_jitter'])} by {one['breaking_sequence']}; all {theory.SEEDS} seeds fly up to {_ms(a)} "
+        f"from near the path, {_ms(b)} from the paper's start"
+        for one, a, b in zip(found, near, paper, strict=True)
+    ]
+    columns = [np.array([one[key] for one in found]) for key in ("delay_limit", "certain_jitter", "breaking_jitter")]
+    flown_too = {"0.1 m off the path": near, "the paper's start": paper}
+    _save(lambda: charts.margins(np.array(theory.MARGIN_PERIODS), *columns, flown_too), "margins")
     return lines
 
 
@@ -253,7 +330,7 @@ def _stamp(given: Any) -> str:
     files = [ROOT / "studies" / "sensitivity.toml"]
     for folder in ("controller_fmu", "plant_fmu", "fmu_kit"):
         files += sorted((ROOT / folder).glob("*.py"))
-    files += [ROOT / "docs" / "batch.py", ROOT / "docs" / "experiments.py"]
+    files += [ROOT / "docs" / f"{name}.py" for name in ("batch", "experiments", "theory")]
     return hashlib.sha256(b"".join([*(file.read_bytes() for file in files), repr(given).encode()])).hexdigest()
 
 
@@ -376,6 +453,16 @@ def _listed(outcomes: dict[str, batch.Outcomes]) -> dict[str, dict[str, list[flo
 
 def _save(make: Callable[[], Any], name: str) -> None:
     figures.save(make, FIGURES / f"{name}.png")
+
+
+def _interval(values: Any) -> str:
+    """The median of some values, with its interval."""
+    median, low, high, _ = quantile(values)
+    return f"{median:.3g} [{low:.3g}, {high:.3g}]"
+
+
+def _all_ms(values: Any) -> str:
+    return ", ".join(_ms(value) for value in values)
 
 
 def _ms(seconds: float | None) -> str:

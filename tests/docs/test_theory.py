@@ -1,0 +1,79 @@
+"""What the findings say from theory is what the equations do; what they measure is measured rightly."""
+
+import numpy as np
+import pytest
+
+from docs import theory
+from orchestration.studies.linear import HoverLoop
+
+
+@pytest.mark.parametrize("exponent", [1.0, 0.9, 0.5])
+def test_a_spring_of_any_power_under_linear_damping_decays_exponentially_at_the_rate_expected(exponent: float) -> None:
+    """ë + k ė + k k_s |e|^β_t sgn e = 0, swung through many times for each time constant."""
+    k, stiffness, h = 0.2, 40.0, 2e-3
+
+    def rates(x: np.ndarray) -> np.ndarray:
+        return np.array([x[1], -k * x[1] - k * stiffness * np.sign(x[0]) * abs(x[0]) ** exponent])
+
+    x, energies = np.array([1.0, 0.0]), []
+    for _ in range(10000):
+        middle = x + 0.5 * h * rates(x)
+        x = x + h * rates(middle)
+        energies.append(0.5 * x[1] ** 2 + k * stiffness * abs(x[0]) ** (1.0 + exponent) / (1.0 + exponent))
+    falls = -np.diff(np.log(energies[::5000])) / (5000 * h)
+    assert falls[0] / (1.0 + exponent) == pytest.approx(theory.expected_rate(exponent, k), rel=0.03)
+
+
+def test_the_rate_of_the_linear_loop_is_that_of_its_slowest_mode() -> None:
+    """k = k_t + β of the paper, β_t = 1: half of it, in continuous time without a coupling."""
+    loop = HoverLoop.of(theory.NATIVE.with_changes(parameters={"controller.coupling": 0.0}))
+    A, B, F = loop.continuous()
+    assert -np.linalg.eigvals(A + B @ F).real.max() == pytest.approx(theory.expected_rate(1.0), rel=1e-5)
+
+
+def test_the_attitude_loop_by_itself_is_at_the_edge_at_its_limit() -> None:
+    for k_theta, k_eta, k_q in ((15.0, 15.0, 15.0), (0.3, 0.2, 9.0)):
+        T = theory.of_attitude_alone(k_theta, k_eta, k_q)
+        K = np.array([[0.5 * (k_theta * k_eta + k_q), k_theta + 0.5 * k_eta]])
+        radius = [
+            np.abs(np.linalg.eigvals([[1.0, t], [0.0, 1.0]] - np.array([[0.5 * t * t], [t]]) @ K)).max()
+            for t in (0.999 * T, 1.001 * T)
+        ]
+        assert radius[0] < 1.0 < radius[1]
+
+
+def test_all_rates_together_scale_the_limit_of_the_period_inversely() -> None:
+    """Times a factor in 1/s, its square in 1/s²: the same loop in another unit of time."""
+    base = theory.NATIVE.with_changes(parameters={"controller.coupling": 0.0})
+    faster = theory.scaled(("k_θ", "k_η", "k_s", "k_t + β"), 2.0, base)
+    faster = theory.scaled(("k_q",), 4.0, faster)
+    loop = HoverLoop.of(base)
+    assert loop.with_law(faster).spectral_radius(0.035, 0.0) == pytest.approx(loop.spectral_radius(0.07, 0.0), rel=1e-6)
+
+
+def test_exponent_of_a_power_is_the_power_and_its_interval_holds_it_under_noise() -> None:
+    factors = np.array(theory.FACTORS)
+    assert theory.exponent_of(factors, 3.0 * factors**-0.7) == pytest.approx((-0.7, -0.7, -0.7), abs=1e-12)
+    noise = np.exp(0.05 * np.random.default_rng(1).standard_normal(len(factors)))
+    slope, low, high = theory.exponent_of(factors, factors**-0.7 * noise)
+    assert low < -0.7 < high
+    assert slope == pytest.approx(0.5 * (low + high))
+
+
+def test_an_error_is_inside_since_it_was_outside_for_the_last_time() -> None:
+    time = np.arange(6.0)
+    assert theory._since(time, np.array([3.0, 0.5, 2.0, 0.5, 0.4, 0.1]), 1.0) == 3.0
+    assert theory._since(time, np.array([0.1] * 6), 1.0) == 0.0
+    assert theory._since(time, np.array([0.1] * 5 + [2.0]), 1.0) is None
+
+
+def test_a_flight_with_the_papers_exponent_decays_and_one_with_a_small_exponent_does_not() -> None:
+    settling, circling = (
+        theory.decay_of(theory.Decay(exponent=b, period=0.01, start=(0.0, 0.0, 0.0), stop_time=15.0))
+        for b in (0.99, 0.7)
+    )
+    assert settling["inside"] == pytest.approx(7.55, abs=0.02)
+    assert all(1.0 < rate < 2.5 for rate in settling["rates"])
+    assert circling["inside"] is None
+    assert circling["rates"][1:] == [None, None, None]
+    assert 1e-3 < circling["remains"] < 1e-2
