@@ -28,6 +28,8 @@ DECAY_PERIODS = (0.001, 0.01, 0.05)
 """[s]"""
 DECADES = ((0.1, 0.01), (0.01, LAYER), (LAYER, 1e-4), (1e-4, 1e-5))
 """[m], of the largest position error of the three axes; the first two lie outside of the boundary layer"""
+STAYS = 2.0
+"""[s], for which an error has to be inside, lest a swing through zero at the end counts"""
 DECAY_STARTS = 20
 """1 m from the path in random directions, beside the paper's start"""
 
@@ -76,10 +78,10 @@ def decay_of(flight: Decay) -> dict[str, Any]:
 
 
 def _since(time: Array, error: Array, bound: float) -> float | None:
-    above = np.flatnonzero(error > bound)
-    if not len(above):
-        return float(time[0])
-    return None if above[-1] + 1 >= len(time) else float(time[above[-1] + 1])
+    """The time [s] from which the error stays below a bound; None: not for `STAYS` up to the end."""
+    outside = time[error > bound]
+    since = float(time[time > outside[-1]].min(initial=np.inf)) if len(outside) else float(time[0])
+    return since if since <= time[-1] - STAYS else None
 
 
 def _slope(time: Array, energy: Array, begin: float, end: float) -> float | None:
@@ -151,7 +153,9 @@ def exponent_of(factors: Array, values: Array) -> tuple[float, float, float]:
 
 MARGIN_PERIODS = (0.005, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07)
 """[s]"""
-JITTERS = tuple(0.0025 * i for i in range(1, 33))
+FLOWN_PERIODS = (0.01, 0.02, 0.04, 0.06)
+"""[s], of which random jitter is flown too"""
+JITTERS = tuple(0.005 * i for i in range(1, 17))
 """[s], flown from either start until one seed does not fly"""
 SEEDS = 20
 NEAR = {"initial.position.x": 0.1, "initial.position.z": 2.0, **{f"initial.quaternion.{a}": 0.0 for a in "xyz"}}

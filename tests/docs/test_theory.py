@@ -62,9 +62,10 @@ def test_exponent_of_a_power_is_the_power_and_its_interval_holds_it_under_noise(
 
 def test_an_error_is_inside_since_it_was_outside_for_the_last_time() -> None:
     time = np.arange(6.0)
-    assert theory._since(time, np.array([3.0, 0.5, 2.0, 0.5, 0.4, 0.1]), 1.0) == 3.0
+    assert theory._since(time, np.array([3.0, 2.0, 0.5, 0.5, 0.4, 0.1]), 1.0) == 2.0
     assert theory._since(time, np.array([0.1] * 6), 1.0) == 0.0
     assert theory._since(time, np.array([0.1] * 5 + [2.0]), 1.0) is None
+    assert theory._since(time, np.array([2.0] * 4 + [0.1] * 2), 1.0) is None  # not for 2 s
 
 
 def test_a_flight_with_the_papers_exponent_decays_and_one_with_a_small_exponent_does_not() -> None:
