@@ -147,22 +147,14 @@ def loop_gains(found: dict[str, Array]) -> Figure:
     return figure
 
 
-def margins(constant: Array, certain: Array, breaking: Array, flown: dict[str, Array]) -> Figure:
-    """Over the period: what delay is stood constantly, how much jitter certainly, how much not, how much was flown."""
+def margins(constant: Array, certain: Array, breaking: Array) -> Figure:
+    """Over the period: what delay is stood constantly, how much jitter certainly, how much not."""
     figure = Figure(figsize=(8.0, 4.4))
     panel, periods = figure.add_subplot(), np.array(theory.MARGIN_PERIODS)
     panel.fill_between(1e3 * periods, 1e3 * certain, 1e3 * breaking, color=GREY, alpha=0.15, linewidth=0.0)
     panel.plot(1e3 * periods, 1e3 * constant, "--", color=GREY, label="constant delay: exact limit")
     panel.plot(1e3 * periods, 1e3 * breaking, "v-", color=RED, label="jitter: a sequence breaks hover")
     panel.plot(1e3 * periods, 1e3 * certain, "^-", color=BLUE, label="jitter: no sequence can (Kao and Lincoln)")
-    for (name, values), marker in zip(flown.items(), "ox"):
-        panel.plot(
-            1e3 * np.array(theory.FLOWN_PERIODS),
-            1e3 * values,
-            marker,
-            color="black",
-            label=f"random jitter flown, {name}",
-        )
     panel.set(xlabel="period [ms]", ylabel="delay, or jitter of the delay [ms]", ylim=(0.0, None))
     panel.legend(fontsize=8)
     return figure

@@ -209,7 +209,7 @@ def bandwidth() -> list[str]:
 
 
 def bounds() -> list[str]:
-    """Delays that hover stands, by theory, beside random jitter that was flown."""
+    """Delays that hover stands, by theory."""
     scenarios = [theory.NATIVE.with_changes(timing={"period": T}) for T in theory.MARGIN_PERIODS]
     found = kept("margins", lambda: [dataclasses.asdict(one) for one in map(margin_of, scenarios)], scenarios)
     lines = [
@@ -217,13 +217,8 @@ def bounds() -> list[str]:
         f"{_ms(one['breaking_jitter'])} by {one['breaking_sequence']}"
         for one in found
     ]
-    cases = [(T, near) for near in (True, False) for T in theory.FLOWN_PERIODS]
-    last = kept("jitter_flown", lambda: _in_processes(theory.jitter_flown, cases), cases, theory.JITTERS, theory.SEEDS)
-    starts_flown = dict(zip(("0.1 m off the path", "the paper's start"), np.array(last).reshape(2, -1), strict=True))
-    for name, up_to in starts_flown.items():
-        lines.append(f"all {theory.SEEDS} seeds fly, {name}: up to {_all_ms(up_to)}")
     columns = [np.array([one[key] for one in found]) for key in ("delay_limit", "certain_jitter", "breaking_jitter")]
-    _save(lambda: charts.margins(*columns, starts_flown), "margins")
+    _save(lambda: charts.margins(*columns), "margins")
     return lines
 
 

@@ -153,27 +153,3 @@ def exponent_of(factors: Array, values: Array) -> tuple[float, float, float]:
 
 MARGIN_PERIODS = (0.005, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07)
 """[s]"""
-FLOWN_PERIODS = (0.01, 0.02, 0.04, 0.06)
-"""[s], of which random jitter is flown too"""
-JITTERS = tuple(0.005 * i for i in range(1, 17))
-"""[s], flown from either start until one seed does not fly"""
-SEEDS = 20
-NEAR = {"initial.position.x": 0.1, "initial.position.z": 2.0, **{f"initial.quaternion.{a}": 0.0 for a in "xyz"}}
-NEAR |= {"initial.quaternion.w": 1.0}
-"""0.1 m from the path, level; the other start is the paper's"""
-
-
-def jitter_flown(case: tuple[float, bool]) -> float:
-    """The last of `JITTERS` [s] up to which all seeds fly at a period [s], from near the path or the paper's start."""
-    period, near = case
-    parameters = {f"plant.{name}": value for name, value in NEAR.items()} if near else {}
-    last = 0.0
-    for jitter in JITTERS:
-        for seed in range(SEEDS):
-            scenario = NATIVE.with_changes(
-                timing={"period": period, "delay_jitter": jitter}, parameters=parameters, seed=seed
-            )
-            if not orchestration.run(scenario).metrics["good"]:
-                return last
-        last = jitter
-    return last
