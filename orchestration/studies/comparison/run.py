@@ -49,10 +49,10 @@ def compare(
 
     Raises `UsageError` as `sweep` does. The engine `batch` is for native comparisons.
     """
-    known = bandwidths(comparison)
     summary = sweep(
         comparison.study, folder=folder, workers=workers, engine=engine, progress=progress, announce=announce
     )
+    known = bandwidths(comparison)  # after the design has been checked, which names the run that cannot be
     place = summary.path.parent
     table = frame(summary.path)
     outcome = concluded(comparison, table, known)

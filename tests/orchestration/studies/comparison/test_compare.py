@@ -147,6 +147,14 @@ def test_a_start_without_its_cell_is_wrong_usage(folder: Path, main: Main) -> No
         assert done.stderr.count("\n") == 1
 
 
+def test_a_parameter_that_cannot_be_is_said_of_the_controller_that_has_it(folder: Path, main: Main) -> None:
+    wrong = folder / "wrong.toml"
+    wrong.write_text(FILE.replace("coupling = 0.0", 'discretisation = "meen"'))
+    line = main("compare", wrong, "--native", "--out", folder / "wrong", code=2).stderr
+    assert "controller = uncoupled" in line
+    assert "controller.discretisation = meen: did you mean mean? expected one of explicit" in line
+
+
 # -- bandwidth ----------------------------------------------------------------------------------------------------
 
 LAW = FmuChoice(fmu="native/UnifiedController", parameters={"coupling": 0.0})
