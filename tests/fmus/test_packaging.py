@@ -332,7 +332,7 @@ def test_an_fmu_of_other_sources_is_out_of_date(built: dict[str, Path], sources:
     shutil.copy(built["QuadrotorPlant"], tmp_path)
     replace(sources / "controller_fmu" / "sliding_mode" / "law.py", "model.mass * n  #", "2.0 * model.mass * n  #")
     build(sources, tmp_path, "UnifiedController")
-    assert fmus.out_of_date(MODELS, tmp_path) == ["UnifiedController"]
+    assert fmus.out_of_date(["UnifiedController", "QuadrotorPlant"], tmp_path) == ["UnifiedController"]
 
 
 @pytest.mark.parametrize("content", [None, b"", b"no archive"])
