@@ -19,8 +19,8 @@ TICKS = {"position_noise": (1e-4, 1e-3, 1e-2), "inertia_factor": (0.5, 1.0, 2.0)
 UNITS = {"jitter": "s", "position_noise": "m"}
 
 
-def gain_limits(factors: Array, ends: dict[str, Array], local: Array, first: float) -> Figure:
-    """First ends of what flies over the gain factor, one line for each thing held; nan: not at the `first` period."""
+def gain_limits(factors: Array, ends: dict[str, Array], local: Array) -> Figure:
+    """First ends of what flies over the gain factor, one line for each thing held; nan: at no period."""
     figure = Figure(figsize=(8.0, 4.6))
     panel = figure.add_subplot()
     panel.plot(factors, 1e3 * local, "--", color=GREY, label="local limit about hover, κ = 0")
@@ -29,7 +29,7 @@ def gain_limits(factors: Array, ends: dict[str, Array], local: Array, first: flo
         none = np.isnan(end)
         low = np.full(int(none.sum()), 0.03 if marker == "s" else 0.07)
         panel.plot(factors[none], low, "v", color=color, markersize=6, transform=panel.get_xaxis_transform())
-    panel.plot([], [], "v", color=GREY, label=f"does not fly at {1e3 * first:g} ms")
+    panel.plot([], [], "v", color=GREY, label="does not fly at any")
     panel.set(xscale="log", yscale="log", xlabel="factor on k_η, k_θ and k_q", ylabel="flies up to a period of [ms]")
     ticks = (5, 10, 20, 40, 80, 160, 320)
     panel.set_yticks(ticks, [str(tick) for tick in ticks])

@@ -1,17 +1,19 @@
-"""The experiments of `findings.md` that take thousands of flights, flown in batches."""
+"""The ensembles of `findings.md` that no study file holds, and what is concluded from what became of them."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from docs.batch import Flights, Outcomes, fly, fly_continuously
 from fmu_kit.trajectory import Trajectory
-from orchestration.studies import sensitivity
-from orchestration.studies.axes import unit_points
-from orchestration.studies.study import Study
+from orchestration.quadrotor.parameters import Parameter
+from orchestration.quadrotor.scenario import FmuChoice, Scenario
 
 Array = Any
+
+PAPER = Scenario(
+    controller=FmuChoice(fmu="native/UnifiedController"), plant=FmuChoice(fmu="native/QuadrotorPlant")
+).with_changes(timing={"plant_interval": 0.005}, parameters={"plant.max_internal_step": 0.005})
+"""The paper's flight, as in the study files, by native FMUs"""
 
 SIZES = (1.0, 2.0, 3.0, 4.0, 5.0)
 """[m], of the initial position error"""
@@ -26,15 +28,8 @@ CASES = (
 """name, kappa, time constant of the actuators [s]"""
 PERIODS = np.round(np.arange(2, 49) * 0.0025, 4)
 """[s], at which every start is flown"""
-
-CONTINUOUS_KAPPAS = (0.0, 0.5, 1.0, 2.0, *(round(2.9 + 0.01 * i, 2) for i in range(11)), 5.0, 15.0)
-CONTINUOUS_STEP = 0.001
-"""[s], of the integration; 5 ms is too long for kappa = 15"""
-
-SAMPLES, DESIGNS = 1024, 4
-"""base samples of a design of Sobol indices, and how many such designs"""
-FEW, FEW_DESIGNS = 64, 16
-"""likewise, for what fewer samples would have said"""
+STARTS = (len(CASES), len(SIZES), DIRECTIONS, len(PERIODS))
+"""How many of each make the flights of the random starts"""
 
 
 def random_starts() -> Array:
@@ -44,91 +39,61 @@ def random_starts() -> Array:
     return np.array(list(Trajectory().position(0.0))) + np.array(SIZES)[:, None, None] * directions
 
 
-def starts_flown(stop_time: float = 30.0) -> Array:
-    """Whether each start flies: booleans of shape (cases, sizes, directions, periods)."""
-    shape = (len(CASES), len(SIZES), DIRECTIONS, len(PERIODS))
-    case, size, direction, period = (index.ravel() for index in np.indices(shape))
-    kappas, lags = (np.array([entry[i] for entry in CASES]) for i in (1, 2))
-    start = random_starts()[size, direction].T
-    flown = fly(Flights(period=PERIODS[period], kappa=kappas[case], lag=lags[case], start=tuple(start)), stop_time)
-    return flown.flies.reshape(shape)
+def flights_of_starts() -> list[Scenario]:
+    """Every case from every start at every period, in the order of `STARTS`, the periods varying fastest."""
+    starts = random_starts()
+    return [flight_from(starts, *place) for place in np.ndindex(STARTS)]
+
+
+def flight_from(starts: Array, case: int, size: int, direction: int, period: int) -> Scenario:
+    """The flight of one case from one of `starts`, at one of `PERIODS`."""
+    _, kappa, lag = CASES[case]
+    return flight(period=PERIODS[period], kappa=kappa, lag=lag, start=starts[size, direction])
 
 
 def first_ends(flew: Array) -> Array:
-    """For each start the last period before the first that does not fly [s]; 0: not even the first."""
+    """For each start the last period before the first that does not fly [s]; 0: not even the first.
+
+    `flew` has the periods along its last axis.
+    """
     failed = np.concatenate([~flew, np.ones((*flew.shape[:-1], 1), bool)], axis=-1)
     return np.concatenate([[0.0], PERIODS])[failed.argmax(axis=-1)]
 
 
-def continuous(stop_time: float = 30.0) -> Outcomes:
-    """The paper's start in continuous time, for each of `CONTINUOUS_KAPPAS`."""
-    return fly_continuously(Flights(kappa=np.array(CONTINUOUS_KAPPAS)), stop_time, CONTINUOUS_STEP)
-
-
-def continuous_gains(factors: list[float]) -> dict[str, Outcomes]:
-    """The paper's start in continuous time for each gain factor, with kappa = 1, scaled with the gains, and 0."""
-    factor = np.array(factors)
-    held = {"1": 0.0 * factor + 1.0, "scaled": factor, "0": 0.0 * factor}
-    found = fly_continuously(
-        Flights(gain_factor=np.tile(factor, 3), kappa=np.concatenate(list(held.values()))), step=0.0025
-    )
-    split = {name: np.split(values, 3) for name, values in vars(found).items()}
-    return {name: Outcomes(**{key: parts[i] for key, parts in split.items()}) for i, name in enumerate(held)}
-
-
-def some_flights(number: int) -> dict[str, Array]:
-    """Flights as in all the experiments here, drawn at random: what a `Flights` takes."""
+def some_flights(number: int) -> list[Scenario]:
+    """Flights as in all the experiments of the page, drawn at random."""
     generator = np.random.default_rng(2)
-    start = random_starts()[generator.integers(0, len(SIZES), number), generator.integers(0, DIRECTIONS, number)]
-    return {
+    starts = random_starts()[generator.integers(0, len(SIZES), number), generator.integers(0, DIRECTIONS, number)]
+    drawn = {
         "period": generator.uniform(0.005, 0.1, number),
         "delay": generator.uniform(0.0, 0.02, number) * generator.integers(0, 2, number),
         "kappa": generator.uniform(0.0, 2.0, number),
         "gain_factor": generator.uniform(0.7, 1.4, number),
         "surface": generator.uniform(2.5, 7.5, number),
         "lag": generator.choice([0.0, 0.01], number),
-        "start": tuple(start.T),
+        "start": starts,
     }
+    return [flight(**{name: values[i] for name, values in drawn.items()}) for i in range(number)]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Design:
-    """One design of Sobol indices, flown."""
+def flight(
+    *, period: float = 0.01, delay: float = 0.0, kappa: float = 1.0, gain_factor: float = 1.0,
+    surface: float = 5.0, lag: float = 0.0, start: Array = (0.0, 0.0, 0.0), stop_time: float = 30.0,
+) -> Scenario:  # fmt: skip
+    """The paper's flight with other times [s], weight of the coupling, gains and initial position [m].
 
-    flies: float
-    """share"""
-    diverged: float
-    """share"""
-    outcome: tuple[sensitivity.Index, ...]
-    """of whether a flight flies, 0 or 1"""
-    rank: tuple[sensitivity.Index, ...]
-    """of the rank of the ultimate bound, what has diverged last"""
-
-
-def sobol_designs(study: Study, samples: int, seeds: range) -> list[Design]:
-    """The indices of `study`, one design for each seed, all flown in one batch."""
-    names = [axis.name for axis in study.axes]
-    designs = [unit_points("saltelli", len(names), samples, seed) for seed in seeds]
-    flown = fly(_flights(study, np.concatenate(designs)), study.base.stop_time)
-    found = []
-    for i, design in enumerate(designs):
-        part = slice(i * len(design), (i + 1) * len(design))
-        flies, diverged, bound = flown.flies[part], flown.diverged[part], flown.ultimate_bound[part]
-        outcome = sensitivity.analyse("saltelli", names, design, flies.astype(float), "outcome")
-        rank = sensitivity.analyse("saltelli", names, design, ranks(bound), "ultimate_bound")
-        found.append(
-            Design(flies=float(flies.mean()), diverged=float(diverged.mean()), outcome=tuple(outcome), rank=tuple(rank))
-        )
-    return found
-
-
-def _flights(study: Study, shares: Array) -> Flights:
-    low_high = {axis.name: axis for axis in study.axes}
-    values = {
-        name: np.array([axis.at(share) for share in column]) for (name, axis), column in zip(low_high.items(), shares.T)
+    The factor is on k_eta, k_theta and k_q; kappa is not scaled with them. `lag` is that of the actuators.
+    """
+    parameters: dict[str, Parameter] = {
+        "controller.coupling": float(kappa),
+        "controller.gain.surface": float(surface),
+        **{f"controller.gain.{name}": 15.0 * float(gain_factor) for name in ("eta", "theta", "attitude")},
+        **{f"plant.initial.position.{axis}": float(x) for axis, x in zip("xyz", start, strict=True)},
+        "plant.actuator_time_constant": float(lag),
     }
-    values["kappa"] = values.pop("coupling")
-    return Flights(**values)
+    return PAPER.with_changes(
+        timing={"period": float(period), "delay": float(delay)}, parameters=parameters, stop_time=stop_time
+    )
 
 
 def ranks(values: Array) -> Array:

@@ -20,25 +20,31 @@ import matplotlib
 import numpy as np
 import pandas as pd
 
-from docs import batch, charts, experiments, theory
+from docs import charts, experiments, theory
+from docs.experiments import PAPER
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import system_of
+from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
 from orchestration.statistics import quantile, wilson
 from orchestration.studies import drawing, figures, limit
 from orchestration.studies.engine import Pool
 from orchestration.studies.files import files_of
+from orchestration.studies.identity import versions
+from orchestration.studies.lanes import Agreement
 from orchestration.studies.linear import HoverLoop
 from orchestration.studies.local import about_hover
 from orchestration.studies.margin import margin_of
+from orchestration.studies.sensitivity import Index
+from orchestration.studies.store import open_for_reading
+from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
-from orchestration.studies.sweep import store_path, sweep
+from orchestration.studies.sweep import AGREEMENT, store_path, sweep
 from orchestration.studies.table import frame
 
 ROOT = Path(__file__).parent.parent
 FIGURES = Path(__file__).parent / "figures"
 RESULTS = ROOT / "results" / "findings"
 WORKERS = 2
-PAPER = Scenario().with_changes(timing={"plant_interval": 0.005}, parameters={"plant.max_internal_step": 0.005})
 KAPPAS = (0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 15.0)
 GAINS = {
     "gains_period": "κ = 1 held: its weight 2κ/k_q falls as the gains rise",
@@ -46,8 +52,14 @@ GAINS = {
     "gains_period_uncoupled": "κ = 0",
 }
 MONTE_CARLO = ("jitter", "loss", "position_noise", "inertia_factor")
+METRICS = ("outcome", "good", "ultimate_bound", "settling_time")
+"""of a flight, that are kept"""
+CONTINUOUS = (0.00005, 0.0001)
+"""[s], periods that stand for continuous time, if both have the same outcomes"""
+DESIGNS, FEW, FEW_DESIGNS = 4, 64, 16
+"""Designs of Sobol indices; base samples of smaller ones, for what fewer would have said, and how many such"""
 CHECKED = 24
-"""flights of the batches that are flown as FMUs as well"""
+"""flights in lanes that are flown by the FMUs with Python inside as well"""
 
 
 def main() -> None:
@@ -56,14 +68,21 @@ def main() -> None:
     RESULTS.mkdir(parents=True, exist_ok=True)
     began = time.perf_counter()
     sections = (
-        period, limits, starts, delay, bounds, gains, bandwidth, finite_time, monte_carlo, sensitivity, agreement,
+        period, limits, continuous, starts, delay, bounds, gains, bandwidth, finite_time, monte_carlo, sensitivity,
+        agreement,
     )  # fmt: skip
     for section in [one for one in sections if one.__name__ in sys.argv[1:] or not sys.argv[1:]]:
         print(f"\n## {section.__name__}", flush=True)
+        before = _processor_time()
         for line in section():
             print(line, flush=True)
-    used = sum(sum(resource.getrusage(who)[:2]) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    print(f"\n{(time.perf_counter() - began) / 60:.1f} min, {used / 60:.1f} min of processor time")
+        print(f"{_processor_time() - before:.0f} s of processor time", flush=True)
+    print(f"\n{(time.perf_counter() - began) / 60:.1f} min, {_processor_time() / 60:.1f} min of processor time")
+
+
+def _processor_time() -> float:
+    """[s], of this process and of those that it has started and that have ended."""
+    return sum(sum(resource.getrusage(who)[:2]) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
 
 
 # -- sections ---------------------------------------------------------------------------------------------
@@ -86,35 +105,35 @@ def period() -> list[str]:
 
 
 def limits() -> list[str]:
-    """Limits of the period over kappa, and what the same flights do in continuous time."""
-    found = limits_of("limits", [_sampled(kappa, 0.01, 30.0) for kappa in KAPPAS])
-    lines = [
+    """Limits of the period over kappa."""
+    found = limits_of("limits", [experiments.flight(kappa=kappa) for kappa in KAPPAS])
+    paper = next(one for kappa, one in zip(KAPPAS, found, strict=True) if kappa == 1.0)
+    drawn = drawing.draw_limit(PAPER, limit.Limit(**{**paper, "continuous": None, "tried": ()}), RESULTS)
+    (FIGURES / "spectral_radius.png").write_bytes(drawn.read_bytes())
+    return [
         f"kappa {kappa:<4g} local {_ms(one['local_limit'])}, large-signal {_ms(one['large_signal_limit'])}, "
         f"flies above at {one['flies_above']}: {one['note']}"
         for kappa, one in zip(KAPPAS, found, strict=True)
     ]
-    paper = next(one for kappa, one in zip(KAPPAS, found, strict=True) if kappa == 1.0)
-    drawn = drawing.draw_limit(PAPER, limit.Limit(**{**paper, "continuous": None, "tried": ()}), RESULTS)
-    (FIGURES / "spectral_radius.png").write_bytes(drawn.read_bytes())
-    (ideal,) = kept("continuous", lambda: list(_listed({"30": experiments.continuous()}).values()))
-    for i, kappa in enumerate(experiments.CONTINUOUS_KAPPAS):
-        lines.append(
-            f"continuous, kappa {kappa:<4g}: diverged {ideal['diverged'][i]}, largest error from 20 to 30 s "
-            f"{ideal['ultimate_bound'][i]:.4g} m, below 5 cm from {ideal['settling_time'][i]:.4g} s"
-        )
-    chosen = ((5.0, 0.001, 120.0), (2.93, 0.001, 30.0), (2.94, 0.001, 30.0), (2.94, 0.00005, 30.0))
-    slow = flown("slow", [_sampled(kappa, T, stop) for kappa, T, stop in chosen])
-    for (kappa, T, stop), one in zip(chosen, slow, strict=True):
-        lines.append(
-            f"kappa {kappa:g} at {_ms(T)} to {stop:g} s: {one['outcome']}, ultimate bound {one['ultimate_bound']} m, "
-            f"below 5 cm from {one['settling_time']} s"
-        )
-    return lines
+
+
+def continuous() -> list[str]:
+    """What the same flights do near continuous time, and when kappa = 5 settles."""
+    table = fly("continuous")
+    lines = [
+        f"kappa {flight.coupling:<4g} at {_ms(flight.period)}: {flight.outcome}, largest error from 20 to 30 s "
+        f"{flight.ultimate_bound:.4g} m, below 5 cm from {flight.settling_time:.5g} s"
+        for flight in table.sort_values(["coupling", "period"], kind="stable").itertuples()
+    ]
+    (long,) = flown("kappa_5", [experiments.flight(period=0.001, kappa=5.0, stop_time=120.0)])
+    end = f"ultimate bound {long['ultimate_bound']:.3g} m, below 5 cm from {long['settling_time']:.4g} s"
+    return [_halving(table, "coupling"), *lines, f"kappa 5 at 1 ms to 120 s: {long['outcome']}, {end}"]
 
 
 def starts() -> list[str]:
     """Medians of the limit over random starts, by size of the initial error."""
-    flew = np.array(kept("starts", lambda: experiments.starts_flown().tolist()))
+    found = flown("starts", experiments.flights_of_starts())
+    flew = np.reshape([one["good"] for one in found], experiments.STARTS)
     _save(lambda: charts.starts(flew), "starts")
     ends = experiments.first_ends(flew)
     lines = []
@@ -145,14 +164,12 @@ def gains() -> list[str]:
     tables = {name: fly(name) for name in GAINS}
     ends = {label: _first_ends(tables[name], "gain_factor", "period") for name, label in GAINS.items()}
     factors = np.array(sorted(set(tables["gains_period"]["gain_factor"])))
-    local = np.array(kept("gains_local", lambda: [_local(factor) for factor in factors], factors.tolist()))
-    _save(lambda: charts.gain_limits(factors, ends, local, 0.005), "gain_limits")
+    local = np.array([about_hover(experiments.flight(kappa=0.0, gain_factor=f), "period").limit for f in factors])
+    _save(lambda: charts.gain_limits(factors, ends, local), "gain_limits")
     lines = [f"local limit, kappa = 0: {', '.join(f'{f:g}: {_ms(one)}' for f, one in zip(factors, local))}"]
     for name in GAINS:
         lines += [name, *flying_up_to(tables[name], "gain_factor", "period")]
-    ideal = kept("continuous_gains", lambda: _listed(experiments.continuous_gains(factors.tolist())), factors.tolist())
-    for held, one in ideal.items():
-        lines.append(f"continuous, kappa {held}: largest error from 20 to 30 s {np.round(one['ultimate_bound'], 4)} m")
+        lines.append(_halving(tables[name], "gain_factor"))
     return lines
 
 
@@ -181,7 +198,7 @@ def finite_time() -> list[str]:
                 whole = [k for k in range(len(theory.DECADES)) if not np.isnan(of[i, j, :, k]).any()]
                 lines.append(f"    rates of {name}: " + "; ".join(_interval(of[i, j, :, k]) for k in whole))
         lines.append(f"    theory, attitude at once: {theory.expected_rate(exponent):.3g} 1/s")
-    loop = {kappa: HoverLoop.of(_sampled(kappa, 0.01, 30.0)) for kappa in (0.0, 1.0)}
+    loop = {kappa: HoverLoop.of(experiments.flight(kappa=kappa)) for kappa in (0.0, 1.0)}
     for kappa, one in loop.items():
         slowest = [round(-float(np.log(one.spectral_radius(T, 0.0))) / T, 3) for T in theory.DECAY_PERIODS]
         lines.append(f"hover, kappa {kappa:g}: slowest mode {slowest} 1/s")
@@ -249,13 +266,13 @@ def sensitivity() -> list[str]:
     """Sobol indices: several designs of many base samples, and what fewer would have said."""
     study = load_study(ROOT / "studies" / "sensitivity.toml")
     names = [axis.name for axis in study.axes]
-    many = kept("sobol_many", lambda: _designs(experiments.SAMPLES, experiments.DESIGNS))
-    few = kept("sobol_few", lambda: _designs(experiments.FEW, experiments.FEW_DESIGNS))
-    lines = [f"{experiments.DESIGNS} designs: fly {[round(d['flies'], 3) for d in many]}, "
-             f"diverge {[round(d['diverged'], 3) for d in many]}"]  # fmt: skip
+    tables, many = designs(study, study.samples, DESIGNS)
+    _, few = designs(study, FEW, FEW_DESIGNS)
+    fly_of, fell_of = ([round(float(of(table).mean()), 3) for table in tables] for of in (figures.flew, _fell))
+    lines = [f"{DESIGNS} designs: fly {fly_of}, diverge {fell_of}"]
     for of in ("outcome", "rank"):
         for kind in ("first", "total"):
-            values, widths = _table(many, of, kind)
+            values, widths = _indices(many[of], kind)
             mean = values.mean(axis=0)
             inside = (np.abs(values - mean) <= widths).sum()
             lines.append(f"{of}, {kind}: {inside} of {values.size} intervals hold the mean over the designs")
@@ -263,41 +280,67 @@ def sensitivity() -> list[str]:
                 lines.append(
                     f"  {name:<12} {mean[i]:6.3f}; designs {np.round(values[:, i], 3)} +- {np.round(widths[:, i], 3)}"
                 )
-            some, spans = _table(few, of, kind)
+            some, spans = _indices(few[of], kind)
             held = (np.abs(some - mean) <= spans).mean()
             lines.append(
-                f"  {experiments.FEW} base samples: {held:.0%} of {some.size} intervals hold that mean; half-widths "
+                f"  {FEW} base samples: {held:.0%} of {some.size} intervals hold that mean; half-widths "
                 f"{np.round(spans.mean(axis=0), 2)}"
             )
-    total = [np.stack(_table(many, of, "total"), axis=-1) for of in ("outcome", "rank")]
+    total = [np.stack(_indices(many[of], "total"), axis=-1) for of in ("outcome", "rank")]
     _save(lambda: charts.sobol(names, *total), "study_sensitivity")
     return lines
 
 
+def designs(study: Study, samples: int, number: int) -> tuple[list[pd.DataFrame], dict[str, list[Any]]]:
+    """The tables of some designs of a study, and of each the indices of the outcome and of the rank of the bound."""
+    tables: list[pd.DataFrame] = []
+    found: dict[str, list[Any]] = {"outcome": [], "rank": []}
+    for seed in range(number):
+        one = dataclasses.replace(study, samples=samples, design_seed=seed, name=f"{study.name}_{samples}_{seed}")
+        table = flown_study(one)
+        found["outcome"].append(drawing.indices_of(one, drawing.numbers(table, "outcome"), "outcome"))
+        ranks = experiments.ranks(drawing.numbers(table, "ultimate_bound"))
+        found["rank"].append(drawing.indices_of(one, ranks, "ultimate_bound"))
+        tables.append(table)
+    return tables, found
+
+
 def agreement() -> list[str]:
-    """Some flights of the batches flown again as FMUs."""
+    """How flights in lanes compare with the same flights by FMUs."""
     chosen = experiments.some_flights(CHECKED)
-    batched = batch.fly(batch.Flights(**chosen))
-    checked = flown("agreement", [as_scenario(chosen, i) for i in range(CHECKED)])
-    same = sum(
-        (one["outcome"] == "settled") == batched.flies[i] and (one["outcome"] == "diverged") == batched.diverged[i]
-        for i, one in enumerate(checked)
+    alone = [with_python_inside(scenario) for scenario in chosen]
+    pairs = zip(_flown(chosen, in_lanes=True), _flown(alone, in_lanes=False), strict=True)
+    lines = [f"FMUs with Python inside: {Agreement.of((i, *pair) for i, pair in enumerate(pairs))}"]
+    for path in sorted(RESULTS.glob("*/study.sqlite")):
+        with open_for_reading(path) as opened:
+            about = opened.about()
+        if AGREEMENT in about:
+            lines.append(f"{path.parent.name}: {Agreement(**json.loads(about[AGREEMENT]))}")
+    return lines
+
+
+def with_python_inside(scenario: Scenario) -> Scenario:
+    """The same flight by the FMUs that have Python inside."""
+    controller = dataclasses.replace(scenario.controller, fmu=DEFAULT_CONTROLLER)
+    return dataclasses.replace(
+        scenario, controller=controller, plant=dataclasses.replace(scenario.plant, fmu=DEFAULT_PLANT)
     )
-    differing = [abs(one["ultimate_bound"] / batched.ultimate_bound[i] - 1.0) for i, one in enumerate(checked)
-                 if one["outcome"] == "settled"]  # fmt: skip
-    return [f"{same} of {CHECKED} outcomes are the same; ultimate bounds of the {len(differing)} that fly differ by up "
-            f"to {max(differing):.1e} of their value"]  # fmt: skip
 
 
 # -- flying -----------------------------------------------------------------------------------------------
 
 
 def fly(name: str) -> pd.DataFrame:
-    """The table of a study, flown as far as it is missing."""
-    study = load_study(ROOT / "studies" / f"{name}.toml")
-    say = lambda done, total: print(f"\r{name}: {done} of {total}", end="", file=sys.stderr)  # noqa: E731
-    sweep(study, folder=RESULTS / name, workers=WORKERS, progress=say)
-    return frame(store_path(name, RESULTS / name))
+    """The table of a study file, flown as far as it is missing."""
+    return flown_study(load_study(ROOT / "studies" / f"{name}.toml"))
+
+
+def flown_study(study: Study) -> pd.DataFrame:
+    """The table of a study, flown in lanes as far as it is missing."""
+    say = lambda done, total: print(f"\r{study.name}: {done} of {total}", end="", file=sys.stderr)  # noqa: E731
+    sweep(study, folder=RESULTS / study.name, workers=WORKERS, engine="batch", progress=say)
+    print(file=sys.stderr)
+    return frame(store_path(study.name, RESULTS / study.name))
 
 
 def draw(name: str, metric: str) -> None:
@@ -321,17 +364,19 @@ def kept(name: str, compute: Callable[[], Any], *given: Any) -> Any:
 
 
 def _stamp(given: Any) -> str:
-    """A hash of what the flights come from."""
-    files = [ROOT / "studies" / "sensitivity.toml"]
-    for folder in ("controller_fmu", "plant_fmu", "fmu_kit"):
-        files += sorted((ROOT / folder).glob("*.py"))
-    files += [ROOT / "docs" / f"{name}.py" for name in ("batch", "experiments", "theory")]
-    return hashlib.sha256(b"".join([*(file.read_bytes() for file in files), repr(given).encode()])).hexdigest()
+    """A hash of what flights come from: FMUs, what flies them, what is asked here and beside theory."""
+    own = [(ROOT / "docs" / f"{name}.py").read_text(encoding="utf-8") for name in ("experiments", "theory")]
+    known = [files_of(system_of(PAPER)).hashes, versions(), own, given]
+    return hashlib.sha256(repr(known).encode()).hexdigest()
 
 
 def flown(name: str, scenarios: list[Scenario]) -> list[dict[str, Any]]:
-    """The metrics of some flights."""
-    return list(kept(name, lambda: _flown(scenarios), scenarios))
+    """What became of some flights, flown in lanes."""
+
+    def fly_them() -> list[dict[str, Any]]:
+        return [{metric: one[metric] for metric in METRICS} for one in _flown(scenarios, in_lanes=True)]
+
+    return list(kept(name, fly_them, scenarios))
 
 
 def limits_of(name: str, scenarios: list[Scenario]) -> list[dict[str, Any]]:
@@ -344,50 +389,14 @@ def _in_processes(function: Callable[[Any], Any], arguments: Any) -> list[Any]:
         return list(pool.map(function, arguments))
 
 
-def _flown(scenarios: list[Scenario]) -> list[Any]:
-    with Pool(files_of(system_of(PAPER)), WORKERS) as pool:
-        return pool.fly(list(map(system_of, scenarios)), stop=lambda metrics: False)
+def _flown(scenarios: list[Scenario], *, in_lanes: bool) -> list[Any]:
+    systems = [system_of(scenario) for scenario in scenarios]
+    with Pool(files_of(systems[0]), WORKERS) as pool:
+        return pool.fly_all(systems, in_lanes=in_lanes)
 
 
 def _limit(scenario: Scenario) -> dict[str, Any]:
     return dataclasses.asdict(limit.find(scenario, "period"))
-
-
-def _sampled(kappa: float, period: float, stop_time: float) -> Scenario:
-    return PAPER.with_changes(
-        timing={"period": period}, parameters={"controller.coupling": kappa}, stop_time=stop_time
-    )  # fmt: skip
-
-
-def _local(factor: float) -> float | None:
-    """The local limit without coupling, the attitude gains times a factor."""
-    return about_hover(_geared(factor, 0.0), "period").limit
-
-
-def _geared(factor: float, kappa: float) -> Scenario:
-    """The paper's flight with its attitude gains times a factor."""
-    scaled = {f"controller.gain.{name}": 15.0 * factor for name in ("eta", "theta", "attitude")}
-    return PAPER.with_changes(parameters={**scaled, "controller.coupling": kappa})
-
-
-def as_scenario(flights: dict[str, Any], i: int) -> Scenario:
-    """One of some flights of a batch, for the FMUs."""
-    chosen = {name: float(flights[name][i]) for name in ("period", "delay", "kappa", "gain_factor", "surface", "lag")}
-    return PAPER.with_changes(
-        timing={"period": chosen["period"], "delay": chosen["delay"]},
-        parameters={
-            "controller.coupling": chosen["kappa"],
-            "controller.gain.surface": chosen["surface"],
-            **{f"controller.gain.{name}": 15.0 * chosen["gain_factor"] for name in ("eta", "theta", "attitude")},
-            **{f"plant.initial.position.{axis}": float(p[i]) for axis, p in zip("xyz", flights["start"], strict=True)},
-            "plant.actuator_time_constant": chosen["lag"],
-        },
-    )
-
-
-def _designs(samples: int, number: int) -> list[dict[str, Any]]:
-    study = load_study(ROOT / "studies" / "sensitivity.toml")
-    return [dataclasses.asdict(design) for design in experiments.sobol_designs(study, samples, range(number))]
 
 
 # -- words ------------------------------------------------------------------------------------------------
@@ -417,6 +426,20 @@ def _first_ends(table: pd.DataFrame, by: str, axis: str) -> Any:
     return np.array(ends)
 
 
+def _fell(table: pd.DataFrame) -> pd.Series:
+    """Which runs diverged."""
+    return table["outcome"].eq("diverged")
+
+
+def _halving(table: pd.DataFrame, by: str) -> str:
+    """Which outcomes change where the period that stands for continuous time is halved."""
+    fine, coarse = (table[table["period"] == period].set_index(by)["outcome"] for period in CONTINUOUS)
+    short, long = map(_ms, CONTINUOUS)
+    changed = [f"{value:g}" for value in fine.index if fine[value] != coarse[value]]
+    settled = [f"{value:g}" for value in fine.index if fine[value] == "settled"]
+    return f"{long} or {short}: outcomes differ at {by} {changed or 'none'}; settled at {settled}"
+
+
 def share_of(flew: pd.Series) -> str:
     """How many of some runs fly, as a share with its Wilson interval."""
     low, high = wilson(int(flew.sum()), len(flew))
@@ -432,18 +455,11 @@ def _rank_correlation(x: pd.Series, y: pd.Series) -> tuple[float, float, float]:
     return of(pairs), *np.percentile(resampled, [2.5, 97.5])
 
 
-def _table(designs: list[dict[str, Any]], of: str, kind: str) -> tuple[Any, Any]:
+def _indices(designs: list[list[Index]], kind: str) -> tuple[Any, Any]:
     """Indices and their half-widths, shapes (designs, axes)."""
-    rows = [[(one["value"], one["confidence"]) for one in design[of] if one["kind"] == kind] for design in designs]
+    rows = [[(one.value, one.confidence) for one in design if one.kind == kind] for design in designs]
     array = np.array(rows)
     return array[..., 0], array[..., 1]
-
-
-def _listed(outcomes: dict[str, batch.Outcomes]) -> dict[str, dict[str, list[float]]]:
-    return {
-        horizon: {name: np.asarray(values).tolist() for name, values in vars(found).items()}
-        for horizon, found in outcomes.items()
-    }
 
 
 def _save(make: Callable[[], Any], name: str) -> None:

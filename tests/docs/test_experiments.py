@@ -1,44 +1,85 @@
-"""The batches behind the findings are the flights of the FMUs; what is concluded from them is computed rightly."""
+"""The ensembles of the findings are what the page says, cells of its tables too; conclusions are computed rightly."""
 
-import math
+import re
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import orchestration as quadcosim
-from docs import batch, experiments
-from docs.make_findings import as_scenario, flying_up_to
+from docs import experiments
+from docs.make_findings import flying_up_to, with_python_inside
+from fmu_kit.trajectory import Trajectory
+from orchestration.batch.fly import fly
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.translation import system_of
+from orchestration.studies.lanes import Agreement
 
-STOP = 2.0
-
-
-def test_a_batch_is_the_flights_of_the_fmus() -> None:
-    chosen = {
-        "period": np.array([0.02, 0.0125, 0.05]), "delay": np.array([0.0, 0.02, 0.005]),
-        "kappa": np.array([1.0, 0.3, 0.0]), "gain_factor": np.array([1.0, 1.2, 0.8]),
-        "surface": np.array([5.0, 3.0, 6.0]), "lag": np.array([0.0, 0.01, 0.0]),
-        "start": (np.array([0.0, 1.0, -0.5]), np.array([0.0, -1.0, 0.7]), np.array([0.0, 2.5, 1.0])),
-    }  # fmt: skip
-    flown = batch.fly(batch.Flights(**chosen), STOP)
-    for i in range(3):
-        metrics = quadcosim.run(as_scenario(chosen, i).with_changes(stop_time=STOP)).metrics
-        assert flown.ultimate_bound[i] == pytest.approx(metrics["ultimate_bound"], rel=1e-3)  # seen at other instants
-        assert not flown.diverged[i]
+PAGE = (Path(__file__).parents[2] / "docs" / "findings.md").read_text(encoding="utf-8")
+DECIMAL = re.compile(r"-?\d+\.?\d*")
 
 
-def test_a_flight_of_a_batch_diverges_where_the_fmus_do_and_leaves_the_others_alone() -> None:
-    periods = np.array([0.2, 0.01, 0.19])
-    flown = batch.fly(batch.Flights(period=periods), 6.0)
-    assert flown.diverged.tolist() == [True, False, True]
-    alone = batch.fly(batch.Flights(period=periods[1]), 6.0)
-    assert flown.ultimate_bound[1] == alone.ultimate_bound[0]
-    assert math.isnan(flown.ultimate_bound[0])
+def flown(scenarios: list[Scenario]) -> list[str]:
+    return [str(metrics["outcome"]) for metrics in fly([system_of(scenario) for scenario in scenarios])]
 
 
-def test_many_samples_come_near_continuous_time() -> None:
-    sampled = batch.fly(batch.Flights(period=0.001, kappa=np.array([0.0, 1.0])), 0.5)
-    continuous = batch.fly_continuously(batch.Flights(kappa=np.array([0.0, 1.0])), 0.5)
-    assert sampled.ultimate_bound == pytest.approx(continuous.ultimate_bound, rel=2e-3)
+def rows(section: str) -> dict[str, list[str]]:
+    """The first table of a section: cells of each row by its first one."""
+    text = PAGE[PAGE.index(f"\n## {section}") :]
+    (table, *_) = re.findall(r"(?:^\|.*\|\n)+", text, re.M)
+    return {first: rest for first, *rest in (line.strip("| ").split(" | ") for line in table.splitlines()[2:])}
+
+
+def test_flights_in_lanes_are_those_of_the_fmus_with_python_inside() -> None:
+    chosen = [scenario.with_changes(stop_time=1.0) for scenario in experiments.some_flights(3)]
+    lanes = fly([system_of(scenario) for scenario in chosen])
+    alone = [quadcosim.run(with_python_inside(scenario)).metrics for scenario in chosen]
+    found = Agreement.of((i, *pair) for i, pair in enumerate(zip(lanes, alone, strict=True)))
+    assert found.runs == 3
+    assert found.difference < 1e-9, str(found)
+
+
+def test_limits_of_the_page_fly_and_what_lies_a_little_above_does_not() -> None:
+    limits = {
+        float(kappa.split()[0]): cells for kappa, cells in rows("What is local").items() if "none" not in cells[1]
+    }
+    assert len(limits) == 5
+    ends = {kappa: float(DECIMAL.findall(cells[1])[0]) * 1e-3 for kappa, cells in limits.items()}
+    assert flown([experiments.flight(kappa=k, period=T) for k, T in ends.items()]) == ["settled"] * 5
+    above = [cells[2].split()[0].replace("diverges", "diverged") for cells in limits.values()]
+    assert flown([experiments.flight(kappa=k, period=T + 0.00025) for k, T in ends.items()]) == above
+
+
+def test_medians_of_the_page_are_those_of_its_starts() -> None:
+    """Of one cell in twenty: the middle of thirty first ends."""
+    (cell,) = (cells[0] for size, cells in rows("Other starts").items() if size == "2 m")
+    median = float(DECIMAL.findall(cell)[0]) * 1e-3
+    near = [T for T in experiments.PERIODS if abs(T - median) <= 0.0026]
+    flights = [experiments.flight(period=T, start=start) for start in experiments.random_starts()[1] for T in near]
+    flew = np.reshape([outcome == "settled" for outcome in flown(flights)], (-1, len(near)))
+    assert flew[:, near.index(pytest.approx(median))].mean() >= 0.5 > flew[:, -1].mean()
+
+
+def test_the_gains_of_the_page_fly_up_to_what_it_says() -> None:
+    table = rows("Gains and period")
+    cells = [(factor, end) for factor, end in zip((0.5, 1.0, 2.0), (table["κ = 0"][i] for i in (2, 4, 6)), strict=True)]
+    ends = [(factor, float(DECIMAL.findall(end)[0]) * 1e-3) for factor, end in cells]
+    flights = [experiments.flight(kappa=0.0, gain_factor=f, period=T) for f, end in ends for T in (end, end + 0.02)]
+    assert [outcome == "settled" for outcome in flown(flights)] == [True, False] * 3
+
+
+def test_starts_lie_around_the_path_and_a_flight_is_from_the_one_that_it_names() -> None:
+    starts, reference = experiments.random_starts(), np.array([*Trajectory().position(0.0)])
+    sizes = np.linalg.norm(starts - reference, axis=-1)
+    assert sizes == pytest.approx(np.array(experiments.SIZES)[:, None] * np.ones(experiments.DIRECTIONS))
+    assert np.prod(experiments.STARTS) == 28_200
+    size, direction, period = 2, 17, 40
+    one = experiments.flight_from(starts, 3, size, direction, period)
+    assert one.timing.period == experiments.PERIODS[period]
+    assert one.controller.parameters["coupling"] == 0.0
+    assert one.plant.parameters["actuator_time_constant"] == 0.01
+    assert [one.plant.parameters[f"initial.position.{a}"] for a in "xyz"] == starts[size, direction].tolist()
 
 
 def test_the_first_end_is_before_the_first_period_that_does_not_fly() -> None:
@@ -53,8 +94,6 @@ def test_what_diverged_comes_last_in_rank_and_shares_it() -> None:
 
 
 def test_an_island_is_told_beside_the_first_end() -> None:
-    import pandas as pd
-
     outcomes = ["settled", "bounded", "settled", "diverged"]
     good = [float(outcome == "settled") for outcome in outcomes]
     table = pd.DataFrame({"k": 1.0, "period": [0.01, 0.02, 0.03, 0.04], "outcome": outcomes, "good": good})
