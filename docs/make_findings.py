@@ -20,7 +20,7 @@ import matplotlib
 import numpy as np
 import pandas as pd
 
-from docs import charts, experiments, theory
+from docs import charts, comparisons, experiments, theory
 from docs.experiments import PAPER
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import system_of
@@ -68,8 +68,8 @@ def main() -> None:
     RESULTS.mkdir(parents=True, exist_ok=True)
     began = time.perf_counter()
     sections = (
-        period, limits, continuous, starts, delay, bounds, gains, bandwidth, finite_time, monte_carlo, sensitivity,
-        agreement,
+        compared, period, limits, continuous, starts, delay, bounds, gains, bandwidth, finite_time, monte_carlo,
+        sensitivity, agreement,
     )  # fmt: skip
     for section in [one for one in sections if one.__name__ in sys.argv[1:] or not sys.argv[1:]]:
         print(f"\n## {section.__name__}", flush=True)
@@ -86,6 +86,14 @@ def _processor_time() -> float:
 
 
 # -- sections ---------------------------------------------------------------------------------------------
+
+
+def compared() -> list[str]:
+    """Controllers from the same starts: limits and cells of every comparison."""
+    found = {name: kept(f"compared_{name}", lambda name=name: comparisons.fly_all(name)) for name in comparisons.NAMES}
+    for name, figure in comparisons.figures():
+        _save(lambda figure=figure: figure, name)
+    return [line for name, content in found.items() for line in comparisons.lines(name, content)]
 
 
 def period() -> list[str]:

@@ -1,0 +1,238 @@
+"""Flies the comparisons of `findings.md` in lanes, and keeps what their cells come to beside the page.
+
+`quadcosim compare studies/comparisons/NAME.toml` flies the same runs one store after the other; here a run leaves no
+row, only the cell that it belongs to: `docs/data/NAME.json`.
+"""
+
+import json
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from functools import cache
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from docs import comparison_charts as charts
+from orchestration.batch import fly
+from orchestration.fmi.model import read_model
+from orchestration.statistics import wilson
+from orchestration.studies.comparison.bandwidth import bandwidths
+from orchestration.studies.comparison.cells import frame_of
+from orchestration.studies.comparison.design import Comparison
+from orchestration.studies.comparison.file import load_comparison
+from orchestration.studies.comparison.outcome import as_json, concluded
+from orchestration.system.model import System
+
+ROOT = Path(__file__).parent.parent
+FILES = ROOT / "studies" / "comparisons"
+DATA = Path(__file__).parent / "data"
+NAMES = (
+    "periods", "fast_inner", "tuned", "tuned_mean", "delays", "inertias", "mismatches", "losses", "jitters", "vehicles",
+)  # fmt: skip
+FAST_INNER = "cascade, fast inner loops"
+TOLD = ("position_rmse", "ultimate_bound", "torque_max", "total_variation.torque")
+WORKERS = 2
+BINS = 8
+"""of the size of the initial error"""
+
+
+@cache
+def loaded(name: str) -> Comparison:
+    """The comparison of a file."""
+    return load_comparison(FILES / f"{name}.toml")
+
+
+def kept(name: str) -> Any:
+    """What the page has of a comparison: its cells, limits and fronts."""
+    return json.loads((DATA / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def fly_all(name: str) -> Any:
+    """Fly a comparison whole, and keep what comes of it."""
+    import pandas as pd
+
+    began, comparison = time.perf_counter(), loaded(name)
+    paths = {fmu: str(path) for fmu, path in comparison.study.files().fmus.items()}  # built here, once
+    cells = [cell.index for cell in comparison.cells()]
+    parts = []
+    with ProcessPoolExecutor(WORKERS, get_context("spawn")) as pool:
+        for done, part in enumerate(pool.map(cell_flown, [name] * len(cells), cells, [paths] * len(cells)), 1):
+            parts.append(part)
+            print(f"\r{name}: {done} of {len(cells)} cells", end="", file=sys.stderr)
+    table = frame_of(comparison, [run for part in parts for run in part])
+    known = bandwidths(comparison)
+    found = as_json(comparison, concluded(comparison, table, known), known)
+    content = {
+        "flights": len(table),
+        "minutes": round((time.perf_counter() - began) / 60.0, 1),
+        "cells": [_short(cell, table[table["design_index"].isin(comparison.runs_of(comparison.cell(cell["cell"])))],
+                         comparison) for cell in found["cells"]],
+        "limits": found["limits"],
+        "fronts": [_point(point) for point in found["fronts"]],
+    }  # fmt: skip
+    assert isinstance(table, pd.DataFrame)
+    DATA.mkdir(exist_ok=True)
+    (DATA / f"{name}.json").write_text(_compact(content), encoding="utf-8")
+    return kept(name)
+
+
+def cell_flown(name: str, index: int, paths: dict[str, str]) -> list[tuple[int, Any]]:
+    """All runs of a cell, by their number in the study."""
+    comparison = loaded(name)
+    runs = comparison.runs_of(comparison.cell(index))
+    return [*zip(runs, (_batches().metrics(systems_of(comparison, index, paths))), strict=True)]
+
+
+def systems_of(comparison: Comparison, index: int, paths: dict[str, str]) -> list[System]:
+    """Its systems: that of the first run, from every start."""
+    runs = comparison.runs_of(comparison.cell(index))
+    first = comparison.study.system(runs[0], _starts(tuple(paths.items())))
+    components = {key: replace(each, fmu=paths[each.fmu]) for key, each in first.components.items()}
+    plant = components["plant"]
+    return [
+        replace(
+            first,
+            seed=comparison.base.seed + comparison.starts.first + i,
+            components={**components, "plant": replace(plant, parameters={**plant.parameters, **start.parameters})},
+        )
+        for i, start in enumerate(comparison.drawn)
+    ]
+
+
+@cache
+def _starts(paths: tuple[tuple[str, str], ...]) -> dict[str, float]:
+    """Start values of the plant's parameters, which conditions multiply."""
+    (plant,) = (path for name, path in paths if name.endswith("QuadrotorPlant"))
+    return {
+        f"plant.{variable.name}": float(variable.start)
+        for variable in read_model(Path(plant)).variables.values()
+        if variable.kind == "Real" and variable.causality == "parameter" and variable.start is not None
+    }
+
+
+class _Lanes:
+    """The batches of this process."""
+
+    def __init__(self) -> None:
+        self._batches = fly.Batches()
+
+    def metrics(self, systems: list[System]) -> Iterator[Any]:
+        """Of systems whose FMUs are files; what lanes leave is flown alone."""
+        for system, flown in zip(systems, self._batches.fly(systems), strict=True):
+            yield fly.run(system).metrics if flown is None else flown.metrics
+
+
+@cache
+def _batches() -> _Lanes:
+    return _Lanes()
+
+
+def _short(cell: dict[str, Any], rows: Any, comparison: Comparison) -> dict[str, Any]:
+    """A cell as it is kept: counts, medians with their intervals, and counts by the size of the initial error."""
+    from orchestration.studies.comparison.cells import Median, sizes
+    from orchestration.studies.figures import flew
+
+    good = flew(rows)
+    bins = (sizes(comparison, rows) * BINS).astype(int).clip(upper=BINS - 1)
+    residual = Median.of(rows[good]["ultimate_bound"].to_numpy(float))
+    medians = {key: [*each.values()] for key, each in cell["medians"].items()}
+    kept = {
+        key: cell[key] for key in ("cell", "vehicle", "condition", "controller", "value", "runs", "flown", "diverged")
+    }
+    return {
+        **kept,
+        **medians,
+        "ultimate_bound": [residual.value, residual.low, residual.high],
+        "by_size": [[int((good & (bins == i)).sum()), int((bins == i).sum())] for i in range(BINS)],
+    }
+
+
+def _point(point: dict[str, Any]) -> dict[str, Any]:
+    return {**point, "error": [*point["error"].values()], "effort": [*point["effort"].values()]}
+
+
+def _compact(content: dict[str, Any]) -> str:
+    """One line for each cell, limit and point, numbers to five digits."""
+
+    def rounded(value: Any) -> Any:
+        if isinstance(value, float):
+            return float(f"{value:.5g}")
+        if isinstance(value, dict):
+            return {key: rounded(one) for key, one in value.items()}
+        return [rounded(one) for one in value] if isinstance(value, list) else value
+
+    parts = []
+    for key, value in content.items():
+        if isinstance(value, list):
+            lines = ",\n".join(json.dumps(rounded(one), ensure_ascii=False) for one in value)
+            parts.append(f'"{key}": [\n{lines}\n]')
+        else:
+            parts.append(f'"{key}": {json.dumps(value)}')
+    return "{\n" + ",\n".join(parts) + "\n}\n"
+
+
+# -- what is printed and drawn ----------------------------------------------------------------------------
+
+
+def lines(name: str, content: Any) -> Iterator[str]:
+    """What the page tells of a comparison."""
+    yield f"{name}: {content['flights']} flights in {content['minutes']} min"
+    for one in content["limits"]:
+        where = ", ".join(one[key] for key in ("vehicle", "condition", "controller"))
+        rad = "" if one["bandwidth"] is None else f", {one['bandwidth']:.3g} rad/s"
+        yield f"  {where}: {one['share']} to {one['value']:g} [{one['low']:g}, {one['high'] or '...'}]{rad}"
+    for cell in content["cells"]:
+        low, high = wilson(cell["flown"], cell["runs"])
+        told = ", ".join(f"{key} {_numbers(cell[key])}" for key in TOLD)
+        where = ", ".join(cell[key] for key in ("vehicle", "condition", "controller"))
+        yield (f"  cell {cell['cell']}: {where}, {cell['value']:g}: {cell['flown']} of {cell['runs']} fly "
+               f"({low:.1%} to {high:.1%}), {cell['diverged']} diverge; {told}")  # fmt: skip
+
+
+def _numbers(median: list[float | None]) -> str:
+    value, low, high = ("-" if one is None else f"{one:.3g}" for one in median)
+    return f"{value} [{low}, {high}]"
+
+
+def figures() -> Iterator[tuple[str, Figure]]:
+    """All figures of the comparisons that were flown, by their names."""
+    at_one_rate, inner = kept("periods"), kept("fast_inner")
+    yield "comparison_basins", charts.basins([*at_one_rate["cells"], *inner["cells"]], {FAST_INNER: 20.0})
+    ends = [*_limits(at_one_rate), *_limits(inner, 20.0)]
+    yield "comparison_limits", charts.limits(ends, 600.0, "period [ms], of the outer loops")
+    tuned = kept("tuned")
+    both = [*tuned["cells"], *kept("tuned_mean")["cells"]]
+    yield "comparison_tuned", charts.shares({"paper's body": both}, "period [ms]")
+    for name, content, values in (
+        ("fronts", at_one_rate, (0.02, 0.05, 0.08)),
+        ("tuned_fronts", tuned, (0.01, 0.05, 0.1)),
+    ):
+        names = list(dict.fromkeys(cell["controller"] for cell in content["cells"]))
+        yield f"comparison_{name}", charts.fronts(content["fronts"], values, charts.colored(names))
+    yield "comparison_delays", charts.shares({"period of 20 ms": kept("delays")["cells"]}, "delay [ms]")
+    yield "comparison_mismatches", charts.shares(_by("condition", kept("mismatches")), "period [ms]")
+    yield "comparison_inertias", charts.shares(_by("condition", kept("inertias")), "inertia, times that believed", 1.0)
+    yield "comparison_vehicles", charts.shares(_by("vehicle", kept("vehicles")), "period [ms]")
+    yield "comparison_losses", charts.shares({"period of 20 ms": kept("losses")["cells"]}, "loss", 1.0)
+    yield "comparison_jitters", charts.shares({"period of 50 ms": kept("jitters")["cells"]}, "jitter [ms]")
+
+
+def _limits(content: Any, factor: float = 1.0) -> Iterator[tuple[str, Any, Any, float]]:
+    """Half and nine in ten of each controller, with the factor on the axis."""
+    for half, most in zip(content["limits"][::2], content["limits"][1::2], strict=True):
+        yield half["controller"], half, most, factor
+
+
+def _by(key: str, content: Any) -> dict[str, Any]:
+    titles = dict.fromkeys(cell[key] for cell in content["cells"])
+    return {title: [cell for cell in content["cells"] if cell[key] == title] for title in titles}
+
+
+if __name__ == "__main__":
+    for asked in sys.argv[1:]:
+        fly_all(asked)

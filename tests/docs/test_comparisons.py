@@ -1,0 +1,46 @@
+"""The maps of the findings are what their commands fly: one cell in a hundred of each is flown again."""
+
+import math
+import random
+import re
+from pathlib import Path
+
+import pytest
+
+from docs import comparisons
+from orchestration.studies.comparison.cells import frame_of, results
+
+PAGE = Path(comparisons.__file__).parent / "findings.md"
+FLOWN = sorted(path.stem for path in comparisons.DATA.glob("*.json"))
+
+
+def test_every_comparison_of_the_page_is_kept_and_said_how_to_fly() -> None:
+    assert sorted(comparisons.NAMES) == FLOWN
+    text = PAGE.read_text(encoding="utf-8")
+    assert {*re.findall(r"quadcosim compare studies/comparisons/(\w+)\.toml", text)} >= {*FLOWN}
+
+
+@pytest.mark.parametrize("name", FLOWN)
+def test_every_cell_of_a_map_is_one_of_its_file(name: str) -> None:
+    expected = [
+        (cell.index, cell.vehicle, cell.condition, cell.controller, cell.value)
+        for cell in comparisons.loaded(name).cells()
+    ]
+    kept = comparisons.kept(name)["cells"]
+    keys = ("cell", "vehicle", "condition", "controller", "value")
+    assert [tuple(cell[key] for key in keys) for cell in kept] == expected
+
+
+@pytest.mark.parametrize("name", FLOWN)
+def test_one_cell_in_a_hundred_is_what_is_flown_again(name: str) -> None:
+    """What `quadcosim compare studies/comparisons/NAME.toml --cell K` flies, here in lanes."""
+    comparison, kept = comparisons.loaded(name), comparisons.kept(name)["cells"]
+    paths = {fmu: str(path) for fmu, path in comparison.study.files().fmus.items()}
+    for cell in random.Random(name).sample(kept, math.ceil(len(kept) / 100)):
+        runs = comparisons.cell_flown(name, cell["cell"], paths)
+        (found,) = results(comparison, frame_of(comparison, runs))
+        assert (found.runs, found.flown, found.diverged) == (cell["runs"], cell["flown"], cell["diverged"])
+        for key, median in found.medians.items():
+            again = [math.nan if one is None else one for one in (median.value, median.low, median.high)]
+            before = [math.nan if one is None else one for one in cell[key]]
+            assert again == pytest.approx(before, rel=1e-4, nan_ok=True), key
