@@ -90,3 +90,16 @@ def test_every_component_of_a_batch_has_its_shape(points: list[float]) -> None:
 def test_reference_of_a_position_alone_is_at_rest() -> None:
     reference = Reference(position=Vec3(1.0, 2.0, 3.0))
     assert [getattr(reference, name) for name in DERIVATIVES[1:]] == [ZERO] * 4
+
+
+def test_the_series_of_a_reference_misses_each_derivative_by_the_first_term_that_it_lacks() -> None:
+    """It ends with snap: the position is wrong in fifth order of the time, the snap in first."""
+    trajectory = Trajectory(frequency=0.8)
+    now = trajectory.at(1.0)
+
+    def missed(quantity: str, time: float) -> float:
+        difference: Vec3 = getattr(now.after(time), quantity) - getattr(trajectory.at(1.0 + time), quantity)
+        return float(difference.norm())
+
+    orders = [math.log2(missed(quantity, 0.01) / missed(quantity, 0.005)) for quantity in DERIVATIVES]
+    assert orders == pytest.approx([5.0, 4.0, 3.0, 2.0, 1.0], abs=0.1)
