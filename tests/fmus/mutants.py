@@ -327,7 +327,7 @@ BEHAVIOUR = (
     ),
     Mutant(
         name="saved state incomplete", rule="saved-state", words=("from the state",),
-        damage=source("plant_fmu/slave.py", "[torque.x, torque.y, torque.z]", "[0.0, 0.0, 0.0]"),
+        damage=source("plant_fmu/slave.py", "list(self._channels)", "[0.0, 0.0, 0.0, 0.0]"),
     ),
     Mutant(
         name="saved clock incomplete", rule="saved-state", words=("from the state",), model=CONTROLLER,
@@ -388,7 +388,7 @@ BEHAVIOUR = (
     ),
     Mutant(
         name="bound not enforced", rule="bounds-enforced", words=("mass = -1",),
-        damage=source("fmu_kit/slave.py", "variable.check(value)", "pass"),
+        damage=source("fmu_kit/slave.py", "if variable.causality == \"parameter\"", "if False"),
     ),
     Mutant(
         name="value not finite taken", rule="not-finite-refused", words=("thrust = nan",),
