@@ -10,12 +10,19 @@ import pytest
 import orchestration
 from fmu_kit.bundle import Target
 from orchestration import Result
+from orchestration.quadrotor.wiring import MODELS
 from tests.fmus.making import PAIR
 from tests.native import assert_near, assert_the_same, natives
 from tests.orchestration.quadrotor.signals_table import TABLE, entry, fingerprint, flights, flown, scenario_of
 
 SAME_MATHEMATICS = json.loads(TABLE.read_text(encoding="utf-8"))["fingerprint"] == fingerprint()
 FLIGHTS = dict(flights())
+LAWS = ("UnifiedController", "GeometricController")
+REDESIGNS = {
+    "mean, with prediction": {"discretisation": "mean", "prediction": 0.05, "hold_period": 0.04},
+    "match": {"discretisation": "match", "stages": 2, "weight": 2.0},
+}
+SEMI_IMPLICIT = {"discretisation": "semi_implicit"}
 
 
 @functools.cache
@@ -41,8 +48,8 @@ def test_a_flight_is_that_of_the_table(name: str) -> None:
 
 @pytest.fixture(scope="module")
 def on_libm(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Both FMUs by name, with the elementary functions that CPython takes."""
-    targets = [Target.parse(text) for text in PAIR.values()]
+    """The FMUs of the plant and of the laws by name, with the elementary functions that CPython takes."""
+    targets = [Target.parse(MODELS[name]) for name in ("QuadrotorPlant", *LAWS)]
     return natives(targets, tmp_path_factory.mktemp("native"), "libm")
 
 
@@ -72,3 +79,21 @@ def test_motors_written_out_as_c_are_those_in_python(on_libm: dict[str, Path]) -
     ]
     assert_the_same(*flown)
     assert 0.01 < flown[0].metrics["saturation_share"] < 0.9
+
+
+@pytest.mark.parametrize(
+    ("law", "redesign"),
+    [*((law, redesign) for law in LAWS for redesign in REDESIGNS.values()), ("UnifiedController", SEMI_IMPLICIT)],
+)
+def test_redesigns_written_out_as_c_are_those_in_python(
+    law: str, redesign: dict[str, str | float], on_libm: dict[str, Path]
+) -> None:
+    """With samples and commands that come late, and measurements that are lost."""
+    timing = {"period": 0.04, "delay": 0.05, "jitter": 0.01, "measurement_loss": 0.05, "plant_interval": 0.005}
+    scenario = scenario_of({"stop_time": 0.6, "timing": timing, "controller": redesign})
+    flown = [
+        orchestration.run(scenario.with_fmus(plant="native/QuadrotorPlant", controller=fmu))
+        for fmu in (on_libm[law], law)
+    ]
+    assert_the_same(*flown)
+    assert flown[0].divergence is None
