@@ -5,7 +5,7 @@ import json
 import typing
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import pydantic
 
@@ -17,6 +17,8 @@ from orchestration.quadrotor.scenario import FmuChoice, Record, ReferenceChoice,
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.vehicles import load_vehicle
 from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
+
+Shape = TypeVar("Shape")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,18 +54,18 @@ def load_scenario(path: str | Path) -> Scenario:
 
 def scenario_from_tables(tables: dict[str, Any], folder: Path) -> Scenario:
     """The scenario of a TOML document whose relative paths start at `folder`; raises `UsageError`."""
-    parsed = _parse(_expanded(tables))
-    file = parsed.reference.file
+    file = parsed(_expanded(tables), ScenarioFile)
+    table = file.reference.file
     return Scenario(
-        stop_time=parsed.stop_time,
-        seed=parsed.seed,
-        model_mismatch=parsed.model_mismatch,
-        vehicle=None if parsed.vehicle is None else load_vehicle(parsed.vehicle, folder),
-        controller=_choice("controller", parsed.controller, DEFAULT_CONTROLLER, folder),
-        plant=_choice("plant", parsed.plant, DEFAULT_PLANT, folder),
-        timing=parsed.timing,
-        reference=ReferenceChoice(file=None if file is None else folder / file),
-        record=parsed.record,
+        stop_time=file.stop_time,
+        seed=file.seed,
+        model_mismatch=file.model_mismatch,
+        vehicle=None if file.vehicle is None else load_vehicle(file.vehicle, folder),
+        controller=_choice("controller", file.controller, DEFAULT_CONTROLLER, folder),
+        plant=_choice("plant", file.plant, DEFAULT_PLANT, folder),
+        timing=file.timing,
+        reference=ReferenceChoice(file=None if table is None else folder / table),
+        record=file.record,
     )
 
 
@@ -94,15 +96,15 @@ def _choice(side: str, table: dict[str, Any], default: str, folder: Path) -> Fmu
     return FmuChoice(fmu=fmu, parameters=parameters)
 
 
-def _parse(tables: dict[str, Any]) -> ScenarioFile:
+def parsed(tables: dict[str, Any], shape: type[Shape]) -> Shape:
     """The typed form of a TOML document; raises `UsageError` in one line for the first thing wrong."""
     try:
-        return pydantic.TypeAdapter(ScenarioFile).validate_json(json.dumps(tables, default=str), strict=True)
+        return pydantic.TypeAdapter(shape).validate_json(json.dumps(tables, default=str), strict=True)
     except pydantic.ValidationError as error:
-        raise UsageError(first_problem(error, ScenarioFile)) from error
+        raise UsageError(_first_problem(error, shape)) from error
 
 
-def first_problem(error: pydantic.ValidationError, file: type) -> str:
+def _first_problem(error: pydantic.ValidationError, file: type) -> str:
     """The first thing wrong with a document of the shape `file`, in one line that says what is valid."""
     problem = error.errors()[0]
     place = ".".join(str(part) for part in problem["loc"])

@@ -1,16 +1,15 @@
 """Reads study files."""
 
-import json
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
-
-import pydantic
+from typing import Any, ClassVar, Protocol, TypeVar
 
 from orchestration.documents import read_toml
 from orchestration.errors import UsageError
-from orchestration.quadrotor.scenario_file import first_problem
-from orchestration.request import load_request, request_from_tables
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.scenario_file import parsed
+from orchestration.request import Request, load_request, request_from_tables
 from orchestration.studies.axes import Axis, Method, Scale, Value, span
 from orchestration.studies.study import Study, names_fmu
 from orchestration.system.paths import names_table
@@ -66,24 +65,53 @@ def load_study(path: str | Path) -> Study:
     Raises `UsageError` for a file that cannot be read, a key that does not exist (naming those that do) or a
     value that cannot be.
     """
-    path = Path(path)
-    tables = read_toml(path, "study file")
+    return load(Path(path), "study file", StudyFile, _study)
+
+
+class Based(Protocol):
+    """A file that builds on a system or a scenario: its tables, or the path of one."""
+
+    @property
+    def scenario(self) -> str | None:
+        """The path."""
+
+    @property
+    def base(self) -> dict[str, Any]:
+        """The tables."""
+
+
+File = TypeVar("File")
+Made = TypeVar("Made")
+
+
+def load(path: Path, kind: str, shape: type[File], make: Callable[[File, Path], Made]) -> Made:
+    """What is made of a file of a shape; raises `UsageError` that names it."""
+    tables = read_toml(path, kind)
     try:
-        return _study(tables, path)
+        return make(parsed(tables, shape), path)
     except UsageError as error:
         raise UsageError(f"{path}: {error}") from error
 
 
-def _study(tables: dict[str, Any], path: Path) -> Study:
-    try:
-        file = pydantic.TypeAdapter(StudyFile).validate_json(json.dumps(tables, default=str), strict=True)
-    except pydantic.ValidationError as error:
-        raise UsageError(first_problem(error, StudyFile)) from error
+def base_of(file: Based, folder: Path) -> Request:
+    """What a file builds on."""
     if file.scenario is not None and file.base:
         raise UsageError("scenario and base: expected one of them")
+    return load_request(folder / file.scenario) if file.scenario else request_from_tables(file.base, folder)
+
+
+def scenario_of(file: Based, folder: Path) -> Scenario:
+    """Likewise, where the starts of the quadrotor are needed; raises `UsageError` for any other system."""
+    base = base_of(file, folder)
+    if not isinstance(base, Scenario):
+        raise UsageError("base: expected a scenario of the quadrotor, whose starts are known")
+    return base
+
+
+def _study(file: StudyFile, path: Path) -> Study:
     if file.design.seed < 0:
         raise UsageError(f"design.seed = {file.design.seed}: expected a whole number from 0")
-    base = load_request(path.parent / file.scenario) if file.scenario else request_from_tables(file.base, path.parent)
+    base = base_of(file, path.parent)
     study = Study(
         name=file.name or path.stem,
         base=base,

@@ -1,21 +1,14 @@
 """Reads files that say what is tuned, and writes what was found."""
 
 import dataclasses
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-import pydantic
-
-from orchestration.documents import read_toml
 from orchestration.errors import UsageError
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.scenario_file import first_problem
-from orchestration.request import load_request, request_from_tables
 from orchestration.studies.starts import Starts
-from orchestration.studies.study_file import AxisTable, axis_of
+from orchestration.studies.study_file import AxisTable, axis_of, load, scenario_of
 from orchestration.studies.tuning import Found, Tuning
 
 _FORBID: dict[str, str] = {"extra": "forbid"}
@@ -72,24 +65,11 @@ def load_tuning(path: str | Path) -> Tuning:
     Raises `UsageError` for a file that cannot be read, a key that does not exist (naming those that do) or a value
     that cannot be.
     """
-    path = Path(path)
-    tables = read_toml(path, "tuning file")
-    try:
-        return _tuning(tables, path)
-    except UsageError as error:
-        raise UsageError(f"{path}: {error}") from error
+    return load(Path(path), "tuning file", TuningFile, _tuning)
 
 
-def _tuning(tables: dict[str, Any], path: Path) -> Tuning:
-    try:
-        file = pydantic.TypeAdapter(TuningFile).validate_json(json.dumps(tables, default=str), strict=True)
-    except pydantic.ValidationError as error:
-        raise UsageError(first_problem(error, TuningFile)) from error
-    if file.scenario is not None and file.base:
-        raise UsageError("scenario and base: expected one of them")
-    base = load_request(path.parent / file.scenario) if file.scenario else request_from_tables(file.base, path.parent)
-    if not isinstance(base, Scenario):
-        raise UsageError("base: expected a scenario of the quadrotor, whose starts are known")
+def _tuning(file: TuningFile, path: Path) -> Tuning:
+    base = scenario_of(file, path.parent)
     parameters = tuple(axis_of(table, path.parent) for table in file.parameters)
     for axis in parameters:
         if axis.values is not None or axis.multiplies:

@@ -1,25 +1,20 @@
 """Reads comparison files, and the files of parameters that they name."""
 
 import dataclasses
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-import pydantic
-
 from orchestration.documents import read_toml
 from orchestration.errors import UsageError
 from orchestration.quadrotor.parameters import parameters_in
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.scenario_file import first_problem
 from orchestration.quadrotor.vehicles import Vehicle, load_vehicle
-from orchestration.request import load_request, request_from_tables
 from orchestration.studies.axes import Value
 from orchestration.studies.comparison.design import FMU, Comparison, Condition, Controller, Craft, Front
 from orchestration.studies.starts import Starts
-from orchestration.studies.study_file import AxisTable, axis_of
+from orchestration.studies.study_file import AxisTable, axis_of, load, scenario_of
 from orchestration.studies.together import Key
 
 _FORBID: dict[str, str] = {"extra": "forbid"}
@@ -98,25 +93,12 @@ def load_comparison(path: str | Path) -> Comparison:
     Raises `UsageError` for a file that cannot be read, a key that does not exist (naming those that do) or a value
     that cannot be.
     """
-    path = Path(path)
-    tables = read_toml(path, "comparison file")
-    try:
-        return _comparison(tables, path)
-    except UsageError as error:
-        raise UsageError(f"{path}: {error}") from error
+    return load(Path(path), "comparison file", ComparisonFile, _comparison)
 
 
-def _comparison(tables: dict[str, Any], path: Path) -> Comparison:
-    try:
-        file = pydantic.TypeAdapter(ComparisonFile).validate_json(json.dumps(tables, default=str), strict=True)
-    except pydantic.ValidationError as error:
-        raise UsageError(first_problem(error, ComparisonFile)) from error
-    if file.scenario is not None and file.base:
-        raise UsageError("scenario and base: expected one of them")
+def _comparison(file: ComparisonFile, path: Path) -> Comparison:
     folder = path.parent
-    base = load_request(folder / file.scenario) if file.scenario else request_from_tables(file.base, folder)
-    if not isinstance(base, Scenario):
-        raise UsageError("base: expected a scenario of the quadrotor, whose starts are known")
+    base = scenario_of(file, folder)
     axis = axis_of(file.axis, folder)
     crafts = _crafts(file.vehicles, base, folder)
     keys = [(craft.name, value) for craft in crafts for value in axis.values or ()]
