@@ -17,7 +17,7 @@ from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.quadrotor.wiring import MODELS
 from tests.fmus.archive import without_loader
 from tests.fmus.instance import Instance
-from tests.fmus.making import Making
+from tests.fmus.making import PAIR, Making
 from tests.fmus.process import run, run_script
 
 PLANT, CONTROLLER = "QuadrotorPlant", "UnifiedController"
@@ -207,7 +207,7 @@ def test_an_input_that_is_not_finite_is_refused_between_steps(model: str, name: 
 # -- steps ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", PAIR)
 @pytest.mark.parametrize(
     ("t", "h", "message"),
     [
@@ -226,7 +226,7 @@ def test_a_step_that_leads_nowhere_is_refused(model: str, t: float, h: float, me
     assert not error.divergence
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", PAIR)
 def test_a_step_before_initialisation_is_refused(model: str, make: Make) -> None:
     simulator = make(model)
     error = refusal(lambda: simulator.step(0.0, 0.01))
@@ -260,7 +260,7 @@ def test_a_plant_step_of_too_many_internal_steps_is_refused(values: Values, make
 
 
 @pytest.mark.parametrize("reference", [2**31 - 1, 2**31, 2**32 - 1])
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", PAIR)
 def test_a_value_reference_that_is_none_is_refused_as_it_was_given(
     model: str, reference: int, built: dict[str, Path]
 ) -> None:
@@ -447,7 +447,7 @@ def test_a_failure_does_not_disturb_another_instance(make: Make) -> None:
 
 
 @pytest.mark.parametrize("logger", ["own", "default"])
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", PAIR)
 def test_calls_after_a_failure_do_not_crash_and_reset_revives(
     model: str, logger: str, making: Making, built: dict[str, Path]
 ) -> None:
