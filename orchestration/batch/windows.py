@@ -3,13 +3,12 @@
 from collections import OrderedDict
 from collections.abc import Hashable, Iterator, Sequence
 
+from orchestration.master.position import INSTANTS
 from orchestration.master.schedule import Schedule
 from orchestration.master.streams import Streams
 from orchestration.master.timetable import Timetable
 from orchestration.system.model import System
 
-INSTANTS = 2**13
-"""Of one window"""
 MOST = 2**17
 """Instants of a schedule that is kept"""
 _KEPT = 8
