@@ -118,11 +118,12 @@ def tune(
     in_lanes = engine == "batch"
     asked = dataclasses.replace(load_tuning(tuning), native=in_lanes)
     files, alone = asked.files(), None if in_lanes else engine_named(engine, "batch")
+    command = f"quadcosim tune {tuning} --out {out}" + (f" --engine {engine}" if engine else "")
     with progress_bar("searching") as progress, Pool(files, workers, alone) as pool:
         written = search_all(
             asked, files, Path("results") / asked.name, out,
             lambda systems: pool.fly_all(systems, in_lanes=in_lanes), pool.fly_all,
-            command=f"quadcosim tune {tuning} --out {out}", progress=progress, announce=say,
+            command=command, progress=progress, announce=say,
         )  # fmt: skip
     for path in written:
         print(path)
