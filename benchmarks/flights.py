@@ -21,7 +21,7 @@ CASES = {
 
 def microseconds(case: str, folder: str) -> float:
     """CPU time of one plant step and what belongs to it [µs]."""
-    import orchestration as quadcosim
+    import quadcosim
 
     prepared = vars(sys.modules[quadcosim.run.__module__])["prepared"]  # whatever that module is called
     (plant, controller), timing = CASES[case]

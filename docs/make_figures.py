@@ -6,7 +6,6 @@ import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration import run
 from orchestration.master.position import Position
 from orchestration.master.streams import Streams
 from orchestration.master.timetable import Timetable
@@ -14,6 +13,7 @@ from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.translation import system_of
 from orchestration.results import plots
+from quadcosim import run
 
 FIGURES = Path(__file__).parent / "figures"
 MILLISECONDS = 1e-6

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-import orchestration
+import quadcosim
 from docs.experiments import random_starts
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
@@ -57,7 +57,7 @@ def error_over_time(flight: Decay) -> tuple[Array, Array, Array]:
     own = {"controller.surface_exponent": flight.exponent, "controller.boundary_layer": LAYER}
     timing = {"period": flight.period, "plant_interval": min(flight.period, 0.005)}
     scenario = NATIVE.with_changes(parameters={**calm, **at, **own}, stop_time=flight.stop_time, timing=timing)
-    signals = orchestration.run(scenario).signals
+    signals = quadcosim.run(scenario).signals
     every = slice(None, None, round(flight.period / timing["plant_interval"]))
     error = np.max([np.abs(signals[f"plant.position.{a}"] - signals[f"reference.position.{a}"]) for a in "xyz"], axis=0)
     return signals["time"][every], error[every], signals["controller.energy"][every]

@@ -1,87 +1,12 @@
-"""quadcosim: fly a quadrotor controller FMU and a plant FMU under a realistic digital clock.
-
-import orchestration as quadcosim
-
-result = quadcosim.run(quadcosim.Scenario(timing=quadcosim.Timing(period=0.02)))
-print(result.metrics["ultimate_bound"])
-quadcosim.save_run(result, "results/20ms")
-
-Any FMUs are a `System`: of `load_system`, or made of `Component`, `Connection` and so on; `run` takes it too.
-"""
+"""What flies FMUs under a realistic digital clock. Its Python API is the package `quadcosim`, and is found here too."""
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from orchestration.errors import QuadcosimError, SimulatorError, UsageError
-    from orchestration.quadrotor.scenario import FmuChoice, Record, ReferenceChoice, Scenario
-    from orchestration.quadrotor.scenario_file import load_scenario
-    from orchestration.quadrotor.timing import Timing
-    from orchestration.results.pause import fly_until, resume
-    from orchestration.results.result import Result
-    from orchestration.results.run_directory import load_run, save_run
-    from orchestration.simulation import RunInterrupted, run
-    from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
-    from orchestration.system.paths import changed
-    from orchestration.system.system_file import load_system
-
-_HOMES = {
-    "QuadcosimError": "errors",
-    "SimulatorError": "errors",
-    "UsageError": "errors",
-    "RunInterrupted": "simulation",
-    "run": "simulation",
-    "Result": "results.result",
-    "load_run": "results.run_directory",
-    "save_run": "results.run_directory",
-    "fly_until": "results.pause",
-    "resume": "results.pause",
-    "FmuChoice": "quadrotor.scenario",
-    "Record": "quadrotor.scenario",
-    "ReferenceChoice": "quadrotor.scenario",
-    "Scenario": "quadrotor.scenario",
-    "load_scenario": "quadrotor.scenario_file",
-    "Timing": "quadrotor.timing",
-    "Component": "system.model",
-    "Connection": "system.model",
-    "Criterion": "system.model",
-    "Sampling": "system.model",
-    "Source": "system.model",
-    "System": "system.model",
-    "changed": "system.paths",
-    "load_system": "system.system_file",
-}
-
-__all__ = [
-    "Component",
-    "Connection",
-    "Criterion",
-    "FmuChoice",
-    "QuadcosimError",
-    "Record",
-    "ReferenceChoice",
-    "Result",
-    "RunInterrupted",
-    "Sampling",
-    "Scenario",
-    "SimulatorError",
-    "Source",
-    "System",
-    "Timing",
-    "UsageError",
-    "changed",
-    "fly_until",
-    "load_run",
-    "load_scenario",
-    "load_system",
-    "resume",
-    "run",
-    "save_run",
-]
+from typing import Any
 
 
 def __getattr__(name: str) -> Any:
-    """Load what is asked for and no more: the command line answers `--help` without numpy."""
-    if name not in _HOMES:
+    """What the API has under this name, for programs written when this package was the API."""
+    api = import_module("quadcosim")
+    if name not in api.__all__:
         raise AttributeError(f"module {__name__} has no attribute {name}")
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    return getattr(api, name)

@@ -5,12 +5,11 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import Any
 
-import vehicles
 from orchestration.documents import read_toml
 from orchestration.errors import UsageError
 from orchestration.quadrotor.parameters import Parameter, parameters_in
 
-SHIPPED = Path(vehicles.__file__).parent
+SHIPPED = Path(__file__).parents[1] / "vehicles"
 """Where the vehicles are that go by a name"""
 ENDING = ".toml"
 

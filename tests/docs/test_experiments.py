@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import orchestration as quadcosim
+import quadcosim
 from docs import experiments
 from docs.make_findings import flying_up_to, with_python_inside
 from fmu_kit.trajectory import Trajectory

@@ -18,13 +18,14 @@ import fmpy
 import numpy as np
 import pytest
 
-from orchestration import fmus, run
+from orchestration import fmus
 from orchestration.checks.doctor.machine import this_machine
 from orchestration.checks.doctor.verdict import INSTALL_LIBPYTHON, satisfies
 from orchestration.exchange.ssp import writing
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
+from quadcosim import run
 from tests.fmus.expected import law_command
 
 GUIDES = Path(__file__).parent.parent.parent / "docs" / "guides"

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-import orchestration
+import quadcosim
 from orchestration import fmus
 from orchestration.errors import UsageError
 from orchestration.fmi.reuse import Instances
@@ -29,7 +29,7 @@ def scenario(
 
 
 def flies(period: float, **given: Any) -> bool:
-    metrics = orchestration.run(scenario(period, **given)).metrics
+    metrics = quadcosim.run(scenario(period, **given)).metrics
     return not metrics["diverged"] and metrics["ultimate_bound"] < 0.05
 
 

@@ -7,10 +7,11 @@ from pathlib import Path
 import platformdirs
 import pytest
 
-from orchestration import QuadcosimError, UsageError, fmus
+from orchestration import fmus
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.model import read_model
 from orchestration.quadrotor.wiring import MODELS
+from quadcosim import QuadcosimError, UsageError
 
 
 @pytest.fixture

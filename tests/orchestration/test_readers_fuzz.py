@@ -11,8 +11,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-import orchestration
-from orchestration import Scenario, UsageError, fly_until, load_run, load_scenario, save_run
+import quadcosim
 from orchestration.exchange.ssp import writing
 from orchestration.master.table_file import read_table
 from orchestration.quadrotor.presets import preset_timing
@@ -20,6 +19,7 @@ from orchestration.quadrotor.wiring import REFERENCE
 from orchestration.request import load_request, text_of
 from orchestration.results.pause import read_state
 from orchestration.studies.study_file import load_study
+from quadcosim import Scenario, UsageError, fly_until, load_run, load_scenario, save_run
 
 resource = pytest.importorskip("resource")  # and signals with a time, neither of which Windows has
 
@@ -281,9 +281,7 @@ RUN_FILES = ("events.parquet", "metrics.json", "provenance.json", "scenario.toml
 
 @pytest.fixture(scope="module")
 def run_files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
-    folder = save_run(
-        orchestration.run(Scenario(stop_time=0.02)), tmp_path_factory.mktemp("runs") / "run", figures=False
-    )
+    folder = save_run(quadcosim.run(Scenario(stop_time=0.02)), tmp_path_factory.mktemp("runs") / "run", figures=False)
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 

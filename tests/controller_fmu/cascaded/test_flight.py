@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-import orchestration
+import quadcosim
 from fmu_kit.bundle import Target
-from orchestration import Result, Scenario, Timing, UsageError
 from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor.wiring import MODELS
 from orchestration.studies.linear import HoverLoop, at_hover
 from orchestration.studies.sampled_loop import growth_of_loop
 from orchestration.system.model import System
+from quadcosim import Result, Scenario, Timing, UsageError
 from tests.native import assert_the_same, natives
 
 NAME, PLANT = "CascadedController", "QuadrotorPlant"
@@ -20,7 +20,7 @@ ONE_RATE = {"controller.velocity_ratio": 1, "controller.attitude_ratio": 1}
 
 def flown(controller: Path | str, parameters: dict[str, float], timing: Timing, stop_time: float = 30.0) -> Result:
     scenario = Scenario(stop_time=stop_time, timing=timing).with_changes(parameters=parameters)
-    return orchestration.run(scenario.with_fmus(plant=f"native/{PLANT}", controller=controller))
+    return quadcosim.run(scenario.with_fmus(plant=f"native/{PLANT}", controller=controller))
 
 
 def test_the_papers_flight_settles_at_the_rates_of_px4() -> None:

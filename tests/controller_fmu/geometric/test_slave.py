@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-import orchestration as quadcosim
+import quadcosim
 from controller_fmu.gain_scaling import GainScaling
 from controller_fmu.geometric.law import Evaluation, Gains, Heading, evaluate
 from controller_fmu.geometric.slave import GeometricController

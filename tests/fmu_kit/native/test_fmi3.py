@@ -13,7 +13,7 @@ from fmpy.fmi3 import FMU3Slave
 from fmpy.model_description import ModelDescription
 from fmpy.validation import validate_fmu
 
-import orchestration
+import quadcosim
 from fmu_kit.native import c_code
 from orchestration import fmus
 from orchestration.quadrotor.scenario import Scenario
@@ -114,7 +114,7 @@ def test_fmpy_finds_nothing_and_flies_it_as_it_does_the_other(name: str) -> None
 
 def test_a_flight_is_that_of_fmi_2_to_the_byte() -> None:
     flown = [
-        orchestration.run(
+        quadcosim.run(
             Scenario(stop_time=2.0).with_fmus(
                 plant=f"{folder}/QuadrotorPlant", controller=f"{folder}/UnifiedController"
             )

@@ -12,9 +12,9 @@ from typing import Any
 
 import pytest
 
-import orchestration
-from orchestration import Scenario, Timing, fmus
+from orchestration import fmus
 from orchestration.quadrotor.wiring import MODELS
+from quadcosim import Scenario, Timing, load_run, run, save_run
 from tests.commands import Done, Main
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -71,7 +71,7 @@ def quadcosim(*arguments: str | Path, code: int = 0, environment: dict[str, str]
 
 def flown(**timing: Any) -> dict[str, Any]:
     """The metrics of the same flight by the API."""
-    result = orchestration.run(Scenario(stop_time=0.5, timing=Timing(**timing)))
+    result = run(Scenario(stop_time=0.5, timing=Timing(**timing)))
     return {**result.metrics, "wall_time": None, "engine": result.provenance["engine"]}
 
 
@@ -214,7 +214,7 @@ def test_the_seed_decides_the_random_numbers(main: Main) -> None:
 def test_flags_go_before_the_scenario_file(main: Main, here: Path) -> None:
     (here / "s.toml").write_text("stop_time = 0.2\n[timing]\nperiod = 0.02\ndelay = 0.004\n[plant]\nmass = 1.1\n")
     main("run", "s.toml", "--period", "0.01", "--out", "out", "--no-figures")
-    scenario = orchestration.load_run(here / "out").asked
+    scenario = load_run(here / "out").asked
     assert (scenario.stop_time, scenario.timing) == (0.2, Timing(period=0.01, delay=0.004))
     assert scenario.plant.parameters == {"mass": 1.1}
 
@@ -233,7 +233,7 @@ def test_out_keeps_the_run_and_its_figures(here: Path) -> None:
 
 
 def test_plot_zooms_on_a_window(main: Main, here: Path) -> None:
-    orchestration.save_run(orchestration.run(Scenario(stop_time=0.5)), here / "run")
+    save_run(run(Scenario(stop_time=0.5)), here / "run")
     before = (here / "run" / "commands.png").read_bytes()
     done = quadcosim("plot", "run", "--from", "0.1", "--to", "0.2")
     assert {Path(line).name for line in done.stdout.splitlines()} == {
@@ -268,7 +268,7 @@ def test_ctrl_c_ends_a_flight_with_one_line_and_130(here: Path, out: list[str]) 
     assert lines[0].startswith("quadcosim: interrupted at t = ")
     if out:
         assert lines[0].endswith("; what was recorded is in stopped\n")
-        assert orchestration.load_run(here / "stopped").interrupted_at is not None
+        assert load_run(here / "stopped").interrupted_at is not None
     else:
         assert list(here.iterdir()) == []
 
@@ -309,8 +309,8 @@ def test_a_run_paused_and_resumed_is_the_same_run(main: Main, here: Path) -> Non
     resumed = quadcosim("run", "--resume", "paused", "--json", "--out", "whole", "--no-figures")
     assert json.loads(resumed.stdout)["steps"] == 500
     timing = Timing(measurement_loss=0.1, command_loss=0.1, delay=0.015)
-    expected = orchestration.run(Scenario(stop_time=0.5, timing=timing))
-    whole = orchestration.load_run(here / "whole")
+    expected = run(Scenario(stop_time=0.5, timing=timing))
+    whole = load_run(here / "whole")
     assert whole.rows.tobytes() == expected.rows.tobytes()
     assert whole.events == expected.events
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestration import Scenario
+from quadcosim import Scenario
 from tests.fmus.source_tree import build, copy_sources, replace
 
 

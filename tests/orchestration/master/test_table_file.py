@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from fmu_kit.trajectory import Trajectory
-from orchestration import UsageError
 from orchestration.master.sources import BuiltIn, Table
 from orchestration.master.table_file import read_table
 from orchestration.quadrotor.wiring import REFERENCE
+from quadcosim import UsageError
 
 HEADER = ",".join(("time", *REFERENCE))
 STOP = 2.0

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-import orchestration
-from orchestration import Result
+import quadcosim
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.scenario_file import scenario_from_tables
+from quadcosim import Result
 
 TABLE = Path(__file__).parents[2] / "data" / "quadrotor_signals.json"
 FUNCTIONS: tuple[Callable[[float], float], ...] = (
@@ -44,7 +44,7 @@ def scenario_of(tables: dict[str, Any]) -> Scenario:
 
 def flown(tables: dict[str, Any]) -> Result:
     """Its flight."""
-    return orchestration.run(scenario_of(tables))
+    return quadcosim.run(scenario_of(tables))
 
 
 def entry(result: Result) -> dict[str, Any]:

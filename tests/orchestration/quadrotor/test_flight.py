@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-import orchestration
+import quadcosim
 from fmu_kit.trajectory import Trajectory
-from orchestration import Result, RunInterrupted, Scenario, SimulatorError, Timing, UsageError
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.quadrotor.measures import desired
 from orchestration.quadrotor.scenario import FmuChoice, Record, ReferenceChoice
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE, REFERENCE
+from quadcosim import Result, RunInterrupted, Scenario, SimulatorError, Timing, UsageError
 
 EVERYTHING: dict[str, Any] = {
     "delay": 0.003,
@@ -37,7 +37,7 @@ EVERYTHING: dict[str, Any] = {
 
 def fly(stop_time: float, parameters: Mapping[str, float | str] | None = None, seed: int = 0, **timing: Any) -> Result:
     scenario = Scenario(stop_time=stop_time, seed=seed, timing=Timing(**timing))
-    return orchestration.run(scenario.with_changes(parameters=parameters))
+    return quadcosim.run(scenario.with_changes(parameters=parameters))
 
 
 @cache
@@ -151,10 +151,10 @@ def test_the_paper_flight_settles() -> None:
 
 HASH = """
 import hashlib, json, sys
-import orchestration
-from orchestration import Scenario, Timing
+import quadcosim
+from quadcosim import Scenario, Timing
 scenario = Scenario(stop_time=1.0, seed=9, timing=Timing(**json.loads(sys.argv[1])))
-result = orchestration.run(scenario)
+result = quadcosim.run(scenario)
 print(hashlib.sha256(result.rows.tobytes() + repr(result.events).encode()).hexdigest())
 """
 
@@ -190,7 +190,7 @@ def write_reference(path: Path, times: np.ndarray, trajectory: Trajectory) -> Pa
 
 def test_a_table_of_the_built_in_trajectory_flies_like_it(tmp_path: Path) -> None:
     table = write_reference(tmp_path / "reference.csv", np.arange(0, 201) / 100, Trajectory())
-    flight = orchestration.run(Scenario(stop_time=2.0, reference=ReferenceChoice(file=table)))
+    flight = quadcosim.run(Scenario(stop_time=2.0, reference=ReferenceChoice(file=table)))
     for name in (*MEASUREMENT, *COMMAND):
         assert flight.signals[f"plant.{name}"] == pytest.approx(plain().signals[f"plant.{name}"], rel=1e-9, abs=1e-9)
     assert desired(flight.signals) == pytest.approx(desired(plain().signals), abs=1e-5)  # linear between rows
@@ -208,7 +208,7 @@ def test_the_true_error_is_that_to_the_trajectory_of_the_parameters() -> None:
 def test_a_table_that_is_too_short_is_refused(tmp_path: Path) -> None:
     table = write_reference(tmp_path / "short.csv", np.array([0.0, 1.0]), Trajectory())
     with pytest.raises(UsageError, match="expected 0 to stop_time = 2"):
-        orchestration.run(Scenario(stop_time=2.0, reference=ReferenceChoice(file=table)))
+        quadcosim.run(Scenario(stop_time=2.0, reference=ReferenceChoice(file=table)))
 
 
 # -- what its metrics rest on -----------------------------------------------------------------------------
@@ -295,7 +295,7 @@ def test_limits_of_the_plant_are_counted_as_saturation() -> None:
 
 def test_what_is_recorded_can_be_chosen() -> None:
     record = Record(plant=("tilt",), controller=("energy",))
-    flight = orchestration.run(Scenario(stop_time=0.05, record=record))
+    flight = quadcosim.run(Scenario(stop_time=0.05, record=record))
     exchanged = [f"plant.{name}" for name in (*COMMAND, *MEASUREMENT)]
     commands = [f"controller.{name}" for name in COMMAND]
     judged = ["controller.energy", "controller.attitude_error.w"]  # the latter only because objectives name it
@@ -349,9 +349,9 @@ def test_a_value_below_what_the_fmu_declares_is_refused_before_it_is_loaded(side
 
 def test_a_record_of_what_is_no_variable_is_refused() -> None:
     with pytest.raises(UsageError, match="did you mean tilt"):
-        orchestration.run(Scenario(stop_time=0.05, record=Record(plant=("tild",))))
+        quadcosim.run(Scenario(stop_time=0.05, record=Record(plant=("tild",))))
     with pytest.raises(UsageError, match=r"^record.plant: mass is a parameter; expected an output or a local$"):
-        orchestration.run(Scenario(stop_time=0.05, record=Record(plant=("mass",))))
+        quadcosim.run(Scenario(stop_time=0.05, record=Record(plant=("mass",))))
 
 
 def test_an_unknown_measurement_is_refused() -> None:
@@ -365,7 +365,7 @@ def test_an_fmu_may_be_given_by_its_path(built: dict[str, Path]) -> None:
         plant=FmuChoice(fmu=str(built["QuadrotorPlant"])),
         controller=FmuChoice(fmu=str(built["UnifiedController"])),
     )
-    assert same_bits(orchestration.run(scenario), plain())
+    assert same_bits(quadcosim.run(scenario), plain())
 
 
 def test_the_provenance_has_versions_and_guids(built: dict[str, Path]) -> None:
@@ -391,19 +391,19 @@ def test_the_fmus_have_nothing_to_warn_of() -> None:
 
 def test_nominal_model_that_is_not_the_plant_is_warned_of_unless_it_is_meant() -> None:
     one_side = Scenario(stop_time=0.02).with_changes(parameters={"plant.mass": 1.2, "controller.inertia.xy": 0.1})
-    (warning,) = orchestration.run(one_side).warnings
+    (warning,) = quadcosim.run(one_side).warnings
     assert "controller.mass = 1 where plant.mass = 1.2" in warning
     assert "controller.inertia.xy = 0.1 where plant.inertia.xy = 0," not in warning
     assert "controller.inertia.xy = 0.1 where plant.inertia.xy = 0." in warning
     assert "inertia.xx" not in warning
-    assert orchestration.run(one_side.with_changes(model_mismatch=True)).warnings == ()
+    assert quadcosim.run(one_side.with_changes(model_mismatch=True)).warnings == ()
     both = one_side.with_changes(parameters={"controller.mass": 1.2, "plant.inertia.xy": 0.1})
-    assert orchestration.run(both).warnings == ()
+    assert quadcosim.run(both).warnings == ()
 
 
 def test_progress_and_announcements_are_heard() -> None:
     heard: list[float] = []
-    orchestration.run(Scenario(stop_time=1.0), progress=heard.append)
+    quadcosim.run(Scenario(stop_time=1.0), progress=heard.append)
     assert heard == sorted(heard)
     assert heard[-1] == 1.0
 
@@ -425,7 +425,7 @@ def test_ctrl_c_is_not_blamed_on_an_fmu_that_is_python() -> None:
     sys.setprofile(hear)
     try:
         with pytest.raises(RunInterrupted, match=r"^at t = 0\.\d+ s of 1 s$") as stop:
-            orchestration.run(Scenario(stop_time=1.0))
+            quadcosim.run(Scenario(stop_time=1.0))
     finally:
         sys.setprofile(None)
     assert stop.value.result.interrupted_at == stop.value.result.rows[-1, 0]
@@ -435,7 +435,7 @@ def test_ctrl_c_is_not_blamed_on_an_fmu_that_is_python() -> None:
 def test_ctrl_c_before_the_first_instant_ends_the_flight_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Fmi2Instance, "enter_initialization", lambda *_: signal.raise_signal(signal.SIGINT))
     with pytest.raises(KeyboardInterrupt):
-        orchestration.run(Scenario(stop_time=1.0))
+        quadcosim.run(Scenario(stop_time=1.0))
 
 
 def test_an_error_after_ctrl_c_is_ctrl_c(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -445,7 +445,7 @@ def test_an_error_after_ctrl_c_is_ctrl_c(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(Fmi2Instance, "step", fail)
     with pytest.raises(KeyboardInterrupt):
-        orchestration.run(Scenario(stop_time=1.0), engine="python")
+        quadcosim.run(Scenario(stop_time=1.0), engine="python")
 
 
 def test_the_second_ctrl_c_does_not_wait(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -456,4 +456,4 @@ def test_the_second_ctrl_c_does_not_wait(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(Fmi2Instance, "step", hang)
     with pytest.raises(KeyboardInterrupt):
-        orchestration.run(Scenario(stop_time=1.0), engine="python")
+        quadcosim.run(Scenario(stop_time=1.0), engine="python")

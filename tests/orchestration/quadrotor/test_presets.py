@@ -2,14 +2,14 @@
 
 import pytest
 
-import orchestration
-from orchestration import Scenario, Timing, UsageError
+import quadcosim
 from orchestration.quadrotor.presets import PRESETS, preset_timing
+from quadcosim import Scenario, Timing, UsageError
 
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_every_preset_flies(name: str) -> None:
-    result = orchestration.run(Scenario(stop_time=0.1, timing=Timing(**preset_timing(name))))
+    result = quadcosim.run(Scenario(stop_time=0.1, timing=Timing(**preset_timing(name))))
     assert result.metrics["diverged"] is False
 
 

@@ -8,10 +8,10 @@ import tomli_w
 from hypothesis import given
 from hypothesis import strategies as st
 
-import orchestration
-from orchestration import FmuChoice, Record, ReferenceChoice, Scenario, Timing, UsageError, load_scenario
+import quadcosim
 from orchestration.documents import tomllib
 from orchestration.quadrotor.timing import TIMING_KEYS
+from quadcosim import FmuChoice, Record, ReferenceChoice, Scenario, Timing, UsageError, load_scenario
 from tests.orchestration.quadrotor.strategies import timings
 
 
@@ -286,13 +286,13 @@ def test_a_wrong_fmu_name_is_refused_with_those_there_are(file: Path) -> None:
         with pytest.raises(
             UsageError, match=r"expected UnifiedController or .* or QuadrotorPlant, or the path of an .fmu"
         ):
-            orchestration.run(scenario)
+            quadcosim.run(scenario)
 
 
 def test_a_wrong_parameter_name_is_refused_with_the_closest(file: Path) -> None:
     scenario = loaded(file, "[controller.gain]\ntheeta = 3.0")
     with pytest.raises(UsageError, match=r"controller.gain.theeta: .* did you mean gain.theta or "):
-        orchestration.run(scenario)
+        quadcosim.run(scenario)
 
 
 @pytest.mark.parametrize(("name", "flag"), [("sample_period", "--period"), ("sample_offset", "--offset")])

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-import orchestration
+import quadcosim
 from fmu_kit.bundle import Target
-from orchestration import Result
 from orchestration.quadrotor.wiring import MODELS
+from quadcosim import Result
 from tests.fmus.making import PAIR
 from tests.native import assert_near, assert_the_same, natives
 from tests.orchestration.quadrotor.signals_table import TABLE, entry, fingerprint, flights, flown, scenario_of
@@ -56,7 +56,7 @@ def on_libm(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 def flown_by(fmus: Mapping[str, str | Path], name: str) -> Result:
     """The flight of a scenario of the table, by these FMUs."""
     scenario = scenario_of(FLIGHTS[name]["scenario"])
-    return orchestration.run(scenario.with_fmus(plant=fmus["QuadrotorPlant"], controller=fmus["UnifiedController"]))
+    return quadcosim.run(scenario.with_fmus(plant=fmus["QuadrotorPlant"], controller=fmus["UnifiedController"]))
 
 
 @pytest.mark.parametrize("name", FLIGHTS)
@@ -74,7 +74,7 @@ def test_motors_written_out_as_c_are_those_in_python(on_libm: dict[str, Path]) -
     motors |= {"time_constant": {"up": 0.0125, "down": 0.025}}
     scenario = scenario_of({"stop_time": 1.0, "plant": {"motor": motors}})
     flown = [
-        orchestration.run(scenario.with_fmus(plant=fmus["QuadrotorPlant"], controller=fmus["UnifiedController"]))
+        quadcosim.run(scenario.with_fmus(plant=fmus["QuadrotorPlant"], controller=fmus["UnifiedController"]))
         for fmus in (on_libm, {model: model for model in PAIR})
     ]
     assert_the_same(*flown)
@@ -92,8 +92,7 @@ def test_redesigns_written_out_as_c_are_those_in_python(
     timing = {"period": 0.04, "delay": 0.05, "jitter": 0.01, "measurement_loss": 0.05, "plant_interval": 0.005}
     scenario = scenario_of({"stop_time": 0.6, "timing": timing, "controller": redesign})
     flown = [
-        orchestration.run(scenario.with_fmus(plant="native/QuadrotorPlant", controller=fmu))
-        for fmu in (on_libm[law], law)
+        quadcosim.run(scenario.with_fmus(plant="native/QuadrotorPlant", controller=fmu)) for fmu in (on_libm[law], law)
     ]
     assert_the_same(*flown)
     assert flown[0].divergence is None

@@ -12,7 +12,6 @@ import typer.main
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestration import Scenario
 from orchestration.command import cli
 from orchestration.command.flags import FlightFlags
 from orchestration.errors import UsageError
@@ -22,6 +21,7 @@ from orchestration.master.streams import Streams
 from orchestration.quadrotor.timing import TIMING_KEYS, Timing
 from orchestration.quadrotor.translation import quadrotor
 from orchestration.system.times import Grid, nanoseconds
+from quadcosim import Scenario
 from tests.orchestration.quadrotor import stubs
 from tests.orchestration.quadrotor.strategies import Case, cases
 from tests.orchestration.quadrotor.stubs import Instant, Sample

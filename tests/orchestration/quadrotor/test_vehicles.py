@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-import orchestration
-from orchestration import Scenario, Timing, UsageError, load_scenario
+import quadcosim
 from orchestration.command.cli import main
 from orchestration.command.flags import FlightFlags, request_from
 from orchestration.quadrotor.translation import warnings
 from orchestration.quadrotor.vehicles import Vehicle, load_vehicle, names
 from orchestration.quadrotor.wiring import RIGID_BODY
+from quadcosim import Scenario, Timing, UsageError, load_scenario
 
 HEAVY = """
 [plant]
@@ -97,7 +97,7 @@ def ideal(vehicle: Vehicle) -> Vehicle:
 def path_of(vehicle: Vehicle, period: float) -> Any:
     """P every millisecond for a second."""
     scenario = Scenario(stop_time=1.0, timing=Timing(period=period, plant_interval=period), vehicle=ideal(vehicle))
-    flown = orchestration.run(scenario.with_fmus(plant="native/QuadrotorPlant", controller="native/UnifiedController"))
+    flown = quadcosim.run(scenario.with_fmus(plant="native/QuadrotorPlant", controller="native/UnifiedController"))
     every = round(1e-3 / period)
     return np.column_stack([flown.signals[f"plant.position.{axis}"] for axis in "xyz"])[::every]
 

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import orchestration
-from orchestration import ReferenceChoice, Scenario, Timing, UsageError
+import quadcosim
 from orchestration.quadrotor.wiring import REFERENCE
 from orchestration.results.pause import fly_until, resume
 from orchestration.results.result import Result
+from quadcosim import ReferenceChoice, Scenario, Timing, UsageError
 
 EVERYTHING = Timing(
     period=0.01,
@@ -54,7 +54,7 @@ def test_a_resumed_run_has_the_bits_of_an_uninterrupted_one(timing: Timing, at: 
     scenario = Scenario(stop_time=0.4, timing=timing, seed=3).with_changes(parameters=LAGGING)
     assert fly_until(scenario, at, tmp_path / "paused") is None
     resumed = resume(tmp_path / "paused")
-    whole = orchestration.run(scenario)
+    whole = quadcosim.run(scenario)
     assert equal(resumed, whole)
     assert resumed.metrics == whole.metrics
 
@@ -64,14 +64,14 @@ def test_it_goes_on_in_another_process(tmp_path: Path) -> None:
     fly_until(scenario, 0.15, tmp_path / "paused")
     code = "import sys, orchestration as q; q.save_run(q.resume(sys.argv[1]), sys.argv[2], figures=False)"
     subprocess.run([sys.executable, "-c", code, tmp_path / "paused", tmp_path / "done"], check=True)
-    assert equal(orchestration.load_run(tmp_path / "done"), orchestration.run(scenario))
+    assert equal(quadcosim.load_run(tmp_path / "done"), quadcosim.run(scenario))
 
 
 def test_a_run_that_diverges_before_the_pause_is_over(tmp_path: Path) -> None:
     result = fly_until(Scenario(stop_time=5.0, timing=Timing(period=0.3)), 4.0, tmp_path / "paused")
     assert result is not None
     assert result.metrics["diverged"] is True
-    assert orchestration.load_run(tmp_path / "paused").rows.tobytes() == result.rows.tobytes()
+    assert quadcosim.load_run(tmp_path / "paused").rows.tobytes() == result.rows.tobytes()
 
 
 def test_other_fmus_than_those_of_the_pause_are_refused(built: dict[str, Path], tmp_path: Path) -> None:
@@ -109,7 +109,7 @@ def test_a_pause_replaces_nothing(paused: bool, tmp_path: Path) -> None:
     if paused:
         fly_until(scenario, 0.05, tmp_path / "there")
     else:
-        orchestration.save_run(orchestration.run(scenario), tmp_path / "there", figures=False)
+        quadcosim.save_run(quadcosim.run(scenario), tmp_path / "there", figures=False)
     before = contents(tmp_path / "there")
     with pytest.raises(UsageError, match=r"there: expected a new or empty directory$"):
         fly_until(scenario, 0.05, tmp_path / "there")
@@ -120,10 +120,10 @@ def test_a_paused_run_is_replaced_by_its_own_end_only(tmp_path: Path) -> None:
     fly_until(Scenario(stop_time=0.1), 0.05, tmp_path / "paused")
     before = contents(tmp_path / "paused")
     with pytest.raises(UsageError, match="expected a new or empty directory, or that of an earlier run"):
-        orchestration.save_run(orchestration.run(Scenario(stop_time=0.1)), tmp_path / "paused")
+        quadcosim.save_run(quadcosim.run(Scenario(stop_time=0.1)), tmp_path / "paused")
     assert contents(tmp_path / "paused") == before
     resumed = resume(tmp_path / "paused", tmp_path / "paused", figures=False)
-    assert equal(orchestration.load_run(tmp_path / "paused"), resumed)
+    assert equal(quadcosim.load_run(tmp_path / "paused"), resumed)
 
 
 @pytest.mark.parametrize("at", [-0.1, 0.1, 1.0])

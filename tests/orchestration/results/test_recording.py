@@ -6,12 +6,12 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-import orchestration
-from orchestration import Result, Scenario, Timing, load_run
+import quadcosim
 from orchestration.master.recording import InMemory, thinned
 from orchestration.results import plots
 from orchestration.results.pause import fly_until, resume
 from orchestration.results.run_directory import keep_flight
+from quadcosim import Result, Scenario, Timing, load_run
 
 JACOBI = Timing(order="jacobi", delay=0.003, jitter=0.004, command_loss=0.3, hold="first")
 SCENARIO = Scenario(stop_time=0.5, timing=JACOBI, seed=5)
@@ -19,7 +19,7 @@ SCENARIO = Scenario(stop_time=0.5, timing=JACOBI, seed=5)
 
 @pytest.fixture
 def whole() -> Result:
-    return orchestration.run(SCENARIO)
+    return quadcosim.run(SCENARIO)
 
 
 @pytest.fixture(autouse=True)
@@ -39,7 +39,7 @@ def expect_equal(found: Result, whole: Result) -> None:
 
 
 def test_what_is_on_disk_is_what_was_flown_chunk_by_chunk(whole: Result, tmp_path: Path) -> None:
-    keep_flight(tmp_path / "run", lambda to: orchestration.run(SCENARIO, recorder=to), figures=False)
+    keep_flight(tmp_path / "run", lambda to: quadcosim.run(SCENARIO, recorder=to), figures=False)
     groups = pq.ParquetFile(tmp_path / "run" / "signals.parquet").metadata
     sizes = [groups.row_group(i).num_rows for i in range(groups.num_row_groups)]
     assert sizes[:-1] == [64] * (len(whole.rows) // 64)
@@ -52,7 +52,7 @@ def test_what_is_on_disk_is_what_was_flown_chunk_by_chunk(whole: Result, tmp_pat
 def test_many_events_make_a_chunk_whole_too(whole: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("orchestration.master.master.ROWS", 10**6)
     monkeypatch.setattr("orchestration.master.master.EVENTS", 20)
-    keep_flight(tmp_path / "run", lambda to: orchestration.run(SCENARIO, recorder=to), figures=False)
+    keep_flight(tmp_path / "run", lambda to: quadcosim.run(SCENARIO, recorder=to), figures=False)
     found = load_run(tmp_path / "run")
     sizes = [len(chunk.events) for chunk in found.recording.chunks()]
     assert len(sizes) > 5
@@ -69,7 +69,7 @@ def test_rows_are_on_disk_before_the_flight_is_over(tmp_path: Path) -> None:
         sizes.append((hidden / "signals.parquet").stat().st_size)
 
     scenario = SCENARIO.with_changes(stop_time=1.5)
-    keep_flight(tmp_path / "run", lambda to: orchestration.run(scenario, recorder=to, progress=look), figures=False)
+    keep_flight(tmp_path / "run", lambda to: quadcosim.run(scenario, recorder=to, progress=look), figures=False)
     assert sizes == sorted(sizes)
     assert len(set(sizes[:-1])) > 1
 
@@ -83,13 +83,13 @@ def test_a_pause_between_chunks_changes_nothing(at: float, whole: Result, tmp_pa
 
 def test_a_diverged_run_is_the_same_in_chunks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scenario = Scenario(stop_time=3.0, timing=Timing(period=0.3, order="jacobi"))
-    chunks = orchestration.run(scenario)
+    chunks = quadcosim.run(scenario)
     monkeypatch.setattr("orchestration.master.master.ROWS", 10**6)
-    expect_equal(chunks, orchestration.run(scenario))
+    expect_equal(chunks, quadcosim.run(scenario))
 
 
 def test_a_long_run_is_drawn_with_fewer_rows_but_all_of_the_window(tmp_path: Path) -> None:
-    result = orchestration.run(SCENARIO)
+    result = quadcosim.run(SCENARIO)
     few = thinned(result.recording, {"time", "plant.thrust"}, (0.1, 0.2), 100)
     t = np.concatenate([chunk.rows[:, 0] for chunk in few.chunks()])
     inside = (t >= 0.1) & (t <= 0.2)
@@ -103,4 +103,4 @@ def test_a_long_run_is_drawn_with_fewer_rows_but_all_of_the_window(tmp_path: Pat
 
 def test_figures_of_a_long_run_are_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plots, "MOST", 100)
-    assert len(plots.draw(orchestration.run(SCENARIO), tmp_path)) == len(plots.FIGURES)
+    assert len(plots.draw(quadcosim.run(SCENARIO), tmp_path)) == len(plots.FIGURES)

@@ -16,8 +16,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-import orchestration
-from orchestration import (
+import quadcosim
+from orchestration.master.recording import Chunk, Events, InMemory, Recorder
+from orchestration.results import plots
+from orchestration.results.run_directory import keep_flight
+from quadcosim import (  # fmt: skip
     QuadcosimError,
     Result,
     RunInterrupted,
@@ -26,10 +29,7 @@ from orchestration import (
     UsageError,
     load_run,
     save_run,
-)  # fmt: skip
-from orchestration.master.recording import Chunk, Events, InMemory, Recorder
-from orchestration.results import plots
-from orchestration.results.run_directory import keep_flight
+)
 
 FILES = {"signals.parquet", "events.parquet", "metrics.json", "scenario.toml"}
 FIGURES = {"path.png", "errors.png", "commands.png", "energy.png"}
@@ -38,7 +38,7 @@ FIGURES = {"path.png", "errors.png", "commands.png", "energy.png"}
 @pytest.fixture(scope="module")
 def result() -> Result:
     timing = Timing(delay=0.003, measurement_loss=0.2, command_loss=0.2, noise={"position": 0.01})
-    return orchestration.run(Scenario(stop_time=0.3, timing=timing).with_changes(parameters={"plant.mass": 1.1}))
+    return quadcosim.run(Scenario(stop_time=0.3, timing=timing).with_changes(parameters={"plant.mass": 1.1}))
 
 
 @pytest.fixture
@@ -83,7 +83,7 @@ def test_a_run_read_back_is_the_run_written(result: Result, folder: Path) -> Non
 
 
 def test_a_diverged_run_is_read_back_with_its_reason(folder: Path) -> None:
-    diverged = orchestration.run(Scenario(stop_time=2.0, timing=Timing(period=0.3)))
+    diverged = quadcosim.run(Scenario(stop_time=2.0, timing=Timing(period=0.3)))
     again = load_run(save_run(diverged, folder))
     assert again.divergence == diverged.divergence
     assert again.metrics["diverged"] is True
@@ -114,8 +114,8 @@ def test_metrics_are_standard_json(result: Result, folder: Path) -> None:
 
 
 def test_the_scenario_in_the_directory_flies_to_the_same_bits(result: Result, folder: Path) -> None:
-    scenario = orchestration.load_scenario(save_run(result, folder, figures=False) / "scenario.toml")
-    assert orchestration.run(scenario).rows.tobytes() == result.rows.tobytes()
+    scenario = quadcosim.load_scenario(save_run(result, folder, figures=False) / "scenario.toml")
+    assert quadcosim.run(scenario).rows.tobytes() == result.rows.tobytes()
 
 
 def test_figures_are_pictures_with_something_on_them(result: Result, tmp_path: Path) -> None:
@@ -136,12 +136,12 @@ def test_the_commands_are_zoomed_on_the_window(result: Result, window: tuple[flo
 
 
 def test_a_run_without_samples_can_be_drawn(tmp_path: Path) -> None:
-    without = orchestration.run(Scenario(stop_time=0.05, timing=Timing(offset=1.0)))
+    without = quadcosim.run(Scenario(stop_time=0.05, timing=Timing(offset=1.0)))
     assert {path.name for path in plots.draw(without, tmp_path)} == FIGURES - {"energy.png"}
 
 
 def test_no_energy_is_drawn_of_a_controller_that_has_none(tmp_path: Path) -> None:
-    flown = orchestration.run(Scenario(stop_time=0.1))
+    flown = quadcosim.run(Scenario(stop_time=0.1))
     place = flown.columns.index("controller.energy")
     columns, without = (*flown.columns[:place], *flown.columns[place + 1 :]), InMemory()
     without.begin(columns)
@@ -155,7 +155,7 @@ def test_no_energy_is_drawn_of_a_controller_that_has_none(tmp_path: Path) -> Non
 
 def test_an_earlier_run_is_replaced_whole(result: Result, folder: Path) -> None:
     save_run(result, folder)
-    other = orchestration.run(Scenario(stop_time=0.1))
+    other = quadcosim.run(Scenario(stop_time=0.1))
     save_run(other, folder, figures=False)
     assert load_run(folder).rows.tobytes() == other.rows.tobytes()
     assert not FIGURES & {path.name for path in folder.iterdir()}
@@ -229,14 +229,14 @@ def test_a_failure_while_writing_leaves_the_earlier_run(
 
     monkeypatch.setattr(plots, "draw", interrupt)
     with pytest.raises(KeyboardInterrupt):
-        save_run(orchestration.run(Scenario(stop_time=0.05)), folder)
+        save_run(quadcosim.run(Scenario(stop_time=0.05)), folder)
     assert contents(folder) == before
     assert list(folder.parent.iterdir()) == [folder]
 
 
 WRITER = """
 import sys, time
-import orchestration
+import quadcosim
 from orchestration.results import plots
 
 def wait(*_):
@@ -244,7 +244,7 @@ def wait(*_):
     time.sleep(60)
 
 plots.draw = wait
-orchestration.save_run(orchestration.run(orchestration.Scenario(stop_time=0.05)), sys.argv[1])
+quadcosim.save_run(quadcosim.run(quadcosim.Scenario(stop_time=0.05)), sys.argv[1])
 """
 
 
@@ -300,7 +300,7 @@ def test_a_process_killed_between_two_renames_leaves_one_that_the_next_finishes(
     renames: int, result: Result, folder: Path
 ) -> None:
     new = save_run(result, folder.with_name("new"), figures=False)
-    old = save_run(orchestration.run(Scenario(stop_time=0.1)), folder.with_name("old"), figures=False)
+    old = save_run(quadcosim.run(Scenario(stop_time=0.1)), folder.with_name("old"), figures=False)
     new.rename(folder.parent / ".run.0123456789ab.new" if renames == 1 else folder)
     old.rename(folder.parent / ".run.0123456789ab.old")
     save_run(result, folder.with_name("other"), figures=False)
@@ -341,7 +341,7 @@ def test_a_flight_whose_place_is_taken_meanwhile_is_kept_beside(result: Result, 
         folder.mkdir()
         (folder / "thesis.tex").write_text("years of work")
         folder.with_name("run.1").mkdir()
-        return orchestration.run(result.asked, recorder=recorder)
+        return quadcosim.run(result.asked, recorder=recorder)
 
     with pytest.raises(QuadcosimError, match=r"expected a new .*; what was written is in .*run\.2$"):
         keep_flight(folder, fly, figures=False)
@@ -358,7 +358,7 @@ def test_a_flight_that_cannot_be_written_whole_is_kept_beside(
 
     monkeypatch.setattr(plots, "draw", fail)
     with pytest.raises(QuadcosimError, match=r"no space left on device; what was written is in .*run\.1$"):
-        keep_flight(folder, lambda to: orchestration.run(result.asked, recorder=to))
+        keep_flight(folder, lambda to: quadcosim.run(result.asked, recorder=to))
     assert load_run(folder.with_name("run.1")).rows.tobytes() == result.rows.tobytes()
 
 
@@ -375,13 +375,13 @@ def test_what_was_recorded_before_an_interruption_is_kept_but_replaces_nothing(
 
     with pytest.raises(RunInterrupted, match=r"^at t = [0-2]\.\d+ s of 3 s; what was recorded is in ") as stop:
         keep_flight(
-            folder, lambda to: orchestration.run(Scenario(stop_time=3.0), recorder=to, progress=progress), figures=False
+            folder, lambda to: quadcosim.run(Scenario(stop_time=3.0), recorder=to, progress=progress), figures=False
         )
     assert str(stop.value).endswith(str(place))
     kept = load_run(place)
     assert kept.interrupted_at == kept.signals["time"][-1] == kept.metrics["horizon"]
     assert max(event.time for event in kept.events) <= kept.interrupted_at * 1e9
-    whole = orchestration.run(Scenario(stop_time=3.0))
+    whole = quadcosim.run(Scenario(stop_time=3.0))
     assert kept.rows.tobytes() == whole.rows[: len(kept.rows)].tobytes()
     if there:
         assert load_run(folder).interrupted_at is None

@@ -12,7 +12,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from orchestration import QuadcosimError, Scenario, Timing
 from orchestration.quadrotor.translation import paths_of, quadrotor, system_of
 from orchestration.studies.axes import Axis
 from orchestration.studies.files import Files, files_of
@@ -21,6 +20,7 @@ from orchestration.studies.study import Study
 from orchestration.studies.sweep import store_path, sweep
 from orchestration.system.model import System
 from orchestration.system.paths import value_at
+from quadcosim import QuadcosimError, Scenario, Timing
 from tests.commands import Done
 
 SCRIPT = shutil.which("quadcosim", path=str(Path(sys.executable).parent))

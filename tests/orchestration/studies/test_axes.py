@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestration import UsageError
 from orchestration.studies.axes import MOST_POINTS, Axis, Method, Points, span, unit_points
+from quadcosim import UsageError
 
 LISTED = Axis(name="period", targets=("timing.period",), values=(0.02, 0.01))
 ORDERS = Axis(name="order", targets=("timing.order",), values=("gauss-seidel", "jacobi", "gauss-seidel"))

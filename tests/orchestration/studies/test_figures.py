@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestration import UsageError
 from orchestration.studies import figures
 from orchestration.studies.axes import Axis
 from orchestration.studies.drawing import draw_limit, draw_study
@@ -18,6 +17,7 @@ from orchestration.studies.sensitivity import Index
 from orchestration.studies.store import open_for_writing
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import store_path
+from quadcosim import UsageError
 from tests.orchestration.studies.common import OBJECTIVES, axis, row, short, study
 
 PERIODS = axis("timing.period", 0.01, 0.02, 0.03, 0.04)

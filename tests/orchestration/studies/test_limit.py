@@ -14,8 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import orchestration
-from orchestration import Result, Scenario, Timing, UsageError
+import quadcosim
 from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor.scenario import FmuChoice, Record
 from orchestration.quadrotor.translation import system_of
@@ -33,6 +32,7 @@ from orchestration.studies.search import first_failure
 from orchestration.studies.trials import is_good
 from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS
+from quadcosim import Result, Scenario, Timing, UsageError
 from tests.fmus import source_tree
 from tests.orchestration.studies.common import at, one_line, short
 
@@ -597,7 +597,7 @@ def test_find_flies_the_scenario_and_its_result_is_json() -> None:
     }  # fmt: skip
     limit = found.large_signal_limit
     assert limit is not None
-    assert is_good(orchestration.run(base.with_changes(timing={"period": limit})).metrics)
+    assert is_good(quadcosim.run(base.with_changes(timing={"period": limit})).metrics)
     assert fields["local_limit"] == pytest.approx(0.080, abs=0.0005)
     assert (fields["of"], fields["tolerance"], fields["confidence"]) == ("period", 0.02, None)
     assert (fields["horizon"], fields["scan"], fields["continuous"]) == (2.0, 0.005, None)

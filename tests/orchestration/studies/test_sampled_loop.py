@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestration import Scenario, Timing, UsageError, fmus
+from orchestration import fmus
 from orchestration.fmi.reuse import Instances
 from orchestration.studies import local
 from orchestration.studies.linear import HoverLoop, at_hover
@@ -20,6 +20,7 @@ from orchestration.studies.sampled_loop import growth_of_loop
 from orchestration.studies.twins import Growth, growth_of
 from orchestration.system.model import Component, Connection, Sampling, System
 from orchestration.system.paths import changed
+from quadcosim import Scenario, Timing, UsageError
 from tests.examples.common import example
 from tests.orchestration.fmi.small import needs_compiler, small
 from tests.orchestration.studies.common import one_line

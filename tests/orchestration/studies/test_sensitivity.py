@@ -7,13 +7,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestration import UsageError
 from orchestration.simulator import Floats
 from orchestration.studies import sensitivity
 from orchestration.studies.axes import Axis
 from orchestration.studies.drawing import draw_study, indices_of, numbers
 from orchestration.studies.sensitivity import Index, SensitivityMethod, analyse, shares
 from orchestration.studies.study import Study
+from quadcosim import UsageError
 from tests.orchestration.studies.common import axis, short, study, swept
 
 AXES = ["a", "b", "c"]

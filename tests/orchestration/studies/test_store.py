@@ -18,7 +18,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestration import QuadcosimError, Scenario, UsageError, fmus
+from orchestration import fmus
 from orchestration.quadrotor.scenario import FmuChoice, ReferenceChoice
 from orchestration.quadrotor.translation import system_of
 from orchestration.quadrotor.wiring import DEFAULT_PLANT
@@ -26,6 +26,7 @@ from orchestration.studies import store as stores
 from orchestration.studies.files import Files
 from orchestration.studies.identity import flight_sources, run_key, sources_hash, versions
 from orchestration.studies.store import TEXTS, Place, Row, open_for_reading, open_for_writing
+from quadcosim import QuadcosimError, Scenario, UsageError
 from tests.orchestration.studies.common import METRICS, OBJECTIVES, files_in, one_line, row
 
 NUMBERS = [name for name in METRICS if name not in TEXTS]

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from orchestration import Scenario, UsageError
 from orchestration.quadrotor.timing import TIMING_KEYS
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
 from orchestration.system.model import System
+from quadcosim import Scenario, UsageError
 from tests.orchestration.studies.common import GRID, at, one_line, starts
 
 REPOSITORY = Path(__file__).resolve().parents[3]

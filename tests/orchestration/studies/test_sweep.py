@@ -14,8 +14,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-import orchestration
-from orchestration import QuadcosimError, UsageError, fmus
+from orchestration import fmus
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.quadrotor.scenario import FmuChoice, Record, Scenario
 from orchestration.quadrotor.translation import system_of
@@ -30,6 +29,7 @@ from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
 from orchestration.studies.sweep import store_path, sweep
 from orchestration.studies.worker import BrokenPlaceError, Hangar, Outcome, Task
+from quadcosim import QuadcosimError, UsageError, run
 from tests.orchestration.studies.common import (
     GRID,
     NOISY,
@@ -117,7 +117,7 @@ def test_the_order_of_runs_does_not_change_them(folder: Path, reference: list[di
 
 
 def test_a_row_has_the_metrics_of_a_direct_run(folder: Path, reference: list[dict[str, Any]]) -> None:
-    direct = orchestration.run(load_study(folder / "study.toml").system(9, starts())).metrics
+    direct = run(load_study(folder / "study.toml").system(9, starts())).metrics
     for name, value in direct.items():
         expected = value if value is None or isinstance(value, str) else float(value).hex()
         assert reference[9][name] == expected, name
@@ -409,7 +409,7 @@ def test_a_store_grows_and_keeps_the_rows_that_are_there(
     assert len(kept) == len(after) - flown
     assert all(row["duration"] == before[row["key"]] for row in kept), "expected none to be flown again"
     for row, index in zip(after, range(len(after)), strict=True):
-        direct = orchestration.run(grown.system(index, starts())).metrics
+        direct = run(grown.system(index, starts())).metrics
         assert row["position_rmse"] == direct["position_rmse"]
     assert sweep(study(PERIODS), folder=tmp_path).flown == 0, "expected what was taken out to be kept"
 
@@ -464,7 +464,7 @@ def test_runs_that_fail_and_diverge_among_others_are_the_same_with_any_number_of
     assert [row["status"] for row in rows] == ["done"] * 2 + ["failed"] * 2 + ["done"] * 2
     for row, index in zip(rows, range(6), strict=True):
         if row["status"] == "done":
-            direct = orchestration.run(chosen.system(index, starts())).metrics
+            direct = run(chosen.system(index, starts())).metrics
             assert row["outcome"] == direct["outcome"]
             assert row["steps"] == float(direct["steps"]).hex()
 
@@ -516,7 +516,7 @@ def test_signals_of_the_chosen_runs_are_kept_and_are_those_of_a_direct_run(tmp_p
     assert sorted((tmp_path / "signals").iterdir()) == sorted(kept)
     for index, path in zip((1, 2), kept, strict=True):
         table = pq.read_table(path)
-        direct = orchestration.run(chosen.system(index, starts()))
+        direct = run(chosen.system(index, starts()))
         assert tuple(table.column_names) == direct.columns
         kept_rows = np.column_stack([table[name].to_numpy() for name in table.column_names])
         assert np.array_equal(kept_rows, direct.rows)
@@ -648,7 +648,7 @@ def test_a_pool_flies_in_order_up_to_the_first_that_stops_it() -> None:
         everything = pool.fly(scenarios, stop=lambda metrics: False)
         first = pool.fly(scenarios, stop=lambda metrics: True)
     assert [metrics["position_rmse"] for metrics in everything] == [
-        orchestration.run(scenario).metrics["position_rmse"] for scenario in scenarios
+        run(scenario).metrics["position_rmse"] for scenario in scenarios
     ]
     assert [metrics["position_rmse"] for metrics in first] == [everything[0]["position_rmse"]]
 

@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import orchestration
-from orchestration import Scenario, Timing, UsageError
 from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor.translation import system_of
 from orchestration.request import load_request
@@ -27,6 +25,7 @@ from orchestration.studies.table import frame
 from orchestration.studies.twins import growth_of
 from orchestration.system.model import Criterion, System
 from orchestration.system.paths import changed
+from quadcosim import Scenario, Timing, UsageError, run
 from tests.orchestration.studies.common import bits, error_line, one_line, quadcosim
 
 FILE = Path(__file__).resolve().parents[3] / "examples" / "double_integrator" / "system.toml"
@@ -76,7 +75,7 @@ def test_rows_of_a_system_have_its_objectives_and_its_outcomes(swept: tuple[Stud
     table = frame(store_path("study", folder))
     assert table["outcome"].tolist() == ["good", "good", "good", "bad", "diverged", "diverged"]
     assert table["good"].fillna(False).tolist() == [True, True, True, False, False, False]
-    direct = orchestration.run(chosen.system(1, {})).metrics
+    direct = run(chosen.system(1, {})).metrics
     assert [table.loc[1, name] for name in ("late", "peak")] == [direct["late"], direct["peak"]]
     assert {"guid.plant", "guid.controller", "horizon", "steps"} <= set(table.columns)
 

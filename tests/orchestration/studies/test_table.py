@@ -9,8 +9,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-import orchestration
-from orchestration import Scenario, UsageError
+import quadcosim
 from orchestration.quadrotor.translation import system_of
 from orchestration.studies.axes import Axis
 from orchestration.studies.identity import versions
@@ -18,6 +17,7 @@ from orchestration.studies.store import Row, open_for_reading, open_for_writing
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
 from orchestration.studies.table import dataset, export, frame
+from quadcosim import Scenario, UsageError
 from tests.orchestration.studies.common import GRID, METRICS, OBJECTIVES, axis, files_in, row, starts, study, swept
 
 GRIDDED = {"timing.period": [0.02, 0.01], "timing.delay": [0.0, 0.01, 0.005]}
@@ -78,7 +78,7 @@ def test_a_frame_has_the_metrics_of_direct_runs(grid: tuple[Study, Path]) -> Non
     chosen, path = grid
     table = frame(path)
     for index in (0, 4):
-        direct = orchestration.run(chosen.system(index, starts())).metrics
+        direct = quadcosim.run(chosen.system(index, starts())).metrics
         for name in METRICS:
             value = table.loc[index, name]
             assert pd.isna(value) if direct[name] is None else value == direct[name], name

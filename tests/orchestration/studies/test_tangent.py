@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestration import UsageError
 from orchestration.simulator import Floats, Transfer
 from orchestration.studies.tangent import Rest, Tangent
+from quadcosim import UsageError
 
 
 class Line:

@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from orchestration import Scenario, run
 from orchestration.exchange.interop.assignment import Loop, Ports
 from orchestration.exchange.interop.catalogue import TOOLS, Tool
 from orchestration.exchange.interop.compare import Agreement
 from orchestration.exchange.interop.trace import Trace
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
 from orchestration.simulator import Floats
+from quadcosim import Scenario, run
 
 PORTS = {
     "controller": Ports(inputs=MEASUREMENT, outputs=COMMAND),

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestration import Scenario, run
 from orchestration.exchange.interop.table import AIM
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
 from orchestration.simulator import Floats
 from orchestration.system.times import NANOSECONDS
+from quadcosim import Scenario, run
 
 H, STEPS = 0.01, 3000
 Point = Callable[[int], tuple[float, float]]

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from orchestration import UsageError
 from orchestration.exchange.interop import copies
 from orchestration.exchange.interop.catalogue import chosen
 from orchestration.exchange.interop.compare import agreements
 from orchestration.exchange.interop.table import AIM
 from orchestration.system.model import System
 from orchestration.system.system_file import load_system
+from quadcosim import UsageError
 from tests.examples.common import example
 from tests.orchestration.fmi.small import needs_compiler, small
 from tests.orchestration.system.described import described

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from orchestration import QuadcosimError, Scenario, UsageError
 from orchestration.exchange.interop import table
 from orchestration.exchange.interop.catalogue import TOOLS, chosen
 from orchestration.exchange.interop.compare import Agreement, agreements
 from orchestration.exchange.interop.table import AIM, agrees
+from quadcosim import QuadcosimError, Scenario, UsageError
 from tests.orchestration.exchange.interop.common import LOOP, components_of, farthest
 from tests.orchestration.studies.common import one_line
 

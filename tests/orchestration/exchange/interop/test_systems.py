@@ -6,7 +6,6 @@ from typing import Any
 
 import pytest
 
-from orchestration import UsageError
 from orchestration.exchange.interop.catalogue import TOOLS, chosen
 from orchestration.exchange.interop.compare import agreements
 from orchestration.exchange.interop.flights import Flights
@@ -14,6 +13,7 @@ from orchestration.exchange.interop.table import AIM
 from orchestration.simulation import run
 from orchestration.system.model import System
 from orchestration.system.paths import changed
+from quadcosim import UsageError
 from tests.commands import Main
 from tests.examples.common import EXAMPLES, example
 from tests.orchestration.studies.common import one_line

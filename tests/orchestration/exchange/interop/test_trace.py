@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestration import QuadcosimError, Result, Scenario, load_run, run
 from orchestration.exchange.interop.copies import log_of, traced_copy
 from orchestration.exchange.interop.trace import Trace, read_trace
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
+from quadcosim import QuadcosimError, Result, Scenario, load_run, run
 from tests.orchestration.exchange.interop.common import LOOP
 from tests.orchestration.studies.common import quadcosim
 

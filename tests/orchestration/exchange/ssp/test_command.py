@@ -8,8 +8,9 @@ from typing import Any
 import pytest
 from fmpy.ssp.ssd import read_ssd
 
-from orchestration import Scenario, Timing, UsageError, fmus
+from orchestration import fmus
 from orchestration.exchange.ssp import writing
+from quadcosim import Scenario, Timing, UsageError
 from tests.commands import Main
 from tests.fmus.making import PAIR
 from tests.orchestration.exchange.interop.common import OTHER

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestration import Scenario, load_scenario
 from orchestration.exchange.interop.catalogue import Tool, chosen
 from orchestration.exchange.interop.compare import Agreement, agreements
 from orchestration.exchange.interop.table import AIM, agrees
 from orchestration.exchange.ssp import writing
 from orchestration.system.model import System
+from quadcosim import Scenario, load_scenario
 from tests.orchestration.exchange.interop.common import LOOP, farthest, states_of_master, with_other_parameters
 
 FROM_SSP = ("libcosim, SSP", "ecos, SSP", "fmpy, SSP")

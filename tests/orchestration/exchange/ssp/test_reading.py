@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from fmu_kit.packaging import write_archive
-from orchestration import Scenario, UsageError
 from orchestration.exchange.ssp import package, writing
 from orchestration.quadrotor.translation import system_of
 from orchestration.request import load_request
 from orchestration.system.model import Sampling, System
+from quadcosim import Scenario, UsageError
 from tests.commands import Main
 from tests.orchestration.studies.common import one_line
 from tests.orchestration.system.described import described

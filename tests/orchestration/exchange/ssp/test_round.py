@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from orchestration import Scenario, UsageError
 from orchestration.exchange.ssp import package, writing
 from orchestration.quadrotor.translation import system_of
 from orchestration.request import load_request
 from orchestration.results.result import Result
 from orchestration.simulation import run
 from orchestration.system.model import Criterion, Source, System
+from quadcosim import Scenario, UsageError
 from tests.commands import Main
 from tests.orchestration.exchange.interop.test_systems import CARRIED, carried
 from tests.orchestration.studies.common import error_line, one_line

@@ -7,12 +7,12 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from orchestration import FmuChoice, Scenario
 from orchestration.fmi.reuse import Instances
 from orchestration.studies.comparison.bandwidth import crossover
 from orchestration.studies.comparison.cells import Median, Result
 from orchestration.studies.comparison.run import agree
 from orchestration.studies.linear import COORDINATES, _controller_at_hover, _located, hover_of
+from quadcosim import FmuChoice, Scenario
 from tests.commands import Main
 
 FILE = """

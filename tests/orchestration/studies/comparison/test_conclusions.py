@@ -7,7 +7,6 @@ import pandas as pd
 import pytest
 from scipy.stats import binomtest
 
-from orchestration import Scenario
 from orchestration.studies.axes import Axis
 from orchestration.studies.comparison import fronts, slices
 from orchestration.studies.comparison.cells import frame_of, results
@@ -16,6 +15,7 @@ from orchestration.studies.comparison.limits import first_ends, limits
 from orchestration.studies.comparison.outcome import as_json, concluded
 from orchestration.studies.comparison.pairs import pairs
 from orchestration.studies.starts import Starts
+from quadcosim import Scenario
 
 PERIODS = (0.01, 0.02, 0.03, 0.04)
 STARTS = 40

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from orchestration import UsageError
 from orchestration.studies.comparison.design import Comparison
 from orchestration.studies.comparison.file import load_comparison
 from orchestration.system.model import System
 from orchestration.system.paths import value_at
+from quadcosim import UsageError
 
 FILE = """
 [base]

@@ -1,0 +1,5 @@
+"""`python -m quadcosim`: the command."""
+
+from orchestration.command.start import main
+
+main()
