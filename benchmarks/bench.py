@@ -13,6 +13,7 @@ from controller_fmu.sliding_mode.law import Gains, evaluate
 from controller_fmu.vehicle import Measurement, Model
 from fmu_kit import packaging
 from fmu_kit.algebra import Quaternion, Vec3
+from fmu_kit.bundle import Target
 from fmu_kit.integrator import rk4_step
 from fmu_kit.rigid_body import Body, RigidState, Wrench, derivative
 from fmu_kit.trajectory import Trajectory
@@ -148,7 +149,7 @@ def main() -> None:
     irregular = Timing(period=MILLISECOND, delay=3e-4, delay_jitter=2e-4, jitter=2e-4, command_loss=0.05)
     with tempfile.TemporaryDirectory() as folder:
         for name in ("EmptyPlant", "EmptyController"):
-            packaging.build(packaging.Target("benchmarks.empty", name), Path(folder))
+            packaging.build(Target("benchmarks.empty", name), Path(folder))
 
         def hollow(timing: Timing) -> Scenario:
             return Scenario(

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from benchmarks.flights import CASES, STEPS
 from fmu_kit import packaging
+from fmu_kit.bundle import Target
 from orchestration import fmus
 from orchestration.quadrotor.wiring import MODELS
 
@@ -50,7 +51,7 @@ def main() -> None:
         folder = Path(name)
         fmus.build(MODELS, folder)
         for model in ("EmptyPlant", "EmptyController"):
-            packaging.build(packaging.Target("benchmarks.empty", model), folder)
+            packaging.build(Target("benchmarks.empty", model), folder)
         here, there = Side(HERE, folder), Side(other, folder)
         print(f"medians of {PAIRS} pairs of {STEPS} plant steps of 1 ms; load {os.getloadavg()[0]:.1f}")
         for case in CASES:

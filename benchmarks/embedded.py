@@ -77,8 +77,8 @@ def main() -> None:
                     bare = text_of(source, folder, *flags, optimised, WITHOUT_TEXTS)
                     numbers = (text, bare, size, stack, mean, most)
                     rows.append([precision, machine, f"`{optimised}`", *(f"{n:,}" for n in numbers)])
-        controllers = [folder / precision / "UnifiedController.c" for precision in ("double", "single")]
-        far = differences(*controllers, plant_source)
+        double, single = (folder / precision / "UnifiedController.c" for precision in ("double", "single"))
+        far = differences(double, single, plant_source)
     heads = ["precision", "machine", "", "text [B]", "without words [B]", "instance [B]", "stack [B]"]
     found = table([*heads, "instructions a step", "most"], rows)
     version = subprocess.run([ARM, "--version"], check=True, capture_output=True, text=True).stdout.splitlines()[0]

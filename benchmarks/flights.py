@@ -3,6 +3,7 @@
 import gc
 import sys
 import time
+from typing import Any
 
 STEPS = 3000
 MILLISECOND = 1e-3
@@ -11,7 +12,7 @@ ON = {
     "delay": MILLISECOND, "measurement_loss": 1e-9, "command_loss": 1e-9,
     "noise": {"position": 1e-9, "quaternion": 1e-9}, "quantisation": {"position": 1e-9},
 }  # fmt: skip
-CASES = {
+CASES: dict[str, tuple[tuple[str, str], dict[str, Any]]] = {
     "closed loop, sampled at 1 ms": (OURS, {"period": MILLISECOND}),
     "closed loop, sampled at 10 ms": (OURS, {"period": 10 * MILLISECOND}),
     "empty slaves, 1 ms": (EMPTY, {"period": MILLISECOND}),

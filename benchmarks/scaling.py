@@ -55,7 +55,8 @@ class Nothing:
 
 def loops(components: int) -> System:
     """Half of the components plants, half controllers, in loops of two: as many connections as components."""
-    members, connections = {}, []
+    members: dict[str, Component] = {}
+    connections: list[Connection] = []
     for i in range(components // 2):
         members |= {f"plant{i}": PLANT, f"controller{i}": CONTROLLER}
         connections += [

@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from docs import comparison_charts as charts
 from orchestration.batch import fly
 from orchestration.fmi.model import read_model
+from orchestration.simulation import run
 from orchestration.statistics import wilson
 from orchestration.studies.comparison.bandwidth import bandwidths
 from orchestration.studies.comparison.cells import frame_of
@@ -124,7 +125,7 @@ class _Lanes:
     def metrics(self, systems: list[System]) -> Iterator[Any]:
         """Of systems whose FMUs are files; what lanes leave is flown alone."""
         for system, flown in zip(systems, self._batches.fly(systems), strict=True):
-            yield fly.run(system).metrics if flown is None else flown.metrics
+            yield run(system).metrics if flown is None else flown.metrics
 
 
 @cache

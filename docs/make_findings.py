@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -90,9 +91,9 @@ def _processor_time() -> float:
 
 def compared() -> list[str]:
     """Controllers from the same starts: limits and cells of every comparison."""
-    found = {name: kept(f"compared_{name}", lambda name=name: comparisons.fly_all(name)) for name in comparisons.NAMES}
+    found = {name: kept(f"compared_{name}", partial(comparisons.fly_all, name)) for name in comparisons.NAMES}
     for name, figure in comparisons.figures():
-        _save(lambda figure=figure: figure, name)
+        _save(lambda: figure, name)  # noqa: B023 (drawn at once)
     return [line for name, content in found.items() for line in comparisons.lines(name, content)]
 
 
@@ -222,13 +223,13 @@ def bandwidth() -> list[str]:
     """Which gains set the local limit of the period: exponents, one gain and one loop at a time."""
     lines = []
     for kappa in (0.0, 1.0):
-        found = kept(f"loop_gains_{kappa:g}", lambda k=kappa: theory.limits_over_gains(k), theory.LOOPS, theory.FACTORS)
+        found = kept(f"loop_gains_{kappa:g}", partial(theory.limits_over_gains, kappa), theory.LOOPS, theory.FACTORS)
         limits = {name: np.array(values, float) for name, values in found.items()}
         for name, values in limits.items():
             slope, low, high = theory.exponent_of(theory.FACTORS, values)
             lines.append(f"kappa {kappa:g}, {name}: exponent {slope:.3f} [{low:.3f}, {high:.3f}]; {_all_ms(values)}")
         if kappa == 0.0:
-            _save(lambda limits=limits: charts.loop_gains(limits), "loop_gains")
+            _save(partial(charts.loop_gains, limits), "loop_gains")
     alone = [theory.of_attitude_alone(15.0 * f, 15.0 * f, 15.0 * f) for f in theory.FACTORS]
     return [*lines, f"attitude loop by itself: {_all_ms(alone)}"]
 
@@ -457,7 +458,10 @@ def share_of(flew: pd.Series) -> str:
 def _rank_correlation(x: pd.Series, y: pd.Series) -> tuple[float, float, float]:
     """Spearman's, with its 95 % interval by the bootstrap."""
     pairs = np.column_stack([x.to_numpy(float), y.to_numpy(float)])
-    of = lambda rows: float(pd.DataFrame(rows).rank().corr().to_numpy()[0, 1])  # noqa: E731
+
+    def of(rows: Any) -> float:
+        return float(pd.DataFrame(rows).rank().corr().to_numpy()[0, 1])
+
     generator = np.random.default_rng(1)
     resampled = [of(pairs[generator.integers(0, len(pairs), len(pairs))]) for _ in range(1000)]
     return of(pairs), *np.percentile(resampled, [2.5, 97.5])

@@ -86,15 +86,15 @@ def plant(axes: Axes) -> None:
     for x, y in ((-0.44, -0.44), (-0.44, 0.44), (0.44, -0.44), (0.44, 0.44)):
         axes.add_patch(Circle((x, y), 0.33, facecolor="#bcd4e2", edgecolor=BLUE, linewidth=1.6))
         axes.plot((0.0, x), (0.0, y), color=DARK, linewidth=3.5, solid_capstyle="round")
-    body = {"boxstyle": "round,pad=0.08", "facecolor": DARK, "edgecolor": "none", "zorder": 3}
-    axes.add_patch(FancyBboxPatch((-0.12, -0.17), 0.24, 0.34, **body))
+    body = (-0.12, -0.17), 0.24, 0.34
+    axes.add_patch(FancyBboxPatch(*body, boxstyle="round,pad=0.08", facecolor=DARK, edgecolor="none", zorder=3))
     axes.add_patch(Polygon(((-0.12, 0.02), (0.12, 0.02), (0.0, 0.21)), facecolor=ORANGE, zorder=4))
 
 
 def _tile(axes: Axes, colour: str) -> None:
     """The ground that the icon stands on, of its own colour so that it shows on light and dark."""
-    tile = {"boxstyle": "round,pad=0.2", "facecolor": colour, "edgecolor": BLUE, "linewidth": 1.2}
-    axes.add_patch(FancyBboxPatch((-0.76, -0.76), 1.52, 1.52, **tile))
+    tile = (-0.76, -0.76), 1.52, 1.52
+    axes.add_patch(FancyBboxPatch(*tile, boxstyle="round,pad=0.2", facecolor=colour, edgecolor=BLUE, linewidth=1.2))
 
 
 if __name__ == "__main__":

@@ -9,10 +9,8 @@ def fill(page: Path, blocks: dict[str, str]) -> None:
     content = page.read_text(encoding="utf-8")
     for name, text in blocks.items():
         start = f"<!-- {name} -->"
-        pattern = f"({re.escape(start)}\n).*?(<!-- end -->)"
-        content, count = re.subn(
-            pattern, lambda found, text=text: f"{found[1]}\n{text}\n\n{found[2]}", content, flags=re.S
-        )
+        between = f"(?<={re.escape(start)}\n).*?(?=<!-- end -->)"
+        content, count = re.subn(between, f"{text}\n\n".replace("\\", r"\\"), content, flags=re.S)
         if count != 1:
             raise ValueError(f"{page}: expected one {start}, found {count}")
     page.write_text(content, encoding="utf-8")

@@ -67,12 +67,16 @@ def decay_of(flight: Decay) -> dict[str, Any]:
     """Since when the error stays inside ε, at what rate error and energy fall in each decade, and what remains."""
     time, error, energy = error_over_time(flight)
     since = {bound: _since(time, error, bound) for decade in DECADES for bound in decade}
-    rates, energy_rates = [], []
+    rates: list[float | None] = []
+    energy_rates: list[float | None] = []
     for high, low in DECADES:
         begin, end = since[high], since[low]
-        whole = begin is not None and end is not None and end > begin
-        rates.append(np.log(high / low) / (end - begin) if whole else None)
-        energy_rates.append(_slope(time, energy, begin, end) if whole else None)
+        if begin is None or end is None or end <= begin:
+            rates.append(None)
+            energy_rates.append(None)
+            continue
+        rates.append(np.log(high / low) / (end - begin))
+        energy_rates.append(_slope(time, energy, begin, end))
     last = float(error[time >= flight.stop_time - 5.0].max()) if time[-1] >= flight.stop_time - 1e-6 else None
     return {"inside": since[LAYER], "rates": rates, "energy_rates": energy_rates, "remains": last}
 

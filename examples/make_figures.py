@@ -95,10 +95,8 @@ def minimum_variance() -> Figure:
     axes.plot(gains, variance * (1.0 - gains + 4.0 * gains**2 / 3.0) + 0.5, color=ORANGE, label="x² + u², theory")
     for gain in (0.4, 0.65, 3.0 - math.sqrt(3.0), 1.6):
         runs = [flown("minimum_variance", seed=s, components__controller__parameters__gain=gain) for s in range(8)]
-        for costs, color in (
-            ([r.metrics["variance"] for r in runs], BLUE),
-            ([r.metrics["variance"] + r.metrics["effort"] for r in runs], ORANGE),
-        ):
+        variances, efforts = (np.array([r.metrics[name] for r in runs], float) for name in ("variance", "effort"))
+        for costs, color in ((variances, BLUE), (variances + efforts, ORANGE)):
             axes.plot([gain] * len(costs), costs, ".", color=color, markersize=4)
     axes.plot([], [], ".", color=GREY, label="runs of 2000 s")
     axes.set(xlabel="gain [1/s]", ylabel="per unit time", ylim=(0.5, 4.0), title="least of x²: (3 + √3)/6 at 3 - √3")
