@@ -36,6 +36,7 @@ from orchestration.master.watch import watch
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import in_its_own_words, system_of, warnings
 from orchestration.results import objectives
+from orchestration.results.described import described
 from orchestration.results.result import Result
 from orchestration.results.units import units
 from orchestration.simulator import Floats
@@ -71,6 +72,7 @@ class Simulation:
     system: System
     """what it means"""
     instances: Mapping[str, Instance]
+    models: Mapping[str, Model]
     parameters: Mapping[str, float]
     """all numeric parameters of all components, as COMPONENT.NAME"""
     units: Mapping[str, str]
@@ -97,6 +99,8 @@ class Simulation:
                 steps=master.steps,
             ),
             units=self.units,
+            described=described(self.system, self.models, recording.columns),
+            parameters=self.parameters,
             divergence=master.divergence,
             interrupted_at=_seconds(master.interrupted_at),
             provenance={
@@ -187,6 +191,7 @@ def prepared(
             asked=asked,
             system=system,
             instances=instances,
+            models=models,
             parameters=parameters,
             units=found.units,
             master=master,

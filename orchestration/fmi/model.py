@@ -36,6 +36,7 @@ class Variable:
     causality: str
     variability: str
     unit: str | None
+    description: str | None
     start: str | None
     reference: int
     element: int
@@ -188,6 +189,7 @@ def _scalars(declared: ModelVariable) -> list[Variable]:
                 causality=declared.causality or "local",
                 variability=declared.variability or "continuous",
                 unit=declared.unit or getattr(declared.declaredType, "unit", None),
+                description=declared.description,
                 start=start,
                 reference=declared.valueReference,
                 element=element,

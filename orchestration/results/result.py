@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from orchestration.master.recording import Event, Recording
 from orchestration.quadrotor.scenario import Scenario
+from orchestration.results.described import Described
 from orchestration.results.objectives import Metrics
 from orchestration.simulator import Floats
 from orchestration.system.model import System
@@ -33,6 +34,10 @@ class Result:
     metrics: Metrics
     units: Mapping[str, str]
     """of metrics that have one, by name"""
+    described: Mapping[str, Described]
+    """unit and description of each column"""
+    parameters: Mapping[str, float]
+    """the numeric ones of all components, as they were flown, as COMPONENT.NAME"""
     divergence: str | None
     """what diverged, if it did"""
     interrupted_at: float | None

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Callable, Container
 from contextlib import AbstractContextManager
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from orchestration.documents import read_json
 from orchestration.errors import UsageError, shown
 from orchestration.request import load_request, system_meant, text_of
 from orchestration.results import tables
+from orchestration.results.described import Described
 from orchestration.results.folder import NewFolder, new_folder
 from orchestration.results.result import FIGURES, SYSTEM_FIGURE, Result
 from orchestration.results.tables import ToFolder
@@ -38,6 +39,8 @@ def _write(result: Result, folder: Path, *, figures: bool) -> None:
     notes = {
         **result.provenance,
         "units": dict(result.units),
+        "described": {name: asdict(one) for name, one in result.described.items()},
+        "parameters": dict(result.parameters),
         "divergence": result.divergence,
         "interrupted_at": result.interrupted_at,
         "warnings": list(result.warnings),
@@ -57,7 +60,10 @@ def load_run(folder: str | Path) -> Result:
     missing = [name for name in (SIGNALS, EVENTS, METRICS, SCENARIO, PROVENANCE) if not (folder / name).is_file()]
     if missing:
         raise UsageError(f"{folder}: expected the directory of a run; it has no {', '.join(missing)}")
-    notes = _object(folder / PROVENANCE, divergence=_TEXT, units=(dict,), interrupted_at=_NUMBER, warnings=(list,))
+    notes = _object(
+        folder / PROVENANCE, divergence=_TEXT, units=(dict,), described=(dict,), parameters=(dict,),
+        interrupted_at=_NUMBER, warnings=(list,),
+    )  # fmt: skip
     recording = tables.InFolder(folder)
     asked = load_request(folder / SCENARIO)
     system = system_meant(asked)
@@ -74,6 +80,8 @@ def load_run(folder: str | Path) -> Result:
         recording=recording,
         metrics=_object(folder / METRICS, diverged=(bool,), divergence_time=_NUMBER),
         units=notes.pop("units"),
+        described={name: Described(**one) for name, one in notes.pop("described").items()},
+        parameters=notes.pop("parameters"),
         divergence=notes.pop("divergence"),
         interrupted_at=notes.pop("interrupted_at"),
         warnings=tuple(notes.pop("warnings")),
