@@ -1,6 +1,6 @@
 # make demo: build the FMUs, fly the paper's scenario, draw it. make test: lint and run all tests.
 # make check: lint and the tests that say most in least time, under a minute, for while you work.
-# make bench: time the loop. make figures, make findings, make interop: what docs/ and examples/ show, and the icons of the FMUs.
+# make site: the documentation as a site, in site/. make bench: time the loop. make figures, make findings, make interop: what docs/ and examples/ show, and the icons of the FMUs.
 # Each makes its own environment first.
 PYTHON ?= python3
 BIN := .venv/bin
@@ -11,7 +11,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # Other people's masters that need an environment of their own are flown where they are: make interop makes it.
 export QUADCOSIM_COFMUPY ?= $(abspath $(wildcard $(COFMUPY)))
 
-.PHONY: demo check test lint bench figures findings interop clean
+.PHONY: demo check test lint bench figures findings interop site clean
 
 demo: .venv/.base
 	$(BIN)/quadcosim build
@@ -50,6 +50,10 @@ figures: .venv/.base
 	$(BIN)/python docs/make_icons.py
 	$(BIN)/python examples/make_figures.py
 
+site: .venv/.test
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@echo "open site/index.html"
+
 .venv/.base: pyproject.toml
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --editable .
@@ -71,4 +75,4 @@ interop: .venv/.test .venv-cofmupy/.made
 	touch $@
 
 clean:
-	rm -rf .venv .venv-cofmupy results fmus/*.fmu fmus/native fmus/*.ssp examples/*/*.fmu examples/*/native
+	rm -rf .venv .venv-cofmupy results site fmus/*.fmu fmus/native fmus/*.ssp examples/*/*.fmu examples/*/native

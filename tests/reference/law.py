@@ -1,6 +1,6 @@
 """The law (1)-(33) on numpy vectors, matrices and Taylor series.
 
-Only what is not a rate is written down, in the order of the paper, with the errata of the README. Every
+Only what is not a rate is written down, in the order of the paper, with the errata of `docs/law.md`. Every
 rate (24)-(28), (31), the desired angular velocity (13), (14) and its rate come out of series arithmetic.
 """
 

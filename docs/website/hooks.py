@@ -1,0 +1,34 @@
+"""What MkDocs asks while it builds the site: which pages there are beside those in `docs/`, and where links lead."""
+
+from typing import Any
+
+from mkdocs.structure.files import File, Files, InclusionLevel
+
+from docs.website import commands, keys, variables
+from docs.website.links import ROOT, Links, pages_elsewhere
+from docs.website.markdown import for_the_site
+
+GENERATED = {"commands.md": commands.page, "keys.md": keys.page, "variables.md": variables.page}
+"""Pages that are made of the code, by their addresses."""
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Add the pages that lie beside what they describe, those made of the code, and what pages link to."""
+    links = Links(repo_url=config.repo_url)
+    for address, path in pages_elsewhere().items():
+        files.append(File.generated(config, address, abs_src_path=str(ROOT / path)))
+    for address, picture in links.pictures().items():
+        files.append(File.generated(config, address, abs_src_path=str(picture)))
+    for address, page in GENERATED.items():
+        files.append(File.generated(config, address, content=page()))
+    for address, text in links.sources().items():
+        files.append(File.generated(config, address, content=text, inclusion=InclusionLevel.NOT_IN_NAV))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
+    """The page as a code host shows it, with its links and code blocks as the site has them."""
+    links = Links(repo_url=config.repo_url)
+    address = page.file.src_uri
+    made = address in GENERATED or address in links.sources() or address.endswith(".ipynb")
+    return markdown if made else for_the_site(links.rewritten(markdown, address))

@@ -1,0 +1,109 @@
+"""Where the links of the pages lead on the site: a page is written with the links that hold in the repository."""
+
+import posixpath
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+"""The repository."""
+ELSEWHERE = ("README.md", "fmus/README.md", "tests/reference/README.md", "examples/README.md", "examples/*/README.md")
+"""Pages that lie beside what they describe."""
+LINK = re.compile(r"(\]\(|^\[[^\]\n]+\]: +)(?![a-z]+:|#|//)([^)\s#]+)", re.MULTILINE)
+"""What leads to another file, inline or by reference: what is before its address, and that."""
+CODE = re.compile(r"^```.*?^```|`[^`\n]*`", re.MULTILINE | re.DOTALL)
+PICTURES = (".png", ".svg")
+PAGES = (".md", ".ipynb")
+
+
+def address_of(path: str) -> str:
+    """The address that a file of the repository has on the site: `docs/` is its top, and README.md its first page."""
+    if path == "README.md":
+        return "index.md"
+    if path.startswith("docs/") or path.endswith((*PICTURES, *PAGES)):
+        return path.removeprefix("docs/")
+    return f"{path}/index.md" if (ROOT / path).is_dir() else f"{path}.md"
+
+
+def pages_elsewhere() -> dict[str, str]:
+    """Paths in the repository of the pages outside `docs/`, by their addresses."""
+    found = (path.relative_to(ROOT).as_posix() for pattern in ELSEWHERE for path in sorted(ROOT.glob(pattern)))
+    return {address_of(path): path for path in found}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Links:
+    """Links as the site has them; sources are linked at `repo_url`, or shown by pages where that is not known."""
+
+    repo_url: str | None
+
+    def rewritten(self, markdown: str, address: str) -> str:
+        """The text of the page at `address` with its links as they are on the site."""
+        path = pages_elsewhere().get(address, f"docs/{address}")
+
+        def led(match: re.Match[str]) -> str:
+            return match[1] + self._to(_target(path, match[2]), posixpath.dirname(address))
+
+        return _outside_of_code(LINK, led, markdown)
+
+    def pictures(self) -> dict[str, Path]:
+        """The pictures outside `docs/` that pages show, by their addresses."""
+        return {address_of(path): ROOT / path for path in _linked() if path.endswith(PICTURES)}
+
+    def sources(self) -> dict[str, str]:
+        """The pages that show the files and folders that are linked to and are no pages, by their addresses."""
+        if self.repo_url:
+            return {}
+        shown = [path for path in _linked() if not path.endswith((*PICTURES, *PAGES))]
+        within = [each.relative_to(ROOT).as_posix() for path in shown for each in _files_in(ROOT / path)]
+        return {address_of(path): _shown(path) for path in (*shown, *within)}
+
+    def _to(self, target: str, folder: str) -> str:
+        if (ROOT / target / "README.md").is_file():
+            target += "/README.md"
+        if self.repo_url and not target.startswith("docs/") and not target.endswith((*PICTURES, *PAGES)):
+            return f"{self.repo_url}/blob/HEAD/{target}"
+        return posixpath.relpath(address_of(target), folder or ".")
+
+
+def _linked() -> list[str]:
+    """What the pages link to outside `docs/`."""
+    targets = {
+        _target(page, link)
+        for page in _pages()
+        for _, link in LINK.findall(CODE.sub("", (ROOT / page).read_text("utf-8")))
+    }
+    return sorted(target for target in targets if not target.startswith("docs/") and (ROOT / target).exists())
+
+
+def _pages() -> Iterator[str]:
+    yield from pages_elsewhere().values()
+    for path in sorted((ROOT / "docs").rglob("*.md")):
+        yield path.relative_to(ROOT).as_posix()
+
+
+def _target(page: str, link: str) -> str:
+    """The path in the repository to which a link of the page at a path leads."""
+    return posixpath.normpath(posixpath.join(posixpath.dirname(page), link))
+
+
+def _files_in(path: Path) -> list[Path]:
+    return sorted(each for each in path.glob("*") if each.suffix in (".toml", ".py")) if path.is_dir() else []
+
+
+def _shown(path: str) -> str:
+    """The page of a source file, or of a folder of them."""
+    if (ROOT / path).is_dir():
+        files = "".join(f"- [{each.name}]({each.name}.md)\n" for each in _files_in(ROOT / path))
+        return f"# {path}/\n\n{files}"
+    return f"# {path}\n\n````{Path(path).suffix[1:]}\n{(ROOT / path).read_text('utf-8')}````\n"
+
+
+def _outside_of_code(pattern: re.Pattern[str], replacement: Callable[[re.Match[str]], str], text: str) -> str:
+    """`text` with `pattern` replaced wherever it is not code."""
+    pieces, end = [], 0
+    for code in CODE.finditer(text):
+        pieces += [pattern.sub(replacement, text[end : code.start()]), code[0]]
+        end = code.end()
+    return "".join([*pieces, pattern.sub(replacement, text[end:])])
