@@ -71,7 +71,7 @@ def to_html(slave: Any, making: Making, fragment: str = "") -> str:
         needs=Template(making.needs.read_text(encoding="utf-8")).substitute(said),
         contents="".join(f"{link} · " for link in _contents(fragment)),
         fragment=_relocated(fragment, posixpath.dirname(making.source)).strip(),
-        variables="\n".join(_tables(slave.variables)),
+        variables="\n".join(variable_tables(slave.variables)),
         categories=_table(("Category", "Messages"), [(_code(k), escape(v)) for k, v in slave.log_categories.items()]),
     )
 
@@ -91,8 +91,8 @@ def _relocated(fragment: str, folder: str) -> str:
     return re.sub(r'\bhref="(?!#|[a-z]+:)', f'href="{escape(folder)}/', fragment)
 
 
-def _tables(variables: Sequence[Variable]) -> Iterator[str]:
-    """A heading and a table for each causality that occurs."""
+def variable_tables(variables: Sequence[Variable]) -> Iterator[str]:
+    """The HTML of a heading and a table for each causality that occurs."""
     for causality, heading in HEADINGS.items():
         chosen = [v for v in variables if v.causality == causality]
         if chosen:

@@ -84,7 +84,7 @@ def hash_of(target: Target, packaging: Iterable[Path], facts: dict[str, str], un
     """The hash of what a slave's modules are, of the files that pack it, of facts, and of what is packed as it is."""
     digest = hashlib.sha256()
     texts = bundled_sources(target) | {path.name: _text(path) for path in packaging} | facts
-    for name, text in {**texts, "fragment": _fragment(target)}.items():
+    for name, text in {**texts, "fragment": fragment_of(target)}.items():
         digest.update(f"{name}\0{text}\0".encode())
     for name, content in unchanged.items():
         digest.update(name.encode() + b"\0" + hashlib.sha256(content).digest())
@@ -236,7 +236,7 @@ def licences_and_icon(target: Target, **others: str) -> dict[str, bytes]:
     return files
 
 
-def _fragment(target: Target) -> str:
+def fragment_of(target: Target) -> str:
     """The part of the documentation written by hand; empty if there is none.
 
     `<?include PATH?>` in it stands for a file that several may share: from the folder of the slave, or else of this
@@ -253,7 +253,7 @@ def _fragment(target: Target) -> str:
 
 def _well_formed_fragment(target: Target) -> str:
     """The same; raises `PackagingError` if the page would not be well-formed XML with it."""
-    fragment = _fragment(target)
+    fragment = fragment_of(target)
     try:
         fromstring(f"<body>{fragment}</body>")
     except ParseError as error:

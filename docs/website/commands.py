@@ -1,59 +1,47 @@
 """The page of the command line: every command and every flag with its help, as the program has them."""
 
-import re
-from collections.abc import Iterator
+from html import escape
 from typing import Any
 
 import typer.main
 
+from docs.website.tables import table
 from orchestration.command.cli import app
 
 INTRODUCTION = """\
 # Command line
 
-`quadcosim COMMAND --help` says on a terminal what is said here.
+What is here is what `quadcosim COMMAND --help` says on a terminal; every command has `--help`.
 
 """
 
 
 def page() -> str:
     """The Markdown of the page."""
-    group = typer.main.get_command(app)
-    commands: dict[str, Any] = group.commands  # type: ignore[attr-defined]
-    listed = "".join(f"- [`{name}`](#{name}): {_sentence(command.help)}\n" for name, command in commands.items())
-    return INTRODUCTION + listed + "".join(_command(name, command) for name, command in commands.items())
+    group: Any = typer.main.get_command(app)
+    listed = [(f'<a href="#{name}"><code>{name}</code></a>', _first(each.help)) for name, each in _commands(group)]
+    return INTRODUCTION + table(listed) + "".join(_section(name, each) for name, each in _commands(group))
 
 
-def _command(name: str, command: Any) -> str:
+def _commands(group: Any) -> list[tuple[str, Any]]:
+    return [(name, command) for name, command in group.commands.items() if not command.hidden]
+
+
+def _section(name: str, command: Any) -> str:
     context = command.make_context(name, [], resilient_parsing=True)
     usage = " ".join(["quadcosim", name, *command.collect_usage_pieces(context)])
-    panels: dict[str, list[Any]] = {}
+    panels: dict[str, list[tuple[str, str]]] = {"Arguments": [], "Options": []}
     for parameter in command.get_params(context):
-        if not getattr(parameter, "hidden", False):
-            panel = getattr(parameter, "rich_help_panel", None)
-            kind = "Arguments" if parameter.param_type_name == "argument" else "Options"
-            panels.setdefault(panel or kind, []).append(parameter)
-    tables = "".join(_table(title, parameters, context) for title, parameters in panels.items())
-    return f"\n## {name}\n\n```text\n{usage}\n```\n\n{_escaped(command.help or '')}\n{tables}"
+        if parameter.name == "help" or getattr(parameter, "hidden", False):
+            continue
+        kind = "Arguments" if parameter.param_type_name == "argument" else "Options"
+        names, said = parameter.get_help_record(context)
+        panel = panels.setdefault(getattr(parameter, "rich_help_panel", None) or kind, [])
+        panel.append((f"<code>{escape(names)}</code>", escape(said)))
+    tables = "".join(table(rows, heading=title) for title, rows in panels.items() if rows)
+    return f"\n## {name}\n\n```text\n{usage}\n```\n\n{escape(command.help or '', quote=False)}\n\n{tables}"
 
 
-def _table(title: str, parameters: list[Any], context: Any) -> str:
-    rows = "".join(_rows(parameters, context))
-    return f"\n| {title} | |\n|---|---|\n{rows}"
-
-
-def _rows(parameters: list[Any], context: Any) -> Iterator[str]:
-    for parameter in parameters:
-        record = parameter.get_help_record(context) or (parameter.name, parameter.help)
-        names, said = (_escaped(str(part)) for part in record)
-        yield f"| `{names}` | {said} |\n"
-
-
-def _sentence(text: str | None) -> str:
-    """Help as one line."""
-    return _escaped(" ".join((text or "").split()))
-
-
-def _escaped(text: str) -> str:
-    """Text in which nothing is taken for Markdown or for a border of a table."""
-    return re.sub(r"([|<*_])", r"\\\1", text)
+def _first(text: str | None) -> str:
+    """The first sentence of a help, which is what the list of commands has."""
+    return escape((text or "").split("\n\n")[0].split(". ")[0].rstrip("."))

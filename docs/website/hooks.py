@@ -1,14 +1,20 @@
 """What MkDocs asks while it builds the site: which pages there are beside those in `docs/`, and where links lead."""
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from mkdocs.structure.files import File, Files, InclusionLevel
 
-from docs.website import commands, keys, variables
+from docs.website import commands, fmus, keys
 from docs.website.links import ROOT, Links, pages_elsewhere
 from docs.website.markdown import for_the_site
 
-GENERATED = {"commands.md": commands.page, "keys.md": keys.page, "variables.md": variables.page}
+GENERATED: dict[str, Callable[[], str]] = {
+    "commands.md": commands.page,
+    "keys.md": keys.page,
+    **{f"fmus/{slave.__name__}.md": partial(fmus.page, slave) for slave in fmus.SLAVES},
+}
 """Pages that are made of the code, by their addresses."""
 
 
@@ -30,5 +36,5 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
     """The page as a code host shows it, with its links and code blocks as the site has them."""
     links = Links(repo_url=config.repo_url)
     address = page.file.src_uri
-    made = address in GENERATED or address in links.sources() or address.endswith(".ipynb")
-    return markdown if made else for_the_site(links.rewritten(markdown, address))
+    shows_source = address in links.sources() or address.endswith(".ipynb")
+    return markdown if shows_source else for_the_site(links.rewritten(markdown, address))

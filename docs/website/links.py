@@ -2,7 +2,7 @@
 
 import posixpath
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,26 +10,36 @@ ROOT = Path(__file__).parents[2]
 """The repository."""
 ELSEWHERE = ("README.md", "fmus/README.md", "tests/reference/README.md", "examples/README.md", "examples/*/README.md")
 """Pages that lie beside what they describe."""
-LINK = re.compile(r"(\]\(|^\[[^\]\n]+\]: +)(?![a-z]+:|#|//)([^)\s#]+)", re.MULTILINE)
+LINK = re.compile(r"(\]\(|^\[(?!\^)[^\]\n]+\]: +)(?![a-z]+:|#|//)([^)\s#]+)", re.MULTILINE)
 """What leads to another file, inline or by reference: what is before its address, and that."""
+HREF = re.compile(r'(href=")(?![a-z]+:|#)([^"#]+)')
+"""The same in HTML."""
+DOCUMENTATION = ("plant_fmu/*.html", "controller_fmu/*/*.html")
+"""What FMUs carry as their documentation, written beside their slaves."""
 CODE = re.compile(r"^```.*?^```|`[^`\n]*`", re.MULTILINE | re.DOTALL)
-PICTURES = (".png", ".svg")
-PAGES = (".md", ".ipynb")
+OF_PICTURES = (".png", ".svg")
+OF_PAGES = (".md", ".ipynb", ".html")
 
 
 def address_of(path: str) -> str:
     """The address that a file of the repository has on the site: `docs/` is its top, and README.md its first page."""
     if path == "README.md":
         return "index.md"
-    if path.startswith("docs/") or path.endswith((*PICTURES, *PAGES)):
+    if path.endswith(".html"):
+        return f"fmus/{Path(path).stem}.md"
+    if path.startswith("docs/") or path.endswith((*OF_PICTURES, *OF_PAGES)):
         return path.removeprefix("docs/")
     return f"{path}/index.md" if (ROOT / path).is_dir() else f"{path}.md"
 
 
 def pages_elsewhere() -> dict[str, str]:
     """Paths in the repository of the pages outside `docs/`, by their addresses."""
-    found = (path.relative_to(ROOT).as_posix() for pattern in ELSEWHERE for path in sorted(ROOT.glob(pattern)))
-    return {address_of(path): path for path in found}
+    return {address_of(path): path for path in _found(ELSEWHERE)}
+
+
+def documentation() -> dict[str, str]:
+    """Paths of the documentation that FMUs carry, by their addresses."""
+    return {address_of(path): path for path in _found(DOCUMENTATION)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,29 +50,32 @@ class Links:
 
     def rewritten(self, markdown: str, address: str) -> str:
         """The text of the page at `address` with its links as they are on the site."""
-        path = pages_elsewhere().get(address, f"docs/{address}")
+        path = (pages_elsewhere() | documentation()).get(address, f"docs/{address}")
 
         def led(match: re.Match[str]) -> str:
             return match[1] + self._to(_target(path, match[2]), posixpath.dirname(address))
 
-        return _outside_of_code(LINK, led, markdown)
+        def led_from_html(match: re.Match[str]) -> str:
+            return re.sub(r"\.md$", ".html", led(match))
+
+        return _outside_of_code(LINK, led, HREF.sub(led_from_html, markdown))
 
     def pictures(self) -> dict[str, Path]:
         """The pictures outside `docs/` that pages show, by their addresses."""
-        return {address_of(path): ROOT / path for path in _linked() if path.endswith(PICTURES)}
+        return {address_of(path): ROOT / path for path in _linked() if path.endswith(OF_PICTURES)}
 
     def sources(self) -> dict[str, str]:
         """The pages that show the files and folders that are linked to and are no pages, by their addresses."""
         if self.repo_url:
             return {}
-        shown = [path for path in _linked() if not path.endswith((*PICTURES, *PAGES))]
+        shown = [path for path in _linked() if not path.endswith((*OF_PICTURES, *OF_PAGES))]
         within = [each.relative_to(ROOT).as_posix() for path in shown for each in _files_in(ROOT / path)]
         return {address_of(path): _shown(path) for path in (*shown, *within)}
 
     def _to(self, target: str, folder: str) -> str:
         if (ROOT / target / "README.md").is_file():
             target += "/README.md"
-        if self.repo_url and not target.startswith("docs/") and not target.endswith((*PICTURES, *PAGES)):
+        if self.repo_url and not target.startswith("docs/") and not target.endswith((*OF_PICTURES, *OF_PAGES)):
             return f"{self.repo_url}/blob/HEAD/{target}"
         return posixpath.relpath(address_of(target), folder or ".")
 
@@ -72,15 +85,22 @@ def _linked() -> list[str]:
     targets = {
         _target(page, link)
         for page in _pages()
-        for _, link in LINK.findall(CODE.sub("", (ROOT / page).read_text("utf-8")))
+        for _, link in (HREF if page.endswith(".html") else LINK).findall(
+            CODE.sub("", (ROOT / page).read_text("utf-8"))
+        )
     }
     return sorted(target for target in targets if not target.startswith("docs/") and (ROOT / target).exists())
 
 
 def _pages() -> Iterator[str]:
     yield from pages_elsewhere().values()
-    for path in sorted((ROOT / "docs").rglob("*.md")):
-        yield path.relative_to(ROOT).as_posix()
+    yield from documentation().values()
+    yield from _found(["docs/**/*.md"])
+
+
+def _found(patterns: Iterable[str]) -> Iterator[str]:
+    for pattern in patterns:
+        yield from sorted(path.relative_to(ROOT).as_posix() for path in ROOT.glob(pattern))
 
 
 def _target(page: str, link: str) -> str:

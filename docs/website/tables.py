@@ -1,0 +1,14 @@
+"""Tables of the pages that are made of the code."""
+
+from collections.abc import Sequence
+
+
+def table(rows: Sequence[Sequence[str]], heading: str = "", columns: Sequence[str] = ()) -> str:
+    """Rows of cells that are HTML already; `heading` stands above all columns, `columns` above each."""
+    lines = ["".join(f"<td>{cell}</td>" for cell in row) for row in rows]
+    if columns:
+        lines.insert(0, "".join(f"<th>{column}</th>" for column in columns))
+    elif heading:
+        lines.insert(0, f'<th colspan="{len(rows[0])}">{heading}</th>')
+    body = "\n".join(f"<tr>{line}</tr>" for line in lines)
+    return f"<table>\n{body}\n</table>\n\n"
