@@ -150,9 +150,10 @@ class _Counted:
 
     def __init__(self, total: int, opened: store.Store, progress: Progress | None, announce: Announce | None) -> None:
         self.total, self.failed = total, 0
-        self._opened, self._progress, self._announce = opened, progress, announce
-        self.done = 0
-        self._recount()
+        self._progress, self._announce = progress, announce
+        self._lacking = opened.lacking()
+        self.done = total - sum(self._lacking.values())
+        self._tell()
 
     def add(self, outcomes: Iterable[Outcome]) -> None:
         """More runs have a row."""
@@ -162,10 +163,10 @@ class _Counted:
                 if self._announce is not None and self.failed <= _TOLD:
                     more = "; further ones are not told" if self.failed == _TOLD else ""
                     self._announce(f"{described(row.index, row.settings)} failed: {row.message}{more}")
-        self._recount()
+            self.done += self._lacking.pop(row.key, 0)
+        self._tell()
 
-    def _recount(self) -> None:
-        self.done = sum(self._opened.counts().values())
+    def _tell(self) -> None:
         if self._progress is not None:
             self._progress(self.done, self.total)
 

@@ -1,19 +1,25 @@
 """The rows of a study as tables for analysis."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from pyarrow import csv
 
 from orchestration.errors import UsageError
-from orchestration.studies.store import TEXTS, UNITS, open_for_reading
+from orchestration.studies.store import SETTINGS, TEXTS, UNITS, Store, open_for_reading
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+
+
+SHARED = (*TEXTS, "status", "machine")
+"""Columns of few words"""
 
 
 def frame(path: Path) -> "pd.DataFrame":
@@ -24,10 +30,9 @@ def frame(path: Path) -> "pd.DataFrame":
         about = opened.about()
         if "axes" not in about:
             raise UsageError(f"{path}: expected the store of a study that has begun")
-        rows, columns = list(opened.rows()), opened.columns
-    axes = json.loads(about["axes"])
-    settings = pd.DataFrame([row.pop("settings") for row in rows], columns=axes)
-    table = pd.DataFrame(rows, columns=list(columns))
+        axes = json.loads(about["axes"])
+        settings_by_axis, columns = _columns(opened, axes)
+    settings, table = pd.DataFrame(settings_by_axis, columns=axes), pd.DataFrame(columns)
     for name in ("diverged", "good"):
         table[name] = table[name].astype("boolean")
     for name in ("steps", "design_index", "seed"):
@@ -38,6 +43,24 @@ def frame(path: Path) -> "pd.DataFrame":
         for name, value in json.loads(about[kind]).items():
             table[f"{prefix}.{name}"] = value
     return table
+
+
+def _columns(store: Store, axes: Sequence[str]) -> tuple[dict[str, list[Any]], dict[str, Any]]:
+    """The settings by axis and the other columns of a store's rows, each whole; block by block, for there are many."""
+    settings: dict[str, list[Any]] = {name: [] for name in axes}
+    blocks: dict[str, list[Any]] = {name: [] for name in store.columns}
+    known: dict[Any, Any] = {}  # a text that many rows share is kept once
+    for block in store.blocks():
+        points = json.loads(f"[{','.join(block.pop(SETTINGS))}]")
+        for name, values in settings.items():
+            values += [point[name] for point in points]
+        for name, found in block.items():
+            if name in store.metrics and name not in TEXTS:
+                blocks[name].append(np.array(found, dtype=float))
+            else:
+                blocks[name] += [known.setdefault(each, each) for each in found] if name in SHARED else found
+    numeric = {name: np.concatenate(blocks[name] or [[]]) for name in store.metrics if name not in TEXTS}
+    return settings, {**blocks, **numeric}
 
 
 def dataset(path: Path) -> "xr.Dataset":
@@ -73,9 +96,9 @@ def _with_units(table: Any, units: Mapping[str, str]) -> Any:
 
 def export(path: Path, folder: Path) -> list[Path]:
     """Write `runs.parquet`, with units in the metadata of its fields, and `runs.csv`, by design index; their paths."""
-    table = frame(path)
+    table = _with_units(pa.Table.from_pandas(frame(path), preserve_index=False), units_in(path))
     folder.mkdir(parents=True, exist_ok=True)
     written = [folder / "runs.parquet", folder / "runs.csv"]
-    pq.write_table(_with_units(pa.Table.from_pandas(table, preserve_index=False), units_in(path)), written[0])
-    table.to_csv(written[1], index=False)
+    pq.write_table(table, written[0])
+    csv.write_csv(table, written[1])
     return written

@@ -10,7 +10,7 @@ import shutil
 import sqlite3
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -481,14 +481,26 @@ DAMAGE = [
 ]
 
 
+def counts_of(path: Path) -> dict[str, int]:
+    with open_for_reading(path) as store:
+        return store.counts()
+
+
+def open_to_write(path: Path) -> None:
+    with open_for_writing(path, OBJECTIVES):
+        pass
+
+
 @pytest.mark.parametrize("statement", DAMAGE)
-@pytest.mark.parametrize("open_it", [open_for_reading, functools.partial(open_for_writing, objectives=OBJECTIVES)])
-def test_a_value_that_was_not_written_by_the_store_is_noticed(path: Path, statement: str, open_it: Any) -> None:
+@pytest.mark.parametrize("use", [rows_of, counts_of, open_to_write])
+def test_a_value_that_was_not_written_by_the_store_is_noticed(
+    path: Path, statement: str, use: Callable[[Path], Any]
+) -> None:
     written(path, row(0), row(1), row(2))
     with contextlib.closing(sqlite3.connect(path)) as other, other:
         other.execute(statement)
-    with pytest.raises(QuadcosimError, match=r"the store is damaged|no store of this version") as caught, open_it(path):
-        pass
+    with pytest.raises(QuadcosimError, match=r"the store is damaged|no store of this version") as caught:
+        use(path)
     one_line(caught.value)
 
 
