@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
+from orchestration.constructors import strict
 from orchestration.errors import UsageError, shown
 from orchestration.quadrotor.parameters import Parameter
 from orchestration.quadrotor.timing import Timing
@@ -14,6 +15,7 @@ from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT, SA
 from orchestration.system.requirements import is_finite
 
 
+@strict()
 @dataclass(frozen=True, kw_only=True)
 class FmuChoice:
     """An FMU, by the name of one of this project's or a path, and the parameters to set."""
@@ -22,6 +24,7 @@ class FmuChoice:
     parameters: dict[str, Parameter] = field(default_factory=dict)
 
 
+@strict("reference.")
 @dataclass(frozen=True, kw_only=True)
 class ReferenceChoice:
     """Where the reference comes from: the controller's built-in trajectory unless a CSV file is named."""
@@ -31,6 +34,7 @@ class ReferenceChoice:
     file: Path | None = None
 
 
+@strict("record.")
 @dataclass(frozen=True, kw_only=True)
 class Record:
     """Variables to record beside what is exchanged; None: all outputs and locals."""
@@ -41,6 +45,7 @@ class Record:
     controller: tuple[str, ...] | None = None
 
 
+@strict()
 @dataclass(frozen=True, kw_only=True)
 class Scenario:
     """One run; the defaults are the paper's scenario (section V) at a 10 ms period.

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, fields
 from fractions import Fraction
 from typing import ClassVar
 
+from orchestration.constructors import strict
 from orchestration.errors import shown
 from orchestration.system.model import Clock, Distribution, Hold, Order
 from orchestration.system.requirements import (
@@ -21,6 +22,7 @@ from orchestration.system.times import exact_nanoseconds
 _PLACE = "timing."
 
 
+@strict("timing.")
 @dataclass(frozen=True, kw_only=True)
 class Timing:
     """How the digital loop is clocked; times in seconds.

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import Any
 
+from orchestration.constructors import strict
 from orchestration.documents import read_toml
 from orchestration.errors import UsageError
 from orchestration.quadrotor.parameters import Parameter, parameters_in
@@ -14,6 +15,7 @@ SHIPPED = Path(__file__).parents[1] / "vehicles"
 ENDING = ".toml"
 
 
+@strict()
 @dataclass(frozen=True, kw_only=True)
 class Vehicle:
     """Parameters of the plant, of every controller, and of single controllers by the names of their FMUs."""

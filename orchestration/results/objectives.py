@@ -11,8 +11,7 @@ from orchestration.expressions.recorded import Marks, Recorded, Spans, vectors
 from orchestration.expressions.syntax import names, parse
 from orchestration.master.recording import Events, Recording
 from orchestration.simulator import Floats
-from orchestration.system.model import System
-from orchestration.system.system_file import expressions
+from orchestration.system.model import System, expressions
 from orchestration.system.times import NANOSECONDS
 
 Metrics = dict[str, float | int | bool | str | None]

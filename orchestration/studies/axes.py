@@ -7,6 +7,7 @@ from typing import Literal, overload
 
 import numpy as np
 
+from orchestration.constructors import strict
 from orchestration.errors import UsageError
 from orchestration.simulator import Floats
 from orchestration.studies import sensitivity
@@ -19,6 +20,7 @@ MOST_POINTS = 1_000_000
 """of a study"""
 
 
+@strict()
 @dataclass(frozen=True, kw_only=True)
 class Axis:
     """One quantity that a study varies.

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fmu_kit.trajectory import Trajectory
+from orchestration.constructors import strict
 from orchestration.errors import UsageError
 from orchestration.master.streams import Streams
 from orchestration.simulator import Floats
@@ -22,6 +23,7 @@ class Start:
     """of the plant, `initial.…`"""
 
 
+@strict("starts.")
 @dataclass(frozen=True, kw_only=True)
 class Starts:
     """Initial errors in position, velocity, attitude and angular velocity, each in a direction of its own.

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from orchestration.constructors import strict
 from orchestration.errors import UsageError
 from orchestration.fmus import native_twin, native_twins
 from orchestration.quadrotor.scenario import Scenario
@@ -21,6 +22,7 @@ from orchestration.system.model import System
 from orchestration.system.paths import changed, names_table, value_at
 
 
+@strict()
 @dataclass(frozen=True, kw_only=True)
 class Study:
     """Runs of a base system, or a scenario of the quadrotor, over axes."""

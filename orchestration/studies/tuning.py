@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fmu_kit.trajectory import Trajectory
+from orchestration.constructors import strict
 from orchestration.errors import UsageError
 from orchestration.fmus import native_twins
 from orchestration.quadrotor.scenario import Scenario
@@ -33,6 +34,7 @@ _WIDTH = 0.25
 _PERIOD = "timing.period"
 
 
+@strict()
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
     """What is tuned, on what, and with how much effort; raises `UsageError` for what cannot be."""

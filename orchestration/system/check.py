@@ -8,9 +8,8 @@ from orchestration.expressions.syntax import Name, names, parse, parts
 from orchestration.fmi.model import NUMERIC, Model, Variable
 from orchestration.fmi.values import taken
 from orchestration.system.conversion import BECOMES, OtherQuantity, conversion
-from orchestration.system.model import Connection, Parameter, System, component_of, variable_of
+from orchestration.system.model import Connection, Parameter, System, component_of, expressions, variable_of
 from orchestration.system.requirements import is_finite
-from orchestration.system.system_file import expressions
 
 
 def check(system: System, models: Mapping[str, Model]) -> None:

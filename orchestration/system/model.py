@@ -1,11 +1,14 @@
 """What a system is: frozen values, checked for what they mean by themselves; no FMU is opened here."""
 
+import functools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from orchestration.constructors import strict
 from orchestration.errors import UsageError
+from orchestration.expressions.syntax import is_number, parse
 from orchestration.system.requirements import (
     is_finite,
     require,
@@ -26,6 +29,7 @@ Align = Literal["exact", "next"]
 Parameter = float | bool | str
 
 
+@strict()
 @dataclass(frozen=True, kw_only=True)
 class Sampling:
     """When a digital task runs; times in seconds of the true clock, but for `period` and `offset` (its own)."""
@@ -53,6 +57,7 @@ class Sampling:
             require_own_clock(self)
 
 
+@strict()
 @dataclass(frozen=True, kw_only=True)
 class Component:
     """An FMU, its parameters, and how it is stepped: at sampling instants if it has `sampling`, else continuously."""
@@ -71,8 +76,6 @@ class Component:
 
     def __post_init__(self) -> None:
         require_choice(self, align=Align)
-        require(isinstance(self.fmu, str), "fmu", self.fmu, "a name or the path of an .fmu file")
-        require(self.record is None or isinstance(self.record, tuple), "record", self.record, "a list of variables")
         if self.sampling is None:
             require(self.step is not None, "step", "none", "step (continuous time) or sampling (a digital task)")
             require_positive(self, "step")
@@ -81,6 +84,7 @@ class Component:
             require(self.step is None, "step", self.step, "none beside sampling, whose period it follows")
 
 
+@strict()
 @dataclass(frozen=True, kw_only=True)
 class Connection:
     """One message from a component to another: its signals travel together; times in seconds."""
@@ -152,6 +156,7 @@ class Connection:
         return component_of(self.end[0])
 
 
+@strict()
 @dataclass(frozen=True, kw_only=True)
 class Source:
     """What drives inputs from outside: a constant, a table over time, white noise or the built-in trajectory.
@@ -182,7 +187,6 @@ class Source:
     def __post_init__(self) -> None:
         kinds = ("constant", "file", "noise", "trajectory")
         given = [kind for kind in kinds if getattr(self, kind) is not None]
-        require(isinstance(self.to, tuple), "to", self.to, "a list of inputs")
         require(len(given) == 1, "source", " and ".join(given) or "nothing", f"one of {', '.join(kinds)}")
         if self.noise is not None:
             require_not_negative(self, "noise")
@@ -196,6 +200,7 @@ class Source:
             require(self.period is None, "period", self.period, "none without noise")
 
 
+@strict()
 @dataclass(frozen=True, kw_only=True)
 class Criterion:
     """What a good run is, as expressions; None: not asked."""
@@ -213,6 +218,7 @@ class Criterion:
         require(two, "outcomes", ascii(given), "two names, and neither is diverged")
 
 
+@strict()
 @dataclass(frozen=True, kw_only=True)
 class System:
     """Components and what connects and drives them, what a run comes to and when it is good.
@@ -273,6 +279,7 @@ class System:
         names = [x.name for x in self.connections]
         for name in names:
             require(names.count(name) == 1, "connections", name, "a name of its own for each")
+        _require_expressions(tuple(expressions(self)))
 
     def _causes(self) -> list[str]:
         """What random numbers are drawn for."""
@@ -295,6 +302,30 @@ def _require_names(table: str, names: Iterable[str], without: str = "") -> None:
     for name in names:
         fits = name.isprintable() and name == name.strip() != "" and not (without and without in name)
         require(fits, table, name.encode("unicode_escape").decode(), expected)
+
+
+def expressions(system: System) -> list[tuple[str, str]]:
+    """Every expression of a system, with its place in the file."""
+    found = [(f"objectives.{name}", text) for name, text in system.objectives.items()]
+    criterion = system.criterion
+    return found + [
+        (f"criterion.{key}", text)
+        for key, text in (("good", criterion.good), ("diverged", criterion.diverged))
+        if text is not None
+    ]
+
+
+@functools.lru_cache(maxsize=256)
+def _require_expressions(listed: tuple[tuple[str, str], ...]) -> None:
+    """They can be read, and those of the criterion are conditions; runs of a study have them in common."""
+    for place, text in listed:
+        try:
+            node = parse(text)
+        except UsageError as error:
+            raise UsageError(f"{place}: {error}") from error
+        if place.startswith("criterion."):
+            meant = parse(dict(listed).get(f"objectives.{text.strip()}", text))
+            require(not is_number(meant) and not is_number(node), place, text, "a condition, as in peak < 2.5")
 
 
 def component_of(variable: str) -> str:

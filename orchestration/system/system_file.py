@@ -10,7 +10,6 @@ import pydantic
 
 from orchestration.documents import read_toml
 from orchestration.errors import UsageError
-from orchestration.expressions.syntax import is_number, parse
 from orchestration.system.model import (
     Align,
     Clock,
@@ -174,33 +173,13 @@ def system_from_tables(tables: Mapping[str, Any], folder: Path) -> System:
         operating_point=dict(_flattened(table.operating_point)),
     )
     for name in system.optional:
-        require(
-            name in system.objectives, "optional", name, f"one of {', '.join(system.objectives) or 'no objectives'}"
-        )
+        known = ", ".join(system.objectives) or "no objectives"
+        require(name in system.objectives, "optional", name, f"one of {known}")
     try:
         changed(system, system.operating_point)
     except UsageError as error:
         raise UsageError(f"operating_point: {error}") from error
-    for place, text in expressions(system):
-        try:
-            node = parse(text)
-        except UsageError as error:
-            raise UsageError(f"{place}: {error}") from error
-        if place.startswith("criterion."):
-            meant = parse(system.objectives.get(text.strip(), text))
-            require(not is_number(meant) and not is_number(node), place, text, "a condition, as in peak < 2.5")
     return system
-
-
-def expressions(system: System) -> list[tuple[str, str]]:
-    """Every expression of a system, with its place in the file."""
-    found = [(f"objectives.{name}", text) for name, text in system.objectives.items()]
-    criterion = system.criterion
-    return found + [
-        (f"criterion.{key}", text)
-        for key, text in (("good", criterion.good), ("diverged", criterion.diverged))
-        if text is not None
-    ]
 
 
 def _component(name: str, table: ComponentTable, folder: Path) -> Component:

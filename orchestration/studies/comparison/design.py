@@ -7,6 +7,7 @@ from typing import Any
 
 from fmu_kit.trajectory import Trajectory
 from orchestration import fmus
+from orchestration.constructors import strict
 from orchestration.errors import UsageError
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import paths_of
@@ -24,6 +25,7 @@ Changes = Mapping[str, Value]
 """Values by target, as axes of studies name them"""
 
 
+@strict()
 @dataclass(frozen=True, kw_only=True)
 class Controller:
     """One that is compared: an FMU with parameters."""
@@ -36,6 +38,7 @@ class Controller:
     """of its attitude loop [rad/s]; None: that of the FMU about hover"""
 
 
+@strict()
 @dataclass(frozen=True, kw_only=True)
 class Craft:
     """A vehicle that they fly."""
@@ -44,6 +47,7 @@ class Craft:
     vehicle: Vehicle = field(default_factory=lambda: Vehicle(name="base"))
 
 
+@strict()
 @dataclass(frozen=True, kw_only=True)
 class Condition:
     """What differs from what a controller believes, or goes wrong: mass, lag, wind, losses."""
@@ -53,6 +57,7 @@ class Condition:
     multiplies: Mapping[str, float] = field(default_factory=dict)
 
 
+@strict("front.")
 @dataclass(frozen=True, kw_only=True)
 class Front:
     """What is weighed against each other, both the less the better."""
@@ -72,6 +77,7 @@ class Cell:
     value: Value
 
 
+@strict()
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
     """Controllers on vehicles under conditions over an axis, each from all starts; raises `UsageError`."""
