@@ -169,6 +169,8 @@ def prepared(
             for name, component in system.components.items():
                 _set_parameters(instances[name], component)
                 _set_clock(instances[name], component, models[name])
+            said = described(system, models, ("time", *_signals(system, models)))
+            recorder.describe({name: one.as_words() for name, one in said.items()})
             sources = {name: source_values(system, name, parameters, streams) for name in system.sources}
             signals = {name: system.sources[name].signals(name) for name in sources}
             watched = (sources, signals, parameters)

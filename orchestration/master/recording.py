@@ -1,6 +1,6 @@
 """What a flight leaves: its rows and events, handed over in chunks as it goes on."""
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, TypeAlias, overload
 
@@ -105,8 +105,15 @@ class Recording(Protocol):
         """In order of time, at least one; with all columns, or those of `columns` that there are."""
 
 
+About = Mapping[str, Mapping[str, str]]
+"""What is known of columns beside their values, by column: its `unit` and its `description`, where it has them"""
+
+
 class Recorder(Protocol):
     """Takes what a flight leaves."""
+
+    def describe(self, about: About) -> None:
+        """What is known of the columns, for those who write it down; before they begin."""
 
     def begin(self, columns: tuple[str, ...]) -> None:
         """The names of what every row has; before the first chunk."""
@@ -124,6 +131,9 @@ class InMemory:
     def __init__(self) -> None:
         self.columns: tuple[str, ...] = ()
         self._chunks: list[Chunk] = []
+
+    def describe(self, about: About) -> None:
+        """As `Recorder`; who has the result has this too."""
 
     def begin(self, columns: tuple[str, ...]) -> None:
         """As `Recorder`."""

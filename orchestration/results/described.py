@@ -16,6 +16,11 @@ class Described:
     text: str | None = None
     """the FMU's description"""
 
+    def as_words(self) -> dict[str, str]:
+        """What there is, by `unit` and `description`, as the fields of a Parquet file have it."""
+        named = {"unit": self.unit, "description": self.text}
+        return {name: text for name, text in named.items() if text}
+
 
 def described(system: System, models: Mapping[str, Model], columns: Iterable[str]) -> dict[str, Described]:
     """By column; a source is described by what it feeds, a trajectory is a position in metres."""

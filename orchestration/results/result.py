@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from orchestration.master.recording import Event, Recording
+from orchestration.master.recording import About, Event, Recording
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.results.described import Described
 from orchestration.results.objectives import Metrics
@@ -61,6 +61,11 @@ class Result:
     def events(self) -> tuple[Event, ...]:
         """In order of time."""
         return tuple(event for chunk in self.recording.chunks(("time",)) for event in chunk.events)
+
+    @property
+    def about(self) -> About:
+        """What is known of each column, in words: its `unit` and its `description`, where it has them."""
+        return {name: one.as_words() for name, one in self.described.items()}
 
     @property
     def end(self) -> float:

@@ -29,7 +29,7 @@ def save_run(result: Result, folder: str | Path, *, figures: bool = True) -> Pat
     Raises `UsageError` if `folder` holds something else.
     """
     with run_folder(Path(folder), (METRICS,)) as new:
-        tables.copy(result.recording, new.path)
+        tables.copy(result.recording, new.path, result.about)
         _write(result, new.path, figures=figures)
     return Path(folder)
 

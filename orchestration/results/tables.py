@@ -10,11 +10,18 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from orchestration.errors import UsageError
-from orchestration.master.recording import KINDS, Chunk, Events, Integers, Recording
+from orchestration.master.recording import KINDS, About, Chunk, Events, Integers, Recording
 from orchestration.simulator import Floats
 
 SIGNALS, EVENTS = "signals.parquet", "events.parquet"
-_EVENT = pa.schema([("time", pa.float64()), ("event", pa.string()), ("what", pa.string()), ("sample", pa.int64())])
+_EVENT = pa.schema(
+    [
+        pa.field("time", pa.float64(), metadata={"unit": "s"}),
+        ("event", pa.string()),
+        ("what", pa.string()),
+        ("sample", pa.int64()),
+    ]
+)
 
 
 class ToFolder:
@@ -22,12 +29,17 @@ class ToFolder:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        self._about: About = {}
         self._writers: tuple[Any, Any] | None = None
+
+    def describe(self, about: About) -> None:
+        """As `Recorder`; it goes into the metadata of the columns."""
+        self._about = about
 
     def begin(self, columns: tuple[str, ...]) -> None:
         """As `Recorder`."""
         self._writers = (
-            pq.ParquetWriter(self.folder / SIGNALS, _signals_schema(columns), write_page_checksum=True),
+            pq.ParquetWriter(self.folder / SIGNALS, _signals_schema(columns, self._about), write_page_checksum=True),
             pq.ParquetWriter(self.folder / EVENTS, _EVENT, write_page_checksum=True),
         )
 
@@ -58,7 +70,7 @@ class InFolder:
             names = signals.schema_arrow.names
             if "time" not in names:
                 raise UsageError(f"{folder / SIGNALS}: no column time; expected those of a run")
-            _expect_schema(folder / SIGNALS, signals, _signals_schema(names))
+            _expect_schema(folder / SIGNALS, signals, _signals_schema(names, {}))
             _expect_schema(folder / EVENTS, events, _EVENT)
             self._count: int = signals.metadata.num_rows
             if signals.num_row_groups != events.num_row_groups:
@@ -109,29 +121,30 @@ def _expect_schema(path: Path, file: Any, schema: Any) -> None:
         raise UsageError(f"{path}: expected the columns {expected}, in this order")
 
 
-def copy(recording: Recording, folder: Path) -> None:
-    """Write the files of `folder`."""
+def copy(recording: Recording, folder: Path, about: About) -> None:
+    """Write the files of `folder`, with what is known of the columns in their metadata."""
     recorder = ToFolder(folder)
+    recorder.describe(about)
     recorder.begin(recording.columns)
     for chunk in recording.chunks():
         recorder.take(chunk)
     recorder.finish()
 
 
-def write_signals(path: Path | BinaryIO, recording: Recording) -> None:
-    """One column each for what is recorded, all float64."""
-    with pq.ParquetWriter(path, _signals_schema(recording.columns), write_page_checksum=True) as writer:
+def write_signals(path: Path | BinaryIO, recording: Recording, about: About) -> None:
+    """One column each for what is recorded, all float64, with what is known of it in its metadata."""
+    with pq.ParquetWriter(path, _signals_schema(recording.columns, about), write_page_checksum=True) as writer:
         for chunk in recording.chunks():
             writer.write_table(_signals_table(chunk))
 
 
-def _signals_schema(columns: Iterable[str]) -> Any:
-    return pa.schema([(name, pa.float64()) for name in columns])
+def _signals_schema(columns: Iterable[str], about: About) -> Any:
+    return pa.schema([pa.field(name, pa.float64(), metadata=dict(about.get(name, {}))) for name in columns])
 
 
 def _signals_table(chunk: Chunk) -> Any:
     columns = [_numbers(values) for values in chunk.signals.values()]
-    return pa.Table.from_arrays(columns, schema=_signals_schema(chunk.columns))
+    return pa.Table.from_arrays(columns, schema=_signals_schema(chunk.columns, {}))
 
 
 def _matrix(table: Any, names: tuple[str, ...]) -> Floats:

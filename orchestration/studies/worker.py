@@ -166,5 +166,5 @@ def _parquet(result: Result) -> bytes:
     from orchestration.results import tables  # pyarrow loads only where signals are kept
 
     buffer = io.BytesIO()
-    tables.write_signals(buffer, result.recording)
+    tables.write_signals(buffer, result.recording, result.about)
     return buffer.getvalue()
