@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from orchestration.drawing.palette import GREY
 from orchestration.master.master import Master
 from orchestration.master.recording import InMemory
 from orchestration.master.streams import Streams
 from orchestration.master.timetable import Timetable
-from orchestration.results import plots
 from orchestration.simulator import Floats, Transfer
 from orchestration.system.model import Component, Connection, Sampling, System
 
@@ -120,7 +120,7 @@ def main() -> None:
         for size, value in zip(SIZES, found, strict=True):
             print(f"{size:>6} {value:10.1f} µs an instant {value / size:8.2f} µs each")
         axes.loglog(SIZES, found, "o", label=f"{what}: {slope:.2f} µs each")
-        axes.loglog(SIZES, slope * np.array(SIZES) + constant, color=plots.GREY, linewidth=1.0)
+        axes.loglog(SIZES, slope * np.array(SIZES) + constant, color=GREY, linewidth=1.0)
     axes.set(xlabel="how many", ylabel="the master's cost of an instant [µs]")
     axes.grid(True, alpha=0.3)
     axes.legend()

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from docs import experiments, theory
 from docs.experiments import CASES, DIRECTIONS, PERIODS, SIZES
-from orchestration.results.plots import BLUE, GREY, ORANGE, RED
+from orchestration.drawing.palette import BLUE, GREY, ORANGE, RED
 from orchestration.statistics import wilson
 from orchestration.studies import figures
 

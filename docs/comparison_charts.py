@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from orchestration.results.plots import BLUE, GREEN, GREY, ORANGE, RED
+from orchestration.drawing.palette import BLUE, GREEN, GREY, ORANGE, RED
 from orchestration.statistics import wilson
 
 Rows = Sequence[Mapping[str, Any]]

@@ -2,17 +2,18 @@
 
 from pathlib import Path
 
-import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from orchestration.drawing.draw import draw
+from orchestration.drawing.palette import BLUE, GREEN, GREY, RED
+from orchestration.drawing.style import DOCS, save
 from orchestration.master.position import Position
 from orchestration.master.streams import Streams
 from orchestration.master.timetable import Timetable
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.translation import system_of
-from orchestration.results import plots
 from quadcosim import run
 
 FIGURES = Path(__file__).parent / "figures"
@@ -22,14 +23,16 @@ MILLISECONDS = 1e-6
 
 def main() -> None:
     """Fly what the figures show and write them, small enough for a repository."""
-    FIGURES.mkdir(exist_ok=True)
     flight = run()
     lossy = Timing(period=0.02, delay=0.012, jitter=0.006, measurement_loss=0.15, command_loss=0.15)
-    with matplotlib.rc_context({**plots.STYLE, "figure.dpi": 80}):
-        plots.path(flight).savefig(FIGURES / "path.png")
-        plots.errors(flight).savefig(FIGURES / "errors.png")
-        timing_diagram().savefig(FIGURES / "timing.png")
-        plots.commands(run(Scenario(stop_time=2.0, timing=lossy)), (0.2, 0.8)).savefig(FIGURES / "commands.png")
+    figures = {
+        **draw(flight, ("path", "errors"), style=DOCS),
+        **draw(run(Scenario(stop_time=2.0, timing=lossy)), ("commands",), window=(0.2, 0.8), style=DOCS),
+    }
+    with DOCS.applied():
+        figures["timing"] = timing_diagram()
+    for path in save(figures, FIGURES, DOCS):
+        print(path)
 
 
 def timing_diagram() -> Figure:
@@ -55,16 +58,16 @@ def _draw_case(axes: Axes, timing: Timing) -> None:
     system, sampled = system_of(Scenario(timing=timing, stop_time=0.065, seed=3)), {}
     for instant in Position(Timetable(system, Streams(system.seed, system.streams))).instants():
         now, arrivals = instant.time * MILLISECONDS, [k for _, k, _, _ in instant.arrivals]
-        axes.plot(now, 0.0, "|", color=plots.GREY, markersize=4, label="plant point")
+        axes.plot(now, 0.0, "|", color=GREY, markersize=4, label="plant point")
         for due in instant.dues:
             ((_, k, _, arrival),) = due.sent
             sampled[k] = now
-            axes.plot(now, 1.0, "o", color=plots.BLUE, markersize=5, label="sample")
+            axes.plot(now, 1.0, "o", color=BLUE, markersize=5, label="sample")
             if arrival < 0:
-                axes.plot(now, 0.72, "x", color=plots.RED, markersize=6, label="command lost")
+                axes.plot(now, 0.72, "x", color=RED, markersize=6, label="command lost")
             arrivals += [k] if arrival == instant.time else []
         for k in arrivals:
-            arrow = {"arrowstyle": "-|>", "color": plots.GREEN, "shrinkA": 3, "shrinkB": 0}
+            arrow = {"arrowstyle": "-|>", "color": GREEN, "shrinkA": 3, "shrinkB": 0}
             axes.annotate("", xy=(now, 0.0), xytext=(sampled[k], 1.0), arrowprops=arrow)
     axes.set(yticks=(0.0, 1.0), yticklabels=("plant", "controller"), ylim=(-0.3, 1.35), xlim=(-1.0, 66.0))
     axes.grid(False)

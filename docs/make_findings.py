@@ -17,12 +17,12 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 import pandas as pd
 
 from docs import charts, comparisons, experiments, theory
 from docs.experiments import PAPER
+from orchestration.drawing.style import DOCS
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import system_of
 from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
@@ -65,7 +65,6 @@ CHECKED = 24
 
 def main() -> None:
     """Everything, in the order of the page."""
-    matplotlib.rcParams["savefig.dpi"] = 80
     RESULTS.mkdir(parents=True, exist_ok=True)
     began = time.perf_counter()
     sections = (
@@ -475,7 +474,7 @@ def _indices(designs: list[list[Index]], kind: str) -> tuple[Any, Any]:
 
 
 def _save(make: Callable[[], Any], name: str) -> None:
-    figures.save(make, FIGURES / f"{name}.png")
+    figures.save(make, FIGURES / f"{name}.png", DOCS)
 
 
 def _interval(values: Any) -> str:

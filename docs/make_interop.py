@@ -8,12 +8,11 @@ import sys
 import tempfile
 from pathlib import Path
 
-import matplotlib
-
 from docs.pages import fill
 from orchestration import fmus
 from orchestration.checks.validation import rules
 from orchestration.checks.validation.finding import name_of
+from orchestration.drawing import style
 from orchestration.exchange.interop import table
 from orchestration.exchange.interop.catalogue import chosen
 from orchestration.exchange.interop.compare import agreements
@@ -21,7 +20,6 @@ from orchestration.exchange.interop.figure import agreement_chart
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.wiring import MODELS
-from orchestration.results import plots
 from tests.fmus.mutants import MUTANTS
 from tests.fmus.verdicts import as_markdown, verdicts
 
@@ -46,8 +44,9 @@ def interop() -> None:
         )
         tables[f"step {interval}"] = table.text(found)
         if interval == INTERVALS[0]:
-            with matplotlib.rc_context({**plots.STYLE, "figure.dpi": 80}):
-                agreement_chart(found).savefig(DOCS / "figures" / "interop.png")
+            with style.DOCS.applied():
+                chart = agreement_chart(found)
+            style.save({"interop": chart}, DOCS / "figures", style.DOCS)
     fill(DOCS / "interop.md", tables)
 
 

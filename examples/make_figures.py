@@ -6,12 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration.results.plots import BLUE, GREEN, GREY, ORANGE, RED, STYLE
+from orchestration.drawing.palette import BLUE, GREEN, GREY, ORANGE, RED
+from orchestration.drawing.style import DOCS, save
 from orchestration.results.result import Result
 from orchestration.simulation import run
 from orchestration.system.paths import changed
@@ -128,11 +128,10 @@ FIGURES: dict[str, Callable[[], Figure]] = {
 
 def main(names: list[str]) -> None:
     """Draw the figures of these examples; of all if none is named."""
-    with matplotlib.rc_context({**STYLE, "figure.dpi": 80}):
-        for name in names or FIGURES:
-            path = HERE / name / "figure.png"
-            FIGURES[name]().savefig(path)
-            print(path)
+    for name in names or FIGURES:
+        with DOCS.applied():
+            figure = FIGURES[name]()
+        print(*save({"figure": figure}, HERE / name, DOCS))
 
 
 if __name__ == "__main__":

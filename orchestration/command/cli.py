@@ -1,7 +1,6 @@
 """The command `quadcosim`."""
 
 import json
-import math
 import sys
 import traceback
 from dataclasses import asdict
@@ -11,12 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 import typer.core
 
+from orchestration.command import plotting
 from orchestration.command import systems as system_commands
 from orchestration.command.flags import EngineFlag, FlightFlags, Timing, flies, request_from
 from orchestration.command.limit_flags import LimitFlags
 from orchestration.command.shared_flags import takes
 from orchestration.command.terminal import progress_bar, say
-from orchestration.errors import QuadcosimError, SimulatorError, UsageError, shown
+from orchestration.errors import QuadcosimError, SimulatorError, UsageError
 from orchestration.exchange.interop import cli as interop
 from orchestration.fmi.banners import banners_to_stderr
 from orchestration.studies import cli as studies
@@ -185,32 +185,6 @@ def run(
 
 
 @app.command()
-def plot(
-    directory: Annotated[Path, typer.Argument(help="Directory of a run.", metavar="DIR")],
-    start: Annotated[
-        float | None, typer.Option("--from", help="Start of the zoom on the commands, in seconds.")
-    ] = None,
-    end: Annotated[float | None, typer.Option("--to", help="End of the zoom on the commands, in seconds.")] = None,
-) -> None:
-    """Draw the figures of a run again, the commands zoomed on a window of time."""
-    from orchestration.results import plots
-    from orchestration.results.run_directory import load_run
-
-    result = load_run(directory)
-    last = result.end
-    window = None
-    if start is not None or end is not None:
-        window = (0.0 if start is None else start, last if end is None else end)
-        if not 0.0 <= window[0] < window[1] < math.inf or window[0] >= last:
-            raise UsageError(
-                f"--from {shown(window[0])} --to {shown(window[1])}: expected 0 <= from < to, and from before the "
-                f"run's end at {shown(last)} s"
-            )
-    for path in plots.draw(result, directory, window):
-        print(path)
-
-
-@app.command()
 @takes("limits", LimitFlags)
 def validate(
     fmu: Annotated[list[Path] | None, typer.Argument(help="FMUs; without any, those of this project.")] = None,
@@ -298,6 +272,7 @@ def ssp(
     say(f"{timing} has its timing, for quadcosim run")
 
 
+plotting.register(app)
 system_commands.register(app)
 studies.register(app)
 interop.register(app)

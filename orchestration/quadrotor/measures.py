@@ -1,12 +1,15 @@
 """Quantities of a flight that figures and studies share with the objectives of the system file."""
 
-from collections.abc import Mapping
-from typing import Literal, get_args
+from collections.abc import Mapping, Sequence
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
+import numpy.typing as npt
 
-from orchestration.quadrotor.wiring import POSITION, POSITION_REFERENCE
+from orchestration.quadrotor.wiring import COMMAND, POSITION, POSITION_REFERENCE
 from orchestration.simulator import Floats
+
+Marks: TypeAlias = npt.NDArray[np.bool_]
 
 SETTLED = 0.05
 """[m] of position error in the last third of a flight, below which it counts as settled; as in system.toml"""
@@ -26,3 +29,29 @@ def position_error(signals: Mapping[str, Floats]) -> Floats:
     actual = np.column_stack([signals[f"plant.{name}"] for name in POSITION])
     error: Floats = np.linalg.norm(actual - desired(signals), axis=1)
     return error
+
+
+def saturated(signals: Mapping[str, Floats], parameters: Mapping[str, float]) -> dict[str, Marks]:
+    """By command as the plant gets it, where a limit of the plant changes it, shape (n,) each.
+
+    A limit of a motor changes all of them. Of a plant that does not tell its limits, nowhere.
+    """
+    thrust, *torques = (signals[f"plant.{name}"] for name in COMMAND)
+    most_thrust, most_torque = (parameters.get(f"plant.{name}", np.inf) for name in ("thrust_max", "torque_max"))
+    motors = _motors_saturated(thrust, torques, parameters)
+    found = {COMMAND[0]: (thrust < 0.0) | (thrust > most_thrust) | motors}
+    return found | {name: (np.abs(t) > most_torque) | motors for name, t in zip(COMMAND[1:], torques, strict=True)}
+
+
+def _motors_saturated(thrust: Floats, torques: Sequence[Floats], parameters: Mapping[str, float]) -> Marks:
+    """Where any of four motors on an X frame would have to give more or less than it can."""
+    most = parameters.get("plant.motor.thrust_max", 0.0)
+    if most <= 0.0:
+        return np.zeros(len(thrust), dtype=np.bool_)
+    arm_x, arm_y, drag = (parameters[f"plant.motor.{name}"] for name in ("arm.x", "arm.y", "drag_to_thrust"))
+    least, (x, y, z) = parameters.get("plant.motor.thrust_min", 0.0), torques
+    motors = [
+        thrust + turn * z / drag + way * (x / arm_y - turn * y / arm_x) for turn in (1.0, -1.0) for way in (1.0, -1.0)
+    ]
+    found: Marks = np.any([(one > 4.0 * most) | (one < 4.0 * least) for one in motors], axis=0)
+    return found

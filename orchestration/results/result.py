@@ -15,11 +15,6 @@ from orchestration.results.objectives import Metrics
 from orchestration.simulator import Floats
 from orchestration.system.model import System
 
-FIGURES = ("path", "errors", "commands", "energy")
-"""The figures of a flight, in the order in which they are drawn; the last where the controller has an energy"""
-SYSTEM_FIGURE = "signals"
-"""The figure of any other system"""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Result:

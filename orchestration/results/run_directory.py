@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.documents import read_json
+from orchestration.drawing.names import FILES
 from orchestration.errors import UsageError, shown
 from orchestration.request import load_request, system_meant, text_of
 from orchestration.results import tables
 from orchestration.results.described import Described
 from orchestration.results.folder import NewFolder, new_folder
-from orchestration.results.result import FIGURES, SYSTEM_FIGURE, Result
+from orchestration.results.result import Result
 from orchestration.results.tables import ToFolder
 from orchestration.simulation import RunInterrupted, columns_of
 
@@ -49,9 +50,9 @@ def _write(result: Result, folder: Path, *, figures: bool) -> None:
     (folder / SCENARIO).write_text(text_of(result.asked), encoding="utf-8")
     (folder / PROVENANCE).write_text(json.dumps(notes, indent=2) + "\n", encoding="utf-8")
     if figures:
-        from orchestration.results import plots  # with it comes matplotlib, which takes longer than a short run
+        from orchestration.drawing import draw, style  # with it comes matplotlib, which takes longer than a short run
 
-        plots.draw(result, folder)
+        style.save(draw.draw(result), folder)
 
 
 def load_run(folder: str | Path) -> Result:
@@ -155,5 +156,5 @@ _KNOWN = {
     SCENARIO,
     PROVENANCE,
     STATE,
-    *(f"{name}.png" for name in (*FIGURES, SYSTEM_FIGURE)),
+    *FILES,
 }

@@ -11,7 +11,9 @@ from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from orchestration.results.plots import BLUE, GREY, ORANGE, RED, STYLE
+from orchestration.drawing.palette import BLUE, GREY, ORANGE, RED
+from orchestration.drawing.style import SCREEN, Style
+from orchestration.drawing.style import save as write
 from orchestration.simulator import Floats
 from orchestration.statistics import wilson
 from orchestration.studies.axes import Axis
@@ -172,12 +174,11 @@ def flew(table: "pd.DataFrame") -> "pd.Series":
     return table["good"].eq(1).fillna(False).astype(bool)
 
 
-def save(make: Callable[[], Figure], path: Path) -> Path:
-    """Make a figure in the project's style and write it as PNG."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with matplotlib.rc_context(STYLE):
-        make().savefig(path)
-    return path
+def save(make: Callable[[], Figure], path: Path, style: Style = SCREEN) -> Path:
+    """Make a figure in a style and write it; the path of the first format."""
+    with style.applied():
+        figure = make()
+    return write({path.stem: figure}, path.parent, style)[0]
 
 
 def _by_horizon(table: "pd.DataFrame") -> str:

@@ -4,12 +4,12 @@ import itertools
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
-import matplotlib
 from matplotlib.figure import Figure
 
+from orchestration.drawing.palette import BLUE, GREEN, GREY, ORANGE, RED
+from orchestration.drawing.style import SCREEN, save
 from orchestration.exchange.interop.compare import Agreement
 from orchestration.exchange.interop.table import AIM
-from orchestration.results.plots import BLUE, GREEN, GREY, ORANGE, RED, STYLE
 from orchestration.system.model import component_of
 
 SMALLEST = 1e-17
@@ -27,11 +27,9 @@ _KINDS = {
 
 def draw(agreements: Sequence[Agreement], folder: Path) -> Path:
     """Write `interop.png` into `folder`; its path."""
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / "interop.png"
-    with matplotlib.rc_context(STYLE):
-        agreement_chart(agreements).savefig(path)
-    return path
+    with SCREEN.applied():
+        chart = agreement_chart(agreements)
+    return save({"interop": chart}, folder)[0]
 
 
 def agreement_chart(agreements: Sequence[Agreement]) -> Figure:

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from orchestration.results.plots import BLUE, GREEN, GREY, ORANGE, RED
+from orchestration.drawing.palette import BLUE, GREEN, GREY, ORANGE, RED
 from orchestration.simulator import Floats
 from orchestration.studies.comparison.cells import Median, Result, sizes
 from orchestration.studies.comparison.design import CONDITION, CONTROLLER, VEHICLE, Comparison

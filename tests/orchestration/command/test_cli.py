@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from orchestration import fmus
+from orchestration.drawing.names import FLIGHT
 from orchestration.quadrotor.wiring import MODELS
 from quadcosim import Scenario, Timing, load_run, run, save_run
 from tests.commands import Done, Main
@@ -236,9 +237,7 @@ def test_plot_zooms_on_a_window(main: Main, here: Path) -> None:
     save_run(run(Scenario(stop_time=0.5)), here / "run")
     before = (here / "run" / "commands.png").read_bytes()
     done = quadcosim("plot", "run", "--from", "0.1", "--to", "0.2")
-    assert {Path(line).name for line in done.stdout.splitlines()} == {
-        "path.png", "errors.png", "commands.png", "energy.png",
-    }  # fmt: skip
+    assert {Path(line).name for line in done.stdout.splitlines()} == {f"{name}.png" for name in FLIGHT}
     assert (here / "run" / "commands.png").read_bytes() != before
     for start, end in (("0.2", "0.1"), ("50", "60"), ("0.5", "0.6"), ("-1", "0.1"), ("0.1", "inf"), ("nan", "0.1")):
         line = error_line(main("plot", "run", "--from", start, "--to", end, code=2))

@@ -7,8 +7,10 @@ import pyarrow.parquet as pq
 import pytest
 
 import quadcosim
+from orchestration.drawing import run as drawn
+from orchestration.drawing.draw import draw
+from orchestration.drawing.names import FLIGHT
 from orchestration.master.recording import InMemory, thinned
-from orchestration.results import plots
 from orchestration.results.pause import fly_until, resume
 from orchestration.results.run_directory import keep_flight
 from quadcosim import Result, Scenario, Timing, load_run
@@ -101,6 +103,6 @@ def test_a_long_run_is_drawn_with_fewer_rows_but_all_of_the_window(tmp_path: Pat
     assert {event for event in result.events if 1e8 <= event.time <= 2e8} <= events < set(result.events)
 
 
-def test_figures_of_a_long_run_are_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(plots, "MOST", 100)
-    assert len(plots.draw(quadcosim.run(SCENARIO), tmp_path)) == len(plots.FIGURES)
+def test_figures_of_a_long_run_are_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(drawn, "MOST", 100)
+    assert set(draw(quadcosim.run(SCENARIO))) == set(FLIGHT)

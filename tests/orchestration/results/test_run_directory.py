@@ -17,8 +17,10 @@ import pyarrow.parquet as pq
 import pytest
 
 import quadcosim
+from orchestration.drawing import draw as drawing
+from orchestration.drawing.names import FLIGHT
+from orchestration.drawing.style import save
 from orchestration.master.recording import Chunk, Events, InMemory, Recorder
-from orchestration.results import plots
 from orchestration.results.run_directory import keep_flight
 from quadcosim import (  # fmt: skip
     QuadcosimError,
@@ -32,7 +34,7 @@ from quadcosim import (  # fmt: skip
 )
 
 FILES = {"signals.parquet", "events.parquet", "metrics.json", "scenario.toml"}
-FIGURES = {"path.png", "errors.png", "commands.png", "energy.png"}
+FIGURES = {f"{name}.png" for name in FLIGHT}
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +121,7 @@ def test_the_scenario_in_the_directory_flies_to_the_same_bits(result: Result, fo
 
 
 def test_figures_are_pictures_with_something_on_them(result: Result, tmp_path: Path) -> None:
-    written = plots.draw(result, tmp_path, (0.1, 0.2))
+    written = save(drawing.draw(result, window=(0.1, 0.2)), tmp_path)
     assert {path.name for path in written} == FIGURES
     for path in written:
         assert path.read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
@@ -130,24 +132,23 @@ def test_figures_are_pictures_with_something_on_them(result: Result, tmp_path: P
 
 @pytest.mark.parametrize("window", [(0.1, 0.2), (5.0, 6.0)])
 def test_the_commands_are_zoomed_on_the_window(result: Result, window: tuple[float, float]) -> None:
-    whole, zoom, *_ = plots.commands(result, window).axes
+    whole, zoom, *_ = drawing.draw(result, ["commands"], window=window)["commands"].axes
     assert zoom.get_xlim() == window
     assert whole.get_xlim() == pytest.approx((0.0, 0.3))
 
 
 def test_a_run_without_samples_can_be_drawn(tmp_path: Path) -> None:
     without = quadcosim.run(Scenario(stop_time=0.05, timing=Timing(offset=1.0)))
-    assert {path.name for path in plots.draw(without, tmp_path)} == FIGURES - {"energy.png"}
+    assert {path.name for path in save(drawing.draw(without), tmp_path)} == FIGURES - {"energy.png", "spectrum.png"}
 
 
-def test_no_energy_is_drawn_of_a_controller_that_has_none(tmp_path: Path) -> None:
+def test_no_energy_is_drawn_of_a_controller_that_has_none() -> None:
     flown = quadcosim.run(Scenario(stop_time=0.1))
     place = flown.columns.index("controller.energy")
     columns, without = (*flown.columns[:place], *flown.columns[place + 1 :]), InMemory()
     without.begin(columns)
     without.take(Chunk(columns=columns, rows=np.delete(flown.rows, place, axis=1), events=Events.of(flown.events)))
-    written = plots.draw(dataclasses.replace(flown, recording=without), tmp_path)
-    assert {path.name for path in written} == {path.name for path in tmp_path.iterdir()} == FIGURES - {"energy.png"}
+    assert set(drawing.draw(dataclasses.replace(flown, recording=without))) == {*FLIGHT} - {"energy"}
 
 
 # -- replacing --------------------------------------------------------------------------------------------
@@ -200,7 +201,7 @@ def test_what_is_not_there_is_no_run(folder: Path) -> None:
 # -- when writing does not end well -----------------------------------------------------------------------
 
 
-@pytest.fixture(params=["tables.ToFolder.take", "tables.copy", "plots.draw"])
+@pytest.fixture(params=["results.tables.ToFolder.take", "results.tables.copy", "drawing.draw.draw"])
 def failing(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """One of the steps of writing fails as on a full disk."""
 
@@ -208,7 +209,7 @@ def failing(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
         raise OSError("no space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr(f"orchestration.results.{request.param}", fail)
+        patch.setattr(f"orchestration.{request.param}", fail)
         yield
 
 
@@ -227,7 +228,7 @@ def test_a_failure_while_writing_leaves_the_earlier_run(
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(plots, "draw", interrupt)
+    monkeypatch.setattr(drawing, "draw", interrupt)
     with pytest.raises(KeyboardInterrupt):
         save_run(quadcosim.run(Scenario(stop_time=0.05)), folder)
     assert contents(folder) == before
@@ -237,13 +238,13 @@ def test_a_failure_while_writing_leaves_the_earlier_run(
 WRITER = """
 import sys, time
 import quadcosim
-from orchestration.results import plots
+from orchestration.drawing import draw
 
 def wait(*_):
     print("writing", flush=True)
     time.sleep(60)
 
-plots.draw = wait
+draw.draw = wait
 quadcosim.save_run(quadcosim.run(quadcosim.Scenario(stop_time=0.05)), sys.argv[1])
 """
 
@@ -356,7 +357,7 @@ def test_a_flight_that_cannot_be_written_whole_is_kept_beside(
     def fail(*_: object) -> None:
         raise OSError("no space left on device")
 
-    monkeypatch.setattr(plots, "draw", fail)
+    monkeypatch.setattr(drawing, "draw", fail)
     with pytest.raises(QuadcosimError, match=r"no space left on device; what was written is in .*run\.1$"):
         keep_flight(folder, lambda to: quadcosim.run(result.asked, recorder=to))
     assert load_run(folder.with_name("run.1")).rows.tobytes() == result.rows.tobytes()

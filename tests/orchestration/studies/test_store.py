@@ -456,7 +456,7 @@ def test_an_edited_source_on_the_path_of_the_flight_is_other_software(module: st
 
 def test_sources_that_only_show_or_keep_results_are_not_on_the_path_of_the_flight() -> None:
     aside = (
-        "orchestration.results.plots",
+        "orchestration.drawing.style",
         "orchestration.command.cli",
         "orchestration.studies.sweep",
         "orchestration.studies.store",

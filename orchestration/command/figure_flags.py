@@ -1,0 +1,87 @@
+"""Flags of the commands that draw: in which formats, how large, in which style."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from orchestration.drawing.names import COLUMNS, FORMATS, STYLES
+from orchestration.errors import UsageError
+
+if TYPE_CHECKING:
+    from orchestration.drawing.style import Style
+
+
+@dataclass(frozen=True, kw_only=True)
+class FigureFlags:
+    """What was given on the command line; raises `UsageError` for what cannot be."""
+
+    format: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--format", help="Of the files, png unless told; may be given several times.", metavar="|".join(FORMATS),
+            show_default=False,
+        ),
+    ] = None  # fmt: skip
+    style: Annotated[
+        str,
+        typer.Option("--style", help="Fonts and lines, and the size unless told.", metavar="|".join(STYLES)),
+    ] = STYLES[0]
+    width: Annotated[
+        str | None,
+        typer.Option(
+            "--width", help="In mm, or a column of a journal: single is 88.9, double 181.", metavar="MM|single|double",
+            show_default=False,
+        ),
+    ] = None  # fmt: skip
+    size: Annotated[
+        str | None, typer.Option("--size", help="Width and height in mm.", metavar="MMxMM", show_default=False)
+    ] = None
+    font_size: Annotated[
+        float | None, typer.Option("--font-size", help="Of the text, in points.", metavar="PT", show_default=False)
+    ] = None
+
+    def __post_init__(self) -> None:
+        for ending in self.format or ():
+            if ending not in FORMATS:
+                raise UsageError(f"--format {ending}: expected one of {', '.join(FORMATS)}")
+        if self.style not in STYLES:
+            raise UsageError(f"--style {self.style}: expected one of {', '.join(STYLES)}")
+        if self.size is not None and self.width is not None:
+            raise UsageError("--size: expected no --width with it; it has the width")
+        if self.font_size is not None and not 1.0 <= self.font_size <= 100.0:
+            raise UsageError(f"--font-size {self.font_size:g}: expected 1 to 100 points")
+        _ = self._extent
+
+    @property
+    def chosen(self) -> "Style":
+        """The style with what was given beside it."""
+        from dataclasses import replace
+
+        from orchestration.drawing.style import STYLES as KNOWN
+
+        style = replace(KNOWN[self.style], formats=tuple(dict.fromkeys(self.format or FORMATS[:1])), **self._extent)
+        return style if self.font_size is None else replace(style, font=self.font_size)
+
+    @property
+    def _extent(self) -> dict[str, Any]:
+        if self.size is not None:
+            width, cross, height = self.size.lower().partition("x")
+            return {
+                "width": _millimetres("--size", self.size, width),
+                "height": _millimetres("--size", self.size, height if cross else ""),
+            }
+        if self.width is None:
+            return {}
+        return {"width": COLUMNS.get(self.width) or _millimetres("--width", self.width, self.width)}
+
+
+def _millimetres(flag: str, given: str, text: str) -> float:
+    try:
+        value = float(text.removesuffix("mm"))
+    except ValueError:
+        value = -1.0
+    if not 20.0 <= value <= 2000.0:
+        expected = "MMxMM, as in 120x80" if flag == "--size" else f"{', '.join(COLUMNS)} or millimetres"
+        raise UsageError(f"{flag} {given}: expected {expected}, each from 20 to 2000 mm")
+    return value

@@ -1,0 +1,80 @@
+"""The command that draws runs: one, or several laid over each other."""
+
+import math
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from orchestration.command.figure_flags import FigureFlags
+from orchestration.command.shared_flags import takes
+from orchestration.drawing.names import FLIGHT
+from orchestration.errors import UsageError, shown
+
+if TYPE_CHECKING:
+    from orchestration.results.result import Result
+
+TOGETHER = "overlay"
+"""Folder beside the runs for what shows several of them"""
+
+
+@takes("look", FigureFlags)
+def plot(
+    directory: Annotated[list[Path], typer.Argument(help="Directories of runs.", metavar="DIR…")],
+    start: Annotated[
+        float | None, typer.Option("--from", help="Start of what is seen, in seconds.", show_default=False)
+    ] = None,
+    end: Annotated[float | None, typer.Option("--to", help="End of what is seen.", show_default=False)] = None,
+    figure: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--figure", help=f"One of {', '.join(FLIGHT)}; all unless told.", metavar="NAME", show_default=False
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", help=f"Folder of the figures; that of the run, or {TOGETHER}/ beside several, unless told.",
+            metavar="DIR", show_default=False,
+        ),
+    ] = None,
+    *,
+    look: FigureFlags,
+) -> None:  # fmt: skip
+    """Draw the figures of a run again, or of several runs laid over each other, for a screen, a paper or slides."""
+    from orchestration.drawing.draw import draw
+    from orchestration.drawing.style import save
+    from orchestration.results.differences import told_apart
+    from orchestration.results.run_directory import load_run
+
+    results = [load_run(one) for one in directory]
+    names = told_apart(results, [str(one) for one in directory])
+    made = draw(results, figure, names=names, window=_window(results, start, end), style=look.chosen)
+    place = out or (directory[0] if len(directory) == 1 else _beside(directory))
+    for path in save(made, place, look.chosen):
+        print(path)
+
+
+def _window(results: "Sequence[Result]", start: float | None, end: float | None) -> tuple[float, float] | None:
+    if start is None and end is None:
+        return None
+    last = max(result.end for result in results)
+    window = (0.0 if start is None else start, last if end is None else end)
+    if not 0.0 <= window[0] < window[1] < math.inf or window[0] >= last:
+        raise UsageError(
+            f"--from {shown(window[0])} --to {shown(window[1])}: expected 0 <= from < to, and from before the "
+            f"run's end at {shown(last)} s"
+        )
+    return window
+
+
+def _beside(directories: Sequence[Path]) -> Path:
+    """A folder in the nearest one that holds all of them."""
+    return Path(os.path.commonpath([path.absolute().parent for path in directories])) / TOGETHER
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the command line."""
+    app.command()(plot)

@@ -1,0 +1,116 @@
+"""Thrust and torques as applied, with what happened when, and where the plant's limits bite."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from orchestration.drawing.lines import TIME, clip_peaks, legend_of_runs, quantity
+from orchestration.drawing.palette import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED
+from orchestration.drawing.run import Run, Window, title
+from orchestration.drawing.style import Style
+from orchestration.quadrotor.measures import saturated
+from orchestration.quadrotor.wiring import COMMAND
+
+NAMES = dict(zip(COMMAND, ("thrust", "torque x", "torque y", "torque z"), strict=True))
+UNITS = dict(zip(COMMAND, ("N", "N.m", "N.m", "N.m"), strict=True))
+COLUMNS = tuple(f"plant.{name}" for name in COMMAND)
+AT_LIMIT = "a limit of the plant is active"
+
+
+def commands(runs: Sequence[Run], style: Style) -> Figure:
+    """The whole run, and a window of it: the first second unless told. In a narrow figure the window alone, if any."""
+    end = max(float(run.result.rows[-1, 0]) for run in runs)
+    told = runs[0].window
+    zoom = told or (0.0, min(1.0, end))
+    spans: list[Window] = [(0.0, end), zoom] if style.is_wide else [told or (0.0, end)]
+    figure = style.figure(3.0 + 10.5 * len(COMMAND))
+    rows = figure.subplots(len(COMMAND), len(spans), sharex="col", squeeze=False, width_ratios=(1.0, 1.3)[: len(spans)])
+    for row, name in zip(rows, COMMAND, strict=True):
+        for panel, span in zip(row, spans, strict=True):
+            is_zoom = span is not spans[0] or told is not None
+            _draw(panel, runs, name, span, style, clips=not is_zoom)
+            if is_zoom and len(runs) == 1:
+                mark_events(panel, runs[0], span)
+        row[0].set_ylabel(quantity(NAMES[name], UNITS[name]))
+        if len(spans) > 1 and told is not None:
+            row[0].axvspan(*zoom, color=GREY, alpha=0.15, linewidth=0.0)
+    for panel in rows[-1]:
+        panel.set_xlabel(TIME)
+    if style.has_titles:
+        rows[0][0].set_title(title(runs))
+        if len(spans) > 1:
+            rows[0][1].set_title(f"{zoom[0]:g} s to {zoom[1]:g} s, with the instants of the digital loop")
+    _legend(figure, list(rows.ravel()))
+    legend_of_runs(figure, runs, style)
+    return figure
+
+
+def _draw(panel: Axes, runs: Sequence[Run], name: str, span: Window, style: Style, *, clips: bool) -> None:
+    """One command over one span, with the limits that are near."""
+    lines = []
+    for run in runs:
+        t, values = run.result.signals["time"], run.result.signals[f"plant.{name}"]
+        color = BLUE if len(runs) == 1 else run.color
+        panel.plot(t, values, drawstyle="steps-post", color=color, linestyle=run.dashes if len(runs) > 1 else "-")
+        inside = (t >= span[0]) & (t <= span[1])
+        lines.append((t[inside], values[inside]) if inside.any() else (t, values))
+    panel.set_xlim(span)
+    low, high = min(float(y.min()) for _, y in lines), max(float(y.max()) for _, y in lines)
+    room = (high - low) or 1.0  # below for what happened, above for what was lost
+    panel.set_ylim(low - (0.1 if clips else 0.25) * room, high + 0.15 * room)
+    if not (clips and clip_peaks(panel, lines, UNITS[name], style)):
+        _mark_limits(panel, runs, name)
+    _mark_saturation(panel, runs, name)
+
+
+def _mark_limits(panel: Axes, runs: Sequence[Run], name: str) -> None:
+    """A line at each limit that the command comes near, in an axis that is made to show it."""
+    bottom, top = panel.get_ylim()
+    for run in runs:
+        most = run.result.parameters.get("plant.thrust_max" if name == COMMAND[0] else "plant.torque_max", np.inf)
+        for limit in (0.0 if name == COMMAND[0] else -most, most):
+            if bottom <= limit <= top:
+                panel.axhline(limit, color=BLACK, linestyle=":", label="limit of the plant")
+
+
+def _mark_saturation(panel: Axes, runs: Sequence[Run], name: str) -> None:
+    """Shade the time at which a limit changes the command."""
+    for run in runs:
+        t = run.result.signals["time"]
+        active = saturated(run.result.signals, run.result.parameters)[name]
+        if active.any():
+            panel.fill_between(
+                t, 0.0, 1.0, where=active, step="post", transform=panel.get_xaxis_transform(),
+                color=RED if len(runs) == 1 else run.color, alpha=0.2, linewidth=0.0, label=AT_LIMIT,
+            )  # fmt: skip
+
+
+def mark_events(axes: Axes, run: Run, span: Window) -> None:
+    """Ticks along the lower and upper edge for what happened in the window."""
+    for kind, what, marker, color, height, label in (
+        ("sampled", "measurement", "|", GREY, 0.04, "sampled"),
+        ("arrived", "command", "^", GREEN, 0.11, "command arrives"),
+        ("lost", "measurement", "x", ORANGE, 0.93, "measurement lost"),
+        ("lost", "command", "x", PURPLE, 0.98, "command lost"),
+    ):
+        times = [e.time / 1e9 for e in run.result.events if e.kind == kind and e.what == what]
+        times = [time for time in times if span[0] <= time <= span[1]]
+        if times:
+            axes.plot(
+                times, [height] * len(times), linestyle="", marker=marker, color=color, markersize=4,
+                markeredgewidth=0.8,
+                transform=axes.get_xaxis_transform(), label=label, clip_on=False,
+            )  # fmt: skip
+
+
+def _legend(figure: Figure, panels: Sequence[Axes]) -> None:
+    """Each thing once, below."""
+    found: dict[str, Artist] = {}
+    for panel in panels:
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    if found:
+        figure.legend([*found.values()], [*found], loc="outside lower center", ncols=len(found))

@@ -1,0 +1,33 @@
+"""The energy function of the law over time."""
+
+from collections.abc import Sequence
+
+from matplotlib.figure import Figure
+
+from orchestration.drawing.lines import TIME, legend_of_runs, positive, quantity, see
+from orchestration.drawing.palette import BLUE
+from orchestration.drawing.run import Run, title
+from orchestration.drawing.style import Style
+from orchestration.quadrotor.wiring import ENERGY
+
+COLUMN = f"controller.{ENERGY}"
+
+
+def energy(runs: Sequence[Run], style: Style) -> Figure | None:
+    """L (33) at the samples; None if no controller has one, or none has sampled."""
+    with_energy = [run for run in runs if COLUMN in run and run.result.sampled[run.seen].any()]
+    if not with_energy:
+        return None
+    figure = style.figure(24.0)
+    panel = figure.add_subplot()
+    for run in with_energy:
+        at = run.result.sampled[run.seen]
+        color = BLUE if len(runs) == 1 else run.color
+        panel.plot(run.time[at], positive(run[COLUMN][at]), color=color, linestyle=run.dashes, label=run.name)
+    unit = with_energy[0].whole.described[COLUMN].unit
+    panel.set(xlabel=TIME, ylabel=quantity("energy L", unit), yscale="log")
+    see(panel, runs)
+    if style.has_titles:
+        panel.set_title(title(runs))
+    legend_of_runs(figure, runs, style)
+    return figure

@@ -1,0 +1,126 @@
+"""The four errors: their norms, and component by component as in Fig. 3 of the paper."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from orchestration.drawing.lines import TIME, clip_peaks, legend_of_runs, positive, quantity, see, wrapped
+from orchestration.drawing.palette import BLUE, GREEN, RED
+from orchestration.drawing.run import Run, title
+from orchestration.drawing.style import Style
+from orchestration.quadrotor.measures import desired
+from orchestration.quadrotor.wiring import POSITION, components
+from orchestration.simulator import Floats
+
+AXES = tuple(zip("xyz", (BLUE, RED, GREEN), ("-", "--", "-."), strict=True))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Error:
+    name: str
+    unit: str
+    of: Callable[[Run], Floats | None]
+    """shape (n, 3); None: the controller does not tell"""
+
+
+def errors(runs: Sequence[Run], style: Style) -> Figure:
+    """Norms of the errors on logarithmic axes; position at every row, the others as of the last sample."""
+    figure, panels = _panels(runs, style)
+    for panel, error in panels:
+        for run in runs:
+            values = error.of(run)
+            if values is not None:
+                color = BLUE if len(runs) == 1 else run.color
+                norm = positive(np.linalg.norm(values, axis=1))
+                panel.plot(run.time, norm, color=color, linestyle=run.dashes, label=run.name)
+        panel.set(yscale="log", ylabel=wrapped(quantity(f"{error.name}, norm", error.unit)))
+        see(panel, runs)
+    return figure
+
+
+def components_of_errors(runs: Sequence[Run], style: Style) -> Figure:
+    """x, y and z of each error; of several runs a panel for each of them."""
+    if len(runs) > 1:
+        return _laid_over(runs, style)
+    figure, panels = _panels(runs, style)
+    for i, (panel, error) in enumerate(panels):
+        _draw_components(panel, runs[0], error, style)
+        if i == 0:
+            panel.legend(loc="upper right", ncols=3)
+    return figure
+
+
+def _draw_components(panel: Axes, run: Run, error: _Error, style: Style) -> None:
+    values = error.of(run)
+    assert values is not None
+    for k, (axis, color, dashes) in enumerate(AXES):
+        panel.plot(run.time, values[:, k], color=color, linestyle=dashes, label=axis)
+    panel.set_ylabel(wrapped(quantity(error.name, error.unit)))
+    see(panel, [run])
+    clip_peaks(panel, [(run.time, values[:, k]) for k in range(3)], error.unit, style)
+
+
+def _laid_over(runs: Sequence[Run], style: Style) -> Figure:
+    """A row for each error, a column for each component, a line for each run."""
+    found = _known(runs)
+    figure = style.figure(2.0 + 11.0 * len(found))
+    rows = figure.subplots(len(found), 3, sharex=True, squeeze=False)
+    for row, error in zip(rows, found, strict=True):
+        for k, panel in enumerate(row):
+            drawn = [(run, values[:, k]) for run in runs if (values := error.of(run)) is not None]
+            for run, values in drawn:
+                panel.plot(run.time, values, color=run.color, linestyle=run.dashes, label=run.name)
+            see(panel, runs)
+            panel.set_ylabel(wrapped(quantity(f"{error.name} {'xyz'[k]}", error.unit), 18))
+            if row is rows[-1]:
+                panel.set_xlabel(TIME)
+    legend_of_runs(figure, runs, style)
+    return figure
+
+
+def _panels(runs: Sequence[Run], style: Style) -> tuple[Figure, list[tuple[Axes, _Error]]]:
+    """A panel for each error that there is; legend and title are there."""
+    found = _known(runs)
+    columns = 2 if style.is_wide and len(found) > 1 else 1
+    rows = -(-len(found) // columns)
+    figure = style.figure(3.0 + 14.0 * rows)
+    panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
+    for panel in panels[len(found) :]:
+        panel.set_visible(False)
+    for panel in panels[max(0, len(found) - columns) : len(found)]:
+        panel.set_xlabel(TIME)
+    if style.has_titles and title(runs):
+        figure.suptitle(title(runs))
+    legend_of_runs(figure, runs, style)
+    return figure, list(zip(panels, found))
+
+
+def _known(runs: Sequence[Run]) -> list[_Error]:
+    return [error for error in _ERRORS if any(error.of(run) is not None for run in runs)]
+
+
+def _position(run: Run) -> Floats | None:
+    flown = run.stacked([f"plant.{name}" for name in POSITION])
+    return flown - desired(run.result.signals)[run.seen]
+
+
+def _told(name: str) -> Callable[[Run], Floats | None]:
+    columns = [f"controller.{component}" for component in components(name)]
+    return lambda run: run.stacked(columns) if run.has(columns) else None
+
+
+_ERRORS = (
+    _Error(name="position error", unit="m", of=_position),
+    _Error(name="velocity error", unit="m/s", of=_told("velocity_error")),
+    _Error(name="attitude error", unit="1", of=_told("attitude_error")),
+    _Error(name="angular velocity error", unit="rad/s", of=_told("angular_velocity_error")),
+)
+"""P̃, Ṽ, q̃ and Ω̃"""
+DRAWN = tuple(
+    f"controller.{name}"
+    for stem in ("velocity_error", "attitude_error", "angular_velocity_error")
+    for name in components(stem)
+)

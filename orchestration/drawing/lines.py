@@ -1,0 +1,104 @@
+"""What figures over time have in common: lines of runs, legends, and peaks that do not fit."""
+
+import textwrap
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from orchestration.drawing.palette import BLACK, GREY
+from orchestration.drawing.run import Run
+from orchestration.drawing.style import Style
+from orchestration.results import labels
+from orchestration.simulator import Floats
+
+Lines: TypeAlias = Sequence[tuple[Floats, Floats]]
+"""Times [s] and values, shape (n,) each"""
+
+TIME = "time [s]"
+OUTSIDE, CLIPPED = 0.015, 3.0
+"""Share of the time to each side that a peak lasts at most, and how many times the range without it makes it one"""
+
+
+def positive(values: Floats) -> Floats:
+    """What a logarithmic axis can show; nan for the rest."""
+    return np.where(values > 0.0, values, np.nan)
+
+
+def see(axes: Axes, runs: Sequence[Run]) -> None:
+    """The axis of time as far as there is anything on it, or over the window."""
+    axes.set_xlim(min(run.span[0] for run in runs), max(run.span[1] for run in runs))
+
+
+def legend_of_runs(figure: Figure, runs: Sequence[Run], style: Style) -> None:
+    """Which line is which run, above all panels; nothing for one run."""
+    if len(runs) > 1:
+        handles = [Line2D([], [], color=run.color, linestyle=run.dashes, label=run.name) for run in runs]
+        longest = max(len(run.name) for run in runs) + 6
+        columns = max(1, int(style.width / (0.5 * longest * style.font * 0.353)))
+        figure.legend(handles=handles, loc="outside upper center", ncols=min(columns, len(runs)))
+
+
+def quantity(name: str, unit: str | None) -> str:
+    """The label of an axis; what has no dimension is said to have none."""
+    return f"{name} [1]" if unit == "1" else labels.with_unit(name, unit)
+
+
+def wrapped(label: str, width: int = 24) -> str:
+    """A label in lines of so many characters, its unit never by itself."""
+    return "\n".join(textwrap.wrap(label.replace(" [", "\u00a0["), width, break_long_words=False))
+
+
+def clip_peaks(axes: Axes, lines: Lines, unit: str, style: Style) -> bool:
+    """Where a short peak would hide all else, leave it out of the axis, say so, and show it in an inset.
+
+    `lines` are what is drawn on `axes`; returns whether it was done.
+    """
+    inner = [_without_peaks(t, y) for t, y in lines if len(t) > 1 and np.isfinite(y).any()]
+    if not inner:
+        return False
+    low, high = min(one[0] for one in inner), max(one[1] for one in inner)
+    bottom, top = (f([f(y[np.isfinite(y)]) for _, y in lines if np.isfinite(y).any()]) for f in (min, max))
+    if high <= low or top - bottom <= CLIPPED * (high - low):
+        return False
+    room = 0.25 * (high - low)
+    seen = (max(bottom, low - room) if bottom >= low - room else low - room, min(top, high + room))
+    axes.set_ylim(seen[0] - 0.05 * (seen[1] - seen[0]), seen[1] + 0.9 * (seen[1] - seen[0]))
+    _inset(axes, lines, (low - room, high + room), unit, style)
+    return True
+
+
+def _without_peaks(t: Floats, values: Floats) -> tuple[float, float]:
+    """The range of a signal but for a small share of the time."""
+    held = np.append(np.diff(t), 0.0)
+    order = np.argsort(values)
+    share = np.cumsum(held[order]) / max(float(held.sum()), 1e-300)
+    low, high = np.searchsorted(share, (OUTSIDE, 1.0 - OUTSIDE))
+    return float(values[order[min(low, len(order) - 1)]]), float(values[order[min(high, len(order) - 1)]])
+
+
+def _inset(axes: Axes, lines: Lines, seen: tuple[float, float], unit: str, style: Style) -> None:
+    """The time of the peaks, whole, in the upper right; the text names the largest."""
+    outside = np.concatenate([t[(y < seen[0]) | (y > seen[1])] for t, y in lines])
+    t, y = max(lines, key=lambda line: float(np.nanmax(np.abs(line[1]))))
+    k = int(np.nanargmax(np.abs(y)))
+    span = axes.get_xlim()[1] - axes.get_xlim()[0]
+    width = max(float(np.ptp(outside)), 0.01 * span)
+    inset = axes.inset_axes((0.42, 0.5, 0.56, 0.48), label="peak")
+    for drawn in axes.get_lines():
+        inset.plot(
+            drawn.get_xdata(), drawn.get_ydata(), color=drawn.get_color(), linestyle=drawn.get_linestyle(),
+            linewidth=0.8 * style.line, drawstyle=drawn.get_drawstyle(),
+        )  # fmt: skip
+    inset.set_xlim(max(outside.min() - 0.15 * width, axes.get_xlim()[0]), outside.max() + 0.4 * width)
+    inset.tick_params(labelsize=0.7 * style.font, length=0.2 * style.font, pad=0.15 * style.font)
+    inset.locator_params(nbins=4)
+    inset.set_title(
+        f"clipped: peak {labels.amount(float(y[k]), unit)} at {t[k]:.3g} s".replace("-", "−"),
+        fontsize=0.8 * style.font, color=BLACK, pad=0.2 * style.font,
+    )  # fmt: skip
+    for side in inset.spines.values():
+        side.set(visible=True, color=GREY, linewidth=0.05 * style.font)

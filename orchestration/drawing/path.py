@@ -1,0 +1,61 @@
+"""The flight in space."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from orchestration.drawing.lines import legend_of_runs
+from orchestration.drawing.palette import BLUE, ORANGE
+from orchestration.drawing.run import Run, title
+from orchestration.drawing.style import Style
+from orchestration.quadrotor.wiring import POSITION, POSITION_REFERENCE
+from orchestration.simulator import Floats
+
+LEAST = 0.2
+"""of the longest side: so long at least is each side of the box"""
+
+
+def path(runs: Sequence[Run], style: Style) -> Figure:
+    """Where it flew and where it should have, a metre being as long along each axis, up being up."""
+    figure = style.figure(38.0, width=0.75 if style.is_wide else 1.0)
+    axes = figure.add_subplot(projection="3d")
+    flown = [run.stacked([f"plant.{name}" for name in POSITION]) for run in runs]
+    wanted = [run.stacked(POSITION_REFERENCE) for run in runs]
+    for i, points in enumerate(wanted):
+        if not any(np.array_equal(points, other) for other in wanted[:i]):
+            axes.plot(
+                *points.T, color=ORANGE, linewidth=3.5 * style.line, alpha=0.6, zorder=1,
+                label="reference" if i == 0 else None,
+            )  # fmt: skip
+    for run, points in zip(runs, flown, strict=True):
+        alone = len(runs) == 1
+        color = BLUE if alone else run.color
+        axes.plot(*points.T, color=color, linestyle=run.dashes, label="flown" if alone else None, zorder=2)
+        for place, marker, what in ((0, "o", "start"), (-1, "s", "end")):
+            axes.plot(
+                *points[place, :, None], marker, color=color, zorder=3, label=what if run.place == 0 else None,
+                markerfacecolor="white" if what == "start" else color,
+            )  # fmt: skip
+    _equal(axes, np.concatenate([*flown, *wanted]))
+    axes.set(xlabel="x, north [m]", ylabel="y, east [m]", zlabel="z, down [m]")
+    axes.view_init(elev=24, azim=-50)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    if style.has_titles:
+        axes.set_title(title(runs))
+    legend_of_runs(figure, runs, style)
+    return figure
+
+
+def _equal(axes: "object", points: Floats) -> None:
+    """Equal scales in a box that holds all points; x to the viewer's right, z down."""
+    points = points[np.isfinite(points).all(axis=1)]
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, size = 0.5 * (low + high), 1.08 * (high - low)
+    size = np.maximum(size, max(LEAST * float(size.max()), 1e-6))
+    starts, ends = middle - 0.5 * size, middle + 0.5 * size
+    axes.set(xlim=(starts[0], ends[0]), ylim=(ends[1], starts[1]), zlim=(ends[2], starts[2]))  # type: ignore[attr-defined]
+    axes.set_box_aspect(size, zoom=0.8)  # type: ignore[attr-defined]
+    for axis, share in zip((axes.xaxis, axes.yaxis, axes.zaxis), size / size.max()):  # type: ignore[attr-defined]
+        axis.set_major_locator(MaxNLocator(max(2, round(6 * share))))

@@ -1,0 +1,107 @@
+"""The spectrum of the command: how its power is spread over frequencies, beside the rate at which it is sampled."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from orchestration.drawing.commands import COLUMNS
+from orchestration.drawing.lines import legend_of_runs, positive, wrapped
+from orchestration.drawing.palette import BLACK, BLUE, GREEN, RED
+from orchestration.drawing.run import Run, title
+from orchestration.drawing.style import Style
+from orchestration.simulator import Floats
+
+SEGMENTS = 8
+"""Of the run, before they overlap by half"""
+FEWEST = 64
+"""Values that a segment has at least"""
+
+
+def spectrum(runs: Sequence[Run], style: Style) -> Figure | None:
+    """Power spectral densities of thrust and torques as applied; None of less than `FEWEST` steps of the plant."""
+    found = [(run, *of) for run in runs if (of := _command(run)) is not None]
+    if not found:
+        return None
+    columns = 2 if style.is_wide else 1
+    figure = style.figure(25.0 if columns == 2 else 42.0)
+    thrust, torque = figure.subplots(2 // columns, columns, squeeze=False).ravel()
+    for run, step, command in found:
+        color, dashes = (BLUE, "-") if len(runs) == 1 else (run.color, run.dashes)
+        frequency, densities = welch(command, step)
+        thrust.plot(frequency, positive(densities[:, 0]), color=color, linestyle=dashes)
+        if len(runs) == 1:
+            for k, (axis, line) in enumerate(zip("xyz", (BLUE, RED, GREEN), strict=True)):
+                torque.plot(frequency, positive(densities[:, k + 1]), color=line, label=axis)
+        else:
+            torque.plot(frequency, positive(densities[:, 1:].sum(axis=1)), color=color, linestyle=dashes)
+    all_three = "" if len(runs) == 1 else " (all axes)"
+    thrust.set(ylabel=wrapped("thrust, power spectral density [N²/Hz]"))
+    torque.set(ylabel=wrapped(f"torque{all_three}, power spectral density [(N·m)²/Hz]"))
+    for panel in (thrust, torque):
+        panel.set(xscale="log", yscale="log", xlabel="frequency [Hz]")
+        panel.set_xlim(frequency[1], frequency[-1])
+        _mark_rates(panel, runs, style)
+    if len(runs) == 1:
+        torque.legend(loc="lower left")
+    if style.has_titles and title(runs):
+        figure.suptitle(title(runs))
+    legend_of_runs(figure, runs, style)
+    return figure
+
+
+def welch(values: Floats, step: float) -> tuple[Floats, Floats]:
+    """One-sided power spectral density by Welch's method, with Hann windows that overlap by half.
+
+    `values` are of shape (n, signals), `step` apart [s]. Returns frequencies [Hz], shape (m,), and densities
+    [unit²/Hz], shape (m, signals).
+    """
+    length = min(len(values), max(FEWEST, len(values) // SEGMENTS))
+    starts = range(0, len(values) - length + 1, max(1, length // 2))
+    window = np.hanning(length + 1)[:-1, None]
+    power = np.zeros((length // 2 + 1, values.shape[1]))
+    for start in starts:
+        part = values[start : start + length]
+        power += np.abs(np.fft.rfft(window * (part - part.mean(axis=0)), axis=0)) ** 2
+    density: Floats = 2.0 * step / float((window**2).sum()) * power / len(starts)
+    density[0] /= 2.0
+    if length % 2 == 0:
+        density[-1] /= 2.0
+    frequencies: Floats = np.arange(length // 2 + 1) / (length * step)
+    return frequencies, density
+
+
+def _command(run: Run) -> tuple[float, Floats] | None:
+    """The step of the plant [s] and what it was given at each, shape (n, 4), of all rows in the window."""
+    step = run.whole.system.components["plant"].step
+    if step is None:
+        return None
+    chunks = run.whole.recording.chunks(("time", *COLUMNS))
+    rows = np.concatenate([[chunk.signals[name] for name in ("time", *COLUMNS)] for chunk in chunks], axis=1).T
+    start, end = run.window or (0.0, float(rows[-1, 0]))
+    count = int((min(end, rows[-1, 0]) - start) / step + 1e-9)
+    if count < FEWEST or not np.isfinite(rows).all():
+        return None
+    grid = start + step * (np.arange(count) + 0.5)  # between the instants, so that none is missed by rounding
+    held = np.searchsorted(rows[:, 0], grid, side="right") - 1
+    return step, rows[held, 1:]
+
+
+def _mark_rates(panel: Axes, runs: Sequence[Run], style: Style) -> None:
+    """The rate at which the controller samples, and half of it, beyond which it cannot see."""
+    for run in runs:
+        sampling = run.whole.system.components["controller"].sampling
+        if sampling is None:
+            continue
+        rate, color = 1.0 / sampling.period, BLACK if len(runs) == 1 else run.color
+        for value, dashes, what in ((rate, "-", f"sampled at {rate:g} Hz"), (0.5 * rate, ":", "half of it")):
+            if not panel.get_xlim()[0] < value < panel.get_xlim()[1]:
+                continue
+            panel.axvline(value, color=color, linestyle=dashes, linewidth=0.7 * style.line, label="_rate")
+            if len(runs) == 1:
+                panel.text(
+                    value, 0.98, f"{what} ", rotation=90, ha="right", va="top", fontsize=0.8 * style.font,
+                    transform=panel.get_xaxis_transform(),
+                    bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5},
+                )  # fmt: skip

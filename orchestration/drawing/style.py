@@ -1,0 +1,140 @@
+"""How figures look: one place for sizes, fonts and lines, and one for how they are written."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+from cycler import cycler
+from matplotlib.figure import Figure
+
+from orchestration.drawing.names import COLUMNS, FORMATS
+from orchestration.drawing.palette import CYCLE
+from orchestration.errors import UsageError
+
+INCH = 25.4
+"""[mm]"""
+POINT = INCH / 72.0
+"""[mm]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Style:
+    """A size, a look and what is written; text has its size in points in the figure as it is written.
+
+    Raises `UsageError` for a format that there is not.
+    """
+
+    width: float = 203.0
+    """[mm]"""
+    height: float | None = None
+    """[mm]; as what is drawn needs it unless told"""
+    font: float = 10.0
+    """[pt]"""
+    serif: bool = False
+    line: float = 1.3
+    """[pt]"""
+    has_titles: bool = True
+    """a paper's captions say what titles would"""
+    dpi: float = 110.0
+    """of PNG"""
+    formats: tuple[str, ...] = FORMATS[:1]
+    """of the files"""
+
+    def __post_init__(self) -> None:
+        for ending in self.formats:
+            if ending not in FORMATS:
+                raise UsageError(f"format {ending}: expected one of {', '.join(FORMATS)}")
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether two panels have room beside each other."""
+        return self.width >= 33.0 * self.font * POINT
+
+    def figure(self, height: float, *, width: float = 1.0, **more: Any) -> Figure:
+        """An empty figure, so many lines of text high unless the style says how high; `width` is a share of its."""
+        high = self.height if self.height is not None else height * self.font * POINT
+        return Figure(figsize=(width * self.width / INCH, high / INCH), **more)
+
+    @contextmanager
+    def applied(self) -> Iterator[None]:
+        """What is made and written inside looks like this, whatever the user's settings of matplotlib are."""
+        with matplotlib.rc_context():
+            matplotlib.rcdefaults()
+            matplotlib.rcParams.update(self._settings())
+            yield
+
+    def _settings(self) -> dict[str, Any]:
+        small = 0.85 * self.font
+        return {
+            "axes.axisbelow": True,
+            "axes.grid": True,
+            "axes.labelsize": self.font,
+            "axes.linewidth": 0.06 * self.font,
+            "axes.prop_cycle": cycler(color=CYCLE),
+            "axes.spines.right": False,
+            "axes.spines.top": False,
+            "axes.titlesize": self.font,
+            "axes.xmargin": 0.0,
+            "figure.constrained_layout.use": True,
+            "figure.constrained_layout.h_pad": 0.3 * self.font / 72.0,
+            "figure.constrained_layout.w_pad": 0.3 * self.font / 72.0,
+            "figure.dpi": self.dpi,
+            "figure.labelsize": self.font,
+            "figure.titlesize": self.font,
+            "font.family": "serif" if self.serif else "sans-serif",
+            "font.sans-serif": ["DejaVu Sans", "Verdana", "sans-serif"],
+            "font.serif": ["STIXGeneral", "STIX Two Text", "Times New Roman", "Times", "serif"],
+            "font.size": self.font,
+            "grid.alpha": 0.3,
+            "grid.linewidth": 0.05 * self.font,
+            "hatch.linewidth": 0.06 * self.font,
+            "legend.fontsize": small,
+            "legend.frameon": False,
+            "legend.handlelength": 1.8,
+            "legend.title_fontsize": small,
+            "lines.linewidth": self.line,
+            "lines.markersize": 0.45 * self.font,
+            "mathtext.fontset": "stix" if self.serif else "dejavusans",
+            "pdf.fonttype": 42,  # text stays text, its font embedded
+            "ps.fonttype": 42,
+            "savefig.dpi": "figure",
+            "svg.fonttype": "none",
+            "svg.hashsalt": "quadcosim",  # the same data, the same bytes
+            "xtick.labelsize": small,
+            "ytick.labelsize": small,
+        }
+
+
+STYLES: Mapping[str, Style] = {
+    "screen": Style(),
+    "paper": Style(width=COLUMNS["double"], font=8.0, serif=True, line=0.9, has_titles=False, dpi=300.0),
+    "slides": Style(width=254.0, height=142.9, font=16.0, line=2.2, dpi=150.0),
+}
+SCREEN = STYLES["screen"]
+DOCS = replace(SCREEN, dpi=80.0)
+"""Files small enough for a repository"""
+
+_UNDATED: Mapping[str, dict[str, str | None]] = {
+    "png": {"Software": "quadcosim"},
+    "svg": {"Creator": "quadcosim", "Date": None},
+    "pdf": {"Creator": "quadcosim", "CreationDate": None, "ModDate": None},
+}
+
+
+def save(figures: Mapping[str, Figure], folder: Path, style: Style = SCREEN) -> list[Path]:
+    """Write figures by name, in each format of the style, into a folder that is made if need be; the paths.
+
+    The same data give the same bytes: nothing has a date.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    with style.applied():
+        for name, figure in figures.items():
+            for ending in style.formats:
+                path = folder / f"{name}.{ending}"
+                figure.savefig(path, metadata=_UNDATED[ending])
+                written.append(path)
+    return written

@@ -1,0 +1,149 @@
+"""Names for people: of metrics, signals and settings, with their units, wherever they are drawn or printed."""
+
+import re
+from collections.abc import Mapping
+
+from orchestration.results.described import Described
+from orchestration.system.model import component_of, variable_of
+
+METRICS: Mapping[str, str] = {
+    "outcome": "outcome",
+    "good": "meets the criterion",
+    "horizon": "time by which it is judged",
+    "position_rmse": "RMS position error",
+    "position_iae": "integral of the position error",
+    "position_itae": "integral of time × position error",
+    "position_max": "largest position error",
+    "settling_time": "settling time, to 5 cm",
+    "ultimate_bound": "largest position error, last third",
+    "attitude_error_rmse": "RMS attitude error",
+    "attitude_error_max": "largest attitude error",
+    "energy_growth_share": "share of samples at which the energy grows",
+    "control_effort.thrust": "control effort, thrust",
+    "control_effort.torque": "control effort, torque",
+    "torque_max": "largest torque",
+    "total_variation.thrust": "total variation of thrust",
+    "total_variation.torque": "total variation of torque",
+    "saturation_share": "share of time at a limit of the plant",
+    "diverged": "diverged",
+    "divergence_time": "time of divergence",
+    "steps": "steps of the plant",
+    "wall_time": "time that the run took",
+    "engine": "engine",
+}
+"""Of what a run comes to; docs/metrics.md defines each."""
+
+SETTINGS: Mapping[str, tuple[str, str | None]] = {
+    "stop_time": ("stop time", "s"),
+    "seed": ("seed", None),
+    "vehicle": ("vehicle", None),
+    "controller": ("controller", None),
+    "controller.fmu": ("controller", None),
+    "plant.fmu": ("plant", None),
+    "reference.file": ("reference", None),
+    "timing.period": ("period", "s"),
+    "timing.offset": ("offset of the first sample", "s"),
+    "timing.plant_interval": ("plant interval", "s"),
+    "timing.order": ("order of exchange", None),
+    "timing.hold": ("hold", None),
+    "timing.clock": ("clock", None),
+    "timing.delay": ("delay", "s"),
+    "timing.delay_jitter": ("jitter of the delay", "s"),
+    "timing.jitter": ("jitter of the sampling", "s"),
+    "timing.jitter_distribution": ("distribution of the jitter", None),
+    "timing.measurement_loss": ("loss of measurements", None),
+    "timing.command_loss": ("loss of commands", None),
+    "timing.clock_ratio": ("clock ratio", None),
+    "controller.coupling": ("κ", None),
+    "controller.surface_exponent": ("exponent of the surface β_t", None),
+    "controller.gain.surface": ("surface gain k_s", None),
+    "controller.gain.eta": ("gain k_η", "rad/s"),
+    "controller.gain.theta": ("gain k_θ", "N.m.s"),
+    "controller.gain.attitude": ("gain k_q", "N.m"),
+    "controller.gain.disturbance": ("gain β", "m/s2"),
+    "controller.discretisation": ("redesign", None),
+    "plant.mass": ("mass", "kg"),
+    "plant.thrust_max": ("largest thrust", "N"),
+    "plant.torque_max": ("largest torque", "N.m"),
+}
+"""Of what a scenario sets, by path: name and unit; what is not here goes by the words of its path."""
+
+SIGNALS: Mapping[str, str] = {
+    "plant.thrust": "thrust",
+    "plant.position": "position",
+    "plant.velocity": "velocity",
+    "plant.quaternion": "attitude quaternion",
+    "plant.angular_velocity": "angular velocity",
+    "plant.torque": "torque",
+    "plant.tilt": "tilt",
+    "reference.position": "desired position",
+    "controller.position_error": "position error",
+    "controller.velocity_error": "velocity error",
+    "controller.attitude_error": "attitude error",
+    "controller.angular_velocity_error": "angular velocity error",
+    "controller.sliding": "sliding variable",
+    "controller.energy": "energy L",
+}
+"""Of the quadrotor's loop; vectors by their stem, a component is said behind it."""
+
+AXES: Mapping[str, str] = {"x": "x", "y": "y", "z": "z", "w": "w"}
+
+
+def metric(name: str) -> str:
+    """A metric or objective in words."""
+    return METRICS.get(name, words(name))
+
+
+def setting(path: str) -> str:
+    """What a path of a scenario, system or study file sets, in words."""
+    if path in SETTINGS:
+        return SETTINGS[path][0]
+    head, _, rest = path.partition(".")
+    return words(rest) if head in ("timing", "controller", "plant") and rest else words(path)
+
+
+def signal(name: str, described: Mapping[str, Described]) -> str:
+    """A recorded column in words: of the quadrotor by name, of any other system by what its FMU says of it."""
+    stem, _, axis = name.rpartition(".")
+    if name in SIGNALS:
+        return SIGNALS[name]
+    if stem in SIGNALS and axis in AXES:
+        return f"{SIGNALS[stem]} {axis}"
+    known, what = described.get(name), words(variable_of(name))
+    text = (known.text or "").strip().rstrip(".") if known is not None else ""
+    if text and len(text) <= LONGEST:
+        what = f"{what} {text}" if text.split()[0] in _GOES_ON else f"{what}, {text}"
+    return f"{words(component_of(name))}: {what}"
+
+
+LONGEST = 32
+"""characters of a description that a legend takes"""
+_GOES_ON = {"of", "at", "in", "on", "from", "to", "by", "for", "asked", "between"}
+
+
+def words(name: str) -> str:
+    """The words of a name as files write it."""
+    return re.sub(r"[_.\s]+", " ", name).strip()
+
+
+def unit(text: str | None) -> str | None:
+    """A unit as people write it: N·m for N.m, m/s² for m/s2; None where there is nothing to say."""
+    if text in (None, "", "1"):
+        return None
+    raised = re.sub(r"(?<=[A-Za-zµΩ°%)])\^?(-?\d+)", lambda found: found[1].translate(_RAISED), str(text))
+    return raised.replace(".", "·").replace("*", "·")
+
+
+_RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+
+
+def amount(value: float, of: str | None) -> str:
+    """A number with its unit, to three digits."""
+    shown = unit(of)
+    return f"{value:.3g}" if shown is None else f"{value:.3g} {shown}"
+
+
+def with_unit(name: str, of: str | None) -> str:
+    """A quantity with its unit in brackets, as axes and heads of tables have it."""
+    shown = unit(of)
+    return name if shown is None else f"{name} [{shown}]"
