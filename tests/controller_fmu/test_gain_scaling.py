@@ -20,7 +20,8 @@ VEHICLES = {
     "heavy": Model(mass=4.34, inertia=Inertia(xx=0.0820, yy=0.0845, zz=0.1377)),
     "with axes of its own": Model(mass=1.3, inertia=Inertia(xx=0.8, yy=0.9, zz=1.4, xy=0.05, xz=-0.2, yz=0.3)),
 }
-GAINS = {sliding_mode: sliding_mode.Gains(per_inertia=True), geometric: geometric.Gains(per_inertia=True)}
+LAWS: tuple[Any, ...] = (sliding_mode, geometric)
+GAINS = {law: law.Gains(per_inertia=True) for law in LAWS}
 START = RigidState(ZERO, ZERO, Quaternion.from_xyzw(0.1699, 0.3058, 0.1699, 0.9212).normalised(), ZERO)
 STEP = 0.01
 """[s]"""

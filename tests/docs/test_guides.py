@@ -122,6 +122,7 @@ def test_the_fmpy_guide_flies_the_papers_scenario(folder: Path, environment: dic
     flight = np.genfromtxt(folder / "flight.csv", delimiter=",", names=True, deletechars="")
     own = run(Scenario(timing=Timing(clock="fmu"))).signals
     assert len(flight) == 30_000
+    assert flight.dtype.names is not None
     for name in flight.dtype.names[1:18]:
         assert np.abs(flight[name] - own[f"plant.{name}"][:-1]).max() < 1e-9, name
     for table, rows in (("fall.csv", 2001), ("heavier.csv", 201), ("step.csv", 2001), ("commands.csv", 501)):

@@ -25,7 +25,8 @@ def slope(t: float) -> float:
 def expected_speeds(ticks: int) -> list[float]:
     """Speeds every 5 ms: sensor every 2 ticks, engine every 4 from tick 1, controller every 20, both wires 4 late."""
     speed, filtered, integral, demand, force, road = 20.0, 20.0, 800.0, 800.0, 800.0, slope(0.0)
-    sent_filtered, sent_demand = {}, {}
+    sent_filtered: dict[int, float] = {}
+    sent_demand: dict[int, float] = {}
     speeds = [speed]
     arrived_filtered, arrived_demand = filtered, demand
     for k in range(ticks):

@@ -1,6 +1,7 @@
 """The examples give the numbers that are known of their problems, each to the accuracy that is said."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ PERIOD = "components.controller.sampling.period"
 COMMAND_DELAY = "connections.command.delay"
 
 
-def limits(system: System, of: str, near: float, **options: float) -> tuple[float, float]:
+def limits(system: System, of: str, near: float, **options: Any) -> tuple[float, float]:
     """What `quadcosim limit` says of a range around a value: the limit by runs, and the local one."""
     found = limit.find(system, of, first=0.97 * near, last=1.03 * near, scan=0.03 * near, **options)
     assert found.large_signal_limit is not None

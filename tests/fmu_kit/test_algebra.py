@@ -142,7 +142,8 @@ AXES = (Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
 @example(rotation(AXES[1], math.pi))
 @example(rotation(AXES[2], math.pi))
 def test_an_attitude_is_found_from_its_axes(Q: Quaternion) -> None:
-    found = Quaternion.from_axes(*(Q.to_inertial(axis) for axis in AXES))
+    x, y, z = (Q.to_inertial(axis) for axis in AXES)
+    found = Quaternion.from_axes(x, y, z)
     assert found.scalar >= 0.0
     same = Q if found.vector @ Q.vector + found.scalar * Q.scalar > 0.0 else -Q
     assert_equal_quaternions(found, same)
@@ -151,9 +152,11 @@ def test_an_attitude_is_found_from_its_axes(Q: Quaternion) -> None:
 def test_attitudes_are_found_from_their_axes_in_a_batch() -> None:
     many = [rotation(axis, angle) for axis in AXES for angle in (0.1, 2.0, 3.0, 4.0)]
     batch = Quaternion.from_xyzw(*np.array([[*Q] for Q in many]).T)
-    found = Quaternion.from_axes(*(batch.to_inertial(axis) for axis in AXES), NUMPY)
+    x, y, z = (batch.to_inertial(axis) for axis in AXES)
+    found = Quaternion.from_axes(x, y, z, NUMPY)
     for i, Q in enumerate(many):
-        expected = Quaternion.from_axes(*(Q.to_inertial(axis) for axis in AXES))
+        x, y, z = (Q.to_inertial(axis) for axis in AXES)
+        expected = Quaternion.from_axes(x, y, z)
         assert_equal_quaternions(Quaternion.from_xyzw(*(component[i] for component in found)), expected)
 
 

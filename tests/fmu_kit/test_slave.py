@@ -1,6 +1,6 @@
 """A slave of a few lines has all that FMI asks of it: only its variables and its step must be said."""
 
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
@@ -89,4 +89,4 @@ def test_variables_out_of_order_are_refused_where_they_are_declared() -> None:
     with pytest.raises(TypeError, match=r"Disordered\.variables: expected all Reals before the others"):
 
         class Disordered(Sum):
-            variables = (discrete_input("on", "", None, True), continuous_input("u", "", "1"))
+            variables: ClassVar[Any] = (discrete_input("on", "", None, True), continuous_input("u", "", "1"))

@@ -4,6 +4,8 @@ import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import hypothesis
 import pytest
@@ -199,6 +201,7 @@ class AnyMaster(RuleBasedStateMachine):
     @precondition(lambda self: self.saved is not None)
     @rule()
     def go_back(self) -> None:
+        assert self.saved is not None
         content, self.expected = self.saved
         self.controller.restore(content)
 
@@ -213,7 +216,8 @@ class AnyMaster(RuleBasedStateMachine):
 
 
 def test_any_sequence_of_steps_samples_at_the_due_times(controller: Instance) -> None:
-    run_machine(lambda: AnyMaster(controller), settings=hypothesis.settings(max_examples=60, stateful_step_count=40))
+    machine: Any = partial(AnyMaster, controller)
+    run_machine(machine, settings=hypothesis.settings(max_examples=60, stateful_step_count=40))
 
 
 T = 0.1

@@ -10,7 +10,7 @@ import pytest
 from fmpy.model_description import ModelDescription
 
 from fmu_kit.model_description import PYTHON_REQUIRED
-from orchestration.documents import tomllib
+from orchestration.documents import read_toml
 from orchestration.quadrotor.wiring import MODELS
 from tests.fmus.archive import files_of
 from tests.fmus.expected import MEASUREMENT
@@ -18,7 +18,7 @@ from tests.fmus.instance import Instance
 from tests.fmus.interface_table import TABLES, Row
 from tests.fmus.process import ROOT
 
-OLDEST = tuple(int(part) for part in PYTHON_REQUIRED.removeprefix(">=").split("."))
+MAJOR, MINOR = map(int, PYTHON_REQUIRED.removeprefix(">=").split("."))
 ROWS = [pytest.param(model, row, id=f"{model}-{row.name}") for model, table in TABLES.items() for row in table]
 
 
@@ -92,14 +92,15 @@ def test_the_description_says_which_python_it_requires_where_the_schema_wants_it
     model: str, built: dict[str, Path]
 ) -> None:
     root = fromstring(files_of(built[model])["modelDescription.xml"])
-    assert root.find("VendorAnnotations/Tool[@name='quadcosim']/Python").attrib == {"requires": PYTHON_REQUIRED}
+    (python,) = root.findall("VendorAnnotations/Tool[@name='quadcosim']/Python")
+    assert python.attrib == {"requires": PYTHON_REQUIRED}
     order = [element.tag for element in root]
     place = order.index("VendorAnnotations")
     assert order[place - 1 : place + 2] == ["DefaultExperiment", "VendorAnnotations", "ModelVariables"]
 
 
 def test_the_required_python_is_the_one_that_the_project_requires_and_is_checked_for() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    project = read_toml(ROOT / "pyproject.toml", "project")
     oldest = PYTHON_REQUIRED.removeprefix(">=")
     assert project["project"]["requires-python"] == PYTHON_REQUIRED
     assert project["tool"]["mypy"]["python_version"] == oldest
@@ -111,7 +112,7 @@ def test_the_bundled_sources_are_in_the_syntax_of_the_required_python(model: str
     sources = {name: content for name, content in files_of(built[model]).items() if name.endswith(".py")}
     assert len(sources) > 10
     for name, content in sources.items():
-        ast.parse(content, name, feature_version=OLDEST)
+        ast.parse(content, name, feature_version=(MAJOR, MINOR))
 
 
 # -- dependencies: that they are true is for validation to say -------------------------------------------

@@ -26,9 +26,8 @@ Findings = Callable[[Mutant], list[Finding]]
 Make = Callable[[str], Path]
 
 
-WITHOUT_INSTANCES = {
-    READABLE, *map(name_of, (*rules.OF_ARCHIVES, description.standard, *rules.OF_DESCRIPTIONS, *rules.OUR_DESCRIPTIONS))
-}  # fmt: skip
+STATIC: list[Callable[..., object]] = [*rules.OF_ARCHIVES, description.standard, *rules.OF_DESCRIPTIONS]
+WITHOUT_INSTANCES = {READABLE, *map(name_of, [*STATIC, *rules.OUR_DESCRIPTIONS])}
 """Rules that look at the archive and the description: for their mutants nothing needs to run"""
 
 

@@ -18,7 +18,7 @@ MEAN = {"discretisation": "mean", "stages": 3}
 
 
 def scenario(
-    period: float, *, delay: float = 0.0, plant: dict[str, float] | None = None, **controller: object
+    period: float, *, delay: float = 0.0, plant: dict[str, float] | None = None, **controller: Any
 ) -> Scenario:
     tables = {
         "controller": {"fmu": str(fmus.locate("native/UnifiedController")), **controller},
@@ -80,6 +80,6 @@ def test_about_hover_what_is_small_decays_up_to_the_limit(kind: str, limit: floa
 
 
 @pytest.mark.parametrize(("name", "value"), [("discretisation", "mean"), ("prediction", 0.02)])
-def test_the_loop_of_one_feedback_for_all_periods_is_not_for_redesigns(name: str, value: object) -> None:
+def test_the_loop_of_one_feedback_for_all_periods_is_not_for_redesigns(name: str, value: Any) -> None:
     with pytest.raises(UsageError, match=f"controllers with {name} = "):
         HoverLoop.of(scenario(0.02, **{name: value}))

@@ -186,4 +186,4 @@ def test_its_type_and_its_range_follow_from_the_items() -> None:
 )
 def test_items_with_gaps_and_enumerations_that_are_no_parameters_are_refused(declare: object) -> None:
     with pytest.raises(TypeError, match="m: expected an Enumeration to be a parameter, its items 1, 2"):
-        declare()  # type: ignore[operator]
+        declare()

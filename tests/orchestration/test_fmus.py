@@ -83,7 +83,8 @@ def test_a_path_is_taken_as_it_is(built: dict[str, Path]) -> None:
 
 
 def test_a_missing_fmu_is_built_and_announced_once(project: Path) -> None:
-    folder, heard = with_fmus_folder(project), []
+    folder = with_fmus_folder(project)
+    heard: list[str] = []
     for _ in range(2):
         assert fmus.locate("UnifiedController", heard.append) == folder / "UnifiedController.fmu"
     assert len(heard) == 1
@@ -151,7 +152,8 @@ def lamp(tmp_path: Path) -> Path:
 
 
 def test_a_missing_fmu_is_built_from_the_slave_beside_it_and_again_when_that_changes(lamp: Path) -> None:
-    path, heard = lamp / "Lamp.fmu", []
+    path = lamp / "Lamp.fmu"
+    heard: list[str] = []
     for _ in range(2):
         assert fmus.locate(str(path), heard.append) == path
     assert heard == [f"building {path}"]
@@ -170,7 +172,8 @@ def test_a_missing_fmu_is_built_from_the_slave_beside_it_and_again_when_that_cha
 def test_without_python_inside_it_is_built_into_a_folder_beside_the_slave(
     folder: str, version: str, lamp: Path
 ) -> None:
-    path, heard = lamp / folder / "Lamp.fmu", []
+    path = lamp / folder / "Lamp.fmu"
+    heard: list[str] = []
     for _ in range(2):
         assert fmus.locate(str(path), heard.append) == path
     assert heard == [f"building {path}"]

@@ -164,7 +164,7 @@ def test_a_study_is_refused_as_its_file_is(tmp_path: Path) -> None:
 
 def test_a_value_without_a_name_is_refused_with_the_names() -> None:
     with pytest.raises(UsageError, match=r"^Timing = 0.01: expected values by name, as in period=…$"):
-        Timing(0.01)  # type: ignore[misc]
+        Timing(0.01)  # type: ignore[call-arg]
 
 
 def test_a_missing_value_is_refused_by_its_name() -> None:
@@ -177,4 +177,4 @@ def test_lists_paths_and_numbers_of_numpy_are_taken_as_they_are_meant() -> None:
     assert (source.to, source.file) == (("a.u",), Path("table.csv"))
     component = Component(fmu=Path("tank.fmu"), step=np.float32(0.5))  # type: ignore[arg-type]
     assert (component.fmu, type(component.step)) == ("tank.fmu", float)
-    assert type(Scenario(seed=np.int64(3)).seed) is int  # type: ignore[arg-type]
+    assert type(Scenario(seed=np.int64(3)).seed) is int

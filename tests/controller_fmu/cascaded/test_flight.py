@@ -15,7 +15,7 @@ from quadcosim import Result, Scenario, Timing, UsageError
 from tests.native import assert_the_same, natives
 
 NAME, PLANT = "CascadedController", "QuadrotorPlant"
-ONE_RATE = {"controller.velocity_ratio": 1, "controller.attitude_ratio": 1}
+ONE_RATE: dict[str, float] = {"controller.velocity_ratio": 1, "controller.attitude_ratio": 1}
 
 
 def flown(controller: Path | str, parameters: dict[str, float], timing: Timing, stop_time: float = 30.0) -> Result:

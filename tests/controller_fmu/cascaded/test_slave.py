@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import pytest
 
@@ -33,7 +33,8 @@ def motion(k: int) -> tuple[Vec3, Vec3, Quaternion, Vec3]:
 
 def measured(k: int) -> dict[str, float]:
     names = ("position", "velocity", "quaternion", "angular_velocity")
-    return {f"{name}.{a}": x for name, v in zip(names, motion(k)) for a, x in zip("xyzw", v)}
+    parts: tuple[Iterable[float], ...] = motion(k)
+    return {f"{name}.{a}": x for name, v in zip(names, parts) for a, x in zip("xyzw", v)}
 
 
 def instance(values: Mapping[str, float] | None = None, **ratios: int) -> CascadedController:

@@ -90,17 +90,18 @@ def test_a_reference_in_free_fall_fails_by_name() -> None:
 
 def test_the_flight_of_its_c_is_that_of_its_python() -> None:
     """To rounding, as their elementary functions are not the same."""
-    values = {"controller.gain_scaling": "inertia", "controller.heading": 0.4, "controller.inertia.zz": 1.5}
+    values: dict[str, float | str] = {"controller.heading": 0.4, "controller.inertia.zz": 1.5}
+    values["controller.gain_scaling"] = "inertia"
     timing = quadcosim.Timing(period=0.02, plant_interval=0.01)
     scenario = quadcosim.Scenario(stop_time=2.0, timing=timing).with_changes(parameters=values)
-    flights = [
+    one, other = (
         quadcosim.run(scenario.with_fmus(plant="native/QuadrotorPlant", controller=f"{folder}GeometricController"))
         for folder in ("", "native/")
-    ]
-    assert_near(*flights, 1e-9)
+    )
+    assert_near(one, other, 1e-9)
 
 
-def outcome(period: float, delay: float = 0.0, **redesign: object) -> str:
+def outcome(period: float, delay: float = 0.0, **redesign: float | str) -> str:
     """Of 12 s from the paper's start, each command held for `period` [s] and late by `delay` [s]."""
     timing = quadcosim.Timing(period=period, plant_interval=0.005, delay=delay)
     parameters = {f"controller.{name}": value for name, value in {"hold_period": period, **redesign}.items()}

@@ -264,8 +264,10 @@ def test_reference_inputs_are_followed_when_asked_for() -> None:
     }
     slave = started({**measured(2), **target}, follow_inputs=True)
     slave.do_step(0.0, 0.01)
+    position, velocity = (Vec3(*(measured(2)[f"{name}.{a}"] for a in "xyz")) for name in ("position", "velocity"))
     state = Measurement(
-        *(Vec3(*(measured(2)[f"{name}.{a}"] for a in "xyz")) for name in ("position", "velocity")),
+        position,
+        velocity,
         Quaternion.from_xyzw(*(measured(2)[f"quaternion.{a}"] for a in "xyzw")),
         Vec3(*(measured(2)[f"angular_velocity.{a}"] for a in "xyz")),
     )
@@ -291,8 +293,10 @@ def test_locals_show_the_last_sample() -> None:
     put(slave, measured(4))
     slave.do_step(3.0, 0.01)
     values = measured(4)
+    position, velocity = (Vec3(*(values[f"{name}.{a}"] for a in "xyz")) for name in ("position", "velocity"))
     state = Measurement(
-        *(Vec3(*(values[f"{name}.{a}"] for a in "xyz")) for name in ("position", "velocity")),
+        position,
+        velocity,
         Quaternion.from_xyzw(*(values[f"quaternion.{a}"] for a in "xyzw")),
         Vec3(*(values[f"angular_velocity.{a}"] for a in "xyz")),
     )

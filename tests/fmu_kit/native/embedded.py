@@ -18,7 +18,7 @@ STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wdouble-prom
 ARM, QEMU = "arm-none-eabi-gcc", "qemu-system-arm"
 M4F = ("-mthumb", "-mfloat-abi=hard", "-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16")
 M7 = ("-mthumb", "-mfloat-abi=hard", "-mcpu=cortex-m7", "-mfpu=fpv5-d16")
-BOARDS = {M4F: "mps2-an386", M7: "mps2-an500"}
+BOARDS: dict[tuple[str, ...], str] = {M4F: "mps2-an386", M7: "mps2-an500"}
 _FIELD = re.compile(r" {8}(?:double|float) (\w+); +/\* ([^ :]+)")
 
 

@@ -104,13 +104,13 @@ class Together:
 
     def initialise(self, active: NDArray[np.bool_], start: NDArray[np.float64]) -> None:
         """Compute outputs at the start time."""
-        given = [self._mask(active), start]
-        self.lanes.initialise(self.memory.ctypes.data, *(a.ctypes.data for a in given), self.status.ctypes.data)
+        given = (self.memory, self._mask(active), start, self.status)
+        self.lanes.initialise(*(a.ctypes.data for a in given))
 
     def step(self, active: NDArray[np.bool_], t: NDArray[np.float64], h: NDArray[np.float64]) -> None:
         """A step."""
-        given = [self._mask(active), t, h]
-        self.lanes.do_step(self.memory.ctypes.data, *(a.ctypes.data for a in given), self.status.ctypes.data)
+        given = (self.memory, self._mask(active), t, h, self.status)
+        self.lanes.do_step(*(a.ctypes.data for a in given))
 
     def _mask(self, active: NDArray[np.bool_]) -> NDArray[np.uint64]:
         return np.where(active, ~np.uint64(0), np.uint64(0))

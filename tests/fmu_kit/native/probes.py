@@ -258,7 +258,7 @@ class Memory(Probe):
         self._filters = [Filter(self.real("a")), Filter(0.0, seen=10)]
         self._named = {"low": math.inf, "high": -math.inf}
         self._last = Pair(self.real("a"), self.real("b"))
-        self._whole = 0
+        self._whole: float = 0
         self._delayed = [0.0] * 4
         self._armed = False
         self._started = t
@@ -365,9 +365,10 @@ class Loops(Probe):
         total, product = repeat(times, add, (0.0, 1.0))
         self.put("y0", total)
         self.put("y1", product)
-        inner = repeat(times, lambda i, x: x + repeat(i, lambda k, y: y + k * b, 0.0), 0)
+        nothing: float = 0
+        inner = repeat(times, lambda i, x: x + repeat(i, lambda k, y: y + k * b, 0.0), nothing)
         self.put("y2", inner)
-        half = repeat(times, lambda i, x: x + 0.5, 0)
+        half = repeat(times, lambda i, x: x + 0.5, nothing)
         self.put_count("count", math.floor(half))
 
         def root(i: int, x: float) -> float:

@@ -95,7 +95,7 @@ def test_in_double_precision_every_variable_is_that_of_the_native_fmu_to_the_bit
     where: str, exported: dict[str, Path], flown: dict[str, list[float]], tmp_path: Path
 ) -> None:
     sides = [exported["UnifiedController"], exported["QuadrotorPlant"]]
-    names = to_note(*sides, tmp_path)
+    names = to_note(sides[0], sides[1], tmp_path)
     lines = RUNS[where]("embedded_flight.c", sides, tmp_path, *FLAGS, f"-DSAMPLE_PERIOD={H}")
     expected = np.array([flown[name] for name in names]).T.copy()
     assert sorted(names) == sorted(flown)
@@ -108,7 +108,7 @@ def test_in_single_precision_the_flight_is_near(
     where: str, exported: dict[str, Path], flown: dict[str, list[float]], tmp_path: Path
 ) -> None:
     sides = [exported["single"], exported["QuadrotorPlant"]]
-    names = to_note(*sides, tmp_path)
+    names = to_note(sides[0], sides[1], tmp_path)
     rows = rows_of(RUNS[where]("embedded_flight.c", sides, tmp_path, *FLAGS, "-DSAMPLE_PERIOD=0"))
     for name in (*(f"p.{name}" for name in MOTION), *(f"c.{name}" for name in COMMAND)):
         far = np.abs(rows[:, names.index(name)] - flown[name][99::100]).max()
@@ -118,7 +118,7 @@ def test_in_single_precision_the_flight_is_near(
 
 def test_in_single_precision_a_clock_of_its_own_misses_samples(exported: dict[str, Path], tmp_path: Path) -> None:
     sides = [exported["single"], exported["QuadrotorPlant"]]
-    names = to_note(*sides, tmp_path)
+    names = to_note(sides[0], sides[1], tmp_path)
     flags = (f"-DSTEPS={STEPS}", "-DH=0.004", "-DSAMPLE_PERIOD=0.004")
     rows = rows_of(on_this_machine("embedded_flight.c", sides, tmp_path, *flags))
     assert STEPS / 2 < rows[-1, names.index("c.sample_count")] < 0.8 * STEPS  # as the page says

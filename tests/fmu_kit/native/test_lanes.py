@@ -97,14 +97,14 @@ def _fly(together: Together, alone: list[Alone], variables: list[Variable], rng:
     period = float(rng.choice([0.001, 0.01, 0.25]))
     before = together.held()
     together.initialise(active, start)
-    for lane in np.flatnonzero(active):
+    for lane in np.flatnonzero(active).tolist():
         alone[lane].initialise(start[lane])
     for k in range(12):
         _expect_alike(together, alone, active, before)
         active &= together.status == 0
         t, h = start + period * k, period * rng.choice([0.5, 1.0, 1.0, 2.0], together.count)
-        for lane in np.flatnonzero(active):
-            given = _given(rng, variables, "input", 0.5)
+        for lane in np.flatnonzero(active).tolist():
+            given = dict(_given(rng, variables, "input", 0.5))
             together.put(lane, given)
             alone[lane].put(given)
             alone[lane].step(t[lane], h[lane])

@@ -32,7 +32,7 @@ def lines(texts: ctypes.CDLL, kind: str, values: Floats, precision: int = 0) -> 
     function.restype = ctypes.c_size_t
     pointer = np.ascontiguousarray(values).ctypes.data_as(ctypes.c_void_p)
     length = function(pointer, ctypes.c_size_t(len(values)), precision, array, ctypes.c_size_t(size))
-    return array[:length].decode("ascii").splitlines()
+    return array.raw[:length].decode("ascii").splitlines()
 
 
 def with_neighbours(values: Floats) -> Floats:

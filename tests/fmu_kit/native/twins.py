@@ -53,7 +53,11 @@ class InPython:
 
     def step(self, values: Values, t: float, h: float) -> Answer:
         """A step with these values."""
-        return self._answer(lambda: (self._set(values), self.slave.do_step(t, h)))
+        return self._answer(lambda: self._step(values, t, h))
+
+    def _step(self, values: Values, t: float, h: float) -> None:
+        self._set(values)
+        self.slave.do_step(t, h)
 
     def _begin(self, values: Values, start: float) -> None:
         self._set(values)
@@ -108,7 +112,11 @@ class InC:
 
     def step(self, values: Values, t: float, h: float) -> Answer:
         """A step with these values."""
-        return self._answer(lambda: (self._set(values), self.fmu.doStep(t, h)))
+        return self._answer(lambda: self._step(values, t, h))
+
+    def _step(self, values: Values, t: float, h: float) -> None:
+        self._set(values)
+        self.fmu.doStep(t, h)
 
     def _begin(self, values: Values, start: float) -> None:
         self._set(values)
@@ -128,11 +136,10 @@ class InC:
         except FMICallException:
             category, words = self.messages[-1]
             return "diverged" if category == "divergence" else "failed", words
-        words = [text for _, text in self.messages]
         found = []
         for vr, variable in enumerate(self.slave.variables):
             found += getattr(self.fmu, f"get{access(variable)}")([vr])
-        return (*words, *map(exact, found))
+        return (*(text for _, text in self.messages), *map(exact, found))
 
 
 def answers(twin: InPython | InC, start: Values, steps: Sequence[Values]) -> list[Answer]:

@@ -5,10 +5,13 @@ MATHEMATICS FOLDER [--root ROOT] MODULE:CLASS …
 
 import functools
 import sys
+from typing import cast
 
 from fmu_kit.native.building import build
+from fmu_kit.native.compiler import Mathematics
 from fmu_kit.packaging import main
 
 if __name__ == "__main__":
-    mathematics, *arguments = sys.argv[1:]
+    chosen, *arguments = sys.argv[1:]
+    mathematics = cast(Mathematics, chosen)
     sys.exit(main(arguments, functools.partial(build, mathematics=mathematics)))

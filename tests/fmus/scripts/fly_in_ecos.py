@@ -3,7 +3,11 @@
 import json
 import sys
 
-from orchestration.exchange.interop.tools.ecos import EcosSimulation, EcosSimulationStructure
+import orchestration.exchange.interop.tools.ecos  # noqa: F401  # oneTBB, which ecospy does not find by itself
+
+# isort: split
+from ecospy import EcosSimulation, EcosSimulationStructure
+
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
 
 if __name__ == "__main__":

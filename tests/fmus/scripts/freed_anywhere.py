@@ -31,6 +31,11 @@ def stepping(instance: Instance) -> None:
     instance.step(0.0, 0.01)
 
 
+def stepping_back(instance: Instance) -> None:
+    stepping(instance)
+    instance.step(0.01, -1.0)
+
+
 def terminated(instance: Instance) -> None:
     stepping(instance)
     instance.fmu.terminate()
@@ -66,7 +71,7 @@ PHASES: tuple[Callable[[Instance], object], ...] = (
     holding_a_state,
     failed(lambda instance: instance.set({"mass": math.nan})),
     failed(lambda instance: instance.initialise({"mass": -1.0})),
-    failed(lambda instance: (stepping(instance), instance.step(0.01, -1.0))),
+    failed(stepping_back),
 )
 
 

@@ -9,7 +9,7 @@ from pythonfmu.builder import FmuBuilder
 from pythonfmu.default_experiment import DefaultExperiment
 
 
-class LowPass(Fmi2Slave):
+class LowPass(Fmi2Slave):  # type: ignore[misc]
     """A first-order lag of its input, with a variable of each type."""
 
     default_experiment = DefaultExperiment(start_time=1.0, stop_time=3.0, step_size=0.1)

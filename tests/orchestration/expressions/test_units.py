@@ -11,7 +11,8 @@ from orchestration.units import BASE, BaseUnits, Unit, named
 
 
 def defined(name: str, factor: float = 1.0, offset: float = 0.0, **exponents: int) -> Unit:
-    return named(name, BaseUnits(exponents=tuple(exponents.get(key, 0) for key in BASE), factor=factor, offset=offset))
+    powers = tuple(Fraction(exponents.get(key, 0)) for key in BASE)
+    return named(name, BaseUnits(exponents=powers, factor=factor, offset=offset))
 
 
 UNITS = {

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from orchestration.checks import confined
 from orchestration.checks.confined import Ending
 from orchestration.fmi import repeatability
 from orchestration.fmi.isolated import IsolatedInstance
@@ -11,6 +12,7 @@ from orchestration.fmi.native import NativeInstance
 from orchestration.fmi.repeatability import Repeatability
 from orchestration.fmi.reuse import Instances
 from orchestration.simulation import prepared
+from orchestration.system.model import Parameter
 from tests.orchestration.fmi.small import needs_compiler, small
 from tests.orchestration.fmi.test_foreign_fmus import alone, ran
 
@@ -26,7 +28,7 @@ HABITS = {
     "REFUSES": Repeatability(reset=False, second_instance=False),
     "CRASHES": Repeatability(reset=False, second_instance=False),
 }
-SETTINGS = ({"gain": 3.0, "mode": "backward"}, {}, {"gain": 3.0})
+SETTINGS: tuple[dict[str, Parameter], ...] = ({"gain": 3.0, "mode": "backward"}, {}, {"gain": 3.0})
 
 
 @pytest.fixture(autouse=True)
@@ -83,7 +85,7 @@ def test_it_is_shown_once_on_a_machine(tmp_path: Path, cache: Path, monkeypatch:
     path = made("BROKEN_RESET", tmp_path)
     first = repeatability.of(path)
     monkeypatch.setattr(repeatability, "_known", {})
-    monkeypatch.setattr(repeatability.confined, "run", lambda *_: pytest.fail("shown again"))
+    monkeypatch.setattr(confined, "run", lambda *_: pytest.fail("shown again"))
     assert repeatability.of(path) == first
     (stored,) = cache.rglob("*.json")
     stored.write_text("damaged")
@@ -96,7 +98,7 @@ def test_what_could_not_be_tried_to_the_end_is_not_relied_on_nor_kept(
     tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stopped = Ending(code=None, reached="it takes longer than the limit of 60 s", out_of_time=True, said="")
-    monkeypatch.setattr(repeatability.confined, "run", lambda *_: stopped)
+    monkeypatch.setattr(confined, "run", lambda *_: stopped)
     assert repeatability.of(made("none", tmp_path)) == Repeatability(reset=False, second_instance=False)
     assert not list(cache.rglob("*.json"))
 

@@ -256,7 +256,8 @@ class Run:
         for wire in self.wires:
             self.inputs[wire.receiver] |= dict(zip(wire.inputs, self.applied[wire.name][0][1], strict=True))
         self.content: dict[tuple[str, int], list[float]] = {}
-        self.leaving, self.arriving = ({t: [] for t in self.instants} for _ in range(2))
+        self.leaving: dict[int, list[tuple[Wire, Message]]] = {t: [] for t in self.instants}
+        self.arriving: dict[int, list[tuple[Wire, Message]]] = {t: [] for t in self.instants}
         for wire in self.wires:
             for m in self.sent.get(wire.name, ()):
                 if not wire.is_sent and m.sent <= self.stop:

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import shutil
 import signal
 import threading
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,7 +17,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fmu_kit.native import compiler
 from orchestration import simulation
 from orchestration.errors import QuadcosimError, SimulatorError
 from orchestration.fmi.fmi2 import Fmi2Instance
@@ -55,7 +55,8 @@ class Kept:
         self._instances: dict[str, NativeInstance] = {}
 
     @contextmanager
-    def load(self, path: Path, name: str) -> Iterator[Instance]:
+    def load(self, path: Path, instance_name: str) -> Iterator[Instance]:
+        name = instance_name
         if name not in self._instances or self._instances[name].failed:
             self._instances[name] = open_here(path, name)
         self._instances[name].reset()
@@ -299,7 +300,7 @@ def test_what_stands_in_the_way_is_said_in_a_line(fmu: Path, tmp_path: Path, mon
     with prepared(system) as run:
         assert run.master.engine == "python"
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(compiler.shutil, "which", lambda name: None)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
     loop.library.cache_clear()
     try:
         with pytest.raises(QuadcosimError, match=r"^--engine compiled cannot be had: no C compiler that is called cc"):

@@ -77,7 +77,7 @@ def both(what: System, fixed: Iterable[str] = ()) -> tuple[second_clock.Seen, se
     master.initialise()
     master.run()
     assert master.divergence is None
-    rows = [row for chunk in master.recorder.chunks() for row in chunk.rows.tolist()]
+    rows = [row for chunk in master.recorder.finish().chunks() for row in chunk.rows.tolist()]
     ours = second_clock.Seen(
         [dict(zip(master.board.columns, row, strict=True)) for row in rows],
         {name: [second_clock.Step(t, h, stub.told(seen)) for t, h, seen in stub.steps] for name, stub in stubs.items()},
@@ -142,7 +142,9 @@ def test_and_with_the_controllers_own_clock(data: st.DataObject) -> None:
     same(flight(data.draw(cases(clock="fmu", jitter=0.0, clock_ratio=1.0, period=period, offset=0.0))))
 
 
-ALL = {"jitter": 0.009, "delay": 0.012, "delay_jitter": 0.02, "measurement_loss": 0.3, "command_loss": 0.3}
+ALL: dict[str, Any] = {
+    "jitter": 0.009, "delay": 0.012, "delay_jitter": 0.02, "measurement_loss": 0.3, "command_loss": 0.3,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("burst_length", [None, 1.0, 4.0])

@@ -67,7 +67,8 @@ def noisy(what):
                     recorder=InMemory())  # fmt: skip
     master.initialise()
     master.run()
-    rows = [dict(zip(master.board.columns, row)) for chunk in master.recorder.chunks() for row in chunk.rows.tolist()]
+    chunks = master.recorder.finish().chunks()
+    rows = [dict(zip(master.board.columns, row)) for chunk in chunks for row in chunk.rows.tolist()]
     tasks = {name for name, component in what.components.items() if component.sampling is not None}
     return {row["time"]: row for row in rows}, {
         name: {t: {key: seen[key] for key in inputs[name]} for t, _, seen in stubs[name].steps} for name in tasks

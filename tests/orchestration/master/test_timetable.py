@@ -1,5 +1,7 @@
 """What happens when, of any system."""
 
+from fractions import Fraction
+
 import pytest
 
 from orchestration.errors import UsageError
@@ -80,7 +82,7 @@ def test_components_that_are_due_together_follow_what_feeds_what():
 
 
 def fixed_plant(moves):
-    return {"plant": FixedStep(name="plant", grid=Grid(0, exact_nanoseconds(0.1)), moves=moves)}
+    return {"plant": FixedStep(name="plant", grid=Grid(Fraction(0), exact_nanoseconds(0.1)), moves=moves)}
 
 
 def test_between_two_points_of_a_fixed_step_is_an_error_that_names_them():

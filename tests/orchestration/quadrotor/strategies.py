@@ -25,7 +25,7 @@ def seconds(smallest: float, largest: float) -> st.SearchStrategy[float]:
 
 
 @st.composite
-def timings(draw: st.DrawFn, **fixed: Any) -> Timing:
+def timings(draw: st.DrawFn, /, **fixed: Any) -> Timing:
     """Timings with everything that can go wrong at once; what is in `fixed` is as given."""
     period = draw(seconds(1e-4, 0.5))
     ratio = fixed.get("clock_ratio", draw(st.sampled_from((1.0, 1.0, 0.5, 0.9999, 1.001, 1.7))))
@@ -50,7 +50,7 @@ def timings(draw: st.DrawFn, **fixed: Any) -> Timing:
 
 
 @st.composite
-def cases(draw: st.DrawFn, **fixed: Any) -> Case:
+def cases(draw: st.DrawFn, /, **fixed: Any) -> Case:
     """A timing with a horizon of at most some thirty periods."""
     timing = draw(timings(**fixed))
     periods = draw(st.integers(1, 30).map(float) | st.floats(0.01, 30.0))

@@ -76,8 +76,8 @@ class Plant(Stub):
 
     name = "plant"
 
-    def __init__(self, log: list[Call] | None = None, **start: float) -> None:
-        super().__init__({**dict.fromkeys((*MEASUREMENT, *COMMAND), 0.0), "quaternion.w": 1.0, **start}, log)
+    def __init__(self, start: Mapping[str, float] | None = None, log: list[Call] | None = None) -> None:
+        super().__init__({**dict.fromkeys((*MEASUREMENT, *COMMAND), 0.0), "quaternion.w": 1.0, **(start or {})}, log)
         self.thrusts: list[float] = []
 
     def advance(self, t: float, h: float) -> None:
@@ -222,7 +222,7 @@ class Flown:
         start: bool = True,
     ) -> None:
         self.timing = timing
-        self.plant = plant or Plant(**{"position.x": 1.0})
+        self.plant = plant or Plant({"position.x": 1.0})
         self.controller: Any = controller or Counting()
         self.recorder = InMemory()
         system = system_of(Scenario(timing=timing, stop_time=stop_time))

@@ -16,7 +16,8 @@ from tests.orchestration.quadrotor.stubs import Counting, Flown, Plant, Straying
 
 @pytest.mark.parametrize("name", ["velocity__x", "quaternion__w"])
 def test_a_measurement_that_is_not_finite_ends_the_run_before_it_is_passed_on(name: str) -> None:
-    flown = Flown(Timing(), 0.05, Straying(time=0.012, **{name: math.nan}))
+    sudden: dict[str, Any] = {name: math.nan}
+    flown = Flown(Timing(), 0.05, Straying(time=0.012, **sudden))
     assert flown.master.divergence_time == 12_000_000
 
 
@@ -32,7 +33,7 @@ def test_a_command_that_is_not_finite_never_reaches_the_plant() -> None:
 
 
 def test_a_start_too_far_away_is_divergence_at_zero() -> None:
-    flown = Flown(Timing(), 0.05, Plant(**{"position.x": 200.0}))
+    flown = Flown(Timing(), 0.05, Plant({"position.x": 200.0}))
     assert flown.master.divergence_time == 0
 
 

@@ -41,7 +41,7 @@ def fly(stop_time: float, parameters: Mapping[str, float | str] | None = None, s
 
 
 @cache
-def long_flight(**timing: float) -> Result:
+def long_flight(**timing: Any) -> Result:
     """A flight of 30 s, which more than one test looks at."""
     return fly(30.0, **timing)
 
@@ -126,7 +126,8 @@ def test_the_fmus_clock_is_the_masters_to_the_bit(plant_interval: float, timing:
 def test_nothing_that_goes_wrong_by_zero_changes_a_bit() -> None:
     nothing = dict.fromkeys(("offset", "delay", "delay_jitter", "jitter", "measurement_loss", "command_loss"), 0.0)
     zero = {"position": 0.0, "quaternion.w": 0.0}
-    timing = {**nothing, "noise": zero, "quantisation": zero, "jitter_distribution": "normal", "clock_ratio": 1.0}
+    others = {"noise": zero, "quantisation": zero, "jitter_distribution": "normal", "clock_ratio": 1.0}
+    timing: dict[str, Any] = {**nothing, **others}
     assert same_bits(fly(2.0, seed=5, burst_length=3.0, **timing), plain())
 
 

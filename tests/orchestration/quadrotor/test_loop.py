@@ -14,6 +14,7 @@ from orchestration.errors import SimulatorError
 from orchestration.master.sources import Constant
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.wiring import MEASUREMENT
+from orchestration.system.model import Hold
 from orchestration.system.times import nanoseconds
 from tests.orchestration.quadrotor.strategies import timings
 from tests.orchestration.quadrotor.stubs import Call, Counting, Feedback, Flown, Plant, Still, Straying
@@ -26,7 +27,7 @@ FARTHEST, FASTEST = 100.0, 1000.0
 def logged(timing: Timing, stop_time: float) -> list[Call]:
     """All calls of a short run, in order."""
     log: list[Call] = []
-    Flown(timing, stop_time, Plant(log), Counting(log))
+    Flown(timing, stop_time, Plant(log=log), Counting(log))
     return log
 
 
@@ -176,7 +177,7 @@ def test_first_order_hold_is_held_over_each_plant_step() -> None:
 
 
 @pytest.mark.parametrize("hold", ["zero", "first"])
-def test_a_row_holds_what_acts_until_the_next(hold: str) -> None:
+def test_a_row_holds_what_acts_until_the_next(hold: Hold) -> None:
     timing = Timing(period=0.003, delay=0.001, delay_jitter=0.004, jitter=0.001, command_loss=0.2, hold=hold)
     flown = Flown(timing, 0.2, controller=Feedback())
     assert flown.plant.thrusts == flown.column("plant.thrust")[:-1].tolist()
@@ -305,7 +306,7 @@ def test_events_name_what_they_are_about() -> None:
     ],
     ids=str,
 )
-def test_leaving_the_region_ends_the_run_with_its_time(sudden: dict[str, float]) -> None:
+def test_leaving_the_region_ends_the_run_with_its_time(sudden: dict[str, Any]) -> None:
     plant = Straying(time=0.012, **sudden)
     flown = Flown(Timing(period=0.01), 0.1, plant)
     assert flown.over is True

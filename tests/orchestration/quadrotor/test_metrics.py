@@ -28,6 +28,11 @@ TIME = np.linspace(0.0, 3.0, 3001)
 AT_SAMPLES = (wiring.ATTITUDE_ERROR_SCALAR, wiring.ENERGY)
 
 
+def attitude(scalar: Array) -> dict[str, Any]:
+    """The scalar part of the attitude error, for `measured`."""
+    return {wiring.ATTITUDE_ERROR_SCALAR: scalar}
+
+
 def measured(
     error: Array | float = 0.0,
     *,
@@ -188,13 +193,13 @@ def test_an_error_that_comes_back_settles_after_the_last_time() -> None:
 def test_the_attitude_error_is_the_angle_of_the_rotation_at_samples() -> None:
     angle = np.array([0.3, 3.0, 0.4, 3.0, 0.0])
     scalar = np.cos(angle / 2) * np.array([1, 1, -1, 1, 1])  # q and -q are one attitude
-    m = measured(t=np.arange(5.0), sampled=np.array([1, 0, 1, 0, 1]), **{"attitude_error.w": scalar})
+    m = measured(t=np.arange(5.0), sampled=np.array([1, 0, 1, 0, 1]), **attitude(scalar))
     assert m["attitude_error_max"] == pytest.approx(0.4)
     assert m["attitude_error_rmse"] == pytest.approx(math.sqrt((0.09 + 0.16) / 3))
 
 
 def test_a_scalar_part_that_rounding_made_too_large_is_no_error() -> None:
-    m = measured(t=np.arange(2.0), **{"attitude_error.w": np.array([1.0 + 1e-15, -1.0 - 1e-15])})
+    m = measured(t=np.arange(2.0), **attitude(np.array([1.0 + 1e-15, -1.0 - 1e-15])))
     assert (m["attitude_error_rmse"], m["attitude_error_max"]) == (0.0, 0.0)
 
 
@@ -220,7 +225,7 @@ def test_energy_growth_does_not_depend_on_how_often_it_is_looked_at(every: int) 
 
 def test_what_is_taken_at_samples_is_none_without_any() -> None:
     values = np.ones(3)
-    m = measured(t=np.arange(3.0), sampled=np.zeros(3), energy=values, **{"attitude_error.w": values})
+    m = measured(t=np.arange(3.0), sampled=np.zeros(3), energy=values, **attitude(values))
     assert m["attitude_error_rmse"] is m["attitude_error_max"] is m["energy_growth_share"] is None
 
 
@@ -323,14 +328,14 @@ def test_a_command_at_its_limit_is_not_beyond_it() -> None:
 
 
 def test_a_run_of_one_row_has_finite_metrics() -> None:
-    m = measured(0.7, t=np.array([0.0]), energy=np.array([1.0]), **{"attitude_error.w": np.array([1.0])})
+    m = measured(0.7, t=np.array([0.0]), energy=np.array([1.0]), **attitude(np.array([1.0])))
     assert (m["position_rmse"], m["position_max"], m["ultimate_bound"]) == (pytest.approx(0.7),) * 3
     assert (m["position_iae"], m["saturation_share"], m["settling_time"]) == (0.0, 0.0, None)
     assert all(math.isfinite(value) for value in m.values() if isinstance(value, float))
 
 
 def test_metrics_are_plain_numbers_of_python() -> None:
-    m = measured(0.1, energy=TIME, **{"attitude_error.w": np.ones(len(TIME))})
+    m = measured(0.1, energy=TIME, **attitude(np.ones(len(TIME))))
     assert {type(value) for value in m.values()} <= {float, int, bool, str, type(None)}
 
 

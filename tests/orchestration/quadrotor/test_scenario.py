@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import quadcosim
-from orchestration.documents import tomllib
+from orchestration.documents import read_toml
 from orchestration.quadrotor.timing import TIMING_KEYS
 from quadcosim import FmuChoice, Record, ReferenceChoice, Scenario, Timing, UsageError, load_scenario
 from tests.orchestration.quadrotor.strategies import timings
@@ -154,8 +154,9 @@ def test_a_scenario_written_and_loaded_is_the_same(
     assert loaded(file, scenario.to_toml()) == scenario
 
 
-def test_what_is_written_names_every_timing_key_that_has_a_value() -> None:
-    tables = tomllib.loads(Scenario().to_toml())
+def test_what_is_written_names_every_timing_key_that_has_a_value(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text(Scenario().to_toml(), encoding="utf-8")
+    tables = read_toml(tmp_path / "s.toml", "scenario")
     assert set(tables["timing"]) == set(TIMING_KEYS) - {"burst_length", "noise", "quantisation"}
     assert tables["controller"] == {"fmu": "UnifiedController"}
     assert tables["plant"] == {"fmu": "QuadrotorPlant"}

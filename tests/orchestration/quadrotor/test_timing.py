@@ -389,9 +389,10 @@ def test_every_key_has_the_name_of_its_flag() -> None:
             (parameter,) = (p for p in COMMANDS[command].params if f"--{key.replace('_', '-')}" in p.opts)
             assert parameter.name == key
         by_name = key in ("noise", "quantisation")
-        given = ["position=0.25"] if by_name else values.get(key, 1.0 if key == "burst_length" else 0.005)
+        given: Any = ["position=0.25"] if by_name else values.get(key, 1.0 if key == "burst_length" else 0.005)
         timing = FlightFlags(**{key: given}).applied_to(Scenario()).timing
-        assert timing == Timing(**{key: {"position": 0.25} if by_name else given})
+        expected: dict[str, Any] = {key: {"position": 0.25} if by_name else given}
+        assert timing == Timing(**expected)
         assert timing != Timing()
 
 

@@ -125,11 +125,6 @@ def bits(path: Path) -> list[dict[str, Any]]:
     ]
 
 
-def keys(path: Path) -> set[str]:
-    with open_for_reading(path) as store:
-        return {key for key, _ in store.statuses().values()}
-
-
 # -- the command ------------------------------------------------------------------------------------------
 
 
@@ -159,7 +154,7 @@ def error_line(done: Done) -> str:
     return lines[0].removeprefix("quadcosim: ")
 
 
-def one_line(error: BaseException) -> str:
+def one_line(error: BaseException | str) -> str:
     text = str(error)
     assert len(text.splitlines()) == 1, text
     return text

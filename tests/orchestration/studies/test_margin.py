@@ -2,6 +2,7 @@
 
 import json
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ from orchestration.studies import delay_bounds
 from orchestration.studies.delay_bounds import SampledLoop, breaking_jitter, certain_jitter
 from tests.orchestration.studies.common import one_line
 
-DOUBLE = {"A": np.array([[0.0, 1.0], [0.0, 0.0]]), "B": np.array([[0.0], [1.0]]), "F": np.array([[-1.0, -1.0]])}
+DOUBLE: dict[str, Any] = {
+    "A": np.array([[0.0, 1.0], [0.0, 0.0]]), "B": np.array([[0.0], [1.0]]), "F": np.array([[-1.0, -1.0]]),
+}  # fmt: skip
 """A double integrator under u = -x - v"""
 
 

@@ -464,7 +464,7 @@ def test_runs_that_fail_and_diverge_among_others_are_the_same_with_any_number_of
     assert [row["status"] for row in rows] == ["done"] * 2 + ["failed"] * 2 + ["done"] * 2
     for row, index in zip(rows, range(6), strict=True):
         if row["status"] == "done":
-            direct = run(chosen.system(index, starts())).metrics
+            direct: dict[str, Any] = run(chosen.system(index, starts())).metrics
             assert row["outcome"] == direct["outcome"]
             assert row["steps"] == float(direct["steps"]).hex()
 

@@ -1,6 +1,7 @@
 import itertools
 import math
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -116,7 +117,8 @@ def test_the_best_is_the_one_that_costs_least_where_it_was_tuned(tuning):
 
 
 def test_a_tuning_goes_on_where_it_was_stopped(tuning, tmp_path):
-    files, told, count = tuning.files(), [], 0
+    files, count = tuning.files(), 0
+    told: list[str] = []
 
     def fly(systems):
         nonlocal count
@@ -125,7 +127,7 @@ def test_a_tuning_goes_on_where_it_was_stopped(tuning, tmp_path):
             raise KeyboardInterrupt
         return bowl(systems)
 
-    how = {"command": "quadcosim tune", "progress": lambda share: None, "announce": told.append}
+    how: dict[str, Any] = {"command": "quadcosim tune", "progress": lambda share: None, "announce": told.append}
     with pytest.raises(KeyboardInterrupt):
         tune(tuning, files, tmp_path / "kept", tmp_path / "gains", fly, fly, **how)
     before = list(told)

@@ -27,7 +27,7 @@ def described(
     experiment: str = "",
 ) -> Path:
     """An FMU `model`.fmu in `folder`; each variable is given as `TYPE [UNIT] [discrete]`, by its name."""
-    variables = []
+    variables: list[str] = []
     for causality, given in (("input", inputs), ("output", outputs), ("parameter", parameters)):
         for name, text in given.items():
             kind, *rest = text.split()

@@ -32,7 +32,9 @@ def test_several_changes_are_all_made_at_once() -> None:
     system = changed(quadrotor(), CHANGES)
     assert {path: value_at(system, path) for path in CHANGES} == CHANGES
     once = {"components.controller.sampling.period": 0.5, "components.controller.sampling.jitter": 0.4}
-    assert changed(quadrotor(), once).components["controller"].sampling.jitter == 0.4  # more than the period there was
+    sampling = changed(quadrotor(), once).components["controller"].sampling
+    assert sampling is not None
+    assert sampling.jitter == 0.4  # more than the period there was
 
 
 @pytest.mark.parametrize(

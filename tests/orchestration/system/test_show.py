@@ -110,7 +110,7 @@ def test_the_figure_has_a_box_for_each_component_and_source_and_a_label_for_each
     figure = diagram.draw(load_system(file))
     (axes,) = figure.axes
     said = [text.get_text() for text in axes.texts]
-    boxes = [text.get_text() for text in axes.texts if text.get_weight() == "bold"]
+    boxes = [text.get_text() for text in axes.texts if text.get_fontweight() == "bold"]
     assert boxes == ["load", "motor", "filter", "controller"]
     for label in ("angle\nquantisation 0.001", "bus: y.a, y.b\ndelay 3 ms", "u\nhold first", "load"):
         assert any(text.startswith(label) for text in said), label

@@ -77,7 +77,7 @@ def agreement(
     """One that was never flown: every signal of the tool is so far from this project's."""
     chosen = TOOLS[tool]
     names = [name for name in LOOP.signals if name.partition(".")[0] in components_of(chosen)]
-    inputs = dict.fromkeys(components_of(chosen), (0.0,))
+    inputs: dict[str, tuple[float, ...]] = dict.fromkeys(components_of(chosen), (0.0,))
     return Agreement(
         tool=chosen,
         versions=dict.fromkeys(chosen.packages, "1.0"),

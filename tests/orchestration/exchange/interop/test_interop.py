@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -159,7 +160,7 @@ def test_the_versions_of_what_flew_are_told(one: One) -> None:
     ],
 )
 def test_times_that_other_masters_do_not_step_on_are_refused(
-    changes: dict[str, object], said: str, short: Scenario
+    changes: dict[str, Any], said: str, short: Scenario
 ) -> None:
     with pytest.raises(UsageError) as refused:
         agreements(short.with_changes(**changes), chosen(["libcosim"], LOOP.ports))

@@ -118,7 +118,7 @@ def test_there_is_a_row_for_each_tool_from_the_top() -> None:
     assert panel.yaxis_inverted()
     for line in panel.get_lines():
         if line.get_marker() == "^":
-            assert line.get_ydata()[0] in range(len(SEVERAL))
+            assert np.ravel(line.get_ydata())[0] in range(len(SEVERAL))
 
 
 def test_the_legend_names_what_any_tool_has_and_the_aim() -> None:

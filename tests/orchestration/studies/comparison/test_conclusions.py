@@ -9,6 +9,7 @@ from scipy.stats import binomtest
 
 from orchestration.studies.axes import Axis
 from orchestration.studies.comparison import fronts, slices
+from orchestration.studies.comparison.bandwidth import Bandwidths
 from orchestration.studies.comparison.cells import frame_of, results
 from orchestration.studies.comparison.design import Comparison, Condition, Controller, Craft
 from orchestration.studies.comparison.limits import first_ends, limits
@@ -36,7 +37,7 @@ def comparison() -> Comparison:
     )
 
 
-BANDWIDTHS = {(name, "v", period): value for name, value in SPEED.items() for period in PERIODS}
+BANDWIDTHS: Bandwidths = {(name, "v", period): value for name, value in SPEED.items() for period in PERIODS}
 
 
 def flew(controller: str, period: float, start: int) -> bool:
