@@ -1,21 +1,23 @@
 """The command `quadcosim`."""
 
-import json
+import difflib
 import sys
 import traceback
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 import typer.core
 
-from orchestration.command import plotting
+from orchestration.command import completion, plotting, registering
 from orchestration.command import systems as system_commands
+from orchestration.command.answer import Answer, of_files
 from orchestration.command.flags import EngineFlag, FlightFlags, Timing, flies, request_from
 from orchestration.command.limit_flags import LimitFlags
+from orchestration.command.manners import Manners
+from orchestration.command.registering import FLY, FMUS, TOOLS
 from orchestration.command.shared_flags import takes
-from orchestration.command.terminal import progress_bar, say
+from orchestration.command.terminal import complain, progress_bar, say, warn
 from orchestration.errors import QuadcosimError, SimulatorError, UsageError
 from orchestration.exchange.interop import cli as interop
 from orchestration.fmi.banners import banners_to_stderr
@@ -37,10 +39,16 @@ class _Stopped(Exception):
     """Ctrl-C; the text says how far the work was."""
 
 
+class _Unread(Exception):
+    """Whoever read standard output has gone."""
+
+
 class _Commands(typer.core.TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         try:
             return super().invoke(ctx)
+        except BrokenPipeError as end:
+            raise _Unread from end
         except (KeyboardInterrupt, typer.Abort) as stop:  # of which the parser would keep an exit code only
             raise _Stopped(str(stop)) from stop
 
@@ -49,15 +57,35 @@ app = typer.Typer(
     name="quadcosim",
     cls=_Commands,
     help="Fly a quadrotor controller FMU under a realistic digital clock.",
-    epilog="A first flight: quadcosim run --out results/paper. Add --debug to any command for a traceback.",
-    no_args_is_help=True,
-    add_completion=False,
+    epilog="A first flight: quadcosim run --out results/paper. Exit codes: 0 done, 1 it failed or something is not as "
+    "it should be, 2 wrong usage, 130 stopped by Ctrl-C, 141 the reader of the output has gone.",
+    invoke_without_command=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
 
-@app.command()
+@app.callback()
+@takes("manners", Manners)
+def quadcosim(
+    context: typer.Context,
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version and stop; with -v also those of what it stands on.")
+    ] = False,
+    *,
+    manners: Manners,
+) -> None:
+    """Fly a quadrotor controller, or any FMUs, under a realistic digital clock."""
+    registering.behave(manners, anew=True)
+    if version:
+        from orchestration.command.version import versions
+
+        registering.give(versions(everything=manners.verbose or manners.as_json))
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        raise UsageError("expected a command; quadcosim --help lists them")
+
+
 def build(
     folder: Annotated[
         Path | None,
@@ -78,14 +106,15 @@ def build(
         typer.Option(
             "--target",
             metavar="all|linux64,win64,darwin64",
-            help="Systems to build --native for, by zig.",
+            autocompletion=completion.among("all", "linux64", "win64", "darwin64"),
+            help="Systems to build --native for, with the compiler of the package ziglang.",
             show_default=False,
         ),
     ] = None,
     fmi: Annotated[
         int, typer.Option("--fmi", min=2, max=3, help="Version of FMI, 3 with --native only; then in native/fmi3/.")
     ] = 2,
-) -> None:
+) -> Answer:
     """Build every slave that the modules of FOLDER define, each as an .fmu. Same sources give the same bytes."""
     from orchestration import fmus
     from orchestration.quadrotor.wiring import MODELS
@@ -100,11 +129,9 @@ def build(
         built = fmus.build(MODELS, where, say, packing=packing, systems=target)
     else:
         built = fmus.build_slaves(fmus.slaves_of(folder), where, say, packing=packing, systems=target)
-    for path in built:
-        print(path)
+    return of_files(built)
 
 
-@app.command()
 def export_c(
     out: Annotated[Path, typer.Option("--out", help="Folder for NAME.h and NAME.c.", metavar="DIR")],
     slave: Annotated[
@@ -116,16 +143,14 @@ def export_c(
     single: Annotated[
         bool, typer.Option("--single", help="In single precision, with the functions of libm; else double, without.")
     ] = False,
-) -> None:
+) -> Answer:
     """Write a controller, or any slave, as two files in C for a microcontroller: no allocation, C99."""
     from orchestration import fmus
 
-    for path in fmus.export_c(fmus.slaves_named(slave), out, single=single):
-        print(path.with_suffix(".h"))
-        print(path)
+    written = fmus.export_c(fmus.slaves_named(slave), out, single=single)
+    return of_files(each for path in written for each in (path.with_suffix(".h"), path))
 
 
-@app.command()
 @flies
 def run(
     scenario: Annotated[
@@ -136,7 +161,6 @@ def run(
     out: Annotated[
         Path | None, typer.Option("--out", help="Directory for signals, events, metrics and figures.", metavar="DIR")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the metrics as JSON.")] = False,
     figures: Annotated[bool, typer.Option(help="Draw the figures into the directory.")] = True,
     pause_at: Annotated[
         float | None, typer.Option("--pause-at", help="Stop here, the state in --out DIR.", metavar="SECONDS")
@@ -147,7 +171,7 @@ def run(
     engine: EngineFlag = None,
     *,
     flags: FlightFlags,
-) -> None:
+) -> Answer:
     """Fly a scenario and print its metrics. FMUs that are missing or out of date are built first."""
     from orchestration.master.engine import engine_named
     from orchestration.simulation import run as fly  # what reads and writes files is loaded where there are any
@@ -176,22 +200,22 @@ def run(
             result = fly(request_from(scenario, flags, timing), **how)
     if result is None:
         say(f"paused in {out}; go on with: quadcosim run --resume {out}")
-        return
-    _report(result, as_json)
+        return Answer(document={"paused_in": out}, lines=[])
+    for warning in result.warnings:
+        warn(warning)
     if out is not None:
         say(f"results in {out}")
-    elif not as_json:
+    elif not registering.manners.as_json:
         say("add --out DIR to keep the signals and the figures")
+    return _metrics(result)
 
 
-@app.command()
 @takes("limits", LimitFlags)
 def validate(
     fmu: Annotated[list[Path] | None, typer.Argument(help="FMUs; without any, those of this project.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
     *,
     limits: LimitFlags,
-) -> None:
+) -> Answer:
     """Check FMUs: archive, description, and what they do when they run; exit code 1 if there is any problem.
 
     Any FMI 2.0 co-simulation FMU will do; those that quadcosim built must keep the rules of this project too.
@@ -205,30 +229,25 @@ def validate(
     for path in paths:
         if not path.is_file():
             raise UsageError(f"{path}: expected an .fmu file")
-    results, problems = [], 0
-    for path in paths:
-        findings = findings_of(path, limits=limits.limits)
-        results.append({"fmu": str(path), "findings": [asdict(finding) for finding in findings]})
-        count = sum(not finding.note for finding in findings)
-        problems += count
-        if not as_json:
-            print(f"{path}: {count or 'no'} problem{'' if count == 1 else 's'}{'' if count else ' found'}")
-            for finding in findings:
-                print(f"  {finding}")
-    if as_json:
-        print(json.dumps(results, indent=2))
-    if problems:
-        raise typer.Exit(1)
+    document, lines, problems = [], [], 0
+    with progress_bar("checking") as progress:
+        for done, path in enumerate(paths):
+            progress(done / len(paths))
+            findings = findings_of(path, limits=limits.limits)
+            document.append({"fmu": path, "findings": findings})
+            count = sum(not finding.note for finding in findings)
+            problems += count
+            lines.append(f"{path}: {count or 'no'} problem{'' if count == 1 else 's'}{'' if count else ' found'}")
+            lines.extend(f"  {finding}" for finding in findings)
+    return Answer(document=document, lines=lines, good=not problems)
 
 
-@app.command()
 @takes("limits", LimitFlags)
 def doctor(
     fmu: Annotated[list[Path] | None, typer.Argument(help="FMUs; without any, those of this project.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the same facts as JSON.")] = False,
     *,
     limits: LimitFlags,
-) -> None:
+) -> Answer:
     """Say what FMUs need to load, what of it this machine has, and try; exit code 1 if anything is missing."""
     from orchestration import fmus
     from orchestration.checks.doctor.as_lines import as_text
@@ -236,12 +255,9 @@ def doctor(
     from orchestration.quadrotor.wiring import MODELS
 
     report = examine(fmu or [fmus.locate(name, say) for name in MODELS], limits.limits)
-    print(json.dumps(as_tables(report), indent=2) if as_json else as_text(report))
-    if not report.good:
-        raise typer.Exit(1)
+    return Answer(document=as_tables(report), lines=as_text(report).splitlines(), good=report.good)
 
 
-@app.command()
 @flies
 def ssp(
     scenario: Annotated[
@@ -256,7 +272,7 @@ def ssp(
     ] = None,
     *,
     flags: FlightFlags,
-) -> None:
+) -> Answer:
     """Write FMUs, connections and parameters as one SSP 1.0 file for other tools, and beside it its timing."""
     from orchestration import fmus
     from orchestration.exchange.ssp import writing
@@ -268,65 +284,78 @@ def ssp(
     else:
         usual = Path(f"{scenario.stem}.ssp")
     written, timing = writing.write_with_timing(asked, out or usual, say)
-    print(written)
     say(f"{timing} has its timing, for quadcosim run")
+    return Answer(document={"files": [written, timing]}, lines=[str(written)])
 
 
+registering.add(app, FLY, run)
 plotting.register(app)
 system_commands.register(app)
 studies.register(app)
+registering.add(app, FMUS, build, validate, doctor)
+registering.add(app, TOOLS, export_c, ssp)
 interop.register(app)
 
 
-def _report(result: "Result", as_json: bool) -> None:
-    for warning in result.warnings:
-        say(f"warning: {warning}")
-    printed = {**result.metrics, "wall_time": result.provenance["wall_time"], "engine": result.provenance["engine"]}
-    if as_json:
-        print(json.dumps(printed, indent=2))
-        return
-    width, units = max(map(len, printed)), {**result.units, "wall_time": "s"}
-    for name, value in printed.items():
+def _metrics(result: "Result") -> Answer:
+    found = {**result.metrics, "wall_time": result.provenance["wall_time"], "engine": result.provenance["engine"]}
+    width, units = max(map(len, found)), {**result.units, "wall_time": "s"}
+    lines = []
+    for name, value in found.items():
         shown = f"{value:.6g}" if isinstance(value, float) else "-" if value is None else str(value)
-        print(f"{name:<{width}}  {shown}{'' if value is None else after(units.get(name))}")
+        lines.append(f"{name:<{width}}  {shown}{'' if value is None else after(units.get(name))}")
     if result.divergence is not None:
-        print(f"diverged: {result.divergence}")
+        lines.append(f"diverged: {result.divergence}")
+    return Answer(document=found, lines=lines)
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line: 0 done, 1 failure, 2 wrong usage; one line for an error, more with --debug."""
+    """Run the command line and end with one of the codes that its help names; one line for an error."""
     given = sys.argv[1:] if arguments is None else arguments
-    debug = "--debug" in given
+    registering.behave(Manners(), anew=True)
     try:
-        arguments = [argument for argument in given if argument != "--debug"]
         with banners_to_stderr():
-            code = app(arguments or ["--help"], standalone_mode=False)
-        sys.exit(code if arguments else 2)
+            code = app(given or ["--help"], prog_name="quadcosim", standalone_mode=False)
+        sys.exit(code if given else 2)
     except (KeyboardInterrupt, _Stopped) as stop:
-        say(f"quadcosim: interrupted {stop}".rstrip())
+        complain(f"interrupted {stop}".rstrip())
         sys.exit(130)
+    except (BrokenPipeError, _Unread):
+        sys.exit(141)
     except Exception as error:
-        _fail(error, debug)
+        sys.exit(_told(error))
 
 
-def _fail(error: Exception, debug: bool) -> None:
-    if debug:
+def _told(error: Exception) -> int:
+    """Says what went wrong; the exit code."""
+    if registering.manners.debug:
         traceback.print_exc()
         if isinstance(error, SimulatorError) and error.details:
             say(f"in the FMU:\n{error.details}")
-    describe = getattr(error, "format_message", None)  # of a usage error that the parser finds
+    misread = _misread(error)
     if isinstance(error, (QuadcosimError, OSError)):
-        say(f"quadcosim: {error}")
-    elif describe is not None:
-        say(f"quadcosim: {describe()} (--help lists what there is)")
-        sys.exit(2)
+        text = str(error)
+    elif misread is not None:
+        text = f"{misread} (--help lists what there is)"
     elif isinstance(error, ModuleNotFoundError) and (extra := _extra_of(error.name)) is not None:
-        say(f"quadcosim: {error.name} is not installed; this command needs: pip install 'quadcosim[{extra}]'")
+        text = f"{error.name} is not installed; this command needs: pip install 'quadcosim[{extra}]'"
     elif isinstance(error, ImportError) and (given := misleading_variables()):
-        say(f"quadcosim: {error}; try without {' '.join(given)}, which may have Python take modules of another one")
+        text = f"{error}; try without {' '.join(given)}, which may have Python take modules of another one"
     else:
-        say(f"quadcosim: {type(error).__name__}: {error} (an error of quadcosim itself; --debug shows where)")
-    sys.exit(2 if isinstance(error, UsageError) else 1)
+        text = f"{type(error).__name__}: {error} (an error of quadcosim itself; --debug shows where)"
+    complain(text, error)
+    return 2 if misread is not None or isinstance(error, UsageError) else 1
+
+
+def _misread(error: Exception) -> str | None:
+    """What the parser says of the command line; None for an error of another kind."""
+    describe = getattr(error, "format_message", None)
+    if describe is None:
+        return None
+    flag, known = getattr(error, "option_name", None), getattr(error, "possibilities", None)
+    if not (flag and known):
+        return str(describe())
+    return f"No such option: {flag}. Did you mean {difflib.get_close_matches(flag, known, n=1, cutoff=0.0)[0]}?"
 
 
 def _extra_of(package: str | None) -> str | None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from orchestration.command import completion
 from orchestration.command.shared_flags import takes
 from orchestration.errors import UsageError
 from orchestration.quadrotor.timing import TIMING_KEYS
@@ -21,6 +22,8 @@ TIMING, EFFECTS, MODEL = "Timing", "What goes wrong", "What flies"
 
 
 def _option(*names: str, panel: str, text: str, metavar: str = "SECONDS", **options: Any) -> Any:
+    if "autocompletion" not in options and metavar.islower():  # alternatives, but for P, N, R and what they are of
+        options["autocompletion"] = completion.among(*metavar.split("|"))
     return typer.Option(*names, help=text, metavar=metavar, rich_help_panel=panel, show_default=False, **options)
 
 
@@ -42,7 +45,8 @@ class FlightFlags:
             "--preset",
             panel=TIMING,
             metavar="px4|crazyflie|betaflight",
-            text="Rate and latency of a real stack; other flags go before it.",
+            text="Sampling period and delay of a real flight stack; flags given beside it win over it.",
+            autocompletion=completion.presets,
         ),
     ] = None
     order: Annotated[
@@ -130,6 +134,7 @@ class FlightFlags:
             panel=MODEL,
             metavar="NAME|PATH",
             text="The controller's FMU, anybody's that has its variables; UnifiedController unless told.",
+            autocompletion=completion.controllers,
         ),
     ] = None
     plant: Annotated[
@@ -139,6 +144,7 @@ class FlightFlags:
             panel=MODEL,
             metavar="NAME|PATH",
             text="The plant's FMU, anybody's that has its variables; QuadrotorPlant unless told.",
+            autocompletion=completion.plants,
         ),
     ] = None
     vehicle: Annotated[
@@ -148,6 +154,7 @@ class FlightFlags:
             panel=MODEL,
             metavar="NAME|FILE",
             text="Parameters of plant and controller by a file: paper, crazyflie, hummingbird, agilicious, or a path.",
+            autocompletion=completion.vehicles,
         ),
     ] = None
     native: Annotated[
@@ -227,6 +234,7 @@ EngineFlag = Annotated[
         "--engine",
         help="What passes through the instants, to the same result; compiled where it can be had.",
         metavar="python|compiled",
+        autocompletion=completion.among("python", "compiled"),
         show_default=False,
     ),
 ]

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from orchestration.command import registering
+from orchestration.command.answer import Answer, of_files
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.shared_flags import takes
 from orchestration.drawing.names import FLIGHT
@@ -42,7 +44,7 @@ def plot(
     ] = None,
     *,
     look: FigureFlags,
-) -> None:  # fmt: skip
+) -> Answer:  # fmt: skip
     """Draw the figures of a run again, or of several runs laid over each other, for a screen, a paper or slides."""
     from orchestration.drawing.draw import draw
     from orchestration.drawing.style import save
@@ -53,8 +55,7 @@ def plot(
     names = told_apart(results, [str(one) for one in directory])
     made = draw(results, figure, names=names, window=_window(results, start, end), style=look.chosen)
     place = out or (directory[0] if len(directory) == 1 else _beside(directory))
-    for path in save(made, place, look.chosen):
-        print(path)
+    return of_files(save(made, place, look.chosen))
 
 
 def _window(results: "Sequence[Result]", start: float | None, end: float | None) -> tuple[float, float] | None:
@@ -77,4 +78,4 @@ def _beside(directories: Sequence[Path]) -> Path:
 
 def register(app: typer.Typer) -> None:
     """Add the command to the command line."""
-    app.command()(plot)
+    registering.add(app, registering.FLY, plot)

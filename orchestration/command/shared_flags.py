@@ -6,7 +6,7 @@ from dataclasses import fields
 from functools import wraps
 from typing import Any
 
-Command = Callable[..., None]
+Command = Callable[..., Any]
 
 
 def takes(name: str, declared: type[Any]) -> Callable[[Command], Command]:
@@ -23,9 +23,9 @@ def takes(name: str, declared: type[Any]) -> Callable[[Command], Command]:
         own = [p for p in inspect.signature(command).parameters.values() if p.name != name]
 
         @wraps(command)
-        def call(**given: Any) -> None:
+        def call(**given: Any) -> Any:
             flags = declared(**{f.name: given.pop(f.name) for f in fields(declared)})
-            command(**{name: flags}, **given)
+            return command(**{name: flags}, **given)
 
         call.__signature__ = inspect.Signature(own + shared)  # type: ignore[attr-defined]
         call.__annotations__ = {p.name: p.annotation for p in own + shared}

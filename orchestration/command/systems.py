@@ -1,23 +1,27 @@
 """The commands that are about a system as a file: its schema, a proposal for one, a picture of one."""
 
-import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from orchestration.command import registering
+from orchestration.command.answer import Answer
 from orchestration.command.flags import FlightFlags, Timing, flies, request_from
+from orchestration.command.registering import FLY
 from orchestration.command.terminal import say
 
 if TYPE_CHECKING:
     from orchestration.system.model import System
 
 
-def schema() -> None:
+def schema() -> Answer:
     """Print the JSON schema of a system file, from which editors complete and check it."""
     from orchestration.system import system_file
 
-    print(json.dumps(system_file.schema(), indent=2))
+    answer = Answer(document=system_file.schema(), lines=[])
+    return replace(answer, lines=answer.as_json.splitlines())
 
 
 def connect(
@@ -25,7 +29,7 @@ def connect(
     out: Annotated[
         Path | None, typer.Option("--out", help="The system file; printed unless told.", metavar="SYSTEM.toml")
     ] = None,
-) -> None:
+) -> Answer:
     """Propose a system file for FMUs: outputs to inputs by name, type and unit; what is open is said in it."""
     from orchestration import fmus
     from orchestration.errors import UsageError
@@ -41,12 +45,12 @@ def connect(
         say(f"guessed: {line}")
     for line in proposal.undecided:
         say(f"not decided: {line}")
+    document = {"file": out, "text": proposal.text, "guessed": proposal.guessed, "undecided": proposal.undecided}
     if out is None:
-        print(proposal.text, end="")
-        return
+        return Answer(document=document, lines=proposal.text.splitlines())
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(proposal.text, encoding="utf-8")
-    print(out)
+    return Answer(document=document, lines=[str(out)])
 
 
 @flies
@@ -61,17 +65,18 @@ def show(
     ] = None,
     *,
     flags: FlightFlags,
-) -> None:
+) -> Answer:
     """Show a system: components with their rates, connections with their delay, jitter, loss and hold, units."""
     from orchestration.request import system_meant
     from orchestration.system.description import as_text
+    from orchestration.system.system_file import to_tables
 
     meant = system_meant(request_from(system, flags, timing))
-    print(as_text(meant, _units_of(meant)))
     if out is not None:
         from orchestration.system import diagram
 
         say(str(diagram.write(meant, out)))
+    return Answer(document=to_tables(meant), lines=as_text(meant, _units_of(meant)).splitlines())
 
 
 def _units_of(system: "System") -> dict[str, str]:
@@ -90,5 +95,4 @@ def _units_of(system: "System") -> dict[str, str]:
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the command line."""
-    for command in (schema, connect, show):
-        app.command()(command)
+    registering.add(app, FLY, show, connect, schema)

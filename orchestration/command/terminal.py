@@ -1,10 +1,14 @@
 """What the commands say beside their results, on standard error."""
 
+import logging
+import math
 import os
 import sys
 import time
+import traceback
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any
 
 Share = Callable[[float], None]
@@ -16,17 +20,76 @@ SPARSE = 10.0
 """[s] between two lines about work that goes on, where no bar can be drawn"""
 
 
+class _Screen(logging.Handler):
+    """Standard error, whatever that is at the time; warnings and errors in colour where it can be seen."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        with suppress(BrokenPipeError):  # nobody reads any more
+            print(_painted(record), file=sys.stderr, flush=True)
+
+
+_MESSAGES = logging.getLogger("quadcosim")
+_SCREEN = _Screen(logging.INFO)
+_MESSAGES.propagate = False
+_MESSAGES.setLevel(logging.INFO)
+_MESSAGES.addHandler(_SCREEN)
+
+
+def listen(level: int, log: Path | None) -> None:
+    """Show messages from `level` on; append all of them, with times, to the file `log`.
+
+    Raises `OSError` if it cannot be written.
+    """
+    for handler in [handler for handler in _MESSAGES.handlers if handler is not _SCREEN]:
+        _MESSAGES.removeHandler(handler)
+        handler.close()
+    _SCREEN.setLevel(level)
+    _MESSAGES.setLevel(level if log is None else logging.DEBUG)
+    if log is not None:
+        log.parent.mkdir(parents=True, exist_ok=True)
+        file = logging.FileHandler(log, encoding="utf-8")
+        file.setFormatter(logging.Formatter("%(asctime)s.%(msecs)03d %(levelname)-7s %(message)s", "%Y-%m-%dT%H:%M:%S"))
+        _MESSAGES.addHandler(file)
+
+
 def say(text: str) -> None:
-    """One line."""
-    print(text, file=sys.stderr, flush=True)
+    """One line about what goes on, on standard error, unless it is to be quiet."""
+    _MESSAGES.info("%s", text)
+
+
+def warn(text: str) -> None:
+    """One line about what may be meant otherwise."""
+    _MESSAGES.warning("warning: %s", text)
+
+
+def complain(text: str, error: BaseException | None = None) -> None:
+    """One line about what went wrong; where, for the log file."""
+    _MESSAGES.error("quadcosim: %s", text)
+    if error is not None:
+        note("".join(traceback.format_exception(error)).rstrip())
+
+
+def note(text: str) -> None:
+    """For the log file only, which has everything."""
+    for handler in _MESSAGES.handlers:
+        if handler is not _SCREEN:
+            handler.handle(_MESSAGES.makeRecord(_MESSAGES.name, logging.DEBUG, "", 0, text, (), None))
+
+
+def _painted(record: logging.LogRecord) -> str:
+    text = record.getMessage()
+    colour = {logging.WARNING: 33, logging.ERROR: 31, logging.DEBUG: 2}.get(record.levelno)
+    if colour is None or not _draws() or os.environ.get("NO_COLOR"):
+        return text
+    return f"\x1b[{colour}m{text}\x1b[0m"
 
 
 @contextmanager
 def progress_bar(what: str) -> Iterator[Share]:
     """A bar while the work goes on, on a terminal that can draw it; else a line now and then."""
     if not _draws():
-        tell = _now_and_then()
-        yield lambda share: tell(f"{what}: {share:.0%}")
+        tell, left = _now_and_then(), _Left()
+        yield lambda share: tell(f"{what}: {share:.0%}", left.after(share))
         return
     from rich.progress import Progress
 
@@ -39,8 +102,8 @@ def progress_bar(what: str) -> Iterator[Share]:
 def runs_bar() -> Iterator[Count]:
     """A bar with rate and time left, on a terminal that can draw it; else a line now and then."""
     if not _draws():
-        tell = _now_and_then()
-        yield lambda done, total: tell(f"{done} of {total} runs")
+        tell, left = _now_and_then(), _Left()
+        yield lambda done, total: tell(f"{done} of {total} runs", left.after(done / max(total, 1)))
         return
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -58,18 +121,38 @@ def runs_bar() -> Iterator[Count]:
         yield update
 
 
-def _now_and_then() -> Callable[[str], None]:
+def _now_and_then() -> Callable[[str, str], None]:
     """Says what it is told, but not within `SPARSE` seconds of the start or of what it said before."""
     last = time.monotonic()
 
-    def tell(text: str) -> None:
+    def tell(text: str, left: str) -> None:
         nonlocal last
         now = time.monotonic()
         if now - last >= SPARSE:
             last = now
-            say(text)
+            say(f"{text}{left}")
 
     return tell
+
+
+class _Left:
+    """How long work will still take, if it goes on at the rate it had since it began."""
+
+    def __init__(self) -> None:
+        self._began, self._first = time.monotonic(), math.nan
+
+    def after(self, share: float) -> str:
+        """For the end of a line; nothing where nothing is known, or left. The share heard first was done before."""
+        if math.isnan(self._first):
+            self._first = share
+        if not self._first < share < 1.0:
+            return ""
+        return f", {_duration((time.monotonic() - self._began) * (1.0 - share) / (share - self._first))} left"
+
+
+def _duration(seconds: float) -> str:
+    minutes, hours = seconds / 60.0, seconds / 3600.0
+    return f"{seconds:.0f} s" if minutes < 2.0 else f"{minutes:.0f} min" if hours < 2.0 else f"{hours:.1f} h"
 
 
 def _draws() -> bool:

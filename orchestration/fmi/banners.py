@@ -5,6 +5,7 @@ import ctypes
 import os
 import sys
 from collections.abc import Iterator
+from typing import TextIO
 
 _OUT, _ERR = 1, 2
 
@@ -30,11 +31,25 @@ def banners_to_stderr() -> Iterator[None]:
     try:
         yield
     finally:
-        if theirs is not None:
-            theirs.flush()
-            sys.stdout = python
-        _set_output(kept)
-        os.close(kept)
+        try:
+            if theirs is not None:
+                sys.stdout = python
+                _emptied(theirs, kept)
+        finally:
+            _set_output(kept)
+            os.close(kept)
+
+
+def _emptied(stream: TextIO, descriptor: int) -> None:
+    """Raise `BrokenPipeError` if nobody reads any more; what is left then goes nowhere, so that no other asks again."""
+    try:
+        stream.flush()
+    except BrokenPipeError:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, descriptor)
+        os.close(nowhere)
+        stream.flush()
+        raise
 
 
 def _is_standard(stream: object) -> bool:

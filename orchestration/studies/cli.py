@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from orchestration.command import completion, registering
+from orchestration.command.answer import Answer, of_files
 from orchestration.command.flags import EngineFlag, FlightFlags, Timing, flies, request_from
 from orchestration.command.terminal import progress_bar, runs_bar, say
 from orchestration.errors import UsageError
@@ -22,6 +24,7 @@ BatchFlag = Annotated[
         "--engine",
         help="What flies them; batch: many at once, as lanes of native FMUs, a sample of them by FMUs too.",
         metavar="python|compiled|batch",
+        autocompletion=completion.among("python", "compiled", "batch"),
         show_default=False,
     ),
 ]
@@ -36,7 +39,7 @@ def sweep(
     ] = None,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Fly failed runs again.")] = False,
     engine: BatchFlag = None,
-) -> None:
+) -> Answer:
     """Fly the runs of a study that are missing; kill it and start it again as you like."""
     from orchestration.master.engine import engine_named
     from orchestration.studies.study_file import load_study
@@ -48,14 +51,13 @@ def sweep(
             engine="batch" if engine == "batch" else engine_named(engine, "batch"), progress=progress, announce=say,
         )  # fmt: skip
     failed = f", {summary.failed} failed (quadcosim export shows why; --retry-failed)" if summary.failed else ""
-    print(f"{summary.path}: {summary.total} runs, {summary.flown} flown now{failed}")
+    lines = [f"{summary.path}: {summary.total} runs, {summary.flown} flown now{failed}"]
     if summary.agreement is not None:
-        print(f"--engine batch: {summary.agreement}")
-    if summary.failed:
-        raise typer.Exit(1)
+        lines.append(f"--engine batch: {summary.agreement}")
+    return Answer(document=summary, lines=lines, good=not summary.failed)
 
 
-def status(study: StudyFile, out: Out = None) -> None:
+def status(study: StudyFile, out: Out = None) -> Answer:
     """Tell how far a study is, also while it runs in another process."""
     from orchestration.studies.lanes import Agreement
     from orchestration.studies.store import open_for_reading
@@ -69,18 +71,21 @@ def status(study: StudyFile, out: Out = None) -> None:
         about, counts = opened.about(), opened.counts()
         total = int(about.get(TOTAL, "0"))
     done, failed = counts.get("done", 0), counts.get("failed", 0)
-    print(f"{path}: {done + failed} of {total} runs, {failed} failed, {total - done - failed} missing")
-    if AGREEMENT in about:
-        print(f"--engine batch: {Agreement(**json.loads(about[AGREEMENT]))}")
+    missing = total - done - failed
+    agreement = Agreement(**json.loads(about[AGREEMENT])) if AGREEMENT in about else None
+    lines = [f"{path}: {done + failed} of {total} runs, {failed} failed, {missing} missing"]
+    if agreement is not None:
+        lines.append(f"--engine batch: {agreement}")
+    numbers = {"total": total, "done": done, "failed": failed, "missing": missing}
+    return Answer(document={"path": path, **numbers, "agreement": agreement}, lines=lines)
 
 
-def export(study: StudyFile, out: Out = None) -> None:
+def export(study: StudyFile, out: Out = None) -> Answer:
     """Write the rows of a study as runs.parquet and runs.csv beside its store, sorted by design index."""
     from orchestration.studies.table import export as write
 
     path = _current_store(study, out)
-    for written in write(path, path.parent):
-        print(written)
+    return of_files(write(path, path.parent))
 
 
 def draw(
@@ -89,7 +94,7 @@ def draw(
     metric: Annotated[
         str | None, typer.Option("--metric", help="What to draw; what the criterion is about unless told.")
     ] = None,
-) -> None:
+) -> Answer:
     """Draw a study: a metric over one or two axes with what is good, or sensitivity bars."""
     from orchestration.studies.drawing import draw_study, metric_of
     from orchestration.studies.study_file import load_study
@@ -97,8 +102,7 @@ def draw(
     chosen = load_study(study)
     metric = metric_of(chosen, metric)
     _current_store(study, out)
-    for written in draw_study(chosen, out, metric):
-        print(written)
+    return of_files(draw_study(chosen, out, metric))
 
 
 def tune(
@@ -108,7 +112,7 @@ def tune(
     out: Annotated[Path, typer.Option("--out", help="Folder for the files of tuned parameters.", metavar="DIR")],
     workers: Annotated[int, typer.Option("--workers", help="Processes on this machine.", metavar="N")] = 1,
     engine: BatchFlag = None,
-) -> None:
+) -> Answer:
     """Tune a controller on an ensemble of starts, and judge it on others; goes on where it was stopped."""
     from orchestration.master.engine import engine_named
     from orchestration.studies.engine import Pool
@@ -125,8 +129,7 @@ def tune(
             lambda systems: pool.fly_all(systems, in_lanes=in_lanes), pool.fly_all,
             command=command, progress=progress, announce=say,
         )  # fmt: skip
-    for path in written:
-        print(path)
+    return of_files(written)
 
 
 def compare(
@@ -148,8 +151,7 @@ def compare(
         typer.Option("--start", help="Of that cell one flight, kept in --out DIR.", metavar="I", show_default=False),
     ] = None,
     figures: Annotated[bool, typer.Option(help="Draw the pictures beside the tables.")] = True,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
-) -> None:
+) -> Answer:
     """Fly controllers against each other from the same starts: who flies, how far, how well, at what effort."""
     from orchestration.master.engine import engine_named
     from orchestration.studies.comparison import command
@@ -159,14 +161,13 @@ def compare(
     chosen = dataclasses.replace(load_comparison(comparison), native=native)
     alone = None if engine == "batch" else engine_named(engine, "batch")
     if start is not None:
-        command.flight(chosen, cell, start, out, engine=alone)
-    elif cell is not None:
-        command.cell(chosen, cell, out, workers=workers, engine=alone, as_json=as_json)
-    else:
-        command.all_cells(
-            chosen, out, workers=workers, engine="batch" if engine == "batch" else alone, as_json=as_json,
-            figures=figures, again=f"quadcosim compare {comparison}{' --native' if native else ''} --cell",
-        )  # fmt: skip
+        return command.flight(chosen, cell, start, out, engine=alone)
+    if cell is not None:
+        return command.cell(chosen, cell, out, workers=workers, engine=alone)
+    return command.all_cells(
+        chosen, out, workers=workers, engine="batch" if engine == "batch" else alone, figures=figures,
+        again=f"quadcosim compare {comparison}{' --native' if native else ''} --cell",
+    )  # fmt: skip
 
 
 @flies
@@ -182,6 +183,7 @@ def limit(
             "--of",
             help="The quantity: of the quadrotor by name, of any system by path.",
             metavar="period|delay|jitter|loss|PATH",
+            autocompletion=completion.among("period", "delay", "jitter", "loss"),
         ),
     ] = "period",
     first: Annotated[
@@ -195,20 +197,23 @@ def limit(
         float | None, typer.Option("--scan", help="Step of the scan upward.", metavar="STEP", show_default=False)
     ] = None,
     confidence: Annotated[
-        float, typer.Option("--confidence", help="For random quantities: that nine seeds in ten are good.")
+        float,
+        typer.Option(
+            "--confidence",
+            help="When chance plays a part: how sure (0 to 1) it must be that at least nine flights in ten are good.",
+        ),
     ] = 0.95,
     continuous: Annotated[
         bool, typer.Option("--continuous", help="Fly near continuous time too (as long as ten flights at 1 ms).")
     ] = False,
     workers: Annotated[int, typer.Option("--workers", help="Processes for the seeds.", metavar="N")] = 1,
     engine: EngineFlag = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
     out: Annotated[
         Path | None, typer.Option("--out", help="Draw the spectral radius with both limits here.", metavar="DIR")
     ] = None,
     *,
     flags: FlightFlags,
-) -> None:
+) -> Answer:
     """Find the largest value that is still good (a period, delay, jitter, loss, any path), and the local limit."""
     from orchestration.master.engine import engine_named
     from orchestration.studies import limit as limits
@@ -222,11 +227,7 @@ def limit(
         from orchestration.studies.drawing import draw_limit
 
         say(str(draw_limit(chosen, found, out)))
-    if as_json:
-        print(json.dumps(dataclasses.asdict(found), indent=2))
-        return
-    for name, value in limits.as_text(found).items():
-        print(f"{name:<19}  {value}")
+    return Answer(document=found, lines=[f"{name:<19}  {value}" for name, value in limits.as_text(found).items()])
 
 
 @flies
@@ -234,10 +235,9 @@ def margin(
     scenario: Annotated[
         Path | None, typer.Argument(help="Scenario file; without one, the paper's flight.", show_default=False)
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
     *,
     flags: FlightFlags,
-) -> None:
+) -> Answer:
     """Tell what delay the loop about hover stands: a constant one exactly, one that varies by bounds from theory."""
     from orchestration.quadrotor.scenario import Scenario
     from orchestration.studies.margin import margin_of
@@ -246,12 +246,11 @@ def margin(
     if not isinstance(chosen, Scenario):
         raise UsageError("margin: expected a scenario of the quadrotor")
     found = dataclasses.asdict(margin_of(chosen))
-    if as_json:
-        print(json.dumps(found, indent=2))
-        return
+    lines = []
     for name, value in found.items():
         shown = " ".join(f"{share:g}" for share in value) if isinstance(value, tuple) else value
-        print(f"{name:<17}  {f'{value:.6g} s' if isinstance(value, float) else '-' if value is None else shown}")
+        lines.append(f"{name:<17}  {f'{value:.6g} s' if isinstance(value, float) else '-' if value is None else shown}")
+    return Answer(document=found, lines=lines)
 
 
 def _current_store(study: Path, out: Path | None) -> Path:
@@ -269,5 +268,4 @@ def _current_store(study: Path, out: Path | None) -> Path:
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the command line."""
-    for command in (sweep, status, export, draw, tune, compare, limit, margin):
-        app.command()(command)
+    registering.add(app, registering.STUDY, limit, margin, sweep, status, draw, export, compare, tune)

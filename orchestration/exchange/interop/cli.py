@@ -1,11 +1,12 @@
 """The command that compares this project's master with other people's."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from orchestration.command import completion, registering
+from orchestration.command.answer import Answer
 from orchestration.command.flags import FlightFlags, Timing, flies, request_from
 from orchestration.command.terminal import progress_bar, say
 
@@ -18,15 +19,17 @@ def interop(
     ] = None,
     timing: Timing = None,
     tool: Annotated[
-        list[str] | None, typer.Option("--tool", help="Only this tool; may be repeated.", metavar="NAME")
+        list[str] | None,
+        typer.Option(
+            "--tool", help="Only this tool; may be repeated.", metavar="NAME", autocompletion=completion.tools
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="Draw the agreement, signal by signal, here.", metavar="DIR")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the table as JSON.")] = False,
     *,
     flags: FlightFlags,
-) -> None:
+) -> Answer:
     """Fly a system in other people's masters and compare every signal with this one's.
 
     Exit code 1 if a tool is farther than 1e-9 in a state, its own first inputs given to this master too.
@@ -44,13 +47,13 @@ def interop(
         from orchestration.exchange.interop.figure import draw
 
         say(str(draw(found, out)))
-    print(json.dumps([table.as_dict(agreement) for agreement in found], indent=2) if as_json else table.text(found))
     far = [agreement.tool.name for agreement in found if not table.agrees(agreement)]
     if far:
         say(f"farther than {table.AIM:g} from this project's master: {'; '.join(far)}")
-        raise typer.Exit(1)
+    document = [table.as_dict(agreement) for agreement in found]
+    return Answer(document=document, lines=table.text(found).splitlines(), good=not far)
 
 
 def register(app: typer.Typer) -> None:
     """Add the command to the command line."""
-    app.command()(interop)
+    registering.add(app, registering.TOOLS, interop)

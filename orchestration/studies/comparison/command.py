@@ -1,12 +1,10 @@
 """`quadcosim compare`: what it prints and where it ends."""
 
 import dataclasses
-import json
 from pathlib import Path
 from typing import Any, Literal
 
-import typer
-
+from orchestration.command.answer import Answer
 from orchestration.command.terminal import runs_bar, say
 from orchestration.errors import UsageError
 from orchestration.master.engine import Engine
@@ -21,21 +19,14 @@ def all_cells(
     *,
     workers: int,
     engine: Engine | Literal["batch"] | None,
-    as_json: bool,
     figures: bool,
     again: str,
-) -> None:
+) -> Answer:
     """Fly what is missing, and tell what all cells come to; `again` is the command for one of them."""
     with runs_bar() as progress:
         found = run.compare(
             comparison, folder=out, workers=workers, engine=engine, figures=figures, progress=progress, announce=say
         )
-    if as_json:
-        content: dict[str, Any] = to_json(comparison, found.outcome, found.bandwidths)
-        print(json.dumps({**content, "files": [str(path) for path in found.written]}, indent=2))
-    else:
-        for line in terminal.lines(comparison, found.outcome):
-            print(line)
     summary = found.summary
     say(f"{summary.path}: {summary.total} runs, {summary.flown} flown now; tables and pictures beside it")
     if summary.agreement is not None:
@@ -43,28 +34,29 @@ def all_cells(
     say(f"one cell again, by its number in cells.csv: {again} K")
     if summary.failed:
         say(f"{summary.failed} runs failed: runs.csv shows why")
-        raise typer.Exit(1)
+    content: dict[str, Any] = to_json(comparison, found.outcome, found.bandwidths)
+    return Answer(
+        document={**content, "files": found.written},
+        lines=list(terminal.lines(comparison, found.outcome)),
+        good=not summary.failed,
+    )
 
 
-def cell(
-    comparison: Comparison, index: int, out: Path | None, *, workers: int, engine: Engine | None, as_json: bool
-) -> None:
+def cell(comparison: Comparison, index: int, out: Path | None, *, workers: int, engine: Engine | None) -> Answer:
     """Fly one cell again, and tell whether the store has the same."""
     found = run.cell_again(comparison, index, workers=workers, engine=engine)
     stored = run.stored_cell(comparison, index, out)
     same = None if stored is None else run.agree(stored, found)
-    if as_json:
-        print(json.dumps({**dataclasses.asdict(found), "same_as_stored": same}, indent=2))
-    else:
-        for line in terminal.cell_lines(comparison, found):
-            print(line)
-        if same is not None:
-            print(f"{'in the store':<22}  {'the same' if same else 'another result'}")
+    lines = list(terminal.cell_lines(comparison, found))
+    if same is not None:
+        lines.append(f"{'in the store':<22}  {'the same' if same else 'another result'}")
+    return Answer(document={**dataclasses.asdict(found), "same_as_stored": same}, lines=lines)
 
 
-def flight(comparison: Comparison, index: int | None, start: int, out: Path | None, *, engine: Engine | None) -> None:
+def flight(comparison: Comparison, index: int | None, start: int, out: Path | None, *, engine: Engine | None) -> Answer:
     """Keep one flight of a cell; raises `UsageError` without a cell or a directory."""
     if index is None or out is None:
         raise UsageError("--start: expected --cell K, whose start it is, and --out DIR for the flight")
     run.flight(comparison, index, start, out, engine=engine)
     say(f"results in {out}")
+    return Answer(document={"directory": out}, lines=[])
