@@ -9,45 +9,39 @@ Complete = Callable[[str], list[str]]
 
 def among(*names: str) -> Complete:
     """Some of a few names."""
-    return lambda incomplete: _starting(incomplete, names)
+    return lambda incomplete: starting(incomplete, names)
 
 
 def controllers(incomplete: str) -> list[str]:
     """This project's controllers, and FMUs by their paths."""
     from orchestration.quadrotor.wiring import DEFAULT_PLANT, MODELS
 
-    return _starting(incomplete, [name for name in MODELS if name != DEFAULT_PLANT]) + _files(incomplete, ".fmu")
+    return starting(incomplete, [name for name in MODELS if name != DEFAULT_PLANT]) + _files(incomplete, ".fmu")
 
 
 def plants(incomplete: str) -> list[str]:
     """This project's plant, and FMUs by their paths."""
     from orchestration.quadrotor.wiring import DEFAULT_PLANT
 
-    return _starting(incomplete, [DEFAULT_PLANT]) + _files(incomplete, ".fmu")
+    return starting(incomplete, [DEFAULT_PLANT]) + _files(incomplete, ".fmu")
 
 
 def vehicles(incomplete: str) -> list[str]:
     """Vehicles that have a name, and files of others."""
     from orchestration.quadrotor.vehicles import ENDING, names
 
-    return _starting(incomplete, names()) + _files(incomplete, ENDING)
+    return starting(incomplete, names()) + _files(incomplete, ENDING)
 
 
 def presets(incomplete: str) -> list[str]:
     """Timings that have a name."""
     from orchestration.quadrotor.presets import PRESETS
 
-    return _starting(incomplete, PRESETS)
+    return starting(incomplete, PRESETS)
 
 
-def tools(incomplete: str) -> list[str]:
-    """Other people's masters."""
-    from orchestration.exchange.interop.catalogue import TOOLS
-
-    return _starting(incomplete, TOOLS)
-
-
-def _starting(incomplete: str, names: Iterable[str]) -> list[str]:
+def starting(incomplete: str, names: Iterable[str]) -> list[str]:
+    """Those names that go on from what is typed."""
     return [name for name in names if name.startswith(incomplete)]
 
 

@@ -11,6 +11,12 @@ from orchestration.command.flags import FlightFlags, Timing, flies, request_from
 from orchestration.command.terminal import progress_bar, say
 
 
+def _tools(incomplete: str) -> list[str]:
+    from orchestration.exchange.interop.catalogue import TOOLS
+
+    return completion.starting(incomplete, TOOLS)
+
+
 @flies
 def interop(
     scenario: Annotated[
@@ -20,9 +26,7 @@ def interop(
     timing: Timing = None,
     tool: Annotated[
         list[str] | None,
-        typer.Option(
-            "--tool", help="Only this tool; may be repeated.", metavar="NAME", autocompletion=completion.tools
-        ),
+        typer.Option("--tool", help="Only this tool; may be repeated.", metavar="NAME", autocompletion=_tools),
     ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="Draw the agreement, signal by signal, here.", metavar="DIR")
