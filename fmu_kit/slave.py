@@ -65,9 +65,9 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     variables: ClassVar[tuple[Variable, ...]]
     description: ClassVar[str]
     initial_outputs_depend_on_inputs: ClassVar[bool] = True
-    """Whether outputs depend on the inputs when initialisation ends; at no other time they do."""
+    """Whether the first outputs, those at the end of initialisation, depend on the inputs. Later ones never do."""
     initially_idle: ClassVar[frozenset[str]] = frozenset()
-    """Inputs on which no output depends even then."""
+    """Inputs on which not even the first outputs depend."""
 
     author = "The quadcosim authors"
     license = "MIT"

@@ -2,7 +2,7 @@
 
 Source: Ali, Hashim, Jayasiri, "A Unified Finite-Time Sliding Mode Quaternion-based Tracking Control for
 Quadrotor UAVs without Time Scale Separation", ACC 2025. `# (22)` is the paper's equation 22; where the
-printed equation cannot be meant, the code has the consistent one and names the erratum of the README.
+printed equation cannot be meant, the code has the consistent one and names the erratum of `docs/law.md`.
 
 Everything here is a pure function of the state, the reference and the parameters, on any scalar.
 Inertial frame north-east-down, body frame forward-right-down, SI units; `_d` desired, `_dot` rate;

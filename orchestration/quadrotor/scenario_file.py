@@ -28,14 +28,23 @@ class ScenarioFile:
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
     stop_time: float = Scenario.stop_time
+    """The end of the run."""
     seed: int = Scenario.seed
+    """The seed of all random numbers."""
     model_mismatch: bool = Scenario.model_mismatch
+    """Whether a controller that believes in another mass or inertia than the plant's is meant: no warning then."""
     vehicle: str | None = None
+    """A vehicle by name, or the path of its file: its parameters hold where the scenario says nothing else."""
     controller: dict[str, Any] = field(default_factory=dict)
+    """Parameters by their names in the FMU, and `fmu`, its name or path."""
     plant: dict[str, Any] = field(default_factory=dict)
+    """Likewise of the plant."""
     timing: Timing = field(default_factory=Timing)
+    """The digital clock between them; `loss` sets both losses, `preset` the rate and latency of a real stack."""
     reference: ReferenceChoice = field(default_factory=ReferenceChoice)
+    """What is flown along."""
     record: Record = field(default_factory=Record)
+    """What is recorded beside what the two FMUs exchange."""
 
 
 def load_scenario(path: str | Path) -> Scenario:

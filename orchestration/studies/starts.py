@@ -34,17 +34,19 @@ class Starts:
     """
 
     count: int = 200
+    """How many starts there are."""
     first: int = 0
-    """index of the first: starts of other indices are other ones"""
+    """The index of the first start. A start is the same in every ensemble that has its index."""
     seed: int = 0
+    """The seed of their directions."""
     position: float = 4.0
-    """largest ‖P(0) - P_d(0)‖ [m]"""
+    """The largest distance from the beginning of the reference, ‖P(0) - P_d(0)‖ [m]."""
     velocity: float = 2.0
-    """largest ‖V(0) - V_d(0)‖ [m/s]"""
+    """The largest difference from the velocity of the reference, ‖V(0) - V_d(0)‖ [m/s]."""
     angle: float = 2.0
-    """largest angle of the attitude from level, with no yaw, about any axis [rad]"""
+    """The largest angle from level and no yaw, about any axis [rad]."""
     rate: float = 2.0
-    """largest ‖Ω(0)‖ [rad/s]"""
+    """The largest angular velocity, ‖Ω(0)‖ [rad/s]."""
 
     def __post_init__(self) -> None:
         for name, lowest in (("count", 1), ("first", 0), ("seed", 0)):

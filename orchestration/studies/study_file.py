@@ -24,13 +24,21 @@ class AxisTable:
     __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     name: str
+    """The name of the axis: a column of the table of runs."""
     sets: list[str] | None = None
+    """The paths that get its value; without `sets` and `multiplies`, the name is the path."""
     multiplies: list[str] | None = None
+    """The paths whose value in the base is multiplied by it."""
     values: list[Value] | None = None
+    """The values, one by one."""
     start: float | None = None
+    """The first value of a range."""
     stop: float | None = None
+    """The last value of a range."""
     number: int | None = None
+    """How many values the range has; a range without a number is sampled."""
     scale: Scale = "linear"
+    """Whether the range has equal steps or equal ratios."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,9 +48,13 @@ class DesignTable:
     __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     method: Method = "sobol"
+    """How the axes without values are sampled; `morris` and `saltelli` are for sensitivity."""
     samples: int = 0
+    """How many samples are drawn; base samples for sensitivity."""
     seed: int = 0
+    """The seed of the samples."""
     vary_seed: bool = False
+    """Whether each run has random numbers of its own; else all have those of the base."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,11 +64,17 @@ class StudyFile:
     __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     name: str | None = None
+    """The name of the study and of its folder in `results/`; without it, that of the file."""
     scenario: str | None = None
+    """The path of the system file or scenario file that the study varies."""
     base: dict[str, Any] = field(default_factory=dict)
+    """The same here instead of in a file of its own: the tables of a system file or a scenario file."""
     axes: list[AxisTable] = field(default_factory=list)
+    """What is varied."""
     design: DesignTable = field(default_factory=DesignTable)
+    """How the axes without values are sampled."""
     keep_signals: list[int] | bool = False
+    """The runs whose signals are kept, by their index in the design; true for all."""
 
 
 def load_study(path: str | Path) -> Study:

@@ -21,7 +21,9 @@ class CostTable:
     __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     of: str
+    """The cost of a flight that flies: an expression over its objectives."""
     bad: float
+    """The cost of one that does not; no flight costs more."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +33,7 @@ class StartsTable(Starts):
     __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     judged: int = 200
+    """How many more starts, after these, the result is judged on."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,8 +43,11 @@ class SearchTable:
     __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     periods: list[float]
+    """The periods [s] that are tuned for, each by itself."""
     evaluations: int
+    """How often the mean cost is evaluated, for each parameter."""
     seeds: list[int]
+    """Seeds of the optimiser: a search each."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,12 +57,19 @@ class TuningFile:
     __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     cost: CostTable
+    """What is made small."""
     search: SearchTable
+    """How long is searched."""
     parameters: list[AxisTable]
+    """What is tuned, each in a range: two at least."""
     starts: StartsTable = field(default_factory=StartsTable)
+    """The initial states that are flown from."""
     name: str | None = None
+    """What the files of the result are called by; without it, the name of the file."""
     scenario: str | None = None
+    """The path of the scenario file whose controller is tuned."""
     base: dict[str, Any] = field(default_factory=dict)
+    """The same here instead of in a file of its own: the tables of a scenario file."""
 
 
 def load_tuning(path: str | Path) -> Tuning:

@@ -41,56 +41,83 @@ class SamplingTable(_Table):
     """When a digital task runs."""
 
     period: Annotated[float, _says("Sampling period in the component's own seconds; instant k is offset + k·period.")]
-    offset: Annotated[float, _says("Time of the first sample [s].")] = 0.0
-    jitter: Annotated[float, _says("Largest lateness of an instant [s]; less than the period.")] = 0.0
-    jitter_distribution: Annotated[Distribution, _says("Of the lateness over [0, jitter].")] = "uniform"
-    clock_ratio: Annotated[float, _says("Seconds that the component believes pass per true second.")] = 1.0
-    clock: Annotated[Clock, _says("Who decides when it samples: the master, or the FMU by its sample_period.")] = (
-        "master"
+    offset: Annotated[float, _says("Time of the first sample, in the component's own seconds.")] = 0.0
+    jitter: Annotated[float, _says("Each instant is late by up to this [s]; less than the period.")] = 0.0
+    jitter_distribution: Annotated[Distribution, _says("How the lateness is distributed between 0 and `jitter`.")] = (
+        "uniform"
     )
+    clock_ratio: Annotated[float, _says("Seconds that the component believes pass per true second.")] = 1.0
+    clock: Annotated[
+        Clock, _says("Who decides when it samples: the master, or the FMU itself, by its parameter sample_period.")
+    ] = "master"
 
 
 class ComponentTable(_Table):
     """An FMU, its parameters, and how it is stepped."""
 
-    fmu: Annotated[str, _says("Path of an .fmu, relative to this file, or the name of one of this project's.")]
-    parameters: Annotated[dict[str, Any], _says("Parameters by their names in the FMU.")] = {}
-    step: Annotated[float | None, _says("Of a component in continuous time: its communication step [s].")] = None
-    sampling: Annotated[SamplingTable | None, _says("Of a digital task: when it runs.")] = None
+    fmu: Annotated[str, _says("The path of an .fmu, relative to this file, or the name of one of this project's FMUs.")]
+    parameters: Annotated[dict[str, Any], _says("Values of parameters, by their names in the FMU.")] = {}
+    step: Annotated[float | None, _says("The communication step [s] of a component in continuous time.")] = None
+    sampling: Annotated[
+        SamplingTable | None, _says("When a digital task runs; a component has either this or `step`.")
+    ] = None
     align: Annotated[
-        Align, _says("Of an FMU with a fixed step: an instant between its points is an error, or moves to the next.")
+        Align,
+        _says("Of an FMU that takes steps of one length only: an instant between its points is an error, or moves on."),
     ] = "exact"
     record: Annotated[
-        tuple[str, ...] | None, _says("Variables to record; without it, all outputs and local Reals.")
+        tuple[str, ...] | None,
+        _says("Variables to record beside what is exchanged; without it, all outputs and local Reals."),
     ] = None
 
 
 class ConnectionTable(_Table):
     """One message: its signals travel together."""
 
-    start: Annotated[tuple[str, ...], _says("Outputs, as COMPONENT.VARIABLE, of one component.", alias="from")]
-    end: Annotated[tuple[str, ...], _says("As many inputs of one component.", alias="to")]
-    name: Annotated[str | None, _says("By which paths and events name it; without one, its index.")] = None
-    order: Annotated[Order | None, _says("Whether it is there at its instant or at the next one of its sender.")] = None
-    delay: Annotated[float, _says("From sending to arrival [s]; may exceed a period.")] = 0.0
+    start: Annotated[tuple[str, ...], _says("Outputs of one component, as COMPONENT.VARIABLE.", alias="from")]
+    end: Annotated[tuple[str, ...], _says("As many inputs of one other component.", alias="to")]
+    name: Annotated[str | None, _says("The name that paths and events use; without one, its index in the file.")] = None
+    order: Annotated[
+        Order | None,
+        _says(
+            "Whether a message is there when it is computed (gauss-seidel), or at its sender's next instant (jacobi)."
+        ),
+    ] = None
+    delay: Annotated[float, _says("Time from sending to arrival [s]; it may exceed a period.")] = 0.0
     delay_jitter: Annotated[float, _says("Largest random addition to the delay [s].")] = 0.0
-    jitter_distribution: Annotated[Distribution, _says("Of the delay's jitter.")] = "uniform"
+    jitter_distribution: Annotated[Distribution, _says("How the delay's jitter is distributed.")] = "uniform"
     loss: Annotated[float, _says("Probability that a message is lost.")] = 0.0
-    burst_length: Annotated[float | None, _says("Mean number of losses in a row; independent without it.")] = None
-    hold: Annotated[Hold, _says("Between arrivals: constant, or the line through the last two.")] = "zero"
-    noise: Annotated[float | dict[str, Any], _says("Standard deviation, for all signals or by variable.")] = {}
-    quantisation: Annotated[float | dict[str, Any], _says("Quantum, for all signals or by variable.")] = {}
+    burst_length: Annotated[
+        float | None, _says("Mean number of losses in a row; without it, each loss is independent of the others.")
+    ] = None
+    hold: Annotated[
+        Hold,
+        _says(
+            "What the receiver has between arrivals: the last value (zero), or the line through the last two (first)."
+        ),
+    ] = "zero"
+    noise: Annotated[
+        float | dict[str, Any],
+        _says("Standard deviation of Gaussian noise: a number for all signals, or a table by variable."),
+    ] = {}
+    quantisation: Annotated[
+        float | dict[str, Any],
+        _says("Values are rounded to multiples of this: a number for all signals, or a table by variable."),
+    ] = {}
     scale: Annotated[float, _says("What arrives is scale · value + offset.")] = 1.0
-    offset: Annotated[float, _says("Added after the scale.")] = 0.0
+    offset: Annotated[float, _says("What is added after the scale.")] = 0.0
 
 
 class SourceTable(_Table):
     """What drives inputs from outside."""
 
-    to: Annotated[tuple[str, ...], _says("Inputs, as COMPONENT.VARIABLE.")] = ()
-    constant: Annotated[float | None, _says("A constant value.")] = None
-    file: Annotated[str | None, _says("CSV with time and a column for each input; linear between rows.")] = None
-    noise: Annotated[float | None, _says("Intensity of white noise [unit² s].")] = None
+    to: Annotated[tuple[str, ...], _says("The inputs that it drives, as COMPONENT.VARIABLE.")] = ()
+    constant: Annotated[float | None, _says("A value that never changes.")] = None
+    file: Annotated[
+        str | None,
+        _says("The path of a CSV file with `time` and a column for each input; values are linear between its rows."),
+    ] = None
+    noise: Annotated[float | None, _says("The intensity of white noise [unit² s].")] = None
     period: Annotated[float | None, _says("How long each value of the noise is held [s].")] = None
     trajectory: Annotated[
         str | None, _says("The component whose parameters trajectory.* say what the built-in trajectory is.")
@@ -100,30 +127,39 @@ class SourceTable(_Table):
 class CriterionTable(_Table):
     """What a good run is."""
 
-    good: Annotated[str | None, _says("Expression over objectives, at the end of a run.")] = None
-    diverged: Annotated[str | None, _says("Expression over signals that ends a run.")] = None
+    good: Annotated[str | None, _says("When a run is good: an expression over objectives, at its end.")] = None
+    diverged: Annotated[
+        str | None, _says("When a run ends early: an expression over signals, looked at at every instant.")
+    ] = None
     outcomes: Annotated[
-        tuple[str, str], _says("What a run is called that is good, and one that is neither good nor diverged.")
+        tuple[str, str],
+        _says("The names of two outcomes: of a run that is good, and of one that is neither good nor diverged."),
     ] = Criterion.outcomes
 
 
 class SystemTable(_Table):
     """A system of FMUs under a digital clock."""
 
-    stop_time: Annotated[float, _says("End of a run [s].")]
-    seed: Annotated[int, _says("Of all random numbers.")] = 0
-    order: Annotated[Order, _says("Of every connection that does not say it itself.")] = "gauss-seidel"
-    components: Annotated[dict[str, ComponentTable], _says("By name; their order decides ties.")]
+    stop_time: Annotated[float, _says("The end of a run [s].")]
+    seed: Annotated[int, _says("The seed of all random numbers.")] = 0
+    order: Annotated[Order, _says("The order of every connection that does not have one of its own.")] = "gauss-seidel"
+    components: Annotated[
+        dict[str, ComponentTable],
+        _says("The FMUs, by a name of yours; of those that could step next, the first in the file does."),
+    ]
     connections: Annotated[tuple[ConnectionTable, ...], _says("What is connected to what.")] = ()
     sources: Annotated[dict[str, SourceTable], _says("What drives inputs from outside, by name.")] = {}
-    objectives: Annotated[dict[str, str], _says("What a run comes to: expressions by name.")] = {}
+    objectives: Annotated[dict[str, str], _says("What a run comes to: expressions, by name.")] = {}
     optional: Annotated[
-        tuple[str, ...], _says("Objectives without a value where an FMU lacks a variable that they name.")
+        tuple[str, ...],
+        _says(
+            "Objectives that have no value, instead of being an error, where an FMU lacks a variable that they name."
+        ),
     ] = ()
     criterion: Annotated[CriterionTable, _says("When a run is good, and when it has diverged.")] = CriterionTable()
-    streams: Annotated[dict[str, int], _says("Random streams that have a number for a name.")] = {}
+    streams: Annotated[dict[str, int], _says("Random streams that are numbered instead of named.")] = {}
     operating_point: Annotated[
-        dict[str, Any], _says("Values by path with which the system rests: where the local limit is taken.")
+        dict[str, Any], _says("Values by path with which the system is at rest; the local limit is taken there.")
     ] = {}
 
 

@@ -19,19 +19,20 @@ class Trace:
     """How a tool flew, as the FMUs saw it."""
 
     order: str
-    """gauss-seidel: one after the other, with the newest outputs of those before; jacobi: all with those of the step
-    before; alone: not all of the loop; other"""
+    """gauss-seidel: the components step one after the other, each with the newest outputs of those before it; jacobi:
+    all step with the outputs of the step before; alone: only a part of the loop was flown; other: none of these"""
     initial_inputs: dict[str, tuple[float, ...]]
-    """by component: what was at its connected inputs when its initialisation ended"""
+    """The values at the connected inputs of each component when its initialisation ended."""
     first_inputs: dict[str, tuple[float, ...]]
-    """by component: what its first step found at its connected inputs"""
+    """The values at the connected inputs of each component when its first step began."""
     first_exchange: dict[str, str]
-    """by component, what that was: exchanged, start values or zeros"""
+    """Where these came from, for each component: exchanged (outputs of the others), start values or zeros."""
     steps: int
+    """How many steps the last component of the loop took."""
     drift: float
-    """largest distance of a communication point from a multiple of the step [s]"""
+    """The largest distance of a communication point from a multiple of the step [s]."""
     end: float
-    """where the last step ended [s]"""
+    """The time at which the last step ended [s]."""
 
 
 def read_trace(folder: Path, components: Mapping[str, Path], loop: Loop, step: float) -> Trace:
@@ -41,7 +42,7 @@ def read_trace(folder: Path, components: Mapping[str, Path], loop: Loop, step: f
         log = log_of(component, folder)
         lines = log.read_text(encoding="utf-8").splitlines() if log.is_file() else []
         if len(lines) < 2:
-            raise QuadcosimError(f"{component}: expected steps, found none in {log}")
+            raise QuadcosimError(f"{component}: the tool did not step it; expected at least one step in {log}")
         starts[component], *steps[component] = map(json.loads, lines)
     exact = Fraction(repr(step))
     last = steps[next(name for name in reversed(list(loop.ports)) if name in steps)]

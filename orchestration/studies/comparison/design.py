@@ -63,7 +63,9 @@ class Front:
     """What is weighed against each other, both the less the better."""
 
     error: str = "position_rmse"
+    """The objective that says how well a run flew."""
     effort: str = "total_variation.torque"
+    """The objective that says what it took."""
 
 
 @dataclass(frozen=True, kw_only=True)

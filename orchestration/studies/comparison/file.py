@@ -27,10 +27,15 @@ class ControllerTable:
     __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     name: str
+    """What tables and pictures call it."""
     fmu: str | None = None
+    """The FMU, by name or path; without it, that of the base."""
     file: str | None = None
+    """A file with parameters in `[controller]`; {vehicle}, {value} and {milli}, 1000 · value, are filled in."""
     parameters: dict[str, Any] = field(default_factory=dict)
+    """Parameters on top of those of the file."""
     bandwidth: float | None = None
+    """Its bandwidth [rad/s]; without it, the bandwidth is measured."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,9 +45,13 @@ class VehicleTable:
     __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     name: str
+    """What tables and pictures call it."""
     vehicle: str | None = None
+    """A vehicle by name, or the path of its file; without it, that of the base."""
     plant: dict[str, Any] = field(default_factory=dict)
+    """Parameters of the plant on top of those of the vehicle."""
     controller: dict[str, Any] = field(default_factory=dict)
+    """Parameters of every controller on top of those of the vehicle."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,8 +61,11 @@ class ConditionTable:
     __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     name: str
+    """What tables and pictures call it."""
     sets: dict[str, Any] = field(default_factory=dict)
+    """Values by path."""
     multiplies: dict[str, Any] = field(default_factory=dict)
+    """Factors by path, on the value that is there by then."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,14 +89,23 @@ class ComparisonFile:
     __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     controllers: list[ControllerTable]
+    """The controllers; pairs are made with the first."""
     axis: AxisTable
+    """What is varied: one axis of numbers that grow."""
     vehicles: list[VehicleTable] = field(default_factory=list)
+    """The vehicles; without any, that of the base."""
     conditions: list[ConditionTable] = field(default_factory=lambda: [ConditionTable(name="nominal")])
+    """What else each is flown under; without any, nothing but the base."""
     starts: StartsTable = field(default_factory=StartsTable)
+    """The initial states that every controller is flown from."""
     front: FrontTable = field(default_factory=FrontTable)
+    """The two objectives that are weighed against each other."""
     name: str | None = None
+    """The name of the comparison and of its folder in `results/`; without it, that of the file."""
     scenario: str | None = None
+    """The path of the scenario file that everything is flown on."""
     base: dict[str, Any] = field(default_factory=dict)
+    """The same here instead of in a file of its own: the tables of a scenario file."""
 
 
 def load_comparison(path: str | Path) -> Comparison:

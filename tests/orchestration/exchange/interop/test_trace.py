@@ -144,7 +144,9 @@ def test_a_component_that_took_no_step_is_an_error(missing: str, logs: Logs) -> 
         log.unlink()
     else:
         log.write_text(log.read_text().splitlines()[0] + "\n")
-    with pytest.raises(QuadcosimError, match=r"^plant: expected steps, found none in .*plant.jsonl$"):
+    with pytest.raises(
+        QuadcosimError, match=r"^plant: the tool did not step it; expected at least one step in .*plant.jsonl$"
+    ):
         read_trace(logs.folder, logs.fmus, LOOP, STEP)
 
 
