@@ -28,6 +28,7 @@ from fmu_kit import bundle, documentation, loader
 from fmu_kit.bundle import PackagingError, Target, bundled_sources, module_path, place, renamed
 from fmu_kit.documentation import Making
 from fmu_kit.model_description import GUID_PLACEHOLDER, PYTHON_REQUIRED, to_xml
+from fmu_kit.versions import generation_tool, version_of
 
 PAGE, ICON = "documentation/index.html", "model.png"
 """The documentation of an FMU and its icon, by their place in the archive."""
@@ -83,7 +84,8 @@ def source_hash(target: Target) -> str:
 def hash_of(target: Target, packaging: Iterable[Path], facts: dict[str, str], unchanged: dict[str, bytes]) -> str:
     """The hash of what a slave's modules are, of the files that pack it, of facts, and of what is packed as it is."""
     digest = hashlib.sha256()
-    texts = bundled_sources(target) | {path.name: _text(path) for path in packaging} | facts
+    texts = bundled_sources(target) | {path.name: _text(path) for path in packaging}
+    texts |= {"tool": generation_tool(), **facts}
     for name, text in {**texts, "fragment": fragment_of(target)}.items():
         digest.update(f"{name}\0{text}\0".encode())
     for name, content in unchanged.items():
@@ -130,6 +132,9 @@ def described(files: dict[str, bytes], target: Target, making: Making, descripti
     for link in documentation.files_linked(page):
         if posixpath.normpath(posixpath.join(posixpath.dirname(PAGE), link)) not in files:
             raise PackagingError(f"{target.fragment}: links to {link}, which is not in the FMU")
+    description.set("generationTool", generation_tool())
+    if version := version_of(slave_class(target)):
+        description.set("version", version)
     text = parseString(tostring(description)).toprettyxml(indent="  ", encoding="UTF-8")
     files["modelDescription.xml"] = text
 

@@ -1,6 +1,6 @@
-/* $model: $description
+/* $model$version: $description
 
-   Written by quadcosim export-c from the slave in Python: change it there. $precision
+   Written by $tool (export-c) from the slave in Python: change it there. $precision
    C99 without allocation, without an operating system. An instance is one struct; instances share nothing.
 
        static $model c;

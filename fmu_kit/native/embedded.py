@@ -23,6 +23,7 @@ from fmu_kit.native.symbols import TraceError
 from fmu_kit.native.tables import start_of
 from fmu_kit.native.tracing import Program, trace
 from fmu_kit.packaging import slave_class
+from fmu_kit.versions import generation_tool, version_of
 
 _HERE = Path(__file__).parent
 _TITLES = {
@@ -75,6 +76,8 @@ def files(program: Program, *, single: bool) -> tuple[str, str]:
     model_functions = functions(program, words, single=single)
     known: dict[str, str] = {
         "model": program.model,
+        "version": f" {version}" if (version := version_of(program.slave)) else "",
+        "tool": generation_tool(),
         "guard": program.model.upper(),
         "description": comment(program.slave.description),
         "precision": _PRECISION[single],

@@ -99,6 +99,12 @@ def test_the_description_says_which_python_it_requires_where_the_schema_wants_it
     assert order[place - 1 : place + 2] == ["DefaultExperiment", "VendorAnnotations", "ModelVariables"]
 
 
+def test_versions_are_those_of_the_project(descriptions: dict[str, ModelDescription]) -> None:
+    version = read_toml(ROOT / "pyproject.toml", "project")["project"]["version"]
+    said = {(one.version, one.generationTool) for one in descriptions.values()}
+    assert said == {(version, f"quadcosim {version}")}
+
+
 def test_the_required_python_is_the_one_that_the_project_requires_and_is_checked_for() -> None:
     project = read_toml(ROOT / "pyproject.toml", "project")
     oldest = PYTHON_REQUIRED.removeprefix(">=")

@@ -76,7 +76,8 @@ class Fmu:
     @property
     def is_ours(self) -> bool:
         """Whether quadcosim built it, so that the rules of this project are meant for it too."""
-        return self.root.get("generationTool") == OUR_TOOL or SOURCE_HASH_FILE in self.archive.files
+        tool, _, _ = self.root.get("generationTool", "").partition(" ")
+        return tool == OUR_TOOL or SOURCE_HASH_FILE in self.archive.files
 
     @property
     def guid(self) -> str:

@@ -14,7 +14,7 @@ from xml.etree.ElementTree import Element
 from orchestration.checks.validation.description import SLAVE_MODULE
 from orchestration.checks.validation.exercise import Bench
 
-_DIFFERS = {"guid", "generationDateAndTime"}
+_DIFFERS = {"guid", "generationDateAndTime", "generationTool", "version"}
 """Attributes that packaging and the calendar decide."""
 
 Elements = dict[tuple[str, ...], dict[str, str]]

@@ -13,6 +13,7 @@ from xml.etree.ElementTree import Element
 
 from fmu_kit.model_description import generation_date
 from fmu_kit.packaging import write_archive
+from fmu_kit.versions import generation_tool
 from orchestration.errors import UsageError
 from orchestration.exchange.ssp import timing
 from orchestration.exchange.ssp.carried import Carried, Part, carried
@@ -89,7 +90,7 @@ def _structure(given: Carried, name: str, about: Mapping[str, str]) -> Element:
         "ssd:SystemStructureDescription",
         name=name,
         version="1.0",
-        generationTool="quadcosim",
+        generationTool=generation_tool(),
         generationDateAndTime=generation_date(),
     )
     system = add(root, "ssd:System", name=name, **about)
