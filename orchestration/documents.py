@@ -5,6 +5,7 @@ editors on Windows write it.
 """
 
 import json
+import logging
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,6 +19,8 @@ if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
+
+_NOTES = logging.getLogger("quadcosim")
 
 LARGEST = 2**20
 """Characters of a TOML or JSON file."""
@@ -47,6 +50,7 @@ def read_text(path: Path, what: str) -> str:
     """The text of a UTF-8 file of at most `LARGEST` characters; raises `UsageError`, naming `what` it should be."""
     if "\0" in str(path):
         raise UsageError(f"{path}: expected a path without NUL characters")
+    _NOTES.debug("reading %s %s", what, path)
     with readable(path, what), path.open(encoding="utf-8-sig") as file:
         text = file.read(LARGEST + 1)
     if len(text) > LARGEST:

@@ -1,6 +1,7 @@
 """Where FMUs are: finds them by name, builds those that are missing or whose sources have changed."""
 
 import functools
+import logging
 import os
 import subprocess
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -17,6 +18,8 @@ from orchestration import subprocesses
 from orchestration.errors import QuadcosimError, UsageError
 from orchestration.quadrotor.wiring import MODELS
 from orchestration.system.model import System
+
+_NOTES = logging.getLogger("quadcosim")
 
 
 def default_folder() -> Path:
@@ -95,6 +98,7 @@ def of_components(fmus: Mapping[str, str], announce: Callable[[str], None] | Non
     for name, fmu in fmus.items():
         try:
             found[name] = locate(fmu, announce)
+            _NOTES.debug("component %s: %s is %s", name, fmu, found[name])
         except UsageError as error:
             raise UsageError(f"components.{name}.{error}") from error
     return found

@@ -2,6 +2,7 @@
 
 import functools
 import importlib.metadata
+import logging
 import platform
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -43,6 +44,8 @@ from orchestration.simulator import Floats
 from orchestration.system.check import check, recorded
 from orchestration.system.model import Component, System, component_of, variable_of
 from orchestration.system.times import NANOSECONDS, Grid, exact_nanoseconds
+
+_NOTES = logging.getLogger("quadcosim")
 
 Progress = Callable[[float], None]
 """Hears the share of the run that is done."""
@@ -113,6 +116,10 @@ class Simulation:
                 *(warning for instance in self.instances.values() for warning in instance.warnings),
             ),
         )
+        _NOTES.debug(
+            "%d steps to t = %g s by the %s loop in %.3f s", master.steps, end, master.engine,
+            result.provenance["wall_time"],
+        )  # fmt: skip
         if self.interrupt.requested:
             raise RunInterrupted(f"at t = {end:g} s of {self.system.stop_time:g} s", result)
         return result

@@ -312,6 +312,7 @@ def _metrics(result: "Result") -> Answer:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and end with one of the codes that its help names; one line for an error."""
     given = sys.argv[1:] if arguments is None else arguments
+    registering.arguments = given
     registering.behave(Manners(), anew=True)
     try:
         with banners_to_stderr():

@@ -1,6 +1,7 @@
 """How a function becomes a command: it answers, and what every command has is added here."""
 
-from collections.abc import Callable
+import shlex
+from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import Any
 
@@ -14,6 +15,8 @@ from orchestration.command.shared_flags import takes
 FLY, STUDY, FMUS, TOOLS = "Fly", "Study", "FMUs", "Other tools"
 """Groups of commands in the help"""
 
+arguments: Sequence[str] = ()
+"""What the command line was started with"""
 manners = Manners()
 """Of the command at hand: what stands before it, and then what stands behind it too"""
 
@@ -36,6 +39,7 @@ def _answering(command: Callable[..., Answer]) -> Callable[..., None]:
     @wraps(command)
     def call(manners: Manners, **given: Any) -> None:
         behave(manners)
+        terminal.detail(shlex.join(["quadcosim", *arguments]))
         give(command(**given))
 
     return call

@@ -52,6 +52,11 @@ def listen(level: int, log: Path | None) -> None:
         _MESSAGES.addHandler(file)
 
 
+def detail(text: str) -> None:
+    """One line for those who want to know more."""
+    _MESSAGES.debug("%s", text)
+
+
 def say(text: str) -> None:
     """One line about what goes on, on standard error, unless it is to be quiet."""
     _MESSAGES.info("%s", text)

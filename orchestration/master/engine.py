@@ -1,9 +1,10 @@
 """Which engine flies a run: the compiled loop where it can be had, else Python. Both give the same to the byte."""
 
+import logging
 from collections.abc import Mapping
 from typing import Any, Literal, cast, get_args
 
-from orchestration.errors import QuadcosimError, UsageError
+from orchestration.errors import QuadcosimError, UsageError, expected_name
 from orchestration.fmi.native import NativeInstance
 from orchestration.master.compiled import CompiledMaster, Condition, obstacle
 from orchestration.master.master import Master
@@ -11,13 +12,15 @@ from orchestration.simulator import Simulator
 from orchestration.system.model import System
 from orchestration.system.times import nanoseconds
 
+_NOTES = logging.getLogger("quadcosim")
+
 Engine = Literal["python", "compiled"]
 
 
 def engine_named(name: str | None, *others: str) -> Engine | None:
     """The engine of that name; raises `UsageError` for another name than those that there are, `others` beside."""
     if name is not None and name not in get_args(Engine):
-        raise UsageError(f"--engine {name}: expected {' or '.join((*get_args(Engine), *others))}")
+        raise UsageError(f"--engine {name}: {expected_name(name, [*get_args(Engine), *others])}")
     return cast(Engine | None, name)
 
 
@@ -30,6 +33,8 @@ def master(
     if that was asked for.
     """
     hindered = None if engine == "python" else obstacle(simulators, nanoseconds(system.stop_time))
+    if hindered:
+        _NOTES.debug("no compiled loop: %s", hindered)
     if engine == "python" or (engine is None and hindered):
         return Master(system, simulators, **others)
     if hindered:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from orchestration.errors import UsageError
+from orchestration.errors import UsageError, expected_name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,5 +50,5 @@ PRESETS = {
 def preset_timing(name: str) -> dict[str, Any]:
     """The timing keys of a preset; raises `UsageError` naming the presets there are."""
     if name not in PRESETS:
-        raise UsageError(f"preset {name}: expected one of {', '.join(PRESETS)}")
+        raise UsageError(f"preset {name}: {expected_name(name, list(PRESETS))}")
     return dict(PRESETS[name].timing)

@@ -7,7 +7,7 @@ from typing import Any
 
 from orchestration.constructors import strict
 from orchestration.documents import read_toml
-from orchestration.errors import UsageError
+from orchestration.errors import UsageError, expected_name
 from orchestration.quadrotor.parameters import Parameter, parameters_in
 
 SHIPPED = Path(__file__).parents[1] / "vehicles"
@@ -42,7 +42,7 @@ def load_vehicle(given: str, folder: Path) -> Vehicle:
     """
     path = folder / given if given.endswith(ENDING) else SHIPPED / f"{given}{ENDING}"
     if not given.endswith(ENDING) and given not in names():
-        raise UsageError(f"vehicle {given}: expected one of {', '.join(names())}, or a path that ends in {ENDING}")
+        raise UsageError(f"vehicle {given}: {expected_name(given, names())}, or a path that ends in {ENDING}")
     tables = read_toml(path, "vehicle file")
     try:
         return _vehicle(path.stem, tables)

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from orchestration.errors import UsageError
+from orchestration.errors import UsageError, expected_name
 from orchestration.fmi.model import Model
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import in_its_own_words
@@ -66,8 +66,8 @@ class Varied:
         if named:
             raise UsageError(f"--of {self.of}: for the quadrotor only; expected a path, as connections.NAME.delay")
         if "." not in self.of and self.of not in TOP:
-            words = f"one of {', '.join(get_args(Quantity))}, or " if quadrotor else ""
-            raise UsageError(f"--of {self.of}: expected {words}a path, as connections.NAME.delay")
+            words = f"{expected_name(self.of, get_args(Quantity))}, or" if quadrotor else "expected"
+            raise UsageError(f"--of {self.of}: {words} a path, as connections.NAME.delay")
         return paths_in(self.request, self.of)
 
     def at(self, value: float) -> System:

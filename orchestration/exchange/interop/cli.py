@@ -14,7 +14,7 @@ from orchestration.command.terminal import progress_bar, say
 def _tools(incomplete: str) -> list[str]:
     from orchestration.exchange.interop.catalogue import TOOLS
 
-    return completion.starting(incomplete, TOOLS)
+    return completion.starting(incomplete, [name for name in TOOLS if " " not in name])
 
 
 @flies

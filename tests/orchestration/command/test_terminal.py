@@ -29,7 +29,7 @@ def wait(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
 
 
 @pytest.mark.parametrize("kind", ["pipe", "dumb terminal"])
-def test_where_no_bar_can_be_drawn_a_line_comes_now_and_then(
+def test_where_no_bar_can_be_drawn_a_line_comes_now_and_then_with_the_time_left(
     kind: str, wait: Callable[[float], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     heard = io.StringIO() if kind == "pipe" else Terminal()
@@ -39,7 +39,7 @@ def test_where_no_bar_can_be_drawn_a_line_comes_now_and_then(
         for percent in range(101):
             wait(SPARSE / 40)
             progress(percent / 100)
-    assert heard.getvalue().splitlines() == ["flying: 39%", "flying: 79%"]
+    assert heard.getvalue().splitlines() == ["flying: 39%, 16 s left", "flying: 79%, 5 s left"]
 
 
 def test_runs_are_counted_on_such_lines_too(
@@ -49,7 +49,7 @@ def test_runs_are_counted_on_such_lines_too(
         for done in range(4):
             wait(0.6 * SPARSE)
             progress(done, 50)
-    assert capsys.readouterr().err.splitlines() == ["1 of 50 runs", "3 of 50 runs"]
+    assert capsys.readouterr().err.splitlines() == ["1 of 50 runs, 10 min left", "3 of 50 runs, 6 min left"]
 
 
 def test_short_work_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:
