@@ -1,0 +1,90 @@
+"""What a store of a million rows costs to write, open, read, draw and export: `python -m benchmarks.stores [ROWS]`.
+
+CPU time. The rows were never flown: they have the columns of a study of the quadrotor over three sampled axes, and
+random numbers in them.
+"""
+
+import json
+import random
+import resource
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from itertools import islice
+from pathlib import Path
+from typing import TypeVar
+
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.translation import system_of
+from orchestration.studies.axes import Axis
+from orchestration.studies.drawing import draw_study
+from orchestration.studies.store import Row, Store, open_for_reading, open_for_writing
+from orchestration.studies.study import Study
+from orchestration.studies.table import export, frame
+
+ROWS = 1_000_000
+TOGETHER = 1000
+"""rows that are written in one transaction"""
+OBJECTIVES = tuple(system_of(Scenario()).objectives)
+AXES = tuple(
+    Axis(name=name, targets=(name,), low=0.0, high=1.0) for name in ("timing.delay", "timing.jitter", "timing.loss")
+)
+STUDY = Study(name="stores", base=Scenario(), axes=AXES, method="random", samples=1)
+Result = TypeVar("Result")
+
+
+def rows(number: int) -> Iterator[Row]:
+    """Rows of which every tenth diverged."""
+    draw = random.Random(0)
+    for index in range(number):
+        diverged = index % 10 == 0
+        fate = {"outcome": "diverged" if diverged else "settled", "good": not diverged, "diverged": diverged}
+        measured = {name: None if diverged else draw.random() for name in OBJECTIVES}
+        yield Row(
+            index=index, key=f"{index:064x}", settings={axis.name: draw.random() for axis in AXES}, seed=index,
+            metrics={**fate, **measured, "horizon": 30.0, "steps": 30000}, message=None, duration=draw.random(),
+            machine="a machine",
+        )  # fmt: skip
+
+
+def write(path: Path, number: int) -> None:
+    """A store of so many rows."""
+    about: dict[str, object] = {"axes": [axis.name for axis in AXES], "grid": None, "guids": {}, "versions": {}}
+    with open_for_writing(path, OBJECTIVES) as store:
+        store.describe({name: json.dumps(value) for name, value in about.items()})
+        made = rows(number)
+        while some := list(islice(made, TOGETHER)):
+            store.add(some)
+
+
+def told(what: str, do: Callable[[], Result]) -> Result:
+    """Print the CPU time that something takes."""
+    start = time.process_time()
+    result = do()
+    print(f"{what:<28} {time.process_time() - start:8.1f} s", flush=True)
+    return result
+
+
+def main(number: int) -> None:
+    """Print the figures."""
+    print(f"a store of {number} rows")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "study.sqlite"
+        told("written", lambda: write(path, number))
+        print(f"{'size':<28} {path.stat().st_size / 1e6:8.0f} MB")
+
+        def count(read: Callable[[Store], object]) -> object:
+            with open_for_reading(path) as store:
+                return read(store)
+
+        told("opened", lambda: count(lambda store: store.about()))
+        told("counted, every row checked", lambda: count(lambda store: store.counts()))
+        told("read as a pandas DataFrame", lambda: frame(path))
+        told("drawn, reading included", lambda: draw_study(STUDY, Path(folder)))
+        told("exported, reading included", lambda: export(path, path.parent))
+    print(f"{'most memory':<28} {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3:8.0f} MB")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else ROWS)
