@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.studies.axes import Axis
@@ -39,7 +39,7 @@ def cluster() -> Iterator[str]:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "scheduler.json"
         dask = (sys.executable, "-m", "dask")
-        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": folder}
+        quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": folder}
         scheduler = ["scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file)]
         worker = ["worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-dashboard"]
         started = [subprocess.Popen((*dask, *scheduler), **quiet)]

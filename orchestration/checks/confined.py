@@ -1,6 +1,7 @@
 """A process for what is not to be trusted: limited in time, memory and output, and ended with all that it started."""
 
 import contextlib
+import math
 import os
 import signal
 import subprocess
@@ -65,6 +66,7 @@ def run(command: Sequence[str], environment: Mapping[str, str], limits: Limits) 
         command, env={**environment, _MARK: mark}, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT, start_new_session=True,
     )  # fmt: skip
+    _limit_processor_time(process, limits)
     assert process.stdout is not None
     output = _Output(process.stdout)
     try:
@@ -130,6 +132,16 @@ def _watched(process: subprocess.Popen[bytes], output: _Output, limits: Limits, 
         if sum(map(_resident, _family(mark))) > limits.memory * 1e6:
             return f"it takes more memory than the limit of {limits.memory:g} MB"
         pause = max(0.05, 10.0 * (time.monotonic() - looked))
+
+
+def _limit_processor_time(process: subprocess.Popen[bytes], limits: Limits) -> None:
+    """Let the system end it, and each process that it starts, where nobody watches any more: we may be killed too."""
+    if sys.platform == "linux":
+        import resource
+
+        seconds = math.ceil(limits.time * (os.cpu_count() or 1)) + 1  # its threads may use all cores until time is up
+        with contextlib.suppress(ProcessLookupError):
+            resource.prlimit(process.pid, resource.RLIMIT_CPU, (seconds, seconds))
 
 
 def _late(limits: Limits) -> str:

@@ -91,3 +91,10 @@ def test_no_file_may_grow_beyond_its_limit(tmp_path: Path) -> None:
         "with open(sys.argv[1], 'wb') as file: file.write(bytes(2_000_000))"
     )
     assert "File too large" in python(program, tmp_path / "file").said
+
+
+@linux_only
+def test_the_system_ends_a_process_that_nobody_watches_any_more() -> None:
+    program = "import resource, time; time.sleep(0.2); print(*resource.getrlimit(resource.RLIMIT_CPU))"
+    seconds = 2 * (os.cpu_count() or 1) + 1
+    assert python(program, time=2.0).said == f"{seconds} {seconds}"
