@@ -21,6 +21,7 @@ from orchestration.studies.sweep import sweep
 
 RUNS = 400
 WORKERS = 2
+ENGINES: dict[str, Literal["batch"] | None] = {"one by one": None, "in lanes": "batch"}
 STOP_TIME = 10.0
 """[s] of a flight"""
 
@@ -74,7 +75,7 @@ def main(runs: int) -> None:
     chosen = study(runs)
     print(f"{runs} flights of {STOP_TIME:g} s at 100 Hz, {WORKERS} workers; wall time")
     with cluster() as address:
-        for engine, how in ((None, "one by one"), ("batch", "in lanes")):
+        for how, engine in ENGINES.items():
             here, there = seconds(chosen, engine, None), seconds(chosen, engine, address)
             print(f"{how:<12} processes here {here:6.2f} s   dask over TCP {there:6.2f} s   "
                   f"{(there - here) / runs * 1e3:6.2f} ms more a run")  # fmt: skip
