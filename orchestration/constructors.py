@@ -4,6 +4,7 @@ import contextlib
 import dataclasses
 import functools
 import os
+import reprlib
 import types
 import typing
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence, Set
@@ -24,7 +25,8 @@ def strict(place: str = "") -> Callable[[Class], Class]:
     """A dataclass whose constructor raises `UsageError`, in one line, for names and types that a file would not have.
 
     Fields that are missing, that there are not, or of another type are named after their `place`. A list is taken for
-    a tuple, text for a path and a path for text, and a number of NumPy's for one of Python's.
+    a tuple, text for a path and a path for text, and a number of NumPy's for one of Python's. Its `repr` says what is
+    not as by default.
     """
 
     def decorated(cls: Class) -> Class:
@@ -53,9 +55,27 @@ def strict(place: str = "") -> Callable[[Class], Class]:
             plain(self, **kept)
 
         cls.__init__ = checked  # type: ignore[misc]
+        if cls.__dataclass_params__.repr:  # type: ignore[attr-defined]
+            cls.__repr__ = _short  # type: ignore[assignment]
         return cls
 
     return decorated
+
+
+def _short(self: Any) -> str:
+    """The class with the fields that differ from their defaults, long ones cut."""
+    given = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+    defaults = {field.name: _default(field) for field in dataclasses.fields(self)}
+    said = [f"{name}={_SHORTENED.repr(value)}" for name, value in given.items() if value != defaults[name]]
+    return f"{type(self).__name__}({', '.join(said)})"
+
+
+_SHORTENED = reprlib.Repr()
+_SHORTENED.maxtuple, _SHORTENED.maxdict, _SHORTENED.maxstring, _SHORTENED.maxother = 6, 6, 80, 400
+
+
+def _default(field: dataclasses.Field[Any]) -> Any:
+    return field.default_factory() if field.default_factory is not dataclasses.MISSING else field.default
 
 
 def _is_needed(field: dataclasses.Field[Any]) -> bool:

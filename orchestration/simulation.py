@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 
@@ -38,7 +37,7 @@ from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import in_its_own_words, system_of, warnings
 from orchestration.results import objectives
 from orchestration.results.described import described
-from orchestration.results.result import Result
+from orchestration.results.result import Provenance, Result
 from orchestration.results.units import units
 from orchestration.simulator import Floats
 from orchestration.system.check import check, recorded
@@ -244,7 +243,7 @@ def columns_of(system: System) -> tuple[str, ...]:
     return ("time", *dict.fromkeys((*applied, *exchanged, *sources)))
 
 
-def provenance(instances: Mapping[str, Instance]) -> dict[str, Any]:
+def provenance(instances: Mapping[str, Instance]) -> Provenance:
     """What the numbers of a run came from: versions of the software and GUIDs of the FMUs."""
     packages = ("quadcosim", "numpy", "fmpy", "pythonfmu")
     return {

@@ -20,6 +20,7 @@ from orchestration.command.shared_flags import takes
 from orchestration.command.terminal import complain, progress_bar, say, warn
 from orchestration.errors import QuadcosimError, SimulatorError, UsageError
 from orchestration.exchange.interop import cli as interop
+from orchestration.extras import extra_of
 from orchestration.fmi.banners import banners_to_stderr
 from orchestration.studies import cli as studies
 from orchestration.subprocesses import misleading_variables
@@ -27,12 +28,6 @@ from orchestration.units import after
 
 if TYPE_CHECKING:
     from orchestration.results.result import Result
-
-EXTRAS = {
-    "studies": ("cma", "dask", "distributed", "filelock", "pandas", "SALib", "scipy", "xarray"),
-    "interop": ("libcosimpy", "ecospy", "tbb", "fmu-manipulation-toolbox"),
-}
-"""Packages that the base install does without, by the extra that brings them."""
 
 
 class _Stopped(Exception):
@@ -338,7 +333,7 @@ def _told(error: Exception) -> int:
         text = str(error)
     elif misread is not None:
         text = f"{misread} (--help lists what there is)"
-    elif isinstance(error, ModuleNotFoundError) and (extra := _extra_of(error.name)) is not None:
+    elif isinstance(error, ModuleNotFoundError) and (extra := extra_of(error.name)) is not None:
         text = f"{error.name} is not installed; this command needs: pip install 'quadcosim[{extra}]'"
     elif isinstance(error, ImportError) and (given := misleading_variables()):
         text = f"{error}; try without {' '.join(given)}, which may have Python take modules of another one"
@@ -357,10 +352,6 @@ def _misread(error: Exception) -> str | None:
     if not (flag and known):
         return str(describe())
     return f"No such option: {flag}. Did you mean {difflib.get_close_matches(flag, known, n=1, cutoff=0.0)[0]}?"
-
-
-def _extra_of(package: str | None) -> str | None:
-    return next((extra for extra, packages in EXTRAS.items() if package in packages), None)
 
 
 if __name__ == "__main__":

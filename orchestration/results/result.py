@@ -1,60 +1,120 @@
 """The outcome of a run."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, TypedDict
 
 import numpy as np
 import numpy.typing as npt
 
+from orchestration.extras import explained
 from orchestration.master.recording import About, Event, Recording
 from orchestration.quadrotor.scenario import Scenario
+from orchestration.results import exports, frames, html, labels
 from orchestration.results.described import Described
 from orchestration.results.objectives import Metrics
 from orchestration.simulator import Floats
 from orchestration.system.model import System
 
+if TYPE_CHECKING:
+    import pandas as pd
 
-@dataclass(frozen=True, kw_only=True)
+    from orchestration.drawing.gallery import Figures
+
+
+class Origin(TypedDict):
+    """Which FMU a component was."""
+
+    model: str
+    """The name of its model."""
+    guid: str
+    """What tells one build of it from another."""
+    path: str
+    """Where it was."""
+
+
+class Provenance(TypedDict, total=False):
+    """What the numbers of a run came from."""
+
+    versions: dict[str, str]
+    """Of Python and of the packages that compute."""
+    platform: str
+    """The operating system and the processor."""
+    fmus: dict[str, Origin]
+    """By component."""
+    engine: str
+    """What stepped the FMUs, `compiled` or `python`; the numbers are the same."""
+    wall_time: float
+    """What the run took [s]."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Result:
-    """One run: what was asked, what was recorded, what it comes to."""
+    """One run: what was asked, what was recorded, what it came to.
+
+    A run that diverged is a result too: `divergence` says what diverged, and objectives have no value then. In a
+    notebook a result shows its metrics.
+    """
 
     asked: Scenario | System
-    """as the user wrote it"""
+    """What was run, as the user wrote it."""
     system: System
-    """what it means"""
+    """The system that it means; of a system that was run, the same with the objectives that its FMUs allow."""
     recording: Recording
-    """rows and events in chunks; what follows has them whole"""
+    """Rows and events in chunks, for runs that are too long to hold at once; `rows` and `events` have them whole."""
     metrics: Metrics
+    """What the run came to: `outcome`, `good`, `horizon` [s], the objectives by name, `diverged`, `divergence_time` [s]
+    and `steps`. None is a metric without a value."""
     units: Mapping[str, str]
-    """of metrics that have one, by name"""
+    """The units of those metrics that have one, by name, as FMI writes them (`N.m`)."""
     described: Mapping[str, Described]
-    """unit and description of each column"""
+    """The unit and the description of each recorded column, by name, as its FMU gives them."""
     parameters: Mapping[str, float]
-    """the numeric ones of all components, as they were flown, as COMPONENT.NAME"""
+    """The numeric parameters of all components as they were flown, by COMPONENT.NAME, in the units of their FMUs."""
     divergence: str | None
-    """what diverged, if it did"""
+    """What diverged, in words; None if nothing did."""
     interrupted_at: float | None
-    """[s]; it was ended there before its time"""
-    provenance: dict[str, Any]
-    """versions, the GUID of each FMU, and `wall_time`, what the run took [s]"""
+    """The time [s] at which Ctrl-C ended the run; None if it went on to its end."""
+    provenance: Provenance
+    """What the numbers came from: versions of the software, the GUID of each FMU, the engine, the wall time [s]."""
     warnings: tuple[str, ...] = ()
-    """what the FMUs warned of"""
+    """What may not be meant, and what the FMUs warned of, a sentence each."""
+
+    def __repr__(self) -> str:
+        outcome = self.metrics["outcome"] or "run"
+        return f"<Result: {outcome}, {self.end:g} s in {len(self.recording)} rows of {len(self.columns)} columns>"
+
+    def _repr_html_(self) -> str:
+        """As notebooks show it."""
+        good = self.metrics["good"]
+        named = [name for name in self.metrics if name not in ("outcome", "good")]
+        return html.card(
+            "A flight" if isinstance(self.asked, Scenario) else "A run",
+            str(self.metrics["outcome"] or "") or None,
+            good if isinstance(good, bool) else None,
+            f"{self.end:g} s in {len(self.recording)} rows of {len(self.columns)} columns"
+            + (f"; diverged: {self.divergence}" if self.divergence else ""),
+            [
+                (labels.metric(name), html.number(self.metrics[name]), labels.unit(self.units.get(name)) or "")
+                for name in named
+            ],
+        )
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """`time`, then COMPONENT.NAME, then the signals of the sources."""
+        """The names of what every row has: `time`, then COMPONENT.NAME, then the signals of the sources."""
         return self.recording.columns
 
     @cached_property
     def rows(self) -> Floats:
-        """Shape (n, number of columns); a row is the value just after its instant."""
+        """All rows, shape (n, number of columns); a row is the value just after its instant."""
         return np.concatenate([chunk.rows for chunk in self.recording.chunks()])
 
     @cached_property
     def events(self) -> tuple[Event, ...]:
-        """In order of time."""
+        """All that happened to messages, in order of time."""
         return tuple(event for chunk in self.recording.chunks(("time",)) for event in chunk.events)
 
     @property
@@ -64,18 +124,59 @@ class Result:
 
     @property
     def end(self) -> float:
-        """Time of the last row [s]."""
+        """The time of the last row [s]."""
         return [float(t) for chunk in self.recording.chunks(("time",)) for t in chunk.rows[-1:, 0]][-1]
 
     @cached_property
     def signals(self) -> dict[str, Floats]:
-        """Every recorded column as an array of shape (n,)."""
+        """Every recorded column by its name, as an array of shape (n,)."""
         return {name: self.rows[:, i] for i, name in enumerate(self.columns)}
 
     @cached_property
     def sampled(self) -> npt.NDArray[np.bool_]:
         """Which rows are sampling instants, shape (n,)."""
         return rows_of(self.rows[:, 0], self.events, "sampled")
+
+    def plot(
+        self,
+        *which: str,
+        beside: Sequence["Result"] = (),
+        window: tuple[float, float] | None = None,
+        style: Literal["screen", "paper", "slides"] = "screen",
+    ) -> "Figures":
+        """Figures of the run, all that there are unless some are named; a notebook shows what is returned.
+
+        Of a flight `which` is among path, errors, components, commands, energy, phase and spectrum, of any other system
+        it is signals. Runs `beside` it are laid over it. `window` is the span of time [s] that is seen, `style` how
+        large and in what type: `quadcosim plot` has the same. The figures are those of matplotlib, by name.
+
+        Raises `UsageError` for a figure that there is not, and for runs of different systems.
+        """
+        from orchestration.drawing.gallery import figures_of  # with it comes matplotlib
+
+        return figures_of([self, *beside], which or None, window=window, style=style)
+
+    @explained
+    def to_pandas(self, what: Literal["signals", "events"] = "signals") -> "pd.DataFrame":
+        """The signals as a table indexed by `time` [s], or the events; units are in its `attrs["units"]`, by column.
+
+        Raises `QuadcosimError` where pandas is not installed.
+        """
+        return frames.events(self.recording) if what == "events" else frames.signals(self.recording, self.about)
+
+    def to_csv(self, folder: str | Path) -> list[Path]:
+        """Write `signals.csv` and `events.csv` into a folder, with units in the heads of the columns; their paths."""
+        from orchestration.results import csv_files  # with it comes pyarrow
+
+        return csv_files.write(self.recording, self.about, Path(folder))
+
+    @explained
+    def to_mat(self, path: str | Path) -> Path:
+        """Write the run as the structure `run` of a MAT-file, as `quadcosim export --format mat` does; its path.
+
+        Raises `QuadcosimError` where SciPy is not installed.
+        """
+        return exports.to_mat(Path(path), self.recording, self.about, self.metrics, self.units)
 
 
 def rows_of(time: Floats, events: tuple[Event, ...], kind: str, what: str | None = None) -> npt.NDArray[np.bool_]:

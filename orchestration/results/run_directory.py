@@ -5,7 +5,7 @@ from collections.abc import Callable, Container
 from contextlib import AbstractContextManager
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from orchestration.documents import read_json
 from orchestration.drawing.names import FILES
@@ -14,12 +14,14 @@ from orchestration.request import load_request, system_meant, text_of
 from orchestration.results import tables
 from orchestration.results.described import Described
 from orchestration.results.folder import NewFolder, new_folder
-from orchestration.results.result import Result
+from orchestration.results.result import Provenance, Result
 from orchestration.results.tables import ToFolder
 from orchestration.simulation import RunInterrupted, columns_of
 
 SIGNALS, EVENTS = tables.SIGNALS, tables.EVENTS
 METRICS, SCENARIO, PROVENANCE = "metrics.json", "scenario.toml", "provenance.json"
+MAT = "run.mat"
+"""of a run that has been exported so"""
 STATE = "paused.npz"
 """of a run that has been paused"""
 
@@ -86,7 +88,7 @@ def load_run(folder: str | Path) -> Result:
         divergence=notes.pop("divergence"),
         interrupted_at=notes.pop("interrupted_at"),
         warnings=tuple(notes.pop("warnings")),
-        provenance=notes,
+        provenance=cast(Provenance, notes),
     )
 
 
@@ -156,5 +158,8 @@ _KNOWN = {
     SCENARIO,
     PROVENANCE,
     STATE,
+    MAT,
+    "signals.csv",
+    "events.csv",
     *FILES,
 }

@@ -138,6 +138,16 @@ def write_signals(path: Path | BinaryIO, recording: Recording, about: About) -> 
             writer.write_table(_signals_table(chunk))
 
 
+def schemas(columns: Iterable[str]) -> tuple[Any, Any]:
+    """Arrow's, of signals with these columns and of events."""
+    return _signals_schema(columns, {}), _EVENT
+
+
+def both(chunk: Chunk) -> tuple[Any, Any]:
+    """A chunk as Arrow's tables: its signals, and its events."""
+    return _signals_table(chunk), _events_table(chunk.events)
+
+
 def _signals_schema(columns: Iterable[str], about: About) -> Any:
     return pa.schema([pa.field(name, pa.float64(), metadata=dict(about.get(name, {}))) for name in columns])
 

@@ -80,12 +80,34 @@ def status(study: StudyFile, out: Out = None) -> Answer:
     return Answer(document={"path": path, **numbers, "agreement": agreement}, lines=lines)
 
 
-def export(study: StudyFile, out: Out = None) -> Answer:
-    """Write the rows of a study as runs.parquet and runs.csv beside its store, sorted by design index."""
-    from orchestration.studies.table import export as write
+def export(
+    what: Annotated[
+        Path,
+        typer.Argument(help="Study file, or the directory of a run.", metavar="STUDY.toml|DIR", show_default=False),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", help="Folder of the study's store, results/NAME unless told; of a run, where the files go, DIR "
+            "unless told.", metavar="DIR", show_default=False,
+        ),
+    ] = None,
+    formats: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--format", help="Of a study parquet and csv unless told; of a run csv. Again for a second one.",
+            metavar="csv|mat|parquet", autocompletion=completion.among("csv", "mat", "parquet"), show_default=False,
+        ),
+    ] = None,
+) -> Answer:  # fmt: skip
+    """Write the rows of a study, or the signals and events of a run, as CSV, MAT or Parquet, with their units."""
+    from orchestration.studies import exporting
+    from orchestration.studies.sweep import store_path
 
-    path = _current_store(study, out)
-    return of_files(write(path, path.parent))
+    if what.is_dir() and not store_path("", what).is_file():
+        return of_files(exporting.of_run(what, out or what, formats or ()))
+    store = store_path("", what) if what.is_dir() else _current_store(what, out)
+    return of_files(exporting.of_study(store, formats or ()))
 
 
 def draw(

@@ -13,6 +13,7 @@ from orchestration.request import Request, system_meant
 from orchestration.studies.study import paths_in
 from orchestration.system.model import System
 from orchestration.system.paths import TOP, changed, value_at
+from orchestration.units import after
 
 Quantity = Literal["period", "delay", "jitter", "loss"]
 """Of the quadrotor, by name; of any system a path"""
@@ -103,7 +104,7 @@ def range_asked_for(
         step=step,
         last=high,
         tolerance=tolerance if tolerance is not None else known.tolerance if known is not None else step / PARTS,
-        unit=known.unit if known is not None else _unit(varied.paths[0], models),
+        unit=known.unit if known is not None else after(unit_at(varied.paths[0], models)),
     )
 
 
@@ -138,12 +139,13 @@ def is_in_seconds(path: str) -> bool:
 _SECONDS = ("period", "offset", "step", "plant_interval", "jitter", "delay", "delay_jitter", "stop_time")
 
 
-def _unit(path: str, models: Mapping[str, Model]) -> str:
+def unit_at(path: str, models: Mapping[str, Model]) -> str | None:
+    """The unit of the value at a path of a system; None where it has none, or none is known."""
     if is_in_seconds(path) and not (path.startswith("connections.") and path.endswith(".offset")):
-        return " s"
+        return "s"
     for name, model in models.items():
         prefix = f"components.{name}.parameters."
         variable = model.variables.get(path.removeprefix(prefix)) if path.startswith(prefix) else None
         if variable is not None and variable.unit:
-            return f" {variable.unit}"
-    return ""
+            return variable.unit
+    return None

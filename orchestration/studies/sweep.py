@@ -25,8 +25,9 @@ from orchestration.studies.identity import (
     versions,
 )
 from orchestration.studies.lanes import Agreement, chunks, expect_lanes, sample
+from orchestration.studies.ranges import unit_at
 from orchestration.studies.store import Row
-from orchestration.studies.study import Study
+from orchestration.studies.study import Study, paths_in
 from orchestration.studies.worker import Chunk, Outcome, Task
 
 Progress = Callable[[int, int], None]
@@ -244,9 +245,15 @@ def _describe(opened: store.Store, study: Study, files: Files) -> None:
 
 
 def _units(study: Study, files: Files) -> dict[str, str]:
-    """Of what its runs come to, as the first of them has them."""
+    """Of the axes, and of what its runs come to, as the first of them has them."""
     first = study.system(0, files.starts_of(study.origin))
-    return checked(first, files.models_of(first)).units
+    models = files.models_of(first)
+    of_axes = {
+        axis.name: unit_at(paths_in(study.base, axis.targets[0])[0], models)
+        for axis in study.axes
+        if axis.targets and not axis.multiplies
+    }
+    return {name: unit for name, unit in of_axes.items() if unit} | checked(first, models).units
 
 
 def _places(study: Study, files: Files) -> Iterator[store.Place]:

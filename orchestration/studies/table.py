@@ -1,7 +1,7 @@
 """The rows of a study as tables for analysis."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,12 +11,15 @@ import pyarrow.parquet as pq
 from pyarrow import csv
 
 from orchestration.errors import UsageError
+from orchestration.results import mat_file
 from orchestration.studies.store import SETTINGS, TEXTS, UNITS, Store, open_for_reading
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+
+FORMATS = ("parquet", "csv", "mat")
 
 SHARED = (*TEXTS, "status", "machine")
 """Columns of few words"""
@@ -82,7 +85,7 @@ def dataset(path: Path) -> "xr.Dataset":
 
 
 def units_in(path: Path) -> dict[str, str]:
-    """The units of the metrics in a store that have one."""
+    """The units of the axes and metrics in a store that have one."""
     with open_for_reading(path) as opened:
         found: dict[str, str] = json.loads(opened.about().get(UNITS, "{}"))
     return {**found, "duration": "s"}
@@ -94,11 +97,29 @@ def _with_units(table: Any, units: Mapping[str, str]) -> Any:
     return table.cast(pa.schema(fields, metadata=table.schema.metadata))
 
 
-def export(path: Path, folder: Path) -> list[Path]:
-    """Write `runs.parquet`, with units in the metadata of its fields, and `runs.csv`, by design index; their paths."""
+def export(path: Path, folder: Path, formats: Collection[str] = ("parquet", "csv")) -> list[Path]:
+    """Write the rows by design index as `runs.parquet`, `runs.csv` or `runs.mat`; their paths.
+
+    Parquet has units in the metadata of its fields, as `unit`; MAT has a structure `runs` with a field for each column,
+    and `units` with the same fields.
+    """
     table = _with_units(pa.Table.from_pandas(frame(path), preserve_index=False), units_in(path))
     folder.mkdir(parents=True, exist_ok=True)
-    written = [folder / "runs.parquet", folder / "runs.csv"]
-    pq.write_table(table, written[0])
-    csv.write_csv(table, written[1])
+    writers = {"parquet": pq.write_table, "csv": csv.write_csv, "mat": _write_mat}
+    written = [folder / f"runs.{kind}" for kind in formats]
+    for kind, file in zip(formats, written):
+        writers[kind](table, file)
     return written
+
+
+def _write_mat(table: Any, file: Path) -> None:
+    columns = {field.name: _column(table[field.name]) for field in table.schema}
+    units = {f.name: (f.metadata or {}).get(b"unit", b"").decode() for f in table.schema}
+    mat_file.write(file, {"runs": mat_file.flat(columns), "units": mat_file.flat(units)})
+
+
+def _column(values: Any) -> Any:
+    """As MATLAB has it: numbers with NaN for what is not there, texts with empty ones."""
+    if pa.types.is_string(values.type) or pa.types.is_large_string(values.type):
+        return [text or "" for text in values.to_pylist()]
+    return values.to_pandas().to_numpy(float, na_value=np.nan)

@@ -219,7 +219,7 @@ class Criterion:
 
 
 @strict()
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class System:
     """Components and what connects and drives them, what a run comes to and when it is good.
 
@@ -243,6 +243,16 @@ class System:
     """random streams that have a number instead of a name, as `connections.NAME.CAUSE` and `components.NAME.jitter`"""
     operating_point: Mapping[str, Any] = field(default_factory=dict)
     """what to change, by path, to be at rest: where the local limit is taken"""
+
+    def __repr__(self) -> str:
+        named = {
+            "components": self.components,
+            "connections": [x.name for x in self.connections],
+            "sources": self.sources,
+            "objectives": self.objectives,
+        }
+        listed = [f"{what}: {', '.join(_few([*names]))}" for what, names in named.items() if names]
+        return f"<System of {self.stop_time:g} s; {'; '.join(listed)}>"
 
     @property
     def fmus(self) -> dict[str, str]:
@@ -294,6 +304,10 @@ class System:
             (f"connections.{x.name}", start, end) for x in self.connections for start, end in zip(x.start, x.end)
         ]
         return feeds + [(f"sources.{name}", None, end) for name, source in self.sources.items() for end in source.to]
+
+
+def _few(names: list[str], most: int = 6) -> list[str]:
+    return names if len(names) <= most else [*names[: most - 1], f"… {len(names)} in all"]
 
 
 def _require_names(table: str, names: Iterable[str], without: str = "") -> None:

@@ -1,0 +1,62 @@
+"""Figures that a notebook shows by themselves, by name."""
+
+import base64
+import html
+import io
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from orchestration.drawing.draw import draw
+from orchestration.drawing.run import Window
+from orchestration.drawing.style import STYLES, Style, save
+from orchestration.errors import UsageError
+from orchestration.results.differences import told_apart
+from orchestration.results.result import Result
+
+
+class Figures(Mapping[str, Figure]):
+    """Figures of matplotlib by name: `figures["errors"].axes` to change one, `save` to write them."""
+
+    def __init__(self, figures: Mapping[str, Figure], style: Style) -> None:
+        self._figures, self._style = dict(figures), style
+
+    def __getitem__(self, name: str) -> Figure:
+        return self._figures[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._figures)
+
+    def __len__(self) -> int:
+        return len(self._figures)
+
+    def __repr__(self) -> str:
+        return f"<Figures: {', '.join(self)}>"
+
+    def _repr_html_(self) -> str:
+        """As notebooks show them: one below the other."""
+        return "".join(
+            f'<img alt="{html.escape(name)}" style="max-width:100%" src="data:image/png;base64,{self._png(figure)}">'
+            for name, figure in self.items()
+        )
+
+    def _png(self, figure: Figure) -> str:
+        file = io.BytesIO()
+        with self._style.applied():
+            figure.savefig(file, format="png")
+        return base64.b64encode(file.getvalue()).decode()
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write them into a folder, each as NAME.png; their paths."""
+        return save(self, Path(folder), self._style)
+
+
+def figures_of(
+    results: Sequence[Result], which: Collection[str] | None, *, window: Window | None, style: str
+) -> Figures:
+    """The figures of runs laid over each other; raises `UsageError` for a name of a figure or a style that is none."""
+    if style not in STYLES:
+        raise UsageError(f"style {style}: expected one of {', '.join(STYLES)}")
+    names = told_apart(results, [f"run {i + 1}" for i in range(len(results))])
+    return Figures(draw(results, which, names=names, window=window, style=STYLES[style]), STYLES[style])

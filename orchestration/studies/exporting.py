@@ -1,0 +1,35 @@
+"""A study or a run in the formats of other programs, as `quadcosim export` writes them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from orchestration.errors import UsageError
+from orchestration.results.run_directory import MAT, load_run
+from orchestration.studies.table import FORMATS, export
+
+OF_RUNS = ("csv", "mat")
+
+
+def of_run(folder: Path, out: Path, formats: Sequence[str]) -> list[Path]:
+    """Write the signals and events of a run as CSV unless told, or all of it as MAT; the paths.
+
+    Raises `UsageError` for a format that there is not, and for a folder that is no directory of a run.
+    """
+    for kind in formats:
+        there = " (signals.parquet and events.parquet are there already)" if kind == "parquet" else ""
+        _expect(kind, OF_RUNS, there)
+    result = load_run(folder)
+    written = result.to_csv(out) if "csv" in formats or not formats else []
+    return [*written, *([result.to_mat(out / MAT)] if "mat" in formats else [])]
+
+
+def of_study(store: Path, formats: Sequence[str]) -> list[Path]:
+    """Write the rows of a store beside it, as Parquet and CSV unless told; the paths."""
+    for kind in formats:
+        _expect(kind, FORMATS)
+    return export(store, store.parent, formats or FORMATS[:2])
+
+
+def _expect(kind: str, known: Sequence[str], otherwise: str = "") -> None:
+    if kind not in known:
+        raise UsageError(f"--format {kind}: expected {' or '.join(known)}{otherwise}")
