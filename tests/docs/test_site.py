@@ -81,3 +81,8 @@ def test_sources_are_linked_where_they_are_published() -> None:
 
 def test_a_code_block_keeps_the_name_of_its_file() -> None:
     assert for_the_site("```toml mine.toml\nx = 1\n```\n") == '```toml title="mine.toml"\nx = 1\n```\n'
+
+
+def test_blocks_of_commands_are_coloured_and_equations_are_not() -> None:
+    assert for_the_site("text\n\n    quadcosim run  # fly\n\nmore") == "text\n\n```sh\nquadcosim run  # fly\n```\n\nmore"
+    assert for_the_site("text\n\n    L = 2 k\n\nmore") == "text\n\n    L = 2 k\n\nmore"
