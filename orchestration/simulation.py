@@ -5,7 +5,7 @@ import importlib.metadata
 import logging
 import platform
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -28,9 +28,20 @@ from orchestration.master.feeds import Feed
 from orchestration.master.fixed_step import FixedStep
 from orchestration.master.master import Master
 from orchestration.master.recording import InMemory, Recorder
-from orchestration.master.sources import BuiltIn, Constant, Table, Values, WhiteNoise
+from orchestration.master.sources import (
+    BuiltIn,
+    Constant,
+    Held,
+    Moving,
+    Scaled,
+    Table,
+    Values,
+    WhiteNoise,
+    along,
+    by_name,
+    gusts,
+)
 from orchestration.master.streams import VALUE, Streams
-from orchestration.master.table_file import read_table
 from orchestration.master.timetable import Timetable
 from orchestration.master.watch import watch
 from orchestration.quadrotor.scenario import Scenario
@@ -39,9 +50,12 @@ from orchestration.results import objectives
 from orchestration.results.described import described
 from orchestration.results.result import Provenance, Result
 from orchestration.results.units import units
+from orchestration.signals.library import made
+from orchestration.signals.table_file import read_table
+from orchestration.signals.waypoints import read_waypoints
 from orchestration.simulator import Floats
 from orchestration.system.check import check, recorded
-from orchestration.system.model import Component, System, component_of, variable_of
+from orchestration.system.model import MOTION, Component, Source, System, component_of, variable_of
 from orchestration.system.times import NANOSECONDS, Grid, exact_nanoseconds
 
 _NOTES = logging.getLogger("quadcosim")
@@ -321,12 +335,32 @@ def source_values(system: System, name: str, parameters: Mapping[str, float], st
         return Constant([source.constant] * len(source.to))
     if source.noise is not None and source.period is not None:
         return WhiteNoise(source.noise, source.period, len(source.to), streams.of(f"sources.{name}", VALUE))
-    if source.file is not None:
-        columns = [variable_of(end) for end in source.to]
-        return Table(*read_table(source.file, columns, system.stop_time))
+    if source.trajectory is None:
+        values = _of_file_or_signal(system, name, streams)
+        return values if source.scale == 1.0 else Scaled(values, source.scale)
     owner = f"{source.trajectory}.trajectory."
     given = {field: parameters[owner + field] for field in TRAJECTORY if owner + field in parameters}
     return BuiltIn(Trajectory(**given))
+
+
+def _of_file_or_signal(system: System, name: str, streams: Streams) -> Values:
+    source = system.sources[name]
+    quantities = [MOTION.index(".".join(signal.split(".")[-2:])) for signal in source.signals(name) if source.is_motion]
+    if source.signal is not None:
+        signal = made(source.signal, source.parameters)
+        if source.is_motion:
+            return Moving(by_name(signal), quantities)
+        return gusts(signal, system.stop_time, streams.of(f"sources.{name}", VALUE))
+    assert source.file is not None
+    if source.is_motion:
+        return Moving(along(read_waypoints(source.file, source.parameters)), quantities)
+    table = read_table(source.file, table_columns(source), system.stop_time)
+    return Held(*table) if source.interpolation == "previous" else Table(*table)
+
+
+def table_columns(source: Source) -> Sequence[str]:
+    """The columns of the file of a source, in the order of the inputs."""
+    return [variable_of(end) for end in source.to] if source.columns is None else source.columns
 
 
 def _feeds(system: System, sources: Mapping[str, Values], instances: Mapping[str, Instance]) -> list[Feed]:

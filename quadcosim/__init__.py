@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from orchestration.errors import QuadcosimError, SimulatorError, UsageError
-    from orchestration.quadrotor.scenario import FmuChoice, Record, ReferenceChoice, Scenario
+    from orchestration.quadrotor.scenario import FmuChoice, Record, Scenario
     from orchestration.quadrotor.scenario_file import load_scenario
+    from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
     from orchestration.quadrotor.timing import Timing
     from orchestration.results.pause import fly_until, resume
     from orchestration.results.result import Result
@@ -38,7 +39,8 @@ _HOMES = {
     "resume": "orchestration.results.pause",
     "FmuChoice": "orchestration.quadrotor.scenario",
     "Record": "orchestration.quadrotor.scenario",
-    "ReferenceChoice": "orchestration.quadrotor.scenario",
+    "DisturbanceChoice": "orchestration.quadrotor.signals",
+    "ReferenceChoice": "orchestration.quadrotor.signals",
     "Scenario": "orchestration.quadrotor.scenario",
     "load_scenario": "orchestration.quadrotor.scenario_file",
     "Timing": "orchestration.quadrotor.timing",
@@ -56,6 +58,7 @@ __all__ = [
     "Component",
     "Connection",
     "Criterion",
+    "DisturbanceChoice",
     "FmuChoice",
     "QuadcosimError",
     "Record",

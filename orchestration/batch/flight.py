@@ -362,7 +362,7 @@ class Batch:
         found: list[Any] = []
         for name, source in system.sources.items():
             if name in self._shape.seen or source.to:
-                found += [source, system.seed if source.noise is not None else None]
+                found += [source, system.seed if source.is_random else None]
             if source.trajectory is not None:
                 found.append(tuple(self._number(system, each) for each in self._trajectories[source.trajectory]))
         return tuple(map(repr, found))

@@ -46,7 +46,9 @@ def _outline_of(x: Connection) -> Hashable:
 
 
 def _kind(source: Source) -> str:
-    return next(kind for kind in ("constant", "file", "noise", "trajectory") if getattr(source, kind) is not None)
+    return next(
+        kind for kind in ("constant", "file", "noise", "signal", "trajectory") if getattr(source, kind) is not None
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -218,7 +220,7 @@ class Shape:
         number = 0
         for name, signals in self.seen.items():
             source = self.system.sources[name]
-            kind = "held" if source.constant is not None or source.noise is not None else "continuous"
+            kind = "held" if source.is_held else "continuous"
             for signal in signals:
                 found[signal] = Leaf(code=f"SEEN({number})", kind=kind)
                 number += 1

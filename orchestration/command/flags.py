@@ -157,6 +157,24 @@ class FlightFlags:
             autocompletion=completion.vehicles,
         ),
     ] = None
+    reference: Annotated[
+        str | None,
+        _option(
+            "--reference",
+            panel=MODEL,
+            metavar="NAME|FILE.csv",
+            text="What to follow: hover, step, circle, lemniscate, helix, paper, or way-points; parameters by --set.",
+        ),
+    ] = None
+    disturbance: Annotated[
+        str | None,
+        _option(
+            "--disturbance",
+            panel=MODEL,
+            metavar="NAME|FILE.csv",
+            text="What pushes the vehicle: dryden (gusts), or force or wind over time; its parameters by --set.",
+        ),
+    ] = None
     native: Annotated[
         bool | None,
         _option(
@@ -180,6 +198,7 @@ class FlightFlags:
         """`scenario` with what was given; raises `UsageError` for what cannot be."""
         from orchestration.fmus import native_twin
         from orchestration.quadrotor.presets import preset_timing
+        from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice, chosen
         from orchestration.quadrotor.vehicles import load_vehicle
 
         timing: dict[str, Any] = {} if self.preset is None else preset_timing(self.preset)
@@ -199,6 +218,10 @@ class FlightFlags:
         }
         if self.vehicle is not None:
             top["vehicle"] = load_vehicle(self.vehicle, Path())
+        if self.reference is not None:
+            top["reference"] = ReferenceChoice(**chosen(self.reference))
+        if self.disturbance is not None:
+            top["disturbance"] = DisturbanceChoice(**chosen(self.disturbance))
         parameters = {key: _value(text) for key, text in _pairs("set", self.set or [])}
         changed = scenario.with_changes(timing=timing, parameters=parameters, **top)
         if not (self.native or self.controller or self.plant):

@@ -1,7 +1,8 @@
-"""The values of sources over time: constants, tables, held white noise, the built-in trajectory."""
+"""The values of sources over time: constants, tables, noise and gusts, motions, the built-in trajectory."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from typing import Protocol
 
@@ -9,6 +10,9 @@ import numpy as np
 
 from fmu_kit.scalar import ScalarOps
 from fmu_kit.trajectory import Trajectory
+from orchestration.signals.dryden import DRAWS, Dryden
+from orchestration.signals.motions import Motion
+from orchestration.signals.spline import Spline
 from orchestration.simulator import Floats
 from orchestration.system.times import NANOSECONDS, Grid, exact_nanoseconds
 
@@ -69,6 +73,22 @@ class Table:
         return values
 
 
+class Held(Table):
+    """A table whose rows hold until the next."""
+
+    def at(self, t: float) -> Sequence[float]:
+        """The values at `t` [s]."""
+        found: list[float] = self.columns[max(int(np.searchsorted(self.time, t, side="right")) - 1, 0)].tolist()
+        return found
+
+    def over(self, t: Floats) -> Floats:
+        """The values at times `t`."""
+        values: Floats = self.columns[np.maximum(np.searchsorted(self.time, t, side="right") - 1, 0)]
+        return values
+
+    each = over
+
+
 NUMPY = ScalarOps(
     sqrt=np.sqrt,
     tanh=np.tanh,
@@ -101,6 +121,76 @@ class BuiltIn:
     def each(self, t: Floats) -> Floats:
         """As `over`, one after the other: the mathematics of numpy is not that of Python."""
         return np.array([self.at(time) for time in t.tolist()]).reshape(len(t), 3)
+
+
+def _one_by_one(function: Callable[[float], float]) -> Callable[[Floats], Floats]:
+    """Over an array, with the bits that the function has for one value."""
+    return lambda x: np.array([function(value) for value in x.tolist()])
+
+
+EXACT = replace(NUMPY, sin=_one_by_one(math.sin), cos=_one_by_one(math.cos))
+"""As `NUMPY`, with the mathematics of Python: many points at once give the bits of one after the other"""
+
+
+class Moving:
+    """What a motion says of `quantities`, each a derivative from 0 (position) on and an axis of x, y, z."""
+
+    def __init__(self, motion: Callable[[Floats], Floats], quantities: Sequence[int]) -> None:
+        """`motion` gives all of them at times (n,), shape (n, 15)."""
+        self._motion, self._quantities = motion, list(quantities)
+
+    def at(self, t: float) -> Sequence[float]:
+        """The values at `t` [s]."""
+        values: list[float] = self.over(np.array([t]))[0].tolist()
+        return values
+
+    def over(self, t: Floats) -> Floats:
+        """The values at times `t`."""
+        return self._motion(t)[:, self._quantities]
+
+    each = over
+
+
+def by_name(motion: Motion) -> Callable[[Floats], Floats]:
+    """A motion of the library, at times (n,) [s] as an array (n, 15)."""
+
+    def over(t: Floats) -> Floats:
+        found = motion.at(t, EXACT)
+        orders = (found.position, found.velocity, found.acceleration, found.jerk, found.snap)
+        return np.column_stack([coordinate for order in orders for coordinate in order])
+
+    return over
+
+
+def along(curve: Spline) -> Callable[[Floats], Floats]:
+    """The curve through way-points, at times (n,) [s] as an array (n, 15)."""
+    return lambda t: curve.at(t).reshape(len(t), -1)
+
+
+def gusts(air: Dryden, stop_time: float, stream: np.random.Generator) -> Table:
+    """The wind from 0 to `stop_time` [s]: north, east, down [m/s]; what a longer run begins with is the same."""
+    count = math.ceil(stop_time / air.step) + 2
+    values = air.velocities(stream.standard_normal((count, DRAWS)).tolist())
+    return Table(air.step * np.arange(count, dtype=np.float64), np.array(values))
+
+
+class Scaled:
+    """Values times a factor."""
+
+    def __init__(self, values: Values, factor: float) -> None:
+        self._values, self._factor = values, factor
+
+    def at(self, t: float) -> Sequence[float]:
+        """The values at `t` [s]."""
+        return [self._factor * value for value in self._values.at(t)]
+
+    def over(self, t: Floats) -> Floats:
+        """The values at times `t`."""
+        return self._factor * self._values.over(t)
+
+    def each(self, t: Floats) -> Floats:
+        """As `over`, to the bit what `at` says."""
+        return self._factor * self._values.each(t)
 
 
 class WhiteNoise:

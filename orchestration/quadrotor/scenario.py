@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 from orchestration.constructors import strict
 from orchestration.errors import UsageError, shown
 from orchestration.quadrotor.parameters import Parameter
+from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.vehicles import Vehicle
 from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT, SAMPLE_OFFSET, SAMPLE_PERIOD
@@ -22,16 +23,6 @@ class FmuChoice:
 
     fmu: str
     parameters: dict[str, Parameter] = field(default_factory=dict)
-
-
-@strict("reference.")
-@dataclass(frozen=True, kw_only=True)
-class ReferenceChoice:
-    """Where the reference comes from: the controller's built-in trajectory unless a CSV file is named."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
-
-    file: Path | None = None
 
 
 @strict("record.")
@@ -65,6 +56,7 @@ class Scenario:
     plant: FmuChoice = field(default_factory=lambda: FmuChoice(fmu=DEFAULT_PLANT))
     timing: Timing = field(default_factory=Timing)
     reference: ReferenceChoice = field(default_factory=ReferenceChoice)
+    disturbance: DisturbanceChoice = field(default_factory=DisturbanceChoice)
     record: Record = field(default_factory=Record)
 
     def __post_init__(self) -> None:
@@ -86,7 +78,7 @@ class Scenario:
         parameters: Mapping[str, Parameter] | None = None,
         **fields: Any,
     ) -> "Scenario":
-        """This scenario with other timing keys, parameters (`controller.NAME`, `plant.NAME`) or fields.
+        """This scenario with other timing keys, parameters (`controller.NAME`, `plant.NAME` and so on) or fields.
 
         Raises `UsageError` for a key that does not exist.
         """
@@ -97,10 +89,15 @@ class Scenario:
             changed = dataclasses.replace(changed, timing=dataclasses.replace(self.timing, **dict(timing)))
         for name, value in (parameters or {}).items():
             side, _, parameter = name.partition(".")
-            if side not in ("controller", "plant") or not parameter:
-                raise UsageError(f"{name}: expected controller.NAME or plant.NAME")
-            choice: FmuChoice = getattr(changed, side)
-            choice = dataclasses.replace(choice, parameters={**choice.parameters, parameter: value})
+            if side not in SIDES or not parameter:
+                raise UsageError(
+                    f"{name}: expected {', '.join(f'{each}.NAME' for each in SIDES[:-1])} or {SIDES[-1]}.NAME"
+                )
+            choice: Any = getattr(changed, side)
+            if parameter in OWN_KEYS.get(side, ()):
+                choice = dataclasses.replace(choice, **{parameter: value})
+            else:
+                choice = dataclasses.replace(choice, parameters={**choice.parameters, parameter: value})
             replaced: dict[str, Any] = {side: choice}
             changed = dataclasses.replace(changed, **replaced)
         return changed
@@ -142,12 +139,31 @@ class Scenario:
             "plant": _table(resolved.plant),
             "timing": timing,
         }
-        if self.reference.file is not None:
-            tables["reference"] = {"file": str(self.reference.file.absolute())}
+        for name in ("reference", "disturbance"):
+            tables |= {name: table} if (table := signal_table(getattr(self, name))) else {}
         record = {key: list(value) for key, value in dataclasses.asdict(self.record).items() if value is not None}
         if record:
             tables["record"] = record
         return tomli_w.dumps(tables)
+
+
+SIDES = ("controller", "plant", "reference", "disturbance")
+"""Tables of a scenario that have parameters"""
+OWN_KEYS = {
+    "reference": ("name",),
+    "disturbance": ("name", "interpolation", "drag"),
+}
+"""What is no parameter in them"""
+
+
+def signal_table(choice: ReferenceChoice | DisturbanceChoice) -> dict[str, Any]:
+    """A choice as a table of a scenario file that may lie in any folder; empty if it says nothing."""
+    table = {
+        f.name: getattr(choice, f.name)
+        for f in dataclasses.fields(choice)
+        if f.name not in ("file", "parameters") and getattr(choice, f.name) != f.default
+    }
+    return {**table, **({} if choice.file is None else {"file": str(choice.file.absolute())}), **choice.parameters}
 
 
 def _expect_keys(prefix: str, given: Mapping[str, Any], table: type) -> None:

@@ -13,7 +13,8 @@ from orchestration.documents import read_toml
 from orchestration.errors import UsageError, shown
 from orchestration.quadrotor.parameters import parameters_in
 from orchestration.quadrotor.presets import preset_timing
-from orchestration.quadrotor.scenario import FmuChoice, Record, ReferenceChoice, Scenario
+from orchestration.quadrotor.scenario import FmuChoice, Record, Scenario
+from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.vehicles import load_vehicle
 from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
@@ -41,8 +42,10 @@ class ScenarioFile:
     """Likewise of the plant."""
     timing: Timing = field(default_factory=Timing)
     """The digital clock between them; `loss` sets both losses, `preset` the rate and latency of a real stack."""
-    reference: ReferenceChoice = field(default_factory=ReferenceChoice)
-    """What is flown along."""
+    reference: dict[str, Any] = field(default_factory=dict)
+    """What is followed: `name` of a motion or `file` of way-points, and its parameters; else the built-in trajectory."""
+    disturbance: dict[str, Any] = field(default_factory=dict)
+    """What pushes it: `name` of gusts or `file`, `drag`, `interpolation`, and parameters of the gusts."""
     record: Record = field(default_factory=Record)
     """What is recorded beside what the two FMUs exchange."""
 
@@ -64,7 +67,6 @@ def load_scenario(path: str | Path) -> Scenario:
 def scenario_from_tables(tables: dict[str, Any], folder: Path) -> Scenario:
     """The scenario of a TOML document whose relative paths start at `folder`; raises `UsageError`."""
     file = parsed(_expanded(tables), ScenarioFile)
-    table = file.reference.file
     return Scenario(
         stop_time=file.stop_time,
         seed=file.seed,
@@ -73,7 +75,8 @@ def scenario_from_tables(tables: dict[str, Any], folder: Path) -> Scenario:
         controller=_choice("controller", file.controller, DEFAULT_CONTROLLER, folder),
         plant=_choice("plant", file.plant, DEFAULT_PLANT, folder),
         timing=file.timing,
-        reference=ReferenceChoice(file=None if table is None else folder / table),
+        reference=_signal("reference", file.reference, ReferenceChoice, folder),
+        disturbance=_signal("disturbance", file.disturbance, DisturbanceChoice, folder),
         record=file.record,
     )
 
@@ -103,6 +106,27 @@ def _choice(side: str, table: dict[str, Any], default: str, folder: Path) -> Fmu
     if fmu.endswith(".fmu"):
         fmu = str(folder / fmu)
     return FmuChoice(fmu=fmu, parameters=parameters)
+
+
+Signal = TypeVar("Signal", ReferenceChoice, DisturbanceChoice)
+
+
+def _signal(place: str, table: dict[str, Any], kind: type[Signal], folder: Path) -> Signal:
+    """A table with the fields of its kind, and parameters beside them."""
+    own = [f.name for f in dataclasses.fields(kind) if f.name != "parameters"]
+    given: dict[str, Any] = {key: value for key, value in table.items() if key in own}
+    parameters = {key: value for key, value in table.items() if key not in own}
+    if parameters and not {"name", "file"} & {*given}:
+        keys = f"one of {', '.join(own)}; parameters beside name or file only"
+        raise UsageError(f"{place}.{next(iter(parameters))}: no such key; expected {keys}")
+    for key, value in given.items():
+        if key == "drag":
+            continue
+        if not isinstance(value, str):
+            raise UsageError(f"{place}.{key} = {shown(repr(value))}: expected a text")
+    if "file" in given:
+        given["file"] = folder / given["file"]
+    return kind(**given, parameters=parameters)
 
 
 def parsed(tables: dict[str, Any], shape: type[Shape]) -> Shape:

@@ -3,15 +3,19 @@
 import functools
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from orchestration.errors import UsageError
 from orchestration.quadrotor.nominal_model import mismatch
 from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.signals import DRAG, DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.timing import TIMING_KEYS
-from orchestration.quadrotor.wiring import REFERENCE, RIGID_BODY, USE_REFERENCE_INPUTS
-from orchestration.system.model import System
+from orchestration.quadrotor.wiring import EXTERNAL_FORCE, REFERENCE, RIGID_BODY, USE_REFERENCE_INPUTS
+from orchestration.signals.limits import AXES
+from orchestration.signals.table_file import header_of
+from orchestration.system.model import Source, System
 from orchestration.system.paths import TOP, changed
 from orchestration.system.system_file import load_system
 
@@ -66,16 +70,47 @@ def system_of(scenario: Scenario) -> System:
         changes[f"components.{side}.fmu"] = choice.fmu
         changes |= {f"components.{side}.parameters.{name}": value for name, value in choice.parameters.items()}
         changes[f"components.{side}.record"] = getattr(scenario.record, side)
-    if scenario.reference.file is not None:
-        changes |= {
-            "sources.reference.trajectory": None,
-            "sources.reference.file": scenario.reference.file,
-            "sources.reference.to": tuple(f"controller.{name}" for name in REFERENCE),
-            f"components.controller.parameters.{USE_REFERENCE_INPUTS}": True,
-        }
+    if scenario.reference.name is not None or scenario.reference.file is not None:
+        changes |= {f"sources.reference.{key}": value for key, value in _reference(scenario.reference).items()}
+        changes[f"components.controller.parameters.{USE_REFERENCE_INPUTS}"] = True
     elif scenario.controller.parameters.get(USE_REFERENCE_INPUTS) is True:
-        raise UsageError(f"controller.{USE_REFERENCE_INPUTS}: expected [reference] file = … to feed them")
-    return changed(quadrotor(), changes)
+        raise UsageError(f"controller.{USE_REFERENCE_INPUTS}: expected [reference] name or file = … to feed them")
+    return _disturbed(changed(quadrotor(), changes), scenario.disturbance)
+
+
+def _reference(choice: ReferenceChoice) -> dict[str, Any]:
+    """The source that feeds the reference inputs of the controller."""
+    keys: dict[str, Any] = {
+        "trajectory": None,
+        "to": tuple(f"controller.{name}" for name in REFERENCE),
+        "parameters": dict(choice.parameters),
+    }
+    if choice.file is None:
+        return {**keys, "signal": choice.name}
+    columns = header_of(choice.file)
+    is_table = REFERENCE[0] in columns or not {*AXES} & {*columns}
+    return {**keys, "file": choice.file, "interpolation": "linear" if is_table else "spline"}
+
+
+def _disturbed(system: System, choice: DisturbanceChoice) -> System:
+    """`system` with what pushes the plant."""
+    if choice.name is None and choice.file is None:
+        return system
+    keys: dict[str, Any] = {"to": tuple(f"plant.{name}" for name in EXTERNAL_FORCE)}
+    drag = DRAG if choice.drag is None else choice.drag
+    if choice.file is None:
+        keys |= {"signal": choice.name, "parameters": dict(choice.parameters), "scale": drag}
+    else:
+        keys |= {"file": choice.file, "interpolation": choice.interpolation}
+        if {*WIND} & {*header_of(choice.file)}:
+            keys |= {"columns": WIND, "scale": drag}
+        elif choice.drag is not None:
+            raise UsageError(f"disturbance.drag: expected columns {', '.join(WIND)} in {choice.file}")
+    try:
+        source = Source(**keys)
+    except UsageError as error:
+        raise UsageError(f"sources.disturbance.{error}") from error
+    return replace(system, sources={**system.sources, "disturbance": source})
 
 
 def paths_of(target: str) -> tuple[str, ...]:
@@ -93,11 +128,13 @@ def paths_of(target: str) -> tuple[str, ...]:
         return TIMING[key]
     if table == "timing" and kind in BY_MEASUREMENT and measurement:
         return (f"connections.measurement.{key}",)
+    if table in ("reference", "disturbance") and key:
+        return (f"sources.{table}.{SIGNAL_KEYS[table].get(key, f'parameters.{key}')}",)
     if table in ("controller", "plant") and key:
         return (f"components.{table}.fmu" if key == "fmu" else f"components.{table}.parameters.{key}",)
     raise UsageError(
-        f"{target}: expected controller.NAME, plant.NAME, seed, stop_time, timing.loss, timing.noise.NAME, "
-        f"timing.quantisation.NAME or timing.KEY with KEY one of {', '.join(_SINGLE)}"
+        f"{target}: expected controller.NAME, plant.NAME, reference.NAME, disturbance.NAME, seed, stop_time, "
+        f"timing.loss, timing.noise.NAME, timing.quantisation.NAME or timing.KEY with KEY one of {', '.join(_SINGLE)}"
     )
 
 
@@ -120,9 +157,23 @@ PLACES = {
     "connections.command.loss": "timing.command_loss",
     "connections.measurement.burst_length": "timing.burst_length",
     "connections.command.": "timing.",
+    "sources.reference.signal": "reference.name",
+    "sources.reference.parameters.": "reference.",
     "sources.reference.": "reference.",
+    "sources.disturbance.signal": "disturbance.name",
+    "sources.disturbance.scale": "disturbance.drag",
+    "sources.disturbance.parameters.": "disturbance.",
+    "sources.disturbance.": "disturbance.",
 }
 """Where a scenario says what its system says elsewhere."""
+
+SIGNAL_KEYS = {
+    "reference": {"name": "signal", "file": "file"},
+    "disturbance": {"name": "signal", "file": "file", "interpolation": "interpolation", "drag": "scale"},
+}
+"""What is no parameter in `[reference]` and `[disturbance]`, and what their sources call it"""
+WIND = ("wind.x", "wind.y", "wind.z")
+"""Columns of a file with a wind in place of a force"""
 
 _SAMPLING, _COMMAND = "components.controller.sampling", "connections.command"
 TIMING: dict[str, tuple[str, ...]] = {

@@ -149,7 +149,7 @@ def _ends(
         else:
             ends |= lines[x.name].ends(signals["time"], {end: signals[end] for end in held}, arrivals[x.name])
     for name, source in system.sources.items():
-        if source.constant is not None or source.noise is not None:
+        if source.is_held:
             ends |= {key: values[:-1] for key, values in signals.items() if key.startswith(f"{name}.")}
     return ends
 

@@ -19,13 +19,13 @@ def units(system: System, models: Mapping[str, Model]) -> dict[str, str]:
 
     Raises `UsageError`, naming the expression, where values of different units are added or compared.
     """
-    sources = tuple((s.signals(name), s.to, s.trajectory is not None) for name, s in system.sources.items())
+    sources = tuple((s.signals(name), s.to, not s.to) for name, s in system.sources.items())
     criterion = (system.criterion.good, system.criterion.diverged)
     return dict(_units(tuple(system.objectives.items()), criterion, sources, tuple(models.items())))
 
 
 Sources = tuple[tuple[tuple[str, ...], tuple[str, ...], bool], ...]
-"""Of each: its signals, where they go, and whether it is a trajectory"""
+"""Of each: its signals, where they go, and whether they are positions that go nowhere"""
 
 
 @functools.lru_cache(maxsize=256)
@@ -62,7 +62,7 @@ def _of_signals(texts: Sequence[str], sources: Sources, models: Mapping[str, Mod
             signal = f"{name}.{variable}"
             if signal in wanted or signal.rpartition(".")[0] in wanted:
                 found[signal] = model.units.get(variable)
-    for signals, to, is_trajectory in sources:
+    for signals, to, are_positions in sources:
         fed = [models[component_of(end)].units.get(variable_of(end)) for end in to]
-        found |= zip(signals, [METRE] * len(signals) if is_trajectory else fed, strict=True)
+        found |= zip(signals, [METRE] * len(signals) if are_positions else fed, strict=True)
     return found

@@ -34,7 +34,11 @@ def calmed(system: System) -> System:
             for x in chosen.connections
         ),
         sources={
-            name: source if source.noise is None else replace(source, noise=0.0)
+            name: replace(source, noise=0.0)
+            if source.noise is not None
+            else replace(source, scale=0.0)
+            if source.is_random
+            else source
             for name, source in chosen.sources.items()
         },
         objectives={},

@@ -5,14 +5,15 @@ from typing import Any
 
 from orchestration.batch.shape import outline
 from orchestration.errors import UsageError
-from orchestration.master.table_file import read_table
 from orchestration.quadrotor.translation import in_its_own_words
-from orchestration.simulation import checked
+from orchestration.signals.table_file import read_table
+from orchestration.signals.waypoints import read_waypoints
+from orchestration.simulation import checked, table_columns
 from orchestration.studies.files import Files
 from orchestration.studies.store import expect_columns
 from orchestration.studies.study import Study
 from orchestration.system.check import check_parameter
-from orchestration.system.model import System, variable_of
+from orchestration.system.model import System
 
 
 def expect_flyable(study: Study, files: Files) -> None:
@@ -61,8 +62,10 @@ class _Alike:
 def expect_tables(system: System) -> None:
     """Raise `UsageError` for a table of a source that cannot be read, or does not last."""
     for source in system.sources.values():
-        if source.file is not None:
-            read_table(source.file, [variable_of(end) for end in source.to], system.stop_time)
+        if source.file is not None and source.is_motion:
+            read_waypoints(source.file, source.parameters)
+        elif source.file is not None:
+            read_table(source.file, table_columns(source), system.stop_time)
 
 
 def described(index: int, settings: Mapping[str, Any]) -> str:

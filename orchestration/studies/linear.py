@@ -22,6 +22,7 @@ from orchestration.fmi.instance import Instance
 from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor import wiring
 from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.translation import system_of
 from orchestration.simulation import prepared
 from orchestration.simulator import Floats
@@ -57,7 +58,8 @@ def hover_of(scenario: Scenario) -> Scenario:
         scenario,
         controller=dataclasses.replace(scenario.controller, parameters=controller),
         plant=dataclasses.replace(scenario.plant, parameters=plant),
-        reference=dataclasses.replace(scenario.reference, file=None),
+        reference=ReferenceChoice(),
+        disturbance=DisturbanceChoice(),
     )
 
 

@@ -23,7 +23,7 @@ def is_random(system: System) -> bool:
     return (
         any(one.sampling is not None and one.sampling.jitter > 0.0 for one in system.components.values())
         or any(x.delay_jitter > 0.0 or x.loss > 0.0 or any(x.noise.values()) for x in system.connections)
-        or any(source.noise for source in system.sources.values())
+        or any(source.is_random and source.noise != 0.0 for source in system.sources.values())
     )
 
 

@@ -82,7 +82,9 @@ def what(source: Source) -> str:
         return f"constant {source.constant:g}"
     if source.noise is not None:
         return f"white noise of intensity {source.noise:g}, held {seconds(source.period or 0.0)}"
-    return f"file {source.file.name}" if source.file is not None else f"trajectory of {source.trajectory}"
+    if source.file is not None:
+        return f"{'way-points of' if source.is_motion else 'file'} {source.file.name}"
+    return f"trajectory of {source.trajectory}" if source.signal is None else source.signal
 
 
 def seconds(value: float) -> str:

@@ -9,6 +9,7 @@ from typing import Any, Literal
 from orchestration.constructors import strict
 from orchestration.errors import UsageError
 from orchestration.expressions.syntax import is_number, parse
+from orchestration.signals import WINDS
 from orchestration.system.requirements import (
     is_finite,
     require,
@@ -26,6 +27,7 @@ Hold = Literal["zero", "first"]
 Clock = Literal["master", "fmu"]
 Distribution = Literal["uniform", "normal"]
 Align = Literal["exact", "next"]
+Interpolation = Literal["linear", "previous", "spline"]
 Parameter = float | bool | str
 
 
@@ -159,33 +161,61 @@ class Connection:
 @strict()
 @dataclass(frozen=True, kw_only=True)
 class Source:
-    """What drives inputs from outside: a constant, a table over time, white noise or the built-in trajectory.
+    """What drives inputs from outside: a constant, a file, white noise, a signal by name or the built-in trajectory.
 
-    Exactly one of `constant`, `file`, `noise` and `trajectory` is given.
+    Exactly one of `constant`, `file`, `noise`, `signal` and `trajectory` is given. A motion, which is what most signals
+    are and what way-points make, feeds inputs whose names end with QUANTITY.AXIS, as reference.position.x: position,
+    velocity, acceleration, jerk and snap along x, y and z.
     """
 
     to: tuple[str, ...] = ()
     """inputs, as COMPONENT.VARIABLE; may be empty for what only objectives need"""
     constant: float | None = None
     file: Path | None = None
-    """CSV: `time` and one column for each input, named as the input without its component; linear between rows"""
+    """CSV: `time` and one column for each input, named as the input without its component; or way-points"""
+    interpolation: Interpolation = "linear"
+    """of a file, between rows: linear, or the row before (previous); spline: its rows are way-points, columns x, y, z
+    [m] and `time` [s] or else `hold` [s] and `speed` [m/s] where they are told"""
+    columns: tuple[str, ...] | None = None
+    """of a file, in the order of the inputs, where they are not named as these"""
     noise: float | None = None
     """intensity [unit² s] of white noise: normal values with variance noise / period, each held over `period`"""
     period: float | None = None
     """[s], of noise"""
+    signal: str | None = None
+    """by name: a motion (hover, step, circle, lemniscate, helix, paper) or gusts of wind (dryden: north, east, down)"""
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    """of a signal; of way-points without times, `speed` [m/s] and `acceleration` [m/s²], which the times follow from"""
+    scale: float = 1.0
+    """by which all values of a file or a signal are multiplied"""
     trajectory: str | None = None
     """the component whose parameters trajectory.* say what the trajectory of `fmu_kit` is"""
 
+    @property
+    def is_motion(self) -> bool:
+        """Whether it says where to be and how to move there."""
+        return self.interpolation == "spline" or (self.signal is not None and self.signal not in WINDS)
+
+    @property
+    def is_random(self) -> bool:
+        """Whether it draws random numbers."""
+        return self.noise is not None or self.signal in WINDS
+
+    @property
+    def is_held(self) -> bool:
+        """Whether its values are constant from one instant to the next."""
+        return self.constant is not None or self.noise is not None
+
     def signals(self, name: str) -> tuple[str, ...]:
         """What is recorded of the source of that name: by the names of the inputs, unless it feeds two of one name."""
-        if self.trajectory is not None:
+        if self.trajectory is not None or (self.is_motion and not self.to):
             return tuple(f"{name}.position.{axis}" for axis in "xyz")
         variables = [variable_of(end) for end in self.to]
         fed = [end if variables.count(variable_of(end)) > 1 else variable_of(end) for end in self.to]
         return tuple(each if each.startswith(f"{name}.") else f"{name}.{each}" for each in fed)
 
     def __post_init__(self) -> None:
-        kinds = ("constant", "file", "noise", "trajectory")
+        kinds = ("constant", "file", "noise", "signal", "trajectory")
         given = [kind for kind in kinds if getattr(self, kind) is not None]
         require(len(given) == 1, "source", " and ".join(given) or "nothing", f"one of {', '.join(kinds)}")
         if self.noise is not None:
@@ -198,6 +228,38 @@ class Source:
             require(nobody, "to", ", ".join(self.to), "none: a trajectory is for objectives")
             require(self.constant is None or is_finite(self.constant), "constant", self.constant, "a finite number")
             require(self.period is None, "period", self.period, "none without noise")
+        self._expect_file()
+        self._expect_signal()
+
+    def _expect_file(self) -> None:
+        require_choice(self, interpolation=Interpolation)
+        is_file, is_table = self.file is not None, self.file is not None and self.interpolation != "spline"
+        require(is_file or self.interpolation == "linear", "interpolation", self.interpolation, "none without a file")
+        if self.columns is not None:
+            require(is_table, "columns", ", ".join(self.columns), "none but for a file with a column for each input")
+            count = len(self.to)
+            require(len(self.columns) == count, "columns", len(self.columns), f"{count} names, one for each input")
+
+    def _expect_signal(self) -> None:
+        if self.signal is not None or self.interpolation == "spline":
+            from orchestration.signals import library  # not before: the command line answers --help without it
+
+            _ = library.limits(self.parameters) if self.signal is None else library.made(self.signal, self.parameters)
+        else:
+            given = ", ".join(self.parameters)
+            require(not self.parameters, "parameters", given, "none but for a signal by name, or way-points")
+        require(is_finite(self.scale), "scale", self.scale, "a finite number")
+        with_scale = self.scale == 1.0 or self.file is not None or self.signal is not None
+        require(with_scale, "scale", self.scale, "none but for a file or a signal by name")
+        if self.signal in WINDS:
+            require(len(self.to) == 3, "to", len(self.to), "3 inputs, for the wind along north, east and down")
+        if self.is_motion:
+            for end in self.to:
+                require(".".join(end.split(".")[-2:]) in MOTION, "to", end, "inputs that end in position.x … snap.z")
+
+
+MOTION = tuple(f"{each}.{axis}" for each in ("position", "velocity", "acceleration", "jerk", "snap") for axis in "xyz")
+"""What a motion says, in its order"""
 
 
 @strict()
@@ -297,7 +359,7 @@ class System:
         sent = [
             f"connections.{x.name}.{cause}" for x in self.connections for cause in ("delay_jitter", "loss", "noise")
         ]
-        return [*tasks, *sent, *(f"sources.{name}.value" for name, x in self.sources.items() if x.noise is not None)]
+        return [*tasks, *sent, *(f"sources.{name}.value" for name, x in self.sources.items() if x.is_random)]
 
     def _feeds(self) -> list[tuple[str, str | None, str]]:
         feeds: list[tuple[str, str | None, str]] = [

@@ -37,7 +37,7 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
         elif table == "connections":
             connections[name] = _replaced(place, connections[name], _by_variable(connections[name], keys))
         else:
-            sources[name] = _replaced(place, sources[name], keys)
+            sources[name] = _replaced(place, sources[name], _by_parameter(sources[name], keys))
     result: System = _replaced(
         "", system, {**top, "components": components, "connections": tuple(connections.values()), "sources": sources}
     )
@@ -110,8 +110,8 @@ def _expect_key(path: str, table: str, system: System, name: str, key: str) -> N
         keys += ["noise", "quantisation", "noise.VARIABLE", "quantisation.VARIABLE"]
         known = key in keys or key.partition(".")[0] in ("noise", "quantisation")
     else:
-        keys = [f.name for f in dataclasses.fields(Source)]
-        known = key in keys
+        keys = [f.name for f in dataclasses.fields(Source)] + ["parameters.NAME"]
+        known = key in keys[:-1] or (key.startswith("parameters.") and key != "parameters.")
     if not known:
         near = difflib.get_close_matches(key, keys, n=1)
         hint = f"; did you mean {near[0]}?" if near else ""
@@ -120,13 +120,17 @@ def _expect_key(path: str, table: str, system: System, name: str, key: str) -> N
 
 def _component(place: str, component: Component, keys: Mapping[str, Any]) -> Component:
     sampling = {key.partition(".")[2]: value for key, value in keys.items() if key.startswith("sampling.")}
-    parameters = {key.partition(".")[2]: value for key, value in keys.items() if key.startswith("parameters.")}
-    rest = {key: value for key, value in keys.items() if "." not in key}
+    rest = {key: value for key, value in _by_parameter(component, keys).items() if "." not in key}
     if sampling:
         rest["sampling"] = _replaced(f"{place}.sampling", component.sampling, sampling)
-    if parameters:
-        rest["parameters"] = {**component.parameters, **parameters}
     return _replaced(place, component, rest) if rest else component
+
+
+def _by_parameter(of: Component | Source, keys: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys such as `parameters.radius` merged into their table."""
+    parameters = {key.partition(".")[2]: value for key, value in keys.items() if key.startswith("parameters.")}
+    rest = {key: value for key, value in keys.items() if not key.startswith("parameters.")}
+    return {**rest, "parameters": {**rest.get("parameters", of.parameters), **parameters}} if parameters else rest
 
 
 def _by_variable(connection: Connection, keys: Mapping[str, Any]) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from orchestration.system.model import (
     Criterion,
     Distribution,
     Hold,
+    Interpolation,
     Order,
     Sampling,
     Source,
@@ -114,11 +115,20 @@ class SourceTable(_Table):
     to: Annotated[tuple[str, ...], _says("The inputs that it drives, as COMPONENT.VARIABLE.")] = ()
     constant: Annotated[float | None, _says("A value that never changes.")] = None
     file: Annotated[
-        str | None,
-        _says("The path of a CSV file with `time` and a column for each input; values are linear between its rows."),
+        str | None, _says("The path of a CSV file with `time` and a column for each input, or with way-points.")
+    ] = None
+    interpolation: Annotated[
+        Interpolation,
+        _says("Between the rows of the file: linear, the row before (previous), or a curve through way-points (spline)."),
+    ] = "linear"
+    columns: Annotated[
+        tuple[str, ...] | None, _says("The columns of the file, if they are not named as the inputs.")
     ] = None
     noise: Annotated[float | None, _says("The intensity of white noise [unit² s].")] = None
     period: Annotated[float | None, _says("How long each value of the noise is held [s].")] = None
+    signal: Annotated[str | None, _says("The name of a motion, or of gusts of wind.")] = None
+    parameters: Annotated[dict[str, float], _says("What the signal is told, or how fast way-points without times are flown.")] = {}
+    scale: Annotated[float, _says("A factor on the values of the file or the signal.")] = 1.0
     trajectory: Annotated[
         str | None, _says("The component whose parameters trajectory.* say what the built-in trajectory is.")
     ] = None

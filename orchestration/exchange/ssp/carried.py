@@ -85,7 +85,7 @@ def _unsaid(system: System) -> Iterator[str]:
         yield from _not_plain(f"connections.{x.name}", x, FAULTS)
     for name, source in system.sources.items():
         if source.to and source.constant is None:
-            kind = "file" if source.file is not None else "noise" if source.noise is not None else "trajectory"
+            kind = next(kind for kind in ("file", "noise", "signal") if getattr(source, kind) is not None)
             yield f"sources.{name}.{kind}: an SSP cannot feed one; expected a constant"
 
 

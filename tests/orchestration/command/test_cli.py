@@ -330,7 +330,7 @@ def test_a_run_paused_and_resumed_is_the_same_run(main: Main, here: Path) -> Non
         (["--noise", "position=much"], "--noise position = much: expected a number"),
         (["--noise", "position=-1"], "timing.noise of position = -1.0"),
         (["--quantisation", "mass=0.1"], "timing.quantisation: mass is no signal of it; expected one of position"),
-        (["--set", "mass=1"], "mass: expected controller.NAME or plant.NAME"),
+        (["--set", "mass=1"], "mass: expected controller.NAME, plant.NAME, reference.NAME or disturbance.NAME"),
         (["--set", "plant.mass"], "--set plant.mass: expected NAME=VALUE"),
         (["--set", "plant.mass=heavy"], "plant.mass = heavy: expected a number"),
         (["--set", "plant.mas=1"], "did you mean mass?"),

@@ -19,7 +19,8 @@ import quadcosim
 from fmu_kit.trajectory import Trajectory
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.quadrotor.measures import desired
-from orchestration.quadrotor.scenario import FmuChoice, Record, ReferenceChoice
+from orchestration.quadrotor.scenario import FmuChoice, Record
+from orchestration.quadrotor.signals import ReferenceChoice
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE, REFERENCE
 from quadcosim import Result, RunInterrupted, Scenario, SimulatorError, Timing, UsageError
 
@@ -323,7 +324,7 @@ def test_every_output_and_local_is_recorded_unless_told() -> None:
         ({"plant.mass": True}, "expected a number"),
         ({"plant.mass": "heavy"}, "expected a number"),
         ({"controller.use_reference_inputs": 1.0}, "expected true or false"),
-        ({"controller.use_reference_inputs": True}, "expected [reference] file"),
+        ({"controller.use_reference_inputs": True}, "expected [reference] name or file"),
     ],
 )
 def test_a_parameter_that_cannot_be_set_is_refused_in_one_line(parameters: dict[str, float | str], text: str) -> None:

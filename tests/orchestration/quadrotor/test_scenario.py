@@ -330,7 +330,7 @@ def test_no_changes_are_no_change() -> None:
 
 @pytest.mark.parametrize("name", ["mass", "plants.mass", "plant.", "plant", ""])
 def test_a_parameter_of_neither_side_is_refused(name: str) -> None:
-    with pytest.raises(UsageError, match=r"expected controller.NAME or plant.NAME"):
+    with pytest.raises(UsageError, match=r"expected controller.NAME, plant.NAME, reference.NAME or disturbance.NAME"):
         Scenario().with_changes(parameters={name: 1.0})
 
 

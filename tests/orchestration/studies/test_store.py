@@ -19,7 +19,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestration import fmus
-from orchestration.quadrotor.scenario import FmuChoice, ReferenceChoice
+from orchestration.quadrotor.scenario import FmuChoice
+from orchestration.quadrotor.signals import ReferenceChoice
 from orchestration.quadrotor.translation import system_of
 from orchestration.quadrotor.wiring import DEFAULT_PLANT
 from orchestration.studies import store as stores

@@ -151,7 +151,7 @@ def test_without_a_base_it_is_the_flight_of_the_paper(tmp_path: Path) -> None:
         (
             "[base]\nduration = 3\n" + ONE,
             "duration",
-            "stop_time, seed, model_mismatch, vehicle, controller, plant, timing, reference, record",
+            "stop_time, seed, model_mismatch, vehicle, controller, plant, timing, reference, disturbance, record",
         ),
         ("[base.timing]\nrate = 3\n" + ONE, "timing.rate", ", ".join(TIMING_KEYS)),
     ],
@@ -164,7 +164,7 @@ def test_an_unknown_key_is_told_with_those_that_there_are(tmp_path: Path, text: 
 @pytest.mark.parametrize("target", ["timing.rate", "nonsense", "wind.amplitude.x", "timing", "plant", ""])
 def test_a_target_that_does_not_exist_is_told_with_those_that_there_are(tmp_path: Path, target: str) -> None:
     line = refused(tmp_path, f'[[axes]]\nname = "x"\nsets = ["{target}"]\nvalues = [1]\n')
-    assert f"{target}: expected controller.NAME, plant.NAME, seed, stop_time, timing.loss" in line
+    assert f"{target}: expected controller.NAME, plant.NAME, reference.NAME, disturbance.NAME, seed, " in line
     assert ", ".join(key for key in TIMING_KEYS if key not in ("noise", "quantisation")) in line
 
 

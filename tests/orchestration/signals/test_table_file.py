@@ -7,8 +7,8 @@ import pytest
 
 from fmu_kit.trajectory import Trajectory
 from orchestration.master.sources import BuiltIn, Table
-from orchestration.master.table_file import read_table
 from orchestration.quadrotor.wiring import REFERENCE
+from orchestration.signals.table_file import read_table
 from quadcosim import UsageError
 
 HEADER = ",".join(("time", *REFERENCE))
@@ -83,12 +83,16 @@ def test_a_table_that_does_not_cover_the_run_is_refused(tmp_path: Path, times: t
 
 @pytest.mark.parametrize("cell", ["fast", "", "0x10"])
 def test_what_is_no_number_is_refused(tmp_path: Path, cell: str) -> None:
-    assert "line 3: expected numbers only" in refused(tmp_path, row(0.0), row(1.0, cell), row(2.0))
+    assert f"line 3: reference.position.x = {cell}: expected numbers only" in refused(
+        tmp_path, row(0.0), row(1.0, cell), row(2.0)
+    )
 
 
 @pytest.mark.parametrize("cell", ["nan", "inf", "-inf"])
 def test_what_is_not_finite_is_refused(tmp_path: Path, cell: str) -> None:
-    assert "line 3: expected finite numbers only" in refused(tmp_path, row(0.0), row(1.0, cell), row(2.0))
+    assert f"line 3: reference.position.x = {cell}: expected finite numbers only" in refused(
+        tmp_path, row(0.0), row(1.0, cell), row(2.0)
+    )
 
 
 @pytest.mark.parametrize("rows", [(), (0.0,)])

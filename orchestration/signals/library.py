@@ -1,0 +1,45 @@
+"""Signals that go by a name, and what they are told."""
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from orchestration.errors import UsageError, expected_name, shown
+from orchestration.signals.dryden import Dryden
+from orchestration.signals.limits import Limits
+from orchestration.signals.motions import MOTIONS
+
+KINDS: dict[str, dict[str, type]] = {"motion": {**MOTIONS}, "wind": {"dryden": Dryden}}
+SIGNALS = {name: kind for kinds in KINDS.values() for name, kind in kinds.items()}
+WAY_POINTS = "way-points"
+
+
+def made(name: str, parameters: Mapping[str, Any], among: Mapping[str, type] = SIGNALS) -> Any:
+    """The signal of a name with these parameters; the others are what its class says.
+
+    Raises `UsageError` for a name or a parameter that there is none of, naming those there are, or a value that
+    cannot be.
+    """
+    if name not in among:
+        raise UsageError(f"signal = {shown(name)}: {expected_name(str(name), list(among))}")
+    return _with_parameters(name, among[name], parameters)
+
+
+def limits(parameters: Mapping[str, Any]) -> Limits:
+    """How fast a curve through way-points may be; raises `UsageError` as `made` does."""
+    found: Limits = _with_parameters(WAY_POINTS, Limits, parameters)
+    return found
+
+
+def _with_parameters(name: str, kind: type, parameters: Mapping[str, Any]) -> Any:
+    known = [field.name for field in dataclasses.fields(kind)]
+    for key, value in parameters.items():
+        if key not in known:
+            raise UsageError(f"parameters.{key}: {name} has no such parameter; {expected_name(key, known)}")
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            raise UsageError(f"parameters.{key} = {shown(value)}: expected a finite number")
+    try:
+        return kind(**{key: float(value) for key, value in parameters.items()})
+    except UsageError as error:
+        raise UsageError(f"parameters.{error}") from error
