@@ -119,7 +119,11 @@ def refusal(folder: Path, text: str) -> str:
         ),
         ('hold = "first"', 'hold = "last"', "connections.1.hold = last: expected 'zero' or 'first'"),
         ("period = 0.5", "", "sources.rain.period = none: expected how long each value is held, in seconds"),
-        ("noise = 0.1\n", "", "sources.rain.source = nothing: expected one of constant, file, noise, signal, trajectory"),
+        (
+            "noise = 0.1\n",
+            "",
+            "sources.rain.source = nothing: expected one of constant, file, noise, signal, trajectory",
+        ),
         ('"max(tank.level)"', '"max(tank.level"', "objectives.peak: "),
         ('"peak < 2.5"', '"open(1)"', "criterion.good: "),
         ('"abs(tank.level) > 100"', '"__import__(1)"', "criterion.diverged: "),
