@@ -43,7 +43,7 @@ class ScenarioFile:
     timing: Timing = field(default_factory=Timing)
     """The digital clock between them; `loss` sets both losses, `preset` the rate and latency of a real stack."""
     reference: dict[str, Any] = field(default_factory=dict)
-    """What is followed: `name` of a motion or `file` of way-points, and its parameters; else the built-in trajectory."""
+    """What is followed: `name` of a motion or `file` of way-points, and its parameters; else the built-in one."""
     disturbance: dict[str, Any] = field(default_factory=dict)
     """What pushes it: `name` of gusts or `file`, `drag`, `interpolation`, and parameters of the gusts."""
     record: Record = field(default_factory=Record)

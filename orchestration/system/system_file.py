@@ -119,7 +119,9 @@ class SourceTable(_Table):
     ] = None
     interpolation: Annotated[
         Interpolation,
-        _says("Between the rows of the file: linear, the row before (previous), or a curve through way-points (spline)."),
+        _says(
+            "Between the rows of the file: linear, the row before (previous), or a curve through way-points (spline)."
+        ),
     ] = "linear"
     columns: Annotated[
         tuple[str, ...] | None, _says("The columns of the file, if they are not named as the inputs.")
@@ -127,7 +129,9 @@ class SourceTable(_Table):
     noise: Annotated[float | None, _says("The intensity of white noise [unit² s].")] = None
     period: Annotated[float | None, _says("How long each value of the noise is held [s].")] = None
     signal: Annotated[str | None, _says("The name of a motion, or of gusts of wind.")] = None
-    parameters: Annotated[dict[str, float], _says("What the signal is told, or how fast way-points without times are flown.")] = {}
+    parameters: Annotated[
+        dict[str, float], _says("What the signal is told, or how fast way-points without times are flown.")
+    ] = {}
     scale: Annotated[float, _says("A factor on the values of the file or the signal.")] = 1.0
     trajectory: Annotated[
         str | None, _says("The component whose parameters trajectory.* say what the built-in trajectory is.")
