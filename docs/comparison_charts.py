@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from orchestration.drawing.palette import BLUE, GREEN, GREY, ORANGE, RED
+from orchestration.drawing import cells as cells_of
+from orchestration.drawing.palette import BLUE, BROWN, GREEN, GREY, ORANGE, PURPLE, RED
 from orchestration.statistics import wilson
 
 Rows = Sequence[Mapping[str, Any]]
@@ -17,19 +18,19 @@ COLORS = {
     "unified": RED,
     "unified, no coupling": BLUE,
     "unified, mean": ORANGE,
-    "no coupling, mean": "#6f4f9f",
+    "no coupling, mean": "#5b3f8f",
     "geometric": GREEN,
-    "geometric, mean": "#8a6d3b",
+    "geometric, mean": BROWN,
     "cascade, one rate": GREY,
-    "unified, predictor": "#c05f9a",
-    "no coupling, predictor": "#8a6d3b",
+    "unified, predictor": PURPLE,
+    "no coupling, predictor": BROWN,
     "mean, predictor": GREEN,
     "unified, paper's gains": RED,
     "unified, tuned for 10 ms": ORANGE,
     "unified, tuned for its period": BLUE,
-    "unified, mean, tuned for 10 ms": "#c05f9a",
-    "unified, mean, tuned for its period": "#8a6d3b",
-    "geometric, tuned for 10 ms": "#6f4f9f",
+    "unified, mean, tuned for 10 ms": PURPLE,
+    "unified, mean, tuned for its period": BROWN,
+    "geometric, tuned for 10 ms": "#5b3f8f",
     "geometric, tuned for its period": GREEN,
     "cascade, one rate, tuned for 10 ms": "#b0b0b0",
     "cascade, one rate, tuned for its period": GREY,
@@ -43,7 +44,7 @@ def basins(cells: Rows, factors: Mapping[str, float]) -> Figure:
     """
     names = list(dict.fromkeys(cell["controller"] for cell in cells))
     columns = 4
-    figure = Figure(figsize=(11.0, 2.9 * -(-len(names) // columns) + 0.6), layout="constrained")
+    figure = Figure(figsize=(11.0, 2.9 * -(-len(names) // columns) + 0.6))
     panels = figure.subplots(-(-len(names) // columns), columns, sharey=True, squeeze=False).ravel()
     for panel in panels[len(names) :]:
         panel.set_visible(False)
@@ -51,21 +52,20 @@ def basins(cells: Rows, factors: Mapping[str, float]) -> Figure:
         mine = [cell for cell in cells if cell["controller"] == name]
         at = 1e3 * factors.get(name, 1.0) * np.array([cell["value"] for cell in mine])
         share = np.array([[flown / count for flown, count in cell["by_size"]] for cell in mine]).T
-        sizes = (np.arange(share.shape[0]) + 0.5) / share.shape[0]
-        mesh = panel.pcolormesh(at, sizes, share, vmin=0.0, vmax=1.0, cmap="viridis", shading="nearest")
-        if share.min() < 0.5 < share.max():
-            panel.contour(at, sizes, share, levels=[0.5], colors="white", linewidths=1.5)
-        panel.set_title(name, fontsize=9)
+        x, sizes = cells_of.edges(at), np.linspace(0.0, 1.0, share.shape[0] + 1)
+        mesh = cells_of.fill(panel, x, sizes, share, vmin=0.0, vmax=1.0)
+        cells_of.limit(panel, x, sizes, (share >= 0.5).astype(float), colors="white")
+        panel.set_title(name)
         panel.set_xlim(0.0, 300.0 * max(1.0, factors.get(name, 1.0) / 10.0))
-    figure.colorbar(mesh, ax=panels.tolist(), label="share that flies", shrink=0.8)
-    figure.supxlabel("period [ms]", fontsize=9)
-    figure.supylabel("size of the initial error", fontsize=9)
+    figure.colorbar(mesh, ax=panels.tolist(), label="share that flies [1]", shrink=0.8)
+    figure.supxlabel("period [ms]")
+    figure.supylabel("size of the initial error [1]")
     return figure
 
 
 def limits(rows: Sequence[tuple[str, Mapping[str, Any], Mapping[str, Any], float]], last: float, label: str) -> Figure:
     """Up to which value half of the starts and nine in ten fly, with intervals: (name, half, nine in ten, factor)."""
-    figure = Figure(figsize=(8.0, 0.42 * len(rows) + 1.2), layout="constrained")
+    figure = Figure(figsize=(8.0, 0.42 * len(rows) + 1.2))
     panel = figure.add_subplot()
     for i, (_, half, most, factor) in enumerate(reversed(rows)):
         for limit, shift, color in ((half, 0.13, BLUE), (most, -0.13, ORANGE)):
@@ -74,10 +74,10 @@ def limits(rows: Sequence[tuple[str, Mapping[str, Any], Mapping[str, Any], float
             told = {BLUE: "half of the starts", ORANGE: "nine in ten"}[color] if i == 0 else None
             panel.errorbar(value, i + shift, xerr=[[value - low], [max(high - value, 0.0)]], fmt="o", color=color,
                            markersize=5, capsize=2, label=told)  # fmt: skip
-    panel.set_yticks(range(len(rows)), [name for name, *_ in reversed(rows)], fontsize=9)
+    panel.set_yticks(range(len(rows)), [name for name, *_ in reversed(rows)])
     panel.set(xlabel=label, xlim=(0.0, last))
     panel.grid(visible=True, axis="x", alpha=0.3)
-    panel.legend(fontsize=8)
+    panel.legend()
     return figure
 
 
@@ -85,25 +85,25 @@ def shares(panels_of: Mapping[str, Rows], label: str, factor: float = 1e3) -> Fi
     """The share that flies over the axis, with Wilson intervals, a panel for each title, a line for each controller."""
     columns = min(4, len(panels_of))
     rows = -(-len(panels_of) // columns)
-    figure = Figure(figsize=(max(2.4 * columns, 4.0) + 3.0, 2.7 * rows + 0.7), layout="constrained")
+    figure = Figure(figsize=(max(2.4 * columns, 4.0) + 3.0, 2.7 * rows + 0.7))
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for panel in panels[len(panels_of) :]:
         panel.set_visible(False)
     for panel, (title, cells) in zip(panels, panels_of.items()):
         for name in dict.fromkeys(cell["controller"] for cell in cells):
             _line(panel, [cell for cell in cells if cell["controller"] == name], name, factor)
-        panel.set_title(title, fontsize=9)
+        panel.set_title(title)
         panel.set_ylim(-0.03, 1.03)
     handles, names = panels[0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside right center", fontsize=8)
-    figure.supxlabel(label, fontsize=9)
-    figure.supylabel("share that flies", fontsize=9)
+    figure.legend(handles, names, loc="outside right center")
+    figure.supxlabel(label)
+    figure.supylabel("share that flies [1]")
     return figure
 
 
 def fronts(points: Rows, values: Sequence[float], colors: Mapping[str, str]) -> Figure:
     """Median error against median total variation of torque at some periods; filled: on the front."""
-    figure = Figure(figsize=(2.4 * len(values) + 2.4, 3.4), layout="constrained")
+    figure = Figure(figsize=(2.4 * len(values) + 2.4, 3.4))
     panels = figure.subplots(1, len(values), sharex=True, sharey=True, squeeze=False).ravel()
     for panel, value in zip(panels, values):
         here = [point for point in points if point["value"] == value and point["error"][0] and point["effort"][0]]
@@ -114,16 +114,16 @@ def fronts(points: Rows, values: Sequence[float], colors: Mapping[str, str]) -> 
                 markerfacecolor=colors[point["controller"]] if point["on_front"] else "none",
                 xerr=_sides(effort), yerr=_sides(error),
             )  # fmt: skip
-        panel.set_title(f"{1e3 * value:g} ms, {here[0]['starts'] if here else 0} starts", fontsize=9)
+        panel.set_title(f"{1e3 * value:g} ms, {here[0]['starts'] if here else 0} starts")
         panel.set(xscale="log")
-        panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+        panel.xaxis.set_major_locator(LogLocator())
         panel.xaxis.set_major_formatter("{x:g}")
         panel.xaxis.set_minor_formatter(NullFormatter())
     for name, color in colors.items():
         panels[0].plot([], [], "o", color=color, label=name)
-    figure.legend(loc="outside right center", fontsize=8)
-    figure.supxlabel("total variation of the torque [N·m]", fontsize=9)
-    figure.supylabel("RMS error [m]", fontsize=9)
+    figure.legend(loc="outside right center")
+    figure.supxlabel("total variation of the torque [N·m]")
+    figure.supylabel("RMS position error [m]")
     return figure
 
 

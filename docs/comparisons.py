@@ -217,9 +217,15 @@ def figures() -> Iterator[tuple[str, Figure]]:
         yield f"comparison_{name}", charts.fronts(content["fronts"], values, charts.colored(names))
     yield "comparison_delays", charts.shares({"period of 20 ms": kept("delays")["cells"]}, "delay [ms]")
     yield "comparison_mismatches", charts.shares(_by("condition", kept("mismatches")), "period [ms]")
-    yield "comparison_inertias", charts.shares(_by("condition", kept("inertias")), "inertia, times that believed", 1.0)
+    yield (
+        "comparison_inertias",
+        charts.shares(_by("condition", kept("inertias")), "inertia, times the one believed [1]", 1.0),
+    )
     yield "comparison_vehicles", charts.shares(_by("vehicle", kept("vehicles")), "period [ms]")
-    yield "comparison_losses", charts.shares({"period of 20 ms": kept("losses")["cells"]}, "loss", 1.0)
+    yield (
+        "comparison_losses",
+        charts.shares({"period of 20 ms": kept("losses")["cells"]}, "share of messages lost [1]", 1.0),
+    )
     yield "comparison_jitters", charts.shares({"period of 50 ms": kept("jitters")["cells"]}, "jitter [ms]")
 
 

@@ -22,7 +22,7 @@ import pandas as pd
 
 from docs import charts, comparisons, experiments, theory
 from docs.experiments import PAPER
-from orchestration.drawing.style import DOCS
+from orchestration.drawing.style import DOCS, save
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import system_of
 from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
@@ -69,7 +69,7 @@ def main() -> None:
     began = time.perf_counter()
     sections = (
         compared, period, limits, continuous, starts, delay, bounds, gains, bandwidth, finite_time, monte_carlo,
-        sensitivity, agreement,
+        sensitivity, agreement, pictures,
     )  # fmt: skip
     for section in [one for one in sections if one.__name__ in sys.argv[1:] or not sys.argv[1:]]:
         print(f"\n## {section.__name__}", flush=True)
@@ -91,9 +91,15 @@ def _processor_time() -> float:
 def compared() -> list[str]:
     """Controllers from the same starts: limits and cells of every comparison."""
     found = {name: kept(f"compared_{name}", partial(comparisons.fly_all, name)) for name in comparisons.NAMES}
-    for name, figure in comparisons.figures():
-        _save(lambda: figure, name)  # noqa: B023 (drawn at once)
+    pictures()
     return [line for name, content in found.items() for line in comparisons.lines(name, content)]
+
+
+def pictures() -> list[str]:
+    """Figures of the comparisons from what docs/data keeps of them, without a flight."""
+    with DOCS.applied():
+        made = dict(comparisons.figures())
+    return [str(path) for path in save(made, FIGURES, DOCS)]
 
 
 def period() -> list[str]:
@@ -116,8 +122,8 @@ def limits() -> list[str]:
     """Limits of the period over kappa."""
     found = limits_of("limits", [experiments.flight(kappa=kappa) for kappa in KAPPAS])
     paper = next(one for kappa, one in zip(KAPPAS, found, strict=True) if kappa == 1.0)
-    drawn = drawing.draw_limit(PAPER, limit.Limit(**{**paper, "continuous": None, "tried": ()}), RESULTS)
-    (FIGURES / "spectral_radius.png").write_bytes(drawn.read_bytes())
+    drawn = drawing.draw_limit(PAPER, limit.Limit(**{**paper, "continuous": None, "tried": ()}), RESULTS, DOCS)
+    (FIGURES / "spectral_radius.png").write_bytes(drawn[0].read_bytes())
     return [
         f"kappa {kappa:<4g} local {_ms(one['local_limit'])}, large-signal {_ms(one['large_signal_limit'])}, "
         f"flies above at {one['flies_above']}: {one['note']}"
@@ -354,7 +360,7 @@ def flown_study(study: Study) -> pd.DataFrame:
 def draw(name: str, metric: str) -> None:
     """The figure of a study, into the docs."""
     study = load_study(ROOT / "studies" / f"{name}.toml")
-    path = drawing.draw_study(study, RESULTS / name, metric)[-1]  # of two axes, the map
+    path = drawing.draw_study(study, RESULTS / name, metric, DOCS)[-1]  # of two axes, the map
     kind = "_map" if path.stem.endswith("_map") else ""
     (FIGURES / f"study_{name}{kind}.png").write_bytes(path.read_bytes())
 
@@ -474,7 +480,7 @@ def _indices(designs: list[list[Index]], kind: str) -> tuple[Any, Any]:
 
 
 def _save(make: Callable[[], Any], name: str) -> None:
-    figures.save(make, FIGURES / f"{name}.png", DOCS)
+    figures.save(lambda style: make(), FIGURES / name, DOCS)
 
 
 def _interval(values: Any) -> str:

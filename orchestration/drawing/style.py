@@ -77,7 +77,6 @@ class Style:
             "axes.spines.right": False,
             "axes.spines.top": False,
             "axes.titlesize": self.font,
-            "axes.xmargin": 0.0,
             "figure.constrained_layout.use": True,
             "figure.constrained_layout.h_pad": 0.3 * self.font / 72.0,
             "figure.constrained_layout.w_pad": 0.3 * self.font / 72.0,

@@ -6,32 +6,32 @@ from collections.abc import Mapping
 from orchestration.results.described import Described
 from orchestration.system.model import component_of, variable_of
 
-METRICS: Mapping[str, str] = {
-    "outcome": "outcome",
-    "good": "meets the criterion",
-    "horizon": "time by which it is judged",
-    "position_rmse": "RMS position error",
-    "position_iae": "integral of the position error",
-    "position_itae": "integral of time × position error",
-    "position_max": "largest position error",
-    "settling_time": "settling time, to 5 cm",
-    "ultimate_bound": "largest position error, last third",
-    "attitude_error_rmse": "RMS attitude error",
-    "attitude_error_max": "largest attitude error",
-    "energy_growth_share": "share of samples at which the energy grows",
-    "control_effort.thrust": "control effort, thrust",
-    "control_effort.torque": "control effort, torque",
-    "torque_max": "largest torque",
-    "total_variation.thrust": "total variation of thrust",
-    "total_variation.torque": "total variation of torque",
-    "saturation_share": "share of time at a limit of the plant",
-    "diverged": "diverged",
-    "divergence_time": "time of divergence",
-    "steps": "steps of the plant",
-    "wall_time": "time that the run took",
-    "engine": "engine",
+METRICS: Mapping[str, tuple[str, str | None]] = {
+    "outcome": ("outcome", None),
+    "good": ("meets the criterion", None),
+    "horizon": ("time by which it is judged", "s"),
+    "position_rmse": ("RMS position error", "m"),
+    "position_iae": ("integral of the position error", "m.s"),
+    "position_itae": ("integral of time × position error", "m.s2"),
+    "position_max": ("largest position error", "m"),
+    "settling_time": ("settling time, to 5 cm", "s"),
+    "ultimate_bound": ("largest position error, last third", "m"),
+    "attitude_error_rmse": ("RMS attitude error", "rad"),
+    "attitude_error_max": ("largest attitude error", "rad"),
+    "energy_growth_share": ("share of samples at which the energy grows", "1"),
+    "control_effort.thrust": ("control effort, thrust", "N2.s"),
+    "control_effort.torque": ("control effort, torque", "N2.m2.s"),
+    "torque_max": ("largest torque", "N.m"),
+    "total_variation.thrust": ("total variation of thrust", "N"),
+    "total_variation.torque": ("total variation of torque", "N.m"),
+    "saturation_share": ("share of time at a limit of the plant", "1"),
+    "diverged": ("diverged", None),
+    "divergence_time": ("time of divergence", "s"),
+    "steps": ("steps of the plant", None),
+    "wall_time": ("time that the run took", "s"),
+    "engine": ("engine", None),
 }
-"""Of what a run comes to; docs/metrics.md defines each."""
+"""Of what a run of the quadrotor comes to, name and unit; docs/metrics.md defines each."""
 
 SETTINGS: Mapping[str, tuple[str, str | None]] = {
     "stop_time": ("stop time", "s"),
@@ -91,7 +91,12 @@ AXES: Mapping[str, str] = {"x": "x", "y": "y", "z": "z", "w": "w"}
 
 def metric(name: str) -> str:
     """A metric or objective in words."""
-    return METRICS.get(name, words(name))
+    return METRICS[name][0] if name in METRICS else words(name)
+
+
+def metric_with_unit(name: str, of: str | None = None) -> str:
+    """A metric in words with its unit: the one that its FMUs give it, else the quadrotor's."""
+    return with_unit(metric(name), of or METRICS.get(name, ("", None))[1])
 
 
 def setting(path: str) -> str:

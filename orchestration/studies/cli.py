@@ -9,7 +9,9 @@ import typer
 
 from orchestration.command import completion, registering
 from orchestration.command.answer import Answer, of_files
+from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.flags import EngineFlag, FlightFlags, Timing, flies, request_from
+from orchestration.command.shared_flags import takes
 from orchestration.command.terminal import progress_bar, runs_bar, say
 from orchestration.errors import UsageError
 
@@ -110,12 +112,15 @@ def export(
     return of_files(exporting.of_study(store, formats or ()))
 
 
+@takes("look", FigureFlags)
 def draw(
     study: StudyFile,
     out: Out = None,
     metric: Annotated[
         str | None, typer.Option("--metric", help="What to draw; what the criterion is about unless told.")
     ] = None,
+    *,
+    look: FigureFlags,
 ) -> Answer:
     """Draw a study: a metric over one or two axes with what is good, or sensitivity bars."""
     from orchestration.studies.drawing import draw_study, metric_of
@@ -124,7 +129,7 @@ def draw(
     chosen = load_study(study)
     metric = metric_of(chosen, metric)
     _current_store(study, out)
-    return of_files(draw_study(chosen, out, metric))
+    return of_files(draw_study(chosen, out, metric, look.chosen))
 
 
 def tune(
@@ -248,7 +253,8 @@ def limit(
     if out is not None:
         from orchestration.studies.drawing import draw_limit
 
-        say(str(draw_limit(chosen, found, out)))
+        for drawn in draw_limit(chosen, found, out):
+            say(str(drawn))
     return Answer(document=found, lines=[f"{name:<19}  {value}" for name, value in limits.as_text(found).items()])
 
 

@@ -1,10 +1,11 @@
-"""Which figures a study gets: decides by its axes, reads the store, writes PNG beside it."""
+"""Which figures a study gets: decides by its axes, reads the store, writes beside it."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from orchestration.drawing.style import SCREEN, Style
 from orchestration.errors import UsageError
 from orchestration.expressions.syntax import Name, Number, Operation, names, parse
 from orchestration.quadrotor.scenario import Scenario
@@ -15,6 +16,7 @@ from orchestration.studies.axes import Axis, unit_points
 from orchestration.studies.limit import Limit
 from orchestration.studies.linear import HoverLoop
 from orchestration.studies.local import radius
+from orchestration.studies.maps import heat_map
 from orchestration.studies.store import TEXTS, metrics_with
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import store_path
@@ -35,7 +37,7 @@ def metric_of(study: Study, metric: str | None) -> str:
     return chosen
 
 
-def draw_study(study: Study, folder: Path | None, metric: str | None = None) -> list[Path]:
+def draw_study(study: Study, folder: Path | None, metric: str | None = None, style: Style = SCREEN) -> list[Path]:
     """Draw what is in the store of `study`, by default what its criterion is about; the paths of figures and tables.
 
     Raises `UsageError` for a metric that does not exist, or axes that no figure here is for.
@@ -46,17 +48,20 @@ def draw_study(study: Study, folder: Path | None, metric: str | None = None) -> 
     if _is_screened(study):
         indices = indices_of(study, numbers(table, metric), metric)
         listed = sensitivity.write(indices, path.parent / f"sensitivity_{metric}.csv")
-        return [listed, figures.save(lambda: figures.sensitivity_bars(indices, metric), listed.with_suffix(".png"))]
+        bars = figures.save(lambda how: figures.sensitivity_bars(indices, metric, how), listed.with_suffix(""), style)
+        return [listed, *bars]
     axes = tuple(axis for axis in study.axes if _is_numeric(axis))
     if len(axes) != len(study.axes):
         raise UsageError(f"{study.name}: expected axes of numbers to draw")
-    words, plain, mapped = system.criterion.outcomes, path.parent / f"{metric}.png", path.parent / f"{metric}_map.png"
+    words, plain, mapped = system.criterion.outcomes, path.parent / metric, path.parent / f"{metric}_map"
     if len(axes) > 2:
-        return [figures.save(lambda: figures.scatter(table, axes, metric, words, unit=unit), plain)]
+        return figures.save(lambda how: figures.scatter(table, axes, metric, words, unit=unit, style=how), plain, style)
     bound = edge(system, metric)
-    written = [figures.save(lambda: figures.lines(table, axes, metric, words, bound, unit=unit), plain)]
+    written = figures.save(
+        lambda how: figures.lines(table, axes, metric, words, bound, unit=unit, style=how), plain, style
+    )
     if len(axes) == 2 and all(axis.values is not None for axis in axes):
-        written.append(figures.save(lambda: figures.heat_map(table, axes, metric, words, unit=unit), mapped))
+        written += figures.save(lambda how: heat_map(table, axes, metric, words, unit=unit, style=how), mapped, style)
     return written
 
 
@@ -76,8 +81,8 @@ def edge(system: System, metric: str) -> float | None:
     return None
 
 
-def draw_limit(request: Request, found: Limit, folder: Path) -> Path:
-    """Draw the spectral radius over the period or the delay, with both limits; the path of the figure.
+def draw_limit(request: Request, found: Limit, folder: Path, style: Style = SCREEN) -> list[Path]:
+    """Draw the spectral radius over the period or the delay, with both limits; the paths of the figure.
 
     Raises `UsageError` if linear theory does not apply.
     """
@@ -91,14 +96,16 @@ def draw_limit(request: Request, found: Limit, folder: Path) -> Path:
     loop = HoverLoop.of(request)
     radii = np.array([radius(loop, request, found.of, value) for value in values])
     return figures.save(
-        lambda: figures.spectral_radius(
+        lambda how: figures.spectral_radius(
             found.of,
             values,
             radii,
             local_limit=found.local_limit,
             large_signal_limit=found.large_signal_limit,
+            style=how,
         ),
-        folder / f"spectral_radius_{found.of}.png",
+        folder / f"spectral_radius_{found.of}",
+        style,
     )
 
 

@@ -13,8 +13,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from orchestration.drawing.palette import BLUE, GREEN, GREY, ORANGE, RED
+from orchestration.drawing import cells
+from orchestration.drawing.palette import BLUE, CYCLE, GREY, ORANGE
+from orchestration.drawing.style import SCREEN, Style
+from orchestration.results import labels
 from orchestration.simulator import Floats
+from orchestration.studies.axis_labels import name_of
 from orchestration.studies.comparison.cells import Median, Result, sizes
 from orchestration.studies.comparison.design import CONDITION, CONTROLLER, VEHICLE, Comparison
 from orchestration.studies.comparison.fronts import Point
@@ -22,7 +26,6 @@ from orchestration.studies.comparison.limits import Limit
 from orchestration.studies.comparison.outcome import Outcome
 from orchestration.studies.figures import flew, save
 from orchestration.studies.ranges import is_in_seconds
-from orchestration.units import in_brackets
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,80 +33,76 @@ if TYPE_CHECKING:
 BINS = 8
 """of the size of the initial error"""
 MOST_PANELS = 6
-COLORS = (BLUE, ORANGE, GREEN, RED, "#6f4f9f", "#8a6d3b", "#c05f9a", GREY)
 
 
-def draw(comparison: Comparison, outcome: Outcome, table: "pd.DataFrame", folder: Path) -> list[Path]:
+def draw(
+    comparison: Comparison, outcome: Outcome, table: "pd.DataFrame", folder: Path, style: Style = SCREEN
+) -> list[Path]:
     """Draw all pictures into a folder; the paths."""
     done = table[table["status"] == "done"]
     written = [
         path
         for (vehicle, condition), rows in done.groupby([VEHICLE, CONDITION], sort=False)
-        for path in _of_one(comparison, outcome, rows, (vehicle, condition), folder)
+        for path in _of_one(comparison, outcome, rows, (vehicle, condition), folder, style)
     ]
     if outcome.limits:
-        written.append(save(lambda: limits_of(comparison, outcome.limits), folder / "limits.png"))
+        written += save(lambda how: limits_of(comparison, outcome.limits, how), folder / "limits", style)
     return written
 
 
 def _of_one(
-    comparison: Comparison, outcome: Outcome, rows: "pd.DataFrame", of: tuple[str, str], folder: Path
+    comparison: Comparison, outcome: Outcome, rows: "pd.DataFrame", of: tuple[str, str], folder: Path, style: Style
 ) -> Iterator[Path]:
     """The pictures of one vehicle under one condition."""
-    cells = [cell for cell in outcome.cells if (cell.vehicle, cell.condition) == of]
+    found = [cell for cell in outcome.cells if (cell.vehicle, cell.condition) == of]
     fronts = [point for point in outcome.fronts if (point.vehicle, point.condition) == of and _is_known(point)]
-    title, end = ", ".join(of), "_".join(re.sub(r"[^\w.-]+", "_", name) for name in of) + ".png"
-    yield save(lambda: basins(comparison, rows, title), folder / f"basin_{end}")
-    yield save(lambda: shares(comparison, cells, title), folder / f"shares_{end}")
+    title, end = ", ".join(of), "_".join(re.sub(r"[^\w.-]+", "_", name) for name in of)
+    yield from save(lambda how: basins(comparison, rows, title, how), folder / f"basin_{end}", style)
+    yield from save(lambda how: shares(comparison, found, title, how), folder / f"shares_{end}", style)
     if fronts:
-        yield save(lambda: fronts_of(comparison, fronts, title), folder / f"front_{end}")
+        yield from save(lambda how: fronts_of(comparison, fronts, title, how), folder / f"front_{end}", style)
 
 
-def basins(comparison: Comparison, rows: "pd.DataFrame", title: str) -> Figure:
+def basins(comparison: Comparison, rows: "pd.DataFrame", title: str, style: Style = SCREEN) -> Figure:
     """The share that flies over size of the initial error and axis, a panel for each controller; white: half."""
     names = [one.name for one in comparison.controllers if (rows[CONTROLLER] == one.name).any()]
-    figure, panels = _panels(len(names), height=3.0)
-    edges = np.linspace(0.0, 1.0, BINS + 1)
+    figure, panels = _panels(len(names), 22.0, style)
+    bins = np.linspace(0.0, 1.0, BINS + 1)
     at, factor = _axis(comparison)
+    x = cells.edges(at)
     for panel, name in zip(panels, names):
-        shown = rows[rows[CONTROLLER] == name]
-        share = _by_size(comparison, shown, edges)
-        mesh = panel.pcolormesh(
-            _edges(at), edges, share, vmin=0.0, vmax=1.0, cmap="viridis", shading="flat", rasterized=True
-        )
-        middles = 0.5 * (edges[1:] + edges[:-1])
-        if np.nanmin(share) < 0.5 < np.nanmax(share) and min(share.shape) > 1:
-            panel.contour(at, middles, share, levels=[0.5], colors="white", linewidths=1.5)
-        panel.set_title(name, fontsize=10)
-        panel.set(ylim=(0.0, 1.0), xlim=(_edges(at)[0], _edges(at)[-1]))
-        panel.grid(False)
-    figure.colorbar(mesh, ax=panels.tolist(), label="share that flies")
-    figure.supxlabel(_label(comparison, factor), fontsize=10)
-    figure.supylabel("size of the initial error", fontsize=10)
-    figure.suptitle(f"{title}; white: half of the starts fly", fontsize=10)
+        share = _by_size(comparison, rows[rows[CONTROLLER] == name], bins)
+        mesh = cells.fill(panel, x, bins, share, vmin=0.0, vmax=1.0)
+        cells.hatch(panel, x, bins, np.isnan(share))
+        cells.limit(panel, x, bins, np.where(np.isnan(share), np.nan, share >= 0.5), colors="white")
+        panel.set_title(name)
+    figure.colorbar(mesh, ax=panels.tolist(), label="share that flies [1]")
+    figure.supxlabel(_label(comparison, factor))
+    figure.supylabel("size of the initial error [1]")
+    figure.suptitle(f"{title}; above the white line less than half of the starts fly")
     return figure
 
 
-def shares(comparison: Comparison, cells: Sequence[Result], title: str) -> Figure:
+def shares(comparison: Comparison, found: Sequence[Result], title: str, style: Style = SCREEN) -> Figure:
     """The share of all starts that flies over the axis, with Wilson intervals, a line for each controller."""
-    figure = Figure(figsize=(8.0, 4.4))
+    figure = style.figure(32.0)
     panel = figure.add_subplot()
     _, factor = _axis(comparison)
     for color, name in _colored(comparison):
-        group = [cell for cell in cells if cell.controller == name]
+        group = [cell for cell in found if cell.controller == name]
         at = [factor * float(cell.value) for cell in group]
         panel.plot(at, [cell.share for cell in group], ".-", color=color, label=name)
         panel.fill_between(
             at, [cell.low for cell in group], [cell.high for cell in group], color=color, alpha=0.15, linewidth=0.0
         )
-    runs = max((cell.runs for cell in cells), default=0)
-    panel.set(xlabel=_label(comparison, factor), ylabel="share that flies", ylim=(-0.02, 1.02))
-    panel.set_title(f"{title}; {runs} starts, 95 % intervals", fontsize=10)
-    panel.legend(fontsize=8)
+    runs = max((cell.runs for cell in found), default=0)
+    panel.set(xlabel=_label(comparison, factor), ylabel="share that flies [1]", ylim=(-0.02, 1.02))
+    panel.set_title(f"{title}; {runs} starts, 95 % intervals")
+    panel.legend()
     return figure
 
 
-def limits_of(comparison: Comparison, limits: Sequence[Limit]) -> Figure:
+def limits_of(comparison: Comparison, limits: Sequence[Limit], style: Style = SCREEN) -> Figure:
     """Up to where half and nine in ten of the starts fly, with intervals, an arrow for those that go beyond the axis.
 
     Beside it the same times the bandwidth.
@@ -113,7 +112,7 @@ def limits_of(comparison: Comparison, limits: Sequence[Limit]) -> Figure:
         (key, [*group]) for key, group in groupby(limits, lambda one: (one.vehicle, one.condition, one.controller))
     ]
     in_seconds = _in_seconds(comparison)
-    figure = Figure(figsize=(8.0, 0.35 * len(groups) + 1.6))
+    figure = style.figure(2.5 * len(groups) + 12.0)
     panels = figure.subplots(1, 2 if in_seconds else 1, sharey=True, squeeze=False).ravel()
     _, factor = _axis(comparison)
     for row, (_, group) in enumerate(groups):
@@ -125,19 +124,18 @@ def limits_of(comparison: Comparison, limits: Sequence[Limit]) -> Figure:
     several = len(comparison.vehicles) * len(comparison.conditions) > 1
     names = [", ".join((key[2], *key[:2])) if several else key[2] for key, _ in groups]
     panels[0].set(yticks=range(len(names)), yticklabels=names, xlabel=f"up to {_label(comparison, factor)}")
-    panels[0].tick_params(axis="y", labelsize=8)
     panels[0].invert_yaxis()
     if in_seconds:
-        panels[1].set(xlabel=f"{comparison.axis.name} · bandwidth of the attitude loop [rad]")
-    figure.legend(loc="outside upper center", ncols=2, fontsize=8)
+        panels[1].set(xlabel=f"{name_of(comparison.axis)} · bandwidth of the attitude loop [rad]")
+    figure.legend(loc="outside upper center", ncols=2)
     return figure
 
 
-def fronts_of(comparison: Comparison, points: Sequence[Point], title: str) -> Figure:
+def fronts_of(comparison: Comparison, points: Sequence[Point], title: str, style: Style = SCREEN) -> Figure:
     """Error against effort at values of the axis; the line joins what nothing beats."""
     values = [*dict.fromkeys(point.value for point in points)]
     chosen = [values[round(i)] for i in np.linspace(0, len(values) - 1, min(len(values), MOST_PANELS))]
-    figure, panels = _panels(len(chosen), height=2.8)
+    figure, panels = _panels(len(chosen), 20.0, style)
     _, factor = _axis(comparison)
     colors = {name: color for color, name in _colored(comparison)}
     for panel, value in zip(panels, chosen):
@@ -152,20 +150,19 @@ def fronts_of(comparison: Comparison, points: Sequence[Point], title: str) -> Fi
         line = sorted((p.effort.value or 0.0, p.error.value or 0.0) for p in here if p.on_front)
         panel.plot(*np.transpose(line), color=GREY, linewidth=0.8, zorder=0)
         starts = here[0].starts
-        panel.set_title(f"{factor * float(value):g}{' ms' if factor != 1.0 else ''}, {starts} starts", fontsize=9)
+        panel.set_title(f"{factor * float(value):g}{' ms' if factor != 1.0 else ''}, {starts} starts")
         panel.set(xscale="log", yscale="log")
         for ticks in (panel.xaxis, panel.yaxis):
             ticks.set_major_locator(LogLocator(subs=(1.0, 3.0)))
             ticks.set_major_formatter("{x:g}")
             ticks.set_minor_formatter(NullFormatter())
-        panel.tick_params(labelsize=8)
     for name, color in colors.items():
         if any(point.controller == name for point in points):
             panels[0].plot([], [], "o", color=color, label=name)
-    figure.legend(loc="outside right center", fontsize=8)
-    figure.supxlabel(comparison.front.effort, fontsize=9)
-    figure.supylabel(comparison.front.error, fontsize=9)
-    figure.suptitle(f"{title}: medians over the starts that all fly; filled: on the front", fontsize=10)
+    figure.legend(loc="outside right center")
+    figure.supxlabel(labels.metric_with_unit(comparison.front.effort))
+    figure.supylabel(labels.metric_with_unit(comparison.front.error))
+    figure.suptitle(f"{title}: medians over the starts that all fly; filled: on the front")
     return figure
 
 
@@ -198,11 +195,11 @@ def _is_known(point: Point) -> bool:
     return point.error.value is not None and point.effort.value is not None
 
 
-def _panels(count: int, height: float) -> tuple[Figure, "np.ndarray[tuple[int], np.dtype[np.object_]]"]:
-    """A figure with so many panels, at most three in a row, that share their axes."""
-    columns = min(3, count)
+def _panels(count: int, height: float, style: Style) -> tuple[Figure, "np.ndarray[tuple[int], np.dtype[np.object_]]"]:
+    """A figure with so many panels, each so many lines high, at most three in a row, that share their axes."""
+    columns = min(3 if style.is_wide else 1, count)
     rows = math.ceil(count / columns)
-    figure = Figure(figsize=(2.6 * columns + 1.4, height * rows + 0.8))
+    figure = style.figure(height * rows + 6.0)
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for panel in panels[count:]:
         panel.set_visible(False)
@@ -212,8 +209,8 @@ def _panels(count: int, height: float) -> tuple[Figure, "np.ndarray[tuple[int], 
 def _colored(comparison: Comparison) -> Iterator[tuple[str, str]]:
     """The colour and the name of each controller."""
     names = [one.name for one in comparison.controllers]
-    if len(names) <= len(COLORS):
-        yield from zip(COLORS, names)
+    if len(names) <= len(CYCLE):
+        yield from zip(CYCLE, names)
         return
     for color, name in zip(matplotlib.colormaps["turbo"](np.linspace(0.05, 0.95, len(names))), names):
         yield matplotlib.colors.to_hex(color), name
@@ -231,12 +228,4 @@ def _in_seconds(comparison: Comparison) -> bool:
 
 
 def _label(comparison: Comparison, factor: float) -> str:
-    return in_brackets(comparison.axis.name, "ms" if factor != 1.0 else None)
-
-
-def _edges(at: Sequence[float]) -> Floats:
-    """Of cells around values that grow."""
-    if len(at) == 1:
-        return np.array([at[0] - 0.5, at[0] + 0.5])
-    inner = 0.5 * (np.array(at[1:]) + np.array(at[:-1]))
-    return np.array([2.0 * at[0] - inner[0], *inner, 2.0 * at[-1] - inner[-1]])
+    return labels.with_unit(name_of(comparison.axis), "ms" if factor != 1.0 else None)

@@ -10,10 +10,12 @@ import pandas as pd
 import pytest
 from matplotlib.patches import Rectangle
 
+from orchestration.drawing import cells
 from orchestration.studies import figures
 from orchestration.studies.axes import Axis
 from orchestration.studies.drawing import draw_limit, draw_study
 from orchestration.studies.limit import Limit
+from orchestration.studies.maps import heat_map
 from orchestration.studies.sensitivity import Index
 from orchestration.studies.store import open_for_writing
 from orchestration.studies.study import Study
@@ -140,10 +142,12 @@ def test_what_flies_has_settled() -> None:
 
 
 def test_a_line_goes_through_what_flies_in_order_and_the_rest_is_crossed() -> None:
-    line, crosses, *_ = lines_of(figures.lines(judged(table()), (axis("timing.period", 1),), "ultimate_bound", WORDS))
-    assert line.get_xdata().tolist() == pytest.approx([0.01, 0.02, 0.03, 0.04, 0.05])
+    line, crosses, *_ = lines_of(
+        figures.lines(judged(table()), (axis("timing.period", 0.01),), "ultimate_bound", WORDS)
+    )
+    assert line.get_xdata().tolist() == pytest.approx([10.0, 20.0, 30.0, 40.0, 50.0])
     assert np.isnan(line.get_ydata()).tolist() == [False] * 4 + [True]
-    assert crosses.get_xdata().tolist() == pytest.approx([0.05])
+    assert crosses.get_xdata().tolist() == pytest.approx([50.0])
     assert crosses.get_marker() == "x"
 
 
@@ -151,43 +155,58 @@ def test_there_is_a_line_for_each_value_of_the_second_axis() -> None:
     runs = pd.concat([table().assign(delay=delay) for delay in (0.0, 0.01, 0.02)])
     second = axis("timing.delay", 0.0, 0.01, 0.02)
     runs = runs.rename(columns={"delay": "timing.delay"})
-    figure = figures.lines(judged(runs), (axis("timing.period", 1), second), "ultimate_bound", WORDS)
+    figure = figures.lines(judged(runs), (axis("timing.period", 0.01), second), "ultimate_bound", WORDS)
     (legend,) = figure.legends
-    assert [text.get_text() for text in legend.get_texts()][:3] == ["0", "0.01", "0.02"]
-    assert legend.get_title().get_text() == "timing.delay"
+    assert [text.get_text() for text in legend.get_texts()][:3] == ["0", "10", "20"]
+    assert legend.get_title().get_text() == "delay [ms]"
 
 
-def test_the_axes_of_time_have_their_unit_and_the_others_none() -> None:
-    for target, label in (("timing.period", "timing.period [s]"), ("plant.mass", "plant.mass"),
-                          ("timing.loss", "timing.loss")):  # fmt: skip
+def test_axes_have_names_for_people_and_their_unit() -> None:
+    for target, label in (("timing.period", "period [ms]"), ("plant.mass", "mass [kg]"),
+                          ("timing.measurement_loss", "loss of measurements")):  # fmt: skip
         runs = table().rename(columns={"timing.period": target})
-        figure = figures.lines(judged(runs), (axis(target, 1),), "ultimate_bound", WORDS)
+        figure = figures.lines(judged(runs), (axis(target, 0.01),), "ultimate_bound", WORDS)
         assert figure.axes[0].get_xlabel() == label
 
 
 def test_a_metric_has_its_unit_wherever_it_is_drawn() -> None:
     runs = judged(pd.concat([table().assign(**{"timing.delay": delay}) for delay in (0.0, 0.01)]))
-    axes = (axis("timing.period", 1), axis("timing.delay", 1))
+    axes = (axis("timing.period", 0.01), axis("timing.delay", 0.01))
     drawn = figures.lines(runs, axes[:1], "ultimate_bound", WORDS, unit="m")
-    assert drawn.axes[0].get_ylabel() == "ultimate_bound [m]"
-    assert figures.heat_map(runs, axes, "ultimate_bound", WORDS, unit="m").axes[1].get_ylabel() == (
-        f"ultimate_bound [m], where {WORDS[0]}"
+    assert drawn.axes[0].get_ylabel() == "largest position error, last third [m]"
+    assert heat_map(runs, axes, "ultimate_bound", WORDS, unit="m").axes[1].get_ylabel() == (
+        f"largest position error, last third [m], where {WORDS[0]}"
     )
     scattered = figures.scatter(runs, axes, "ultimate_bound", WORDS, unit="m")
-    assert scattered.get_supylabel() == "ultimate_bound [m]"
+    assert scattered.get_supylabel() == "largest position error, last third [m]"
 
 
 def test_a_map_has_a_cell_for_each_run_and_the_boundary_of_what_flies() -> None:
     runs = pd.concat([table().assign(**{"timing.delay": delay}) for delay in (0.0, 0.01, 0.02)])
-    figure = figures.heat_map(
-        judged(runs), (axis("timing.period", 1), axis("timing.delay", 1)), "ultimate_bound", WORDS
-    )
+    figure = heat_map(judged(runs), (axis("timing.period", 0.01), axis("timing.delay", 0.01)), "ultimate_bound", WORDS)
     _, mesh, boundary = figure.axes[0].collections
     values: Any = np.ma.filled(np.ma.asarray(mesh.get_array()), np.nan).reshape(3, 5)
     assert np.isnan(values).tolist() == [[False] * 4 + [True]] * 3
     assert values[0, :4] == pytest.approx([0.01, 0.02, 0.03, 0.04])
     crossings = np.concatenate([path.vertices for path in boundary.get_paths()])
-    assert crossings[:, 0] == pytest.approx(0.045)
+    assert crossings[:, 0] == pytest.approx(45.0)
+
+
+def test_cells_of_a_map_have_their_edges_half_way_between_values_in_the_scale_of_the_axis() -> None:
+    assert cells.edges([1.0, 2.0, 4.0]).tolist() == [0.5, 1.5, 3.0, 5.0]
+    assert cells.edges([1.0, 10.0, 100.0], logarithmic=True) == pytest.approx([10**-0.5, 10**0.5, 10**1.5, 10**2.5])
+    assert cells.edges([3.0]).tolist() == [2.5, 3.5]
+
+
+def test_the_limit_of_a_map_runs_along_edges_of_cells_and_not_beside_missing_ones() -> None:
+    panel = matplotlib.figure.Figure().add_subplot()
+    good = np.array([[1.0, 1.0, 0.0], [1.0, np.nan, 0.0]])
+    drawn = cells.limit(panel, np.arange(4.0), np.arange(3.0), good)
+    assert drawn is not None
+    assert [np.asarray(path.vertices).tolist() for path in drawn.get_paths()] == [[[2.0, 0.0], [2.0, 1.0]]]
+    cells.hatch(panel, np.arange(4.0), np.arange(3.0), np.isnan(good))
+    (missing,) = [one for one in panel.collections if one.get_hatch()]
+    assert missing.get_paths()[0].get_extents().bounds == (1.0, 1.0, 1.0, 1.0)
 
 
 def test_a_map_tells_bounded_from_diverged_with_the_horizon_beside_them() -> None:
@@ -195,28 +214,25 @@ def test_a_map_tells_bounded_from_diverged_with_the_horizon_beside_them() -> Non
     runs["outcome"] = ["settled", "bounded", "diverged", None, "settled"] * 2  # periods from 0.05 down
     runs.loc[runs["outcome"] == "diverged", "ultimate_bound"] = np.nan
     runs["horizon"] = 30.0
-    figure = figures.heat_map(
-        judged(runs), (axis("timing.period", 1), axis("timing.delay", 1)), "ultimate_bound", WORDS
-    )
+    figure = heat_map(judged(runs), (axis("timing.period", 0.01), axis("timing.delay", 0.01)), "ultimate_bound", WORDS)
     fell = np.ma.filled(np.ma.asarray(figure.axes[0].collections[0].get_array()), np.nan).reshape(2, 5)[0]
-    assert fell == pytest.approx([np.nan, np.nan, 2.0, 1.0, np.nan], nan_ok=True)
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["bounded", "diverged"]
-    assert figure.axes[0].get_title().endswith("by 30 s")
+    assert fell == pytest.approx([np.nan, np.nan, 1.0, 0.0, np.nan], nan_ok=True)
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        "settled", "bounded", "diverged", "missing", "limit of what is settled, by 30 s",
+    ]  # fmt: skip
 
 
 def test_a_line_marks_what_diverged_where_it_has_no_value() -> None:
     runs = table()
     runs["outcome"] = ["diverged", *runs["outcome"][1:]]
     runs.loc[runs["outcome"] == "diverged", "ultimate_bound"] = np.nan
-    _, _, down, *_ = lines_of(figures.lines(judged(runs), (axis("timing.period", 1),), "ultimate_bound", WORDS))
-    assert (down.get_marker(), down.get_xdata().tolist()) == ("v", pytest.approx([0.05]))
+    _, _, down, *_ = lines_of(figures.lines(judged(runs), (axis("timing.period", 0.01),), "ultimate_bound", WORDS))
+    assert (down.get_marker(), down.get_xdata().tolist()) == ("v", pytest.approx([50.0]))
 
 
 def test_where_everything_flies_a_map_has_no_boundary() -> None:
     runs = pd.concat([table(4).assign(**{"timing.delay": delay}) for delay in (0.0, 0.01)])
-    figure = figures.heat_map(
-        judged(runs), (axis("timing.period", 1), axis("timing.delay", 1)), "ultimate_bound", WORDS
-    )
+    figure = heat_map(judged(runs), (axis("timing.period", 0.01), axis("timing.delay", 0.01)), "ultimate_bound", WORDS)
     assert len(figure.axes[0].collections) == 2, "what fell, and what flies"
 
 
@@ -231,7 +247,7 @@ def test_the_spectral_radius_is_drawn_with_the_limits_that_there_are(
     assert unit.get_ydata() == [1.0, 1.0]
     assert [line.get_xdata()[0] for line in limits] == [1e3 * limit for limit in (local, large) if limit is not None]
     assert len(limits) == marks
-    expect_picture(figures.save(lambda: figure, tmp_path / "new" / "radius.png"))
+    expect_picture(*figures.save(lambda _: figure, tmp_path / "new" / "radius"))
 
 
 def limit(of: str) -> Limit:
@@ -243,7 +259,7 @@ def limit(of: str) -> Limit:
 
 @pytest.mark.parametrize("of", ["period", "delay"])
 def test_a_limit_is_drawn_with_the_radius_that_crosses_one_there(tmp_path: Path, of: str) -> None:
-    picture = draw_limit(short(), limit(of), tmp_path)
+    (picture,) = draw_limit(short(), limit(of), tmp_path)
     assert picture == tmp_path / f"spectral_radius_{of}.png"
     expect_picture(picture)
 
@@ -255,7 +271,7 @@ def test_a_limit_that_linear_theory_does_not_have_is_not_drawn(tmp_path: Path) -
 
 def test_dots_of_many_axes_are_apart_by_what_flies() -> None:
     runs = table().assign(**{"plant.mass": 1.0, "timing.delay": 0.0})
-    axes = (axis("timing.period", 1), axis("plant.mass", 1), axis("timing.delay", 1))
+    axes = (axis("timing.period", 0.01), axis("plant.mass", 1), axis("timing.delay", 0.01))
     figure = figures.scatter(judged(runs), axes, "ultimate_bound", WORDS)
     for panel in figure.axes[:3]:
         dots, crosses, _ = panel.get_lines()
@@ -274,7 +290,7 @@ def test_sensitivity_is_drawn_as_bars_with_their_confidence(tmp_path: Path) -> N
     panel = figure.axes[0]
     assert [bar.get_width() for bar in panel.patches if isinstance(bar, Rectangle)] == [0.3, 0.4, 0.5, 0.6]
     assert [label.get_text() for label in panel.get_yticklabels()] == ["a", "b"]
-    expect_picture(figures.save(lambda: figure, tmp_path / "bars.png"))
+    expect_picture(*figures.save(lambda _: figure, tmp_path / "bars"))
 
 
 def test_figures_are_the_same_bytes_each_time(tmp_path: Path) -> None:

@@ -1,0 +1,82 @@
+"""Maps drawn cell by cell: what was flown, and no more, is coloured."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PatchCollection
+from matplotlib.colors import ListedColormap, LogNorm
+from matplotlib.patches import Patch, Rectangle
+
+from orchestration.drawing.palette import GREY, RED, SHADES
+from orchestration.simulator import Floats
+
+LIMIT = {"colors": RED, "linewidths": 1.8}
+"""How the line between what is good and what is not looks"""
+_HATCH: Mapping[str, Any] = {"facecolor": "none", "edgecolor": GREY, "hatch": "////", "linewidth": 0.0}
+
+
+def edges(values: Sequence[float] | Floats, *, logarithmic: bool = False) -> Floats:
+    """Of cells around values that grow, half-way between neighbours; shape (n + 1,)."""
+    at = np.log(np.asarray(values, float)) if logarithmic else np.asarray(values, float)
+    if len(at) == 1:
+        around = np.array([at[0] - 0.5, at[0] + 0.5])
+    else:
+        inner = 0.5 * (at[1:] + at[:-1])
+        around = np.array([1.5 * at[0] - 0.5 * at[1], *inner, 1.5 * at[-1] - 0.5 * at[-2]])
+    return np.exp(around) if logarithmic else around
+
+
+def fill(panel: Axes, x: Floats, y: Floats, values: Floats, **how: Any) -> Any:
+    """Colour cells between edges `x` and `y` by `values`, shape (rows, columns); none where they are nan.
+
+    Logarithmic in the values unless `norm` or `vmin` say otherwise or nothing is positive. Returns what a colour bar
+    is made of.
+    """
+    if not {"norm", "vmin", "cmap"} & set(how) and (values[np.isfinite(values)] > 0.0).any():
+        how["norm"] = LogNorm()
+    panel.grid(False)
+    mesh = panel.pcolormesh(
+        x, y, np.ma.masked_invalid(values), shading="flat", **{"cmap": SHADES, "rasterized": True, **how}
+    )
+    panel.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+    return mesh
+
+
+def fill_kinds(panel: Axes, x: Floats, y: Floats, kinds: Floats, colors: Sequence[str]) -> None:
+    """Colour cells by what they are: 0 the first colour and so on; none where nan."""
+    fill(panel, x, y, kinds, cmap=ListedColormap([*colors]), vmin=-0.5, vmax=len(colors) - 0.5)
+
+
+def hatch(panel: Axes, x: Floats, y: Floats, where: npt.NDArray[np.bool_]) -> None:
+    """Hatch the cells of which nothing is known."""
+    cells = [Rectangle((x[j], y[i]), x[j + 1] - x[j], y[i + 1] - y[i]) for i, j in zip(*np.nonzero(where), strict=True)]
+    if cells:
+        panel.add_collection(PatchCollection(cells, label="missing", **_HATCH))
+
+
+def hatched() -> Patch:
+    """The same in a legend."""
+    return Patch(label="missing", **_HATCH)
+
+
+def limit(panel: Axes, x: Floats, y: Floats, good: Floats, **how: Any) -> LineCollection | None:
+    """A line along the edges between cells that are good and their neighbours that are not; None if there are none.
+
+    `good` is 1, 0, or nan where nothing is known, shape (rows, columns).
+    """
+    segments = [
+        [(x[j + 1], y[i]), (x[j + 1], y[i + 1])] for i, j in zip(*np.nonzero(_differ(good[:, :-1], good[:, 1:])))
+    ] + [[(x[j], y[i + 1]), (x[j + 1], y[i + 1])] for i, j in zip(*np.nonzero(_differ(good[:-1], good[1:])))]
+    if not segments:
+        return None
+    drawn = LineCollection(segments, capstyle="projecting", **{**LIMIT, **how})
+    panel.add_collection(drawn)
+    return drawn
+
+
+def _differ(one: Floats, other: Floats) -> npt.NDArray[np.bool_]:
+    found: npt.NDArray[np.bool_] = (one != other) & ~np.isnan(one) & ~np.isnan(other)
+    return found

@@ -1,0 +1,65 @@
+"""A metric of a study over two axes, cell by cell."""
+
+from typing import TYPE_CHECKING
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from orchestration.drawing import cells
+from orchestration.drawing.palette import DIVERGED as DARK
+from orchestration.drawing.palette import NOT_GOOD, RED, SHADES
+from orchestration.drawing.style import SCREEN, Style
+from orchestration.drawing.ticks import plain
+from orchestration.results import labels
+from orchestration.simulator import Floats
+from orchestration.studies.axes import Axis
+from orchestration.studies.axis_labels import SCALES, edges, label
+from orchestration.studies.figures import DIVERGED, by_horizon, flew
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def heat_map(
+    table: "pd.DataFrame",
+    axes: tuple[Axis, ...],
+    metric: str,
+    words: tuple[str, str],
+    *,
+    unit: str | None = None,
+    style: Style = SCREEN,
+) -> Figure:
+    """A metric where runs are good, the outcome where not, the limit between the two; what is missing is hatched."""
+    kinds = {words[0]: 0, words[1]: 1, DIVERGED: 2}
+    coded = table.assign(flew=flew(table).astype(float), kind=table["outcome"].map(kinds).astype(float))
+    coded.loc[table["outcome"].isna(), "flew"] = np.nan
+    values, good, kind = (_grid(coded, axes, name) for name in (metric, "flew", "kind"))
+    x, y = (edges(axis, coded[axis.name]) for axis in axes[:2])
+    figure = style.figure(36.0)
+    panel = figure.add_subplot()
+    cells.fill_kinds(panel, x, y, np.where(kind > 0.0, kind - 1.0, np.nan), (NOT_GOOD, DARK))
+    mesh = cells.fill(panel, x, y, np.where(good > 0.5, values, np.nan))
+    cells.hatch(panel, x, y, np.isnan(kind))
+    has_limit = cells.limit(panel, x, y, good) is not None
+    panel.set(xlabel=label(axes[0]), ylabel=label(axes[1]), xscale=SCALES[axes[0].scale], yscale=SCALES[axes[1].scale])
+    bar = figure.colorbar(mesh, ax=panel, label=f"{labels.metric_with_unit(metric, unit)}, where {words[0]}")
+    plain(bar.ax.yaxis)
+    shown: list[Patch | Line2D] = [
+        Patch(color=matplotlib.colormaps[SHADES](0.5), label=words[0]),
+        *(Patch(color=color, label=word) for word, color in ((words[1], NOT_GOOD), (DIVERGED, DARK))),
+        *([cells.hatched()] if np.isnan(kind).any() else []),
+        *([Line2D([], [], color=RED, label=f"limit of what is {words[0]}{by_horizon(table)}")] if has_limit else []),
+    ]
+    figure.legend(handles=shown, loc="outside lower center", ncols=len(shown) if style.is_wide else 2)
+    return figure
+
+
+def _grid(table: "pd.DataFrame", axes: tuple[Axis, ...], name: str) -> Floats:
+    """Values by cell, shape (values of the second axis, values of the first); nan where there is no run."""
+    found: Floats = table.pivot_table(index=axes[1].name, columns=axes[0].name, values=name, dropna=False).to_numpy(
+        float
+    )
+    return found
