@@ -84,5 +84,7 @@ def test_a_code_block_keeps_the_name_of_its_file() -> None:
 
 
 def test_blocks_of_commands_are_coloured_and_equations_are_not() -> None:
-    assert for_the_site("text\n\n    quadcosim run  # fly\n\nmore") == "text\n\n```sh\nquadcosim run  # fly\n```\n\nmore"
+    assert (
+        for_the_site("text\n\n    quadcosim run  # fly\n\nmore") == "text\n\n```sh\nquadcosim run  # fly\n```\n\nmore"
+    )
     assert for_the_site("text\n\n    L = 2 k\n\nmore") == "text\n\n    L = 2 k\n\nmore"
