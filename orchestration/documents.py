@@ -79,6 +79,12 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     return tables
 
 
+def tables_in(text: str) -> dict[str, Any]:
+    """The tables of TOML that this project has written."""
+    tables: dict[str, Any] = tomllib.loads(text)
+    return tables
+
+
 def read_json(path: Path, what: str) -> Any:
     """The value of a JSON file; raises `UsageError` for what is none, `NaN` and `Infinity` included."""
     text = read_text(path, what)

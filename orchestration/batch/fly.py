@@ -1,6 +1,6 @@
 """Flies many systems as lanes of runs, and says of each what it came to, or that it is to be flown alone."""
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,8 +17,12 @@ from orchestration.master.streams import Streams
 from orchestration.master.watch import watch
 from orchestration.results.objectives import Metrics, told
 from orchestration.simulation import checked, run, source_values
+from orchestration.simulator import Floats
 from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS, nanoseconds
+
+Take = Callable[[int, Floats], None]
+"""Hears of a run, by its place among those that were asked for, the rows of what was recorded."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,10 +63,13 @@ class Batches:
         self._lanes = lanes_here()
         self._batches: dict[Hashable, tuple[Shape, Batch]] = {}
 
-    def fly(self, systems: Sequence[System]) -> list[Flown | None]:
+    def fly(
+        self, systems: Sequence[System], record: Sequence[str] = (), take: Take | None = None
+    ) -> list[Flown | None]:
         """What runs came to; None for one that is to be flown alone, by what flies anything.
 
-        Raises `UsageError` for what cannot be flown in lanes.
+        `record` are columns whose rows, the time [s] first, `take` is given of each run. Raises `UsageError` for what
+        cannot be flown in lanes.
         """
         found: list[Flown | None] = [None] * len(systems)
         shapes: dict[Hashable, list[int]] = {}
@@ -72,9 +79,12 @@ class Batches:
             shape, batch = self._batch(key, systems[indices[0]])
             timings = {index: timing(systems[index]) for index in indices}
             for group in _groups(indices, timings, self._lanes):
-                landed = batch.fly([systems[i] for i in group], [timings[i] for i in group])
+                landed = batch.fly([systems[i] for i in group], [timings[i] for i in group], record)
                 for index, flown in zip(group, _told(shape, batch, landed, [systems[i] for i in group])):
                     found[index] = flown
+                for index, rows in zip(group, landed.signals if take is not None else ()):
+                    assert take is not None
+                    take(index, rows)
         return found
 
     def _batch(self, key: Hashable, system: System) -> tuple[Shape, Batch]:

@@ -22,6 +22,7 @@ from orchestration.errors import QuadcosimError, SimulatorError, UsageError
 from orchestration.exchange.interop import cli as interop
 from orchestration.extras import extra_of
 from orchestration.fmi.banners import banners_to_stderr
+from orchestration.report import command as reports
 from orchestration.studies import cli as studies
 from orchestration.subprocesses import misleading_variables
 from orchestration.units import after
@@ -285,6 +286,7 @@ def ssp(
 
 registering.add(app, FLY, run)
 plotting.register(app)
+reports.register(app)
 system_commands.register(app)
 studies.register(app)
 registering.add(app, FMUS, build, validate, doctor)

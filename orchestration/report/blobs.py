@@ -1,0 +1,77 @@
+"""Arrays of numbers as text in a JSON document: each content once, as the bytes that a browser reads."""
+
+import base64
+import hashlib
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+Kind = Literal["float32", "int16"]
+STEPS = 2**15 - 4
+"""of an int16 to each side of the middle; -2**15 is left for what is no number, a few for rounding"""
+NOTHING = -(2**15)
+"""The int16 of what is no number"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Blob:
+    """An array: value = offset + scale * number, and 10 to the power of that if it is `logarithmic`."""
+
+    kind: Kind
+    data: str
+    """its little-endian bytes in base 64"""
+    offset: float = 0.0
+    scale: float = 1.0
+    logarithmic: bool = False
+
+    def as_list(self) -> list[str | float | bool]:
+        """As the document has it: its text, and beside that what the numbers of an int16 stand for."""
+        if self.kind == "float32":
+            return [self.data]
+        return [self.data, self.offset, self.scale, *([True] if self.logarithmic else [])]
+
+
+class Blobs:
+    """Collects arrays; an array is called by its place among them."""
+
+    def __init__(self) -> None:
+        self.blobs: list[Blob] = []
+        self._places: dict[bytes, int] = {}
+
+    @property
+    def size(self) -> int:
+        """Characters that they take in the document."""
+        return sum(len(blob.data) for blob in self.blobs)
+
+    def exact(self, values: npt.ArrayLike) -> int:
+        """The place of an array of float32."""
+        array = np.asarray(values, dtype="<f4")
+        return self._place(Blob(kind="float32", data=_text(array)))
+
+    def compact(self, values: npt.ArrayLike, *, logarithmic: bool = False) -> int:
+        """The place of an array of int16, right to a part in 65,000 of its range; of its logarithm if so asked."""
+        given = np.asarray(values, dtype=float)
+        if logarithmic:
+            given = np.log10(np.where(given > 0.0, given, np.nan))
+        known = given[np.isfinite(given)]
+        low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
+        offset = float(f"{0.5 * (low + high):.9g}")
+        scale = float(f"{max(high - offset, offset - low) / STEPS:.9g}") or 1.0
+        steps = np.rint((np.where(np.isfinite(given), given, offset) - offset) / scale)
+        steps[~np.isfinite(given)] = NOTHING
+        data = _text(steps.astype("<i2"))
+        return self._place(Blob(kind="int16", data=data, offset=offset, scale=scale, logarithmic=logarithmic))
+
+    def _place(self, blob: Blob) -> int:
+        how = repr((blob.kind, blob.offset, blob.scale, blob.logarithmic))
+        key = hashlib.sha256(f"{how} {blob.data}".encode()).digest()
+        if key not in self._places:
+            self._places[key] = len(self.blobs)
+            self.blobs.append(blob)
+        return self._places[key]
+
+
+def _text(array: npt.NDArray[np.generic]) -> str:
+    return base64.b64encode(array.tobytes()).decode("ascii")

@@ -1,0 +1,113 @@
+"""Flies runs of a study again for their signals, of which a store keeps none: in lanes where that can be."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from orchestration.batch.fly import Batches
+from orchestration.errors import QuadcosimError
+from orchestration.master.streams import Streams
+from orchestration.report.layouts import COMPACT, is_flight
+from orchestration.report.tracks import Signals
+from orchestration.results.objectives import Metrics
+from orchestration.simulation import columns_of, run, source_values
+from orchestration.simulator import Floats
+from orchestration.studies.files import Files, all_with_files
+from orchestration.studies.lanes import expect_lanes
+from orchestration.studies.study import Study
+from orchestration.system.model import System
+
+SOME = 64
+"""Runs that are flown at once, so that of no more the whole signals are held"""
+MOST_COLUMNS = 24
+"""of a system that is no quadrotor"""
+Progress = Callable[[float], None]
+"""Hears the share of the flights that is done"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flight:
+    """A run that was flown again."""
+
+    index: int
+    system: System
+    signals: Signals
+    metrics: Metrics
+    message: str | None
+
+
+def in_lanes(study: Study) -> tuple[Study, Files] | None:
+    """The study by the native twins of its FMUs, if it can be flown in lanes on this machine."""
+    native = replace(study, native=True)
+    try:
+        files = native.files()
+        expect_lanes(native.system(0, files.starts_of(native.origin)), files)
+    except QuadcosimError:  # no compiler, or FMUs of other makers
+        return None
+    return native, files
+
+
+def fly(
+    study: Study, files: Files, indices: Sequence[int], *, lanes: bool, progress: Progress | None = None
+) -> Iterator[Flight]:
+    """Runs of a study by their indices, flown again; a run that fails is left out."""
+    starts, paths = files.starts_of(study.origin), {**files.fmus, **files.tables}
+    batches = Batches() if lanes else None
+    for first in range(0, len(indices), SOME if lanes else 1):
+        some = indices[first : first + (SOME if lanes else 1)]
+        systems = all_with_files([study.system(i, starts) for i in some], paths)
+        for index, system, found in zip(some, systems, _flown(systems, starts, batches)):
+            if found is not None:
+                signals, metrics, message = found
+                yield Flight(index=index, system=system, signals=signals, metrics=metrics, message=message)
+        if progress is not None:
+            progress(min(1.0, (first + len(some)) / len(indices)))
+
+
+Found = tuple[Signals, Metrics, str | None]
+
+
+def _flown(systems: Sequence[System], starts: Mapping[str, float], batches: Batches | None) -> Iterator[Found | None]:
+    """What runs of a study come to, in their order; their files are where they are."""
+    if batches is None:
+        yield from map(_alone, systems)
+        return
+    wanted = _columns(systems[0])
+    columns = [name for name in wanted if name.partition(".")[0] in systems[0].components]
+    rows: dict[int, Floats] = {}
+    for place, flown in enumerate(batches.fly(systems, columns, rows.__setitem__)):
+        if flown is None:
+            yield _alone(systems[place])
+            continue
+        signals = dict(zip(("time", *columns), rows[place].T))
+        yield signals | _of_sources(systems[place], starts, signals["time"]), flown.metrics, flown.message
+
+
+def _alone(system: System) -> Found | None:
+    try:
+        result = run(system)
+    except QuadcosimError:
+        return None
+    wanted = ("time", *_columns(system))
+    return {name: result.signals[name] for name in wanted}, result.metrics, result.divergence
+
+
+def _columns(system: System) -> list[str]:
+    """What of a run is kept: of a flight the plant and what it is to follow, else what is exchanged."""
+    there = columns_of(system)[1:]
+    if is_flight(there):
+        sources = [name for name in there if name.partition(".")[0] in system.sources]
+        return [name for name in (*COMPACT, *sources) if name in there]
+    return [*there[:MOST_COLUMNS]]
+
+
+def _of_sources(system: System, starts: Mapping[str, float], t: Floats) -> dict[str, Floats]:
+    """What the sources said, which lanes do not record."""
+    streams = Streams(system.seed, system.streams)
+    found: dict[str, Floats] = {}
+    for name, source in system.sources.items():
+        component = source.trajectory
+        given = {} if component is None else system.components[component].parameters
+        numbers = {f"{component}.{key}": float(value) for key, value in given.items() if not isinstance(value, str)}
+        values = source_values(system, name, {**starts, **numbers}, streams).over(t)
+        found |= dict(zip(source.signals(name), values.T))
+    return found

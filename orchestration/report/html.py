@@ -1,0 +1,49 @@
+"""A report as one HTML file: its document, the code of the page and the plotting library, all of it inside."""
+
+import html
+import re
+from importlib import resources
+from pathlib import Path
+
+from orchestration.errors import UsageError
+from orchestration.report.model import Report, as_json
+
+SCRIPTS = (
+    "data.js", "words.js", "scene.js", "timeplots.js", "map.js", "shares.js", "run.js", "tables.js", "page.js",
+)  # fmt: skip
+"""In the order in which the page takes them; each needs those before it only"""
+_PAGE = resources.files("orchestration.report") / "page"
+_PLACE = re.compile(r"\{\{(\w+)\}\}")
+
+
+def write(report: Report, out: Path) -> Path:
+    """Write the file of a report; raises `UsageError` where it cannot be."""
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        out.write_text(as_html(report), encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"--out {out}: expected a file that can be written: {error.strerror}") from error
+    return out
+
+
+def as_html(report: Report) -> str:
+    """The text of the file."""
+    from plotly.offline import get_plotlyjs  # comes with an extra
+
+    parts = {
+        "title": html.escape(report.title),
+        "style": _text("style.css"),
+        "data": _in_script(as_json(report)),
+        "plotly": get_plotlyjs(),
+        "script": "\n".join(_text(name) for name in SCRIPTS),
+    }
+    return _PLACE.sub(lambda place: parts[place[1]], _text("page.html"))
+
+
+def _in_script(document: str) -> str:
+    """JSON that may stand in a script element, whatever names are in it: no tag begins or ends there."""
+    return document.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+
+
+def _text(name: str) -> str:
+    return (_PAGE / name).read_text(encoding="utf-8")

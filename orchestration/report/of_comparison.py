@@ -1,0 +1,88 @@
+"""The report of a comparison: cells with their shares, the runs of each, and flights of some of these."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from orchestration.report.choice import evenly
+from orchestration.report.flights import Progress
+from orchestration.report.model import Cell, Compared, Report, Share
+from orchestration.report.of_study import Stored, read, report_of, ways_of
+from orchestration.report.tables import Way
+from orchestration.report.words import number
+from orchestration.studies.comparison.cells import Median, Result, results
+from orchestration.studies.comparison.design import START, Comparison
+from orchestration.studies.table import frame
+
+SIZE = "size of the initial error"
+"""A column of the table: of each start, as a share of the largest"""
+
+
+def comparison_report(
+    comparison: Comparison,
+    path: Path,
+    command: str,
+    *,
+    wanted: Sequence[int] = (),
+    most: int | None = None,
+    progress: Progress | None = None,
+) -> Report:
+    """The report of a comparison whose store is at `path`; as that of a study, with its cells."""
+    study = comparison.study
+    stored = _with_sizes(read(path, study), comparison)
+    found = report_of(
+        comparison.name, stored, study, command, wanted=wanted, most=most, progress=progress,
+        ways=[*ways_of(stored, study), Way(name=SIZE)], choose=_from_each_cell(comparison, stored),
+    )  # fmt: skip
+    cells = results(comparison, frame(path))
+    axis = next(way for way in ways_of(stored, study) if way.name == comparison.axis.name)
+    return replace(
+        found,
+        kind="comparison",
+        shares=(),
+        compared=Compared(
+            axis=axis.name,
+            unit=axis.unit,
+            controllers=tuple(one.name for one in comparison.controllers),
+            cells=tuple(map(_cell, cells)),
+        ),
+        summary=f"{len(cells)} cells of {len(comparison.drawn)} starts each. {found.summary}",
+    )
+
+
+def _with_sizes(stored: Stored, comparison: Comparison) -> Stored:
+    sizes = [start.size for start in comparison.drawn]
+    rows = [{**row, "settings": {**row["settings"], SIZE: sizes[int(row["settings"][START])]}} for row in stored.rows]
+    return replace(stored, rows=rows)
+
+
+def _from_each_cell(comparison: Comparison, stored: Stored) -> Callable[[int], list[int]]:
+    """Chooses so many runs, as many of each cell as of any other."""
+    starts, flown = len(comparison.drawn), {row["design_index"] for row in stored.rows if row["status"] == "done"}
+    cells = sum(1 for _ in comparison.cells())
+
+    def choose(most: int) -> list[int]:
+        places = [*evenly(starts, min(starts, max(1, most // cells)))]
+        return [index for cell in range(cells) for place in places if (index := cell * starts + place) in flown][:most]
+
+    return choose
+
+
+def _cell(found: Result) -> Cell:
+    value = float(found.value)
+    return Cell(
+        number=found.cell,
+        vehicle=found.vehicle,
+        condition=found.condition,
+        controller=found.controller,
+        value=value,
+        share=Share(
+            label=number(value), value=value, good=found.flown, runs=found.runs, low=found.low, high=found.high
+        ),
+        diverged=found.diverged,
+        medians={name: _ends(median) for name, median in found.medians.items()},
+    )
+
+
+def _ends(median: Median) -> tuple[float | None, float | None, float | None]:
+    return median.value, median.low, median.high

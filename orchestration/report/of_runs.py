@@ -1,0 +1,118 @@
+"""The report of runs, from their directories or as they were returned."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from orchestration.documents import tables_in
+from orchestration.errors import UsageError
+from orchestration.report.blobs import Blobs
+from orchestration.report.model import Report, Run, Setting
+from orchestration.report.tracks import Tracks
+from orchestration.report.words import number
+from orchestration.request import text_of
+from orchestration.results import labels
+from orchestration.results.result import Result
+
+BYTES = 9_000_000
+"""Characters that the signals of all runs may take"""
+MOST_ROWS, LEAST_ROWS = 6000, 200
+"""of a run"""
+MOST_RUNS = 200
+_CODED = 4.0 * 4.0 / 3.0
+"""Characters of a number"""
+
+
+def report_of(results: Mapping[str, Result], command: str) -> Report:
+    """The report of runs by name; raises `UsageError` for more than `MOST_RUNS`."""
+    if len(results) > MOST_RUNS:
+        raise UsageError(f"{len(results)} runs: expected at most {MOST_RUNS}; a study holds more")
+    blobs = Blobs()
+    tracks = Tracks(blobs)
+    columns = sum(len(result.columns) for result in results.values())
+    rows = int(min(MOST_ROWS, max(LEAST_ROWS, BYTES / _CODED / columns)))
+    runs = [_run(name, result, tracks, rows) for name, result in results.items()]
+    some = next(iter(results.values()))
+    told = [_told(name, result) for name, result in results.items()]
+    return Report(
+        kind="runs",
+        title=next(iter(results)) if len(results) == 1 else f"{len(results)} runs",
+        summary=told[0] if len(results) == 1 else "; ".join(told[:6]) + ("; …" if len(told) > 6 else ""),
+        words=some.system.criterion.outcomes,
+        layouts=tuple(tracks.layouts),
+        runs=tuple(runs),
+        blobs=blobs.blobs,
+        units={
+            key: shown
+            for result in results.values()
+            for key, unit in result.units.items()
+            if (shown := labels.unit(unit))
+        },
+        labels={key: labels.metric(key) for result in results.values() for key in result.metrics},
+        contents=(*_contents(results, rows),),
+        warnings=tuple(f"{name}: {text}" for name, result in results.items() for text in result.warnings),
+        provenance=tuple(provenance(results)),
+        command=command,
+    )
+
+
+def _run(name: str, result: Result, tracks: Tracks, rows: int) -> Run:
+    signals = dict(result.signals)
+    return Run(
+        name=name,
+        settings=_settings(result),
+        metrics=result.metrics,
+        message=result.divergence,
+        note=None if result.interrupted_at is None else f"interrupted at {number(result.interrupted_at)} s",
+        track=tracks.whole(result.system, signals, result.described, rows),
+    )
+
+
+def _settings(result: Result) -> dict[str, Setting]:
+    """What its file says, by key."""
+    found: dict[str, Setting] = {}
+    waiting: list[tuple[str, Any]] = [("", tables_in(text_of(result.asked)))]
+    while waiting:
+        place, value = waiting.pop(0)
+        if isinstance(value, Mapping):
+            waiting = [(f"{place}.{key}".lstrip("."), each) for key, each in value.items()] + waiting
+        elif isinstance(value, float | int | bool | str):
+            found[place] = value
+    return found
+
+
+def _told(name: str, result: Result) -> str:
+    outcome = result.metrics["outcome"]
+    said = "no criterion" if outcome is None else str(outcome)
+    return f"{name}: {said} after {number(result.end)} s"
+
+
+def _contents(results: Mapping[str, Result], rows: int) -> Sequence[str]:
+    longest = max(len(result.recording) for result in results.values())
+    if longest <= rows:
+        return ["All that was recorded is in this file, as numbers of 32 bits."]
+    stride = -(-longest // rows)
+    return [
+        f"Of the recorded rows every {stride}th is in this file, and with them those at which a signal is largest or "
+        "smallest; the metrics are of all rows."
+    ]
+
+
+def provenance(results: Mapping[str, Result]) -> list[tuple[str, str]]:
+    """Versions, platform, engine and GUIDs of FMUs; what differs from run to run once for each."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for name, result in results.items():
+        notes = result.provenance
+        facts = [
+            *notes.get("versions", {}).items(),
+            *((key, notes[key]) for key in ("platform", "engine") if key in notes),
+        ]
+        facts += [
+            (f"FMU of {component}", f"{fmu.get('model')} {fmu.get('guid')}")
+            for component, fmu in notes.get("fmus", {}).items()
+        ]
+        for key, value in facts:
+            found.setdefault((str(key), str(value)), []).append(name)
+    return [
+        (key, value if len(names) == len(results) else f"{value} ({', '.join(names)})")
+        for (key, value), names in found.items()
+    ]

@@ -1,0 +1,99 @@
+// What the page is about, and the arrays in it, which are read when they are needed.
+
+const report = JSON.parse(document.getElementById("data").textContent);
+const NOTHING = -32768;
+const arraysByPlace = new Map();
+
+/** The numbers of a blob, by its place. */
+function numbersOf(place) {
+  if (!arraysByPlace.has(place)) arraysByPlace.set(place, decoded(report.blobs[place]));
+  return arraysByPlace.get(place);
+}
+
+function decoded(blob) {
+  const [text, offset, scale, isLogarithmic] = blob;
+  const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  if (offset === undefined) return new Float32Array(bytes.buffer);
+  const steps = new Int16Array(bytes.buffer);
+  return Float64Array.from(steps, (step) => {
+    if (step === NOTHING) return NaN;
+    const value = offset + scale * step;
+    return isLogarithmic ? 10 ** value : value;
+  });
+}
+
+/** The signals of a run: its time and what it has by column, the angles of a vehicle with them; null without any. */
+function signalsOf(run) {
+  if (!run || !run.track) return null;
+  if (!run.signals) {
+    const layout = report.layouts[run.track.layout];
+    const columns = {};
+    run.track.columns.forEach((place, i) => {
+      Object.defineProperty(columns, layout.columns[i], { enumerable: true, get: () => numbersOf(place) });
+    });
+    run.signals = { time: numbersOf(run.track.time), columns, layout };
+    addAngles(run.signals);
+  }
+  return run.signals;
+}
+
+/** Roll, pitch and yaw [deg] about the body's axes, from the quaternion. */
+function addAngles(signals) {
+  const scene = signals.layout.scene;
+  if (!scene) return;
+  const [x, y, z, w] = scene.quaternion.map((name) => signals.columns[name]);
+  const degrees = (make) => Float64Array.from(x, (_, i) => (180 / Math.PI) * make(x[i], y[i], z[i], w[i]));
+  signals.columns.roll = degrees((a, b, c, d) => Math.atan2(2 * (d * a + b * c), 1 - 2 * (a * a + b * b)));
+  signals.columns.pitch = degrees((a, b, c, d) => Math.asin(Math.max(-1, Math.min(1, 2 * (d * b - c * a)))));
+  signals.columns.yaw = degrees((a, b, c, d) => Math.atan2(2 * (d * c + a * b), 1 - 2 * (b * b + c * c)));
+}
+
+/** The last place whose time is not after t. */
+function placeAt(time, t) {
+  let low = 0;
+  let high = time.length - 1;
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (time[middle] <= t) low = middle;
+    else high = middle - 1;
+  }
+  return low;
+}
+
+/** The value of a column at t, on the line between two rows. */
+function valueAt(signals, name, t) {
+  const time = signals.time;
+  const values = signals.columns[name];
+  const i = placeAt(time, t);
+  if (i + 1 >= time.length) return values[time.length - 1];
+  const share = Math.max(0, (t - time[i]) / (time[i + 1] - time[i]));
+  return values[i] + share * (values[i + 1] - values[i]);
+}
+
+// -- the table of a study ---------------------------------------------------------------------------------
+
+const columnsByName = new Map((report.table ? report.table.columns : []).map((column) => [column.name, column]));
+const axes = [...columnsByName.values()].filter((column) => column.kind === "axis");
+const drawable = [...columnsByName.values()].filter((column) => column.kind === "metric" && !column.words);
+
+/** The value of a column in a row: a number, a word, or NaN. */
+function cellOf(column, row) {
+  const value = numbersOf(column.values)[row];
+  return column.words ? column.words[value] : value;
+}
+
+function outcomeOf(row) {
+  return cellOf(columnsByName.get("outcome"), row);
+}
+
+/** good, bad or diverged; failed runs are bad. */
+function kindOf(outcome) {
+  if (outcome === report.words[0]) return "good";
+  return outcome === "diverged" ? "diverged" : "bad";
+}
+
+/** The run whose flight is in the file, of a row of the table; undefined without one. */
+function runOfRow(row) {
+  const place = report.table.tracks[row];
+  return place === undefined ? undefined : report.runs[place];
+}

@@ -1,0 +1,306 @@
+// A study over its axes: cells of a grid, or points of a sample, each of which opens its run.
+
+const NOT_GOOD = { bad: "#c9ced4", diverged: "#5f666d" };
+const MARKS = { good: "circle", bad: "x-thin-open", diverged: "triangle-down-open" };
+const EDGE = "#D55E00";
+const MOST_SYMBOLS = 2500;
+const VALUE = "value";
+
+const map = { x: null, y: null, metric: null, fixed: {}, row: null, rows: [], isGrid: false };
+
+function startMap() {
+  byId("map").hidden = false;
+  map.metric = columnsByName.get(report.metric) ?? drawable[0];
+  const varied = axes.filter((axis) => valuesOf(axis).length > 1);
+  map.x = varied[0] ?? axes[0];
+  map.y = varied[1] ?? VALUE;
+  for (const axis of axes) map.fixed[axis.name] = valuesOf(axis)[0];
+  byId("map-plot").setAttribute("aria-label", "Map of the runs. Arrow keys open the neighbouring run.");
+  byId("map-plot").addEventListener("keydown", stepOnMap);
+  buildMapControls();
+  return drawMap();
+}
+
+/** The different values of an axis, in order. */
+function valuesOf(axis) {
+  if (!axis.distinct) {
+    const seen = new Set(numbersOf(axis.values));
+    const values = [...seen].sort((a, b) => a - b);
+    axis.distinct = axis.words ? values.map((place) => axis.words[place]) : values;
+  }
+  return axis.distinct;
+}
+
+function buildMapControls() {
+  const controls = byId("map-controls");
+  controls.replaceChildren(
+    choice("Colour", drawable.map((column) => [column.name, column.label]), map.metric.name, (name) => changeMap({ metric: columnsByName.get(name) })),
+    choice("across", axes.map((axis) => [axis.name, axis.label]), map.x.name, (name) => changeMap({ x: columnsByName.get(name) })),
+    choice("up", [...axes.map((axis) => [axis.name, axis.label]), [VALUE, "the metric"]], map.y === VALUE ? VALUE : map.y.name, (name) => changeMap({ y: name === VALUE ? VALUE : columnsByName.get(name) })),
+  );
+  if (report.table.is_grid) {
+    for (const axis of axes) {
+      if (axis === map.x || axis === map.y || valuesOf(axis).length < 2) continue;
+      controls.append(choice(titled(axis.label, axis.unit), valuesOf(axis).map((value, i) => [i, shown(value)]), valuesOf(axis).indexOf(map.fixed[axis.name]), (i) => {
+        map.fixed[axis.name] = valuesOf(axis)[i];
+        drawMap();
+      }));
+    }
+  }
+}
+
+function changeMap(change) {
+  Object.assign(map, change);
+  if (map.x === map.y) map.y = VALUE;
+  buildMapControls();
+  drawMap();
+}
+
+/** Rows of the slice that is shown: all of a sample. */
+function rowsOfSlice() {
+  const others = report.table.is_grid ? axes.filter((axis) => axis !== map.x && axis !== map.y && valuesOf(axis).length > 1) : [];
+  const found = [];
+  for (let row = 0; row < report.table.count; row += 1) {
+    if (others.every((axis) => cellOf(axis, row) === map.fixed[axis.name])) found.push(row);
+  }
+  return found;
+}
+
+function drawMap() {
+  map.rows = rowsOfSlice();
+  map.isGrid = report.table.is_grid && map.y !== VALUE;
+  const traces = map.isGrid ? gridTraces() : pointTraces();
+  const holder = byId("map-plot");
+  return Plotly.react(holder, [...traces, chosenTrace()], mapLayout(), PLOTLY).then(() => {
+    if (!map.isDrawn) holder.on("plotly_click", (event) => openRow(rowOfPoint(event.points[0])));
+    map.isDrawn = true;
+    byId("map-hint").textContent = mapHint();
+  });
+}
+
+function mapHint() {
+  const flights = report.runs.length ? ` ${report.runs.length} of ${report.table.count} have their flight in this file.` : "";
+  const [good, bad] = report.words;
+  const signs = map.isGrid ? `Colour: ${good}; light grey ✕: ${bad}; dark grey ▽: diverged; orange line: edge of what is ${good}.` : `Discs: ${good}; ✕: ${bad}; ▽: diverged.`;
+  const clipped = map.isClipped ? " The colours leave out the outermost 2 % to each side." : "";
+  return `${signs}${clipped} Click, or move with the arrow keys, to open a run.${flights}`;
+}
+
+function rowOfPoint(point) {
+  if (point.customdata === undefined || point.customdata === null) return map.row;
+  return Array.isArray(point.customdata) ? point.customdata[0] : point.customdata;
+}
+
+/** What hovering over a run says. */
+function hoverOf(row) {
+  const lines = axes.map((axis) => `${escaped(axis.label)}: ${escaped(withUnit(cellOf(axis, row), axis.unit))}`);
+  const index = shown(cellOf(columnsByName.get("design_index"), row));
+  lines.unshift(`<b>run ${index}: ${escaped(outcomeOf(row))}</b>`);
+  if (map.metric) lines.push(`${escaped(map.metric.label)}: ${escaped(withUnit(cellOf(map.metric, row), map.metric.unit))}`);
+  if (report.runs.length && !runOfRow(row)) lines.push("<i>metrics only</i>");
+  return lines.join("<br>");
+}
+
+/** Whether colour and height go by the logarithm of the metric. */
+function isLogarithmic() {
+  return map.metric.logarithmic;
+}
+
+/** The ends of the colours: of all values, or without the outermost fiftieths where those would take most of them. */
+function colorEnds(values) {
+  const sorted = values.filter(Number.isFinite).sort((a, b) => a - b);
+  if (!sorted.length) return [0, 1];
+  const at = (share) => sorted[Math.round(share * (sorted.length - 1))];
+  const [low, high, inner, outer] = [sorted[0], sorted.at(-1), at(0.02), at(0.98)];
+  map.isClipped = sorted.length >= 20 && high - low > 2.5 * (outer - inner) && outer > inner;
+  return map.isClipped ? [inner, outer] : [low, high];
+}
+
+function colorOf(value) {
+  return isLogarithmic() ? Math.log10(value) : value;
+}
+
+/** The colour bar between two ends, its ticks in the metric's own numbers. */
+function colorBar([low, high]) {
+  const bar = { title: { text: escaped(titled(map.metric.label, map.metric.unit)), side: "right" }, thickness: 14, outlinewidth: 0, len: 1 };
+  if (!isLogarithmic()) return bar;
+  const ticks = [];
+  for (let power = Math.floor(low); power <= high; power += 1) {
+    for (const factor of high - low > 2.5 ? [1] : [1, 2, 5]) {
+      const tick = power + Math.log10(factor);
+      if (tick >= low && tick <= high) ticks.push(tick);
+    }
+  }
+  return { ...bar, tickvals: ticks, ticktext: ticks.map((tick) => String(Number((10 ** tick).toPrecision(1)))) };
+}
+
+// -- a grid -----------------------------------------------------------------------------------------------
+
+function gridTraces() {
+  const [across, up] = [valuesOf(map.x), valuesOf(map.y)];
+  const place = (axis, row) => valuesOf(axis).indexOf(cellOf(axis, row));
+  const empty = () => up.map(() => new Array(across.length).fill(null));
+  const [colors, codes, texts, rows, kinds] = [empty(), empty(), empty(), empty(), empty()];
+  for (const row of map.rows) {
+    const [i, j] = [place(map.y, row), place(map.x, row)];
+    const kind = kindOf(outcomeOf(row));
+    kinds[i][j] = kind;
+    rows[i][j] = row;
+    texts[i][j] = hoverOf(row);
+    codes[i][j] = { good: 0, bad: 1, diverged: 2 }[kind];
+    if (kind === "good") colors[i][j] = colorOf(cellOf(map.metric, row));
+  }
+  const gaps = across.length * up.length <= 900 ? { xgap: 1, ygap: 1 } : {};
+  const scale = [[0, "rgba(0,0,0,0)"], [1 / 3, "rgba(0,0,0,0)"], [1 / 3, NOT_GOOD.bad], [2 / 3, NOT_GOOD.bad], [2 / 3, NOT_GOOD.diverged], [1, NOT_GOOD.diverged]];
+  const values = colors.flat();
+  const [zmin, zmax] = colorEnds(values);
+  return [
+    { type: "heatmap", x: across, y: up, z: colors, zmin, zmax, colorscale: "Viridis", colorbar: colorBar([zmin, zmax]), hoverinfo: "skip", showscale: values.some(Number.isFinite), ...gaps },
+    { type: "heatmap", x: across, y: up, z: codes, zmin: -0.5, zmax: 2.5, colorscale: scale, showscale: false, customdata: rows, text: texts, hovertemplate: "%{text}<extra></extra>", ...gaps },
+    ...symbolTraces(kinds, across, up),
+    edgeTrace(kinds, across, up),
+  ];
+}
+
+/** Signs on what is not good, where there is room for them. */
+function symbolTraces(kinds, across, up) {
+  if (across.length * up.length > MOST_SYMBOLS) return [];
+  return ["bad", "diverged"].map((kind) => {
+    const found = { x: [], y: [] };
+    kinds.forEach((line, i) => line.forEach((each, j) => {
+      if (each !== kind) return;
+      found.x.push(across[j]);
+      found.y.push(up[i]);
+    }));
+    return {
+      type: "scatter", mode: "markers", ...found, hoverinfo: "skip", showlegend: false,
+      marker: { symbol: MARKS[kind], size: 5, color: kind === "bad" ? "#3b4249" : "#fff", line: { width: 1, color: kind === "bad" ? "#3b4249" : "#fff" } },
+    };
+  });
+}
+
+/** The ends of the cells around values that grow. */
+function edgesOf(values) {
+  if (typeof values[0] === "string") return [...values.keys(), values.length].map((i) => i - 0.5);
+  if (values.length === 1) return [values[0] - 0.5, values[0] + 0.5];
+  const inner = values.slice(1).map((value, i) => (value + values[i]) / 2);
+  return [2 * values[0] - inner[0], ...inner, 2 * values.at(-1) - inner.at(-1)];
+}
+
+/** The line between what is good and what is not. */
+function edgeTrace(kinds, across, up) {
+  const [xs, ys] = [edgesOf(across), edgesOf(up)];
+  const [x, y] = [[], []];
+  const isGood = (i, j) => kinds[i]?.[j] === "good";
+  const isThere = (i, j) => Boolean(kinds[i]?.[j]);
+  for (let i = 0; i < up.length; i += 1) {
+    for (let j = 0; j < across.length; j += 1) {
+      if (isThere(i, j + 1) && isThere(i, j) && isGood(i, j) !== isGood(i, j + 1)) { x.push(xs[j + 1], xs[j + 1], null); y.push(ys[i], ys[i + 1], null); }
+      if (isThere(i + 1, j) && isThere(i, j) && isGood(i, j) !== isGood(i + 1, j)) { x.push(xs[j], xs[j + 1], null); y.push(ys[i + 1], ys[i + 1], null); }
+    }
+  }
+  return { type: "scatter", mode: "lines", x, y, line: { color: EDGE, width: 2.5 }, hoverinfo: "skip", showlegend: false };
+}
+
+// -- points of a sample -----------------------------------------------------------------------------------
+
+function pointTraces() {
+  const many = map.rows.length > 1500 && hasWebGL();
+  const values = map.rows.map((row) => colorOf(cellOf(map.metric, row))).filter(Number.isFinite);
+  const ends = colorEnds(map.rows.filter((row) => kindOf(outcomeOf(row)) === "good").map((row) => colorOf(cellOf(map.metric, row))));
+  const bottom = values.length ? (isLogarithmic() ? 10 ** Math.min(...values) : Math.min(...values)) : 0;
+  return ["good", "bad", "diverged"].map((kind) => {
+    const rows = map.rows.filter((row) => kindOf(outcomeOf(row)) === kind);
+    const height = (row) => {
+      if (map.y !== VALUE) return cellOf(map.y, row);
+      const value = cellOf(map.metric, row);
+      return Number.isNaN(value) ? bottom : value;
+    };
+    const word = { good: report.words[0], bad: report.words[1], diverged: "diverged" }[kind];
+    const colored = kind === "good" && map.y !== VALUE;
+    const plain = { good: COLORS[0], bad: "#8a6d1f", diverged: COLORS[1] }[kind];
+    return {
+      type: many ? "scattergl" : "scatter", mode: "markers", name: escaped(`${word} (${rows.length})`),
+      x: rows.map((row) => cellOf(map.x, row)), y: rows.map(height), customdata: rows, text: rows.map(hoverOf),
+      hovertemplate: "%{text}<extra></extra>",
+      marker: {
+        symbol: MARKS[kind], size: kind === "good" ? 7 : 8, line: { width: kind === "good" ? 0 : 1.5, color: plain },
+        color: colored ? rows.map((row) => colorOf(cellOf(map.metric, row))) : plain,
+        ...(colored ? { colorscale: "Viridis", colorbar: colorBar(ends), cmin: ends[0], cmax: ends[1] } : {}),
+      },
+    };
+  });
+}
+
+// -- what is chosen ---------------------------------------------------------------------------------------
+
+function placeOnMap(row) {
+  const value = map.y === VALUE ? cellOf(map.metric, row) : cellOf(map.y, row);
+  return [cellOf(map.x, row), Number.isNaN(value) ? null : value];
+}
+
+function chosenTrace() {
+  const isShown = map.row !== null && map.rows.includes(map.row);
+  const [x, y] = isShown ? placeOnMap(map.row) : [null, null];
+  return {
+    type: "scatter", mode: "markers", x: [x, x], y: [y, y], hoverinfo: "skip", showlegend: false, name: "open",
+    marker: { symbol: "square-open", size: [15, 19], color: ["#000", "#fff"], line: { width: [2.5, 2] } },
+  };
+}
+
+function markOnMap(row) {
+  map.row = row;
+  if (!map.isDrawn) return undefined;
+  const holder = byId("map-plot");
+  const { x, y } = chosenTrace();
+  return Plotly.restyle(holder, { x: [x], y: [y] }, [holder.data.length - 1]);
+}
+
+/** The neighbour of the open run in the direction of an arrow key. */
+function stepOnMap(event) {
+  const [dx, dy] = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key] ?? [0, 0];
+  if (!dx && !dy) return;
+  event.preventDefault();
+  if (map.row === null || !map.rows.includes(map.row)) openRow(map.rows[0]);
+  else openRow(neighbour(map.row, dx, dy));
+}
+
+function neighbour(row, dx, dy) {
+  const [across, up] = placeOnMap(row);
+  const place = (axis, value) => (axis === VALUE || axis.words === null ? value : axis.words.indexOf(value));
+  const [cx, cy] = [place(map.x, across), place(map.y, up)];
+  const spanX = spreadOf(map.x);
+  const spanY = map.y === VALUE ? 0 : spreadOf(map.y);
+  let [best, least] = [row, Infinity];
+  for (const other of map.rows) {
+    const [ox, oy] = placeOnMap(other);
+    const right = ((place(map.x, ox) - cx) / spanX) * (dx || 1);
+    const top = spanY ? ((place(map.y, oy) - cy) / spanY) * (dy || 1) : 0;
+    const [along, aside] = dx ? [right, top] : [top, right];
+    const distance = along + 6 * Math.abs(aside);
+    if (along > 1e-9 && distance < least) [best, least] = [other, distance];
+  }
+  return best;
+}
+
+function spreadOf(axis) {
+  if (axis.words) return axis.words.length;
+  const values = valuesOf(axis);
+  return values.at(-1) - values[0] || 1;
+}
+
+function mapLayout() {
+  const y = map.y === VALUE ? { title: { text: escaped(titled(map.metric.label, map.metric.unit)) }, type: isLogarithmic() ? "log" : "linear" } : axisLayout(map.y);
+  return {
+    height: 470, margin: { l: 66, r: 10, t: 26, b: 50 }, font: FONT, hovermode: "closest", dragmode: "pan",
+    paper_bgcolor: "#fff", plot_bgcolor: map.isGrid ? "#fff" : "#fbfcfd", xaxis: axisLayout(map.x),
+    yaxis: { ...y, gridcolor: "#e8ebee" }, showlegend: !map.isGrid,
+    legend: { orientation: "h", x: 0, y: 1.0, yanchor: "bottom" }, hoverlabel: { align: "left" },
+    uirevision: [map.x.name, map.y === VALUE ? VALUE : map.y.name].join(),
+  };
+}
+
+function axisLayout(axis) {
+  const type = axis.words ? "category" : axis.logarithmic ? "log" : "linear";
+  return { title: { text: escaped(titled(axis.label, axis.unit)), standoff: 8 }, type, gridcolor: "#e8ebee", zeroline: false, exponentformat: "power" };
+}

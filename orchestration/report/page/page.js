@@ -1,0 +1,38 @@
+// Begins: what is seen first is drawn first, the rest when the browser has time.
+
+function noteFirstPlot() {
+  if (performance.getEntriesByName("first plot").length) return;
+  performance.mark("first plot");
+  document.body.dataset.drawn = "yes";
+}
+
+function later(action) {
+  setTimeout(action, 0);
+}
+
+function startPage() {
+  document.body.classList.add(report.kind === "runs" ? "run-page" : "wide-page");
+  startHeader();
+  startRun();
+  startContents();
+  if (report.kind === "runs") {
+    openPlace(0);
+    later(startRunsTable);
+    return;
+  }
+  const drawn = report.compared ? startCells() : startMap();
+  drawn.then(() => {
+    noteFirstPlot();
+    later(openFirst);
+    later(startShares);
+  });
+}
+
+/** The run that is open at first: one that is good and has its flight here, if there is one. */
+function openFirst() {
+  if (report.compared) return openCell(cellsHere()[0]);
+  const rows = Object.keys(report.table.tracks).map(Number);
+  return openRow(rows.find((row) => kindOf(outcomeOf(row)) === "good") ?? rows[0] ?? 0);
+}
+
+startPage();

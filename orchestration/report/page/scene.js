@@ -1,0 +1,304 @@
+// The flight in space, drawn on a canvas: path, reference, and the vehicle with its arms and the axes of its body.
+// Space is north, east, down; up is up on the screen.
+
+const VIEWS = { "3-D": [-0.9, 0.42], side: [-Math.PI / 2, 0], top: [-Math.PI / 2, Math.PI / 2 - 1e-3] };
+const FLOWN = "#0072B2";
+const WANTED = "#D55E00";
+const BESIDE = "#8a4f7d";
+
+const scene = { canvas: null, tracks: [], t: 0, azimuth: VIEWS["3-D"][0], elevation: VIEWS["3-D"][1], zoom: 1, box: null };
+
+function startScene(canvas) {
+  scene.canvas = canvas;
+  canvas.setAttribute("aria-label", "The flight in space. Arrow keys turn it, plus and minus zoom, 0 shows all of it.");
+  canvas.addEventListener("pointerdown", startTurning);
+  canvas.addEventListener("keydown", turnByKey);
+  canvas.addEventListener("wheel", zoomByWheel, { passive: false });
+  new ResizeObserver(drawScene).observe(canvas);
+  const views = document.querySelector(".views");
+  for (const name of Object.keys(VIEWS)) views.append(button(name, () => look(...VIEWS[name])));
+}
+
+function look(azimuth, elevation) {
+  Object.assign(scene, { azimuth, elevation, zoom: 1 });
+  drawScene();
+}
+
+function startTurning(event) {
+  const { azimuth, elevation } = scene;
+  const move = (now) => {
+    scene.azimuth = azimuth - (now.clientX - event.clientX) * 0.008;
+    scene.elevation = Math.max(-1.5, Math.min(1.57, elevation + (now.clientY - event.clientY) * 0.008));
+    drawScene();
+  };
+  const stop = () => {
+    window.removeEventListener("pointermove", move);
+    window.removeEventListener("pointerup", stop);
+    window.removeEventListener("pointercancel", stop);
+  };
+  window.addEventListener("pointermove", move);
+  window.addEventListener("pointerup", stop);
+  window.addEventListener("pointercancel", stop);
+}
+
+function turnByKey(event) {
+  const turns = { ArrowLeft: [0.1, 0], ArrowRight: [-0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] };
+  if (event.key in turns) {
+    scene.azimuth += turns[event.key][0];
+    scene.elevation = Math.max(-1.5, Math.min(1.57, scene.elevation + turns[event.key][1]));
+  } else if (event.key === "+" || event.key === "=") scene.zoom *= 1.2;
+  else if (event.key === "-") scene.zoom /= 1.2;
+  else if (event.key === "0") return look(...VIEWS["3-D"]);
+  else return undefined;
+  event.preventDefault();
+  return drawScene();
+}
+
+function zoomByWheel(event) {
+  if (!event.ctrlKey && document.activeElement !== scene.canvas) return; // the page scrolls until the view is chosen
+  event.preventDefault();
+  scene.zoom *= Math.exp(-event.deltaY * 0.001);
+  drawScene();
+}
+
+/** Show these runs, the first as the one that is replayed. */
+function showInScene(tracks) {
+  scene.tracks = tracks.filter((signals) => signals && signals.layout.scene);
+  scene.box = boxOf(scene.tracks);
+  drawScene();
+}
+
+/** The box that holds the paths; what diverges does not make it endless. */
+function boxOf(tracks) {
+  const low = [Infinity, Infinity, Infinity];
+  const high = [-Infinity, -Infinity, -Infinity];
+  const take = (values, i, most) => {
+    for (const value of values) {
+      if (!Number.isFinite(value) || Math.abs(value) > most) continue;
+      low[i] = Math.min(low[i], value);
+      high[i] = Math.max(high[i], value);
+    }
+  };
+  for (const { layout, columns } of tracks) {
+    const { position, reference } = layout.scene;
+    for (let i = 0; i < 3; i += 1) {
+      take(columns[position[i]], i, 30);
+      if (reference) take(columns[reference[i]], i, Infinity);
+    }
+  }
+  const middle = low.map((value, i) => (value + high[i]) / 2);
+  const size = Math.max(0.5, ...low.map((value, i) => high[i] - value));
+  return { low, high, middle, size };
+}
+
+/** What turns a point (north, east, down) into a place on the screen, with its depth. */
+function camera(width, height) {
+  const fit = { scale: 1, right: 0, top: 0 };
+  const raw = projection(width, height, fit);
+  const corners = cornersOf(scene.box).map(raw);
+  const ends = (i) => [Math.min(...corners.map((c) => c[i])), Math.max(...corners.map((c) => c[i]))];
+  const [[left, right], [top, bottom]] = [ends(0), ends(1)];
+  const scale = scene.zoom * Math.min((width - 90) / (right - left || 1), (height - 70) / (bottom - top || 1));
+  return projection(width, height, { scale, right: (left + right) / 2 - width / 2, top: (top + bottom) / 2 - height / 2 });
+}
+
+/** The corners of what is to be seen, the floor with them. */
+function cornersOf({ low, high, size }) {
+  const step = niceStep(size);
+  const from = [0, 1].map((i) => Math.floor(low[i] / step) * step);
+  const to = [0, 1].map((i) => Math.ceil(high[i] / step) * step);
+  const levels = [low[2], Math.ceil(high[2] / step) * step];
+  return levels.flatMap((z) => [from[0], to[0]].flatMap((n) => [from[1], to[1]].map((e) => [n, e, z])));
+}
+
+/** As `camera`, at a scale and moved by some pixels of the picture at scale 1. */
+function projection(width, height, fit) {
+  const { middle, size, low, high } = scene.box;
+  const extent = Math.hypot(...low.map((value, i) => high[i] - value));
+  const [ca, sa, ce, se] = [Math.cos(scene.azimuth), Math.sin(scene.azimuth), Math.cos(scene.elevation), Math.sin(scene.elevation)];
+  const far = 3.2 * Math.max(extent, size);
+  return (point) => {
+    const [n, e, up] = [point[0] - middle[0], point[1] - middle[1], middle[2] - point[2]];
+    const right = -sa * n + ca * e;
+    const away = ca * n + sa * e;
+    const depth = ce * away - se * up;
+    const perspective = far / (far + depth);
+    const [x, y] = [perspective * right - fit.right, -perspective * (se * away + ce * up) - fit.top];
+    return [width / 2 + fit.scale * x, height / 2 + fit.scale * y, depth];
+  };
+}
+
+function drawScene() {
+  const canvas = scene.canvas;
+  if (!canvas || !scene.tracks.length || !canvas.clientWidth) return;
+  const ratio = window.devicePixelRatio || 1;
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+  if (canvas.width !== Math.round(width * ratio)) canvas.width = Math.round(width * ratio);
+  if (canvas.height !== Math.round(height * ratio)) canvas.height = Math.round(height * ratio);
+  const context = canvas.getContext("2d");
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.clearRect(0, 0, width, height);
+  const project = camera(width, height);
+  drawFloor(context, project);
+  scene.tracks.slice().reverse().forEach((signals, k, all) => drawFlight(context, project, signals, k < all.length - 1));
+}
+
+/** A step of 1, 2 or 5 times a power of ten that cuts a length in about five. */
+function niceStep(length) {
+  const power = 10 ** Math.floor(Math.log10(length / 5));
+  return power * [1, 2, 5, 10].find((factor) => factor * power >= length / 5);
+}
+
+function drawFloor(context, project) {
+  const { low, high, size } = scene.box;
+  const step = niceStep(size);
+  const from = [0, 1].map((i) => Math.floor(low[i] / step) * step);
+  const to = [0, 1].map((i) => Math.ceil(high[i] / step) * step);
+  const down = Math.ceil(high[2] / step) * step;
+  context.lineWidth = 1;
+  context.strokeStyle = "#dfe4e9";
+  for (let n = from[0]; n <= to[0] + step / 2; n += step) stroke(context, project, [[n, from[1], down], [n, to[1], down]]);
+  for (let e = from[1]; e <= to[1] + step / 2; e += step) stroke(context, project, [[from[0], e, down], [to[0], e, down]]);
+  drawTicks(context, project, from, to, down, step);
+}
+
+/** Numbers along the two edges of the floor that are nearer, and up a corner. */
+function drawTicks(context, project, from, to, down, step) {
+  const east = project([0, from[1], down])[2] < project([0, to[1], down])[2] ? from[1] : to[1];
+  const north = project([from[0], 0, down])[2] < project([to[0], 0, down])[2] ? from[0] : to[0];
+  context.fillStyle = "#57606a";
+  context.font = "11px system-ui, sans-serif";
+  context.textAlign = "center";
+  const outward = (a, b) => (a === b ? -1 : 1);
+  const shift = 0.32 * step;
+  const text = (what, point) => context.fillText(what, ...project(point).slice(0, 2));
+  for (let n = from[0]; n <= to[0] + step / 2; n += step) text(shown(n), [n, east + shift * outward(east, from[1]), down]);
+  for (let e = from[1]; e <= to[1] + step / 2; e += step) text(shown(e), [north + shift * outward(north, from[0]), e, down]);
+  text("north [m]", [(from[0] + to[0]) / 2, east + 2.4 * shift * outward(east, from[1]), down]);
+  text("east [m]", [north + 2.4 * shift * outward(north, from[0]), (from[1] + to[1]) / 2, down]);
+  const corner = [north, east === from[1] ? to[1] : from[1]];
+  const top = Math.floor(scene.box.low[2] / step) * step;
+  if (Math.cos(scene.elevation) < 0.3) return;
+  context.strokeStyle = "#c3cad1";
+  stroke(context, project, [[...corner, down], [...corner, top]]);
+  for (let z = top; z <= down + step / 2; z += step) text(`${shown(z)} `, [corner[0], corner[1] + shift * outward(corner[1], from[1]), z]);
+  text("down [m]", [corner[0], corner[1], top - 0.35 * step]);
+}
+
+function stroke(context, project, points) {
+  context.beginPath();
+  for (const [i, point] of points.entries()) {
+    const [x, y] = project(point);
+    if (i) context.lineTo(x, y);
+    else context.moveTo(x, y);
+  }
+  context.stroke();
+}
+
+function drawFlight(context, project, signals, isBeside) {
+  const { position, reference, quaternion } = signals.layout.scene;
+  const t = Math.min(scene.t, signals.time[signals.time.length - 1]);
+  const until = placeAt(signals.time, t);
+  const color = isBeside ? BESIDE : FLOWN;
+  const here = position.map((name) => valueAt(signals, name, t));
+  context.lineJoin = "round";
+  if (reference && !isBeside) {
+    context.setLineDash([6, 4]);
+    drawPath(context, project, signals, reference, 0, signals.time.length - 1, WANTED, 1.4);
+    context.setLineDash([]);
+  }
+  drawPath(context, project, signals, position, until, signals.time.length - 1, color, 1.2, 0.45);
+  drawPath(context, project, signals, position, 0, until, color, isBeside ? 1.6 : 2.4, 1, here);
+  if (reference && !isBeside) drawDiamond(context, project(reference.map((name) => valueAt(signals, name, t))));
+  drawVehicle(context, project, here, attitudeAt(signals, quaternion, t), color);
+}
+
+function drawPath(context, project, signals, names, first, last, color, width, alpha = 1, end = null) {
+  const [x, y, z] = names.map((name) => signals.columns[name]);
+  const step = Math.max(1, Math.floor((last - first) / 1500));
+  context.globalAlpha = alpha;
+  context.strokeStyle = color;
+  context.lineWidth = width;
+  context.beginPath();
+  let isOpen = false;
+  const add = (point) => {
+    if (!point.every((value) => Math.abs(value) < 1e4)) return;
+    const [right, top] = project(point);
+    if (isOpen) context.lineTo(right, top);
+    else context.moveTo(right, top);
+    isOpen = true;
+  };
+  for (let i = first; i <= last; i += step) add([x[i], y[i], z[i]]);
+  if (end) add(end);
+  context.stroke();
+  context.globalAlpha = 1;
+}
+
+function drawDiamond(context, [x, y]) {
+  context.strokeStyle = WANTED;
+  context.lineWidth = 2;
+  context.beginPath();
+  context.moveTo(x, y - 6);
+  for (const [dx, dy] of [[6, 0], [0, 6], [-6, 0]]) context.lineTo(x + dx, y + dy);
+  context.closePath();
+  context.stroke();
+}
+
+function attitudeAt(signals, names, t) {
+  const q = names.map((name) => valueAt(signals, name, t));
+  const length = Math.hypot(...q) || 1;
+  return q.map((part) => part / length);
+}
+
+/** A vector of the body in space, by the unit quaternion (x, y, z, w). */
+function rotated([x, y, z, w], [a, b, c]) {
+  const [u, v, s] = [2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)];
+  return [a + w * u + y * s - z * v, b + w * v + z * u - x * s, c + w * s + x * v - y * u];
+}
+
+/** Arms in a cross, rotors as discs (those in front filled), the axes of the body, and a plumb line to the floor. */
+function drawVehicle(context, project, here, q, color) {
+  if (!here.every((value) => Math.abs(value) < 1e4)) return;
+  const size = (0.05 * scene.box.size) / scene.zoom ** 0.5;
+  const at = (point) => rotated(q, point).map((value, i) => here[i] + value);
+  const down = Math.ceil(scene.box.high[2] / niceStep(scene.box.size)) * niceStep(scene.box.size);
+  context.strokeStyle = "#b4bcc4";
+  context.lineWidth = 1;
+  context.setLineDash([2, 3]);
+  stroke(context, project, [here, [here[0], here[1], down]]);
+  context.setLineDash([]);
+  context.strokeStyle = "#1b1f24";
+  context.lineWidth = 2.5;
+  for (const side of [1, -1]) stroke(context, project, [at([size, side * size, 0]), at([-size, -side * size, 0])]);
+  for (const [fore, side] of [[1, 1], [1, -1], [-1, 1], [-1, -1]]) drawRotor(context, project, at, size, fore, side, color);
+  drawAxis(context, project, at, [1.9 * size, 0, 0], "x");
+  drawAxis(context, project, at, [0, 1.9 * size, 0], "y");
+  drawAxis(context, project, at, [0, 0, 1.9 * size], "z");
+}
+
+function drawRotor(context, project, at, size, fore, side, color) {
+  context.beginPath();
+  for (let k = 0; k <= 16; k += 1) {
+    const angle = (k * Math.PI) / 8;
+    const [x, y] = project(at([fore * size + 0.55 * size * Math.cos(angle), side * size + 0.55 * size * Math.sin(angle), 0]));
+    if (k) context.lineTo(x, y);
+    else context.moveTo(x, y);
+  }
+  context.fillStyle = fore > 0 ? color : "#fff";
+  context.globalAlpha = 0.75;
+  context.fill();
+  context.globalAlpha = 1;
+  context.strokeStyle = color;
+  context.lineWidth = 1.5;
+  context.stroke();
+}
+
+function drawAxis(context, project, at, tip, name) {
+  context.strokeStyle = "#57606a";
+  context.lineWidth = 1.2;
+  stroke(context, project, [at([0, 0, 0]), at(tip)]);
+  context.fillStyle = "#1b1f24";
+  context.font = "italic 11px system-ui, sans-serif";
+  context.textAlign = "center";
+  context.fillText(name, ...project(at(tip.map((value) => 1.15 * value))).slice(0, 2));
+}

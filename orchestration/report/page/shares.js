@@ -1,0 +1,161 @@
+// Shares of runs that are good, with their intervals.
+
+const shares = { of: 0 };
+
+function startShares() {
+  if (report.kind !== "study" || !report.shares.length) return;
+  byId("shares").hidden = false;
+  byId("shares-title").textContent = `Share that is ${report.words[0]}`;
+  byId("shares-text").textContent = `All runs: ${shareText(report.overall)}.${report.overall.low === null ? " The runs are chosen, not drawn by chance, so that their shares have no interval." : " Bars: Wilson intervals at 95 %."}`;
+  byId("shares-controls").replaceChildren(choice("along", report.shares.map((each, i) => [i, each.axis.replace(/_/g, " ")]), 0, (i) => { shares.of = Number(i); drawShares(); }));
+  drawShares();
+}
+
+function drawShares() {
+  const { axis, unit, logarithmic, shares: found } = report.shares[shares.of];
+  const share = found.map((each) => each.good / each.runs);
+  const has = found.some((each) => each.low !== null);
+  const isNumber = found.every((each) => each.value !== null);
+  const trace = {
+    type: "scatter", mode: isNumber ? "lines+markers" : "markers", x: found.map((each) => (isNumber ? each.value : each.label)), y: share,
+    line: { color: COLORS[0], width: 1.2 }, marker: { size: 7, color: COLORS[0] }, text: found.map((each) => `${escaped(axis)} ${escaped(each.label)}${escaped(afterNumber(unit))}<br>${escaped(shareText(each))}`),
+    hovertemplate: "%{text}<extra></extra>",
+    ...(has ? { error_y: { type: "data", symmetric: false, array: found.map((each, i) => each.high - share[i]), arrayminus: found.map((each, i) => share[i] - each.low), thickness: 1.4, width: 4 } } : {}),
+  };
+  const layout = {
+    height: 270, margin: { l: 60, r: 10, t: 10, b: 48 }, font: FONT, paper_bgcolor: "#fff", plot_bgcolor: "#fff", hovermode: "closest",
+    xaxis: { title: { text: escaped(titled(axis.replace(/_/g, " "), unit)) }, type: isNumber ? (logarithmic ? "log" : "linear") : "category", gridcolor: "#e8ebee", zeroline: false },
+    yaxis: { title: { text: `share ${escaped(report.words[0])}` }, range: [-0.03, 1.03], tickformat: ".0%", gridcolor: "#e8ebee", zeroline: false },
+  };
+  Plotly.react(byId("shares-plot"), [trace], layout, PLOTLY);
+  const rows = found.map((each) => [each.label, `${each.good} of ${each.runs}`, percent(each.good / each.runs), each.low === null ? "–" : `${percent(each.low)} to ${percent(each.high)}`]);
+  byId("shares-table").replaceChildren(tableOf(rows, [titled(axis, unit), report.words[0], "share", "95 % interval"]));
+}
+
+// -- the cells of a comparison ----------------------------------------------------------------------------
+
+const cells = { place: 0, open: null };
+
+/** Vehicles and conditions that there are, as pairs. */
+function placesOfCells() {
+  const names = report.compared.cells.map((cell) => JSON.stringify([cell.vehicle, cell.condition]));
+  return [...new Set(names)].map((text) => JSON.parse(text));
+}
+
+function startCells() {
+  byId("map").hidden = false;
+  byId("map-title").textContent = `Share of the starts that is ${report.words[0]}`;
+  const plot = byId("map-plot");
+  plot.setAttribute("aria-label", "Cells of the comparison. Arrow keys open the neighbouring cell.");
+  plot.addEventListener("keydown", stepOverCells);
+  map.metric = columnsByName.get(report.metric) ?? drawable[0];
+  const places = placesOfCells();
+  byId("map-controls").replaceChildren();
+  if (places.length > 1) {
+    byId("map-controls").append(choice("Vehicle and condition", places.map((pair, i) => [i, pair.join(", ")]), 0, (i) => { cells.place = Number(i); drawCells(); openCell(cellsHere()[0]); }));
+  }
+  byId("map-hint").textContent = `One row a controller. Click a cell, or move with the arrow keys, to see its runs below; hover for its 95 % interval.`;
+  return drawCells();
+}
+
+function cellsHere() {
+  const [vehicle, condition] = placesOfCells()[cells.place];
+  return report.compared.cells.filter((cell) => cell.vehicle === vehicle && cell.condition === condition);
+}
+
+function hoverOfCell(cell) {
+  const { axis, unit } = report.compared;
+  const medians = Object.entries(cell.medians).map(([name, [value, low, high]]) => `${escaped(report.labels[name] ?? name)}: ${withUnit(value, report.units[name])}${low === null || high === null ? "" : ` (${shown(low)} to ${shown(high)})`}`);
+  return [`<b>${escaped(cell.controller)}, ${escaped(axis)} ${withUnit(cell.value, unit)}</b>`, escaped(shareText(cell.share)), `${cell.diverged} diverged`, "<i>medians of those with their 95 % intervals</i>", ...medians].join("<br>");
+}
+
+function drawCells() {
+  const { controllers, axis, unit } = report.compared;
+  const here = cellsHere();
+  const values = [...new Set(here.map((cell) => cell.value))].sort((a, b) => a - b);
+  const rows = [...controllers].reverse();
+  const at = (controller, value) => here.find((cell) => cell.controller === controller && cell.value === value);
+  const table = (make) => rows.map((controller) => values.map((value) => { const cell = at(controller, value); return cell ? make(cell) : null; }));
+  const room = values.length <= 16;
+  const heat = {
+    type: "heatmap", x: values.map(shown), y: rows, z: table((cell) => cell.share.good / cell.share.runs), zmin: 0, zmax: 1, colorscale: "Cividis", xgap: 1, ygap: 1,
+    text: table((cell) => (room ? String(Math.round((100 * cell.share.good) / cell.share.runs)) : "")), texttemplate: "%{text}", textfont: { size: 11 },
+    customdata: table((cell) => cell.number), hovertext: table(hoverOfCell), hovertemplate: "%{hovertext}<extra></extra>",
+    colorbar: { tickformat: ".0%", thickness: 14, outlinewidth: 0, title: { text: `share ${escaped(report.words[0])}`, side: "right" } },
+  };
+  const layout = {
+    height: Math.max(220, 110 + 42 * rows.length), margin: { l: 20, r: 10, t: 10, b: 50 }, font: FONT, dragmode: false, hoverlabel: { align: "left" },
+    xaxis: { type: "category", title: { text: escaped(titled(axis.replace(/_/g, " "), unit)), standoff: 8 } }, yaxis: { type: "category", automargin: true },
+  };
+  const holder = byId("map-plot");
+  return Plotly.react(holder, [heat, chosenCell()], layout, PLOTLY).then(() => {
+    if (!cells.isDrawn) holder.on("plotly_click", (event) => openCell(report.compared.cells.find((cell) => cell.number === event.points[0].customdata)));
+    cells.isDrawn = true;
+  });
+}
+
+function chosenCell() {
+  const cell = cells.open;
+  const [x, y] = cell && cellsHere().includes(cell) ? [shown(cell.value), cell.controller] : [null, null];
+  return { type: "scatter", mode: "markers", x: [x, x], y: [y, y], hoverinfo: "skip", showlegend: false, marker: { symbol: "square-open", size: [26, 31], color: ["#000", "#fff"], line: { width: [2.5, 2] } } };
+}
+
+function stepOverCells(event) {
+  const [dx, dy] = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key] ?? [0, 0];
+  if (!dx && !dy) return;
+  event.preventDefault();
+  const here = cellsHere();
+  const { controllers } = report.compared;
+  const values = [...new Set(here.map((cell) => cell.value))].sort((a, b) => a - b);
+  const open = cells.open ?? here[0];
+  const [i, j] = [controllers.indexOf(open.controller) + dy, values.indexOf(open.value) + dx];
+  const next = here.find((cell) => cell.controller === controllers[i] && cell.value === values[j]);
+  if (next) openCell(next);
+}
+
+/** Show the runs of a cell over the size of their start, and open the first that has its flight in the file. */
+function openCell(cell) {
+  if (!cell) return;
+  cells.open = cell;
+  const { x, y } = chosenCell();
+  Plotly.restyle(byId("map-plot"), { x: [x], y: [y] }, [1]);
+  byId("cell").hidden = false;
+  byId("cell-title").textContent = `${cell.controller}, ${report.compared.axis} ${withUnit(cell.value, report.compared.unit)}`;
+  byId("cell-text").textContent = `${shareText(cell.share)}; ${cell.diverged} diverged. Each point is a run; click one, or use the arrow keys, to open it.`;
+  map.rows = rowsOfCell(cell);
+  map.x = columnsByName.get("size of the initial error");
+  map.y = VALUE;
+  byId("cell-controls").replaceChildren(choice("Metric", drawable.map((column) => [column.name, column.label]), map.metric.name, (name) => { map.metric = columnsByName.get(name); drawRunsOfCell(); }));
+  drawRunsOfCell().then(() => openRow(map.rows.find((row) => runOfRow(row)) ?? map.rows[0]));
+}
+
+function rowsOfCell(cell) {
+  const same = [["vehicle", cell.vehicle], ["condition", cell.condition], ["controller", cell.controller]].map(([name, word]) => [columnsByName.get(name), word]);
+  const axis = columnsByName.get(report.compared.axis);
+  const value = Math.fround(cell.value);
+  const found = [];
+  for (let row = 0; row < report.table.count; row += 1) {
+    if (cellOf(axis, row) === value && same.every(([column, word]) => String(cellOf(column, row)) === word)) found.push(row);
+  }
+  return found;
+}
+
+function drawRunsOfCell() {
+  const holder = byId("cell-plot");
+  const layout = { ...mapLayout(), height: 260 };
+  return Plotly.react(holder, [...pointTraces(), chosenTrace()], layout, PLOTLY).then(() => {
+    if (cells.hasRuns) return;
+    cells.hasRuns = true;
+    holder.setAttribute("aria-label", "Runs of the cell. Arrow keys open the neighbouring run.");
+    holder.addEventListener("keydown", stepOnMap);
+    holder.on("plotly_click", (event) => openRow(rowOfPoint(event.points[0])));
+  });
+}
+
+function markInCell(row) {
+  map.row = row;
+  if (!cells.hasRuns) return;
+  const holder = byId("cell-plot");
+  const { x, y } = chosenTrace();
+  Plotly.restyle(holder, { x: [x], y: [y] }, [holder.data.length - 1]);
+}

@@ -1,0 +1,164 @@
+// Signals over time: a panel under the other over one axis of time, with the instant of the replay as a line.
+
+const PANEL = 128;
+const GAP = 46;
+const MARGIN = { l: 62, r: 14, t: 34, b: 44 };
+
+const timePlot = { signals: null, beside: null, shownPanels: new Map(), isDrawn: false };
+
+/** The panels of a layout that are chosen. */
+function panelsOf(layout) {
+  return layout.panels.filter((panel) => timePlot.shownPanels.get(panel.title) ?? panel.shown);
+}
+
+function drawTimePlot(signals, beside, names) {
+  Object.assign(timePlot, { signals, beside });
+  const panels = panelsOf(signals.layout);
+  const height = MARGIN.t + MARGIN.b + panels.length * PANEL + (panels.length - 1) * GAP;
+  const traces = panels.flatMap((panel, k) => tracesOf(panel, k, signals, beside, names));
+  const holder = byId("time-plot");
+  holder.style.height = `${height}px`;
+  return Plotly.react(holder, traces, timeLayout(panels, height, signals), PLOTLY).then(() => {
+    if (!timePlot.isDrawn) listenToTimePlot(holder);
+    timePlot.isDrawn = true;
+    moveCursor();
+  });
+}
+
+function tracesOf(panel, k, signals, beside, names) {
+  const found = [];
+  panel.lines.forEach((line, i) => {
+    if (!(line.column in signals.columns)) return;
+    found.push(traceOf(panel, line, i, k, signals, ""));
+    if (beside && line.column in beside.columns && !line.reference) {
+      found.push(traceOf(panel, line, i, k, beside, names[1]));
+    }
+  });
+  return found;
+}
+
+function traceOf(panel, line, i, k, signals, other) {
+  const place = line.reference ? i - panel.lines.filter((each) => !each.reference).length : i;
+  const alone = panel.lines.length === 1;
+  const name = other ? `${line.label} (${other})` : line.label;
+  const inLegend = other || (line.reference ? "reference" : line.label);
+  return {
+    x: signals.time,
+    y: signals.columns[line.column],
+    name: escaped(inLegend),
+    yaxis: k ? `y${k + 1}` : "y",
+    legend: k ? `legend${k + 1}` : "legend",
+    showlegend: other ? place === 0 : line.reference ? place === 0 : !alone,
+    mode: "lines",
+    opacity: other ? 0.75 : 1,
+    line: {
+      color: other ? (alone ? BESIDE : COLORS[place % 8]) : COLORS[place % 8],
+      width: line.reference || other ? 1.1 : 1.7,
+      dash: other || line.reference ? "dot" : DASHES[place % 8],
+      shape: line.held ? "hv" : "linear",
+    },
+    hovertemplate: `${escaped(name)}: %{y:.5~g}${escaped(afterNumber(panel.unit))}<extra></extra>`,
+  };
+}
+
+function timeLayout(panels, height, signals) {
+  const inner = height - MARGIN.t - MARGIN.b;
+  const layout = {
+    height, margin: MARGIN, font: FONT, hovermode: "x", hoversubplots: "axis", dragmode: "zoom",
+    paper_bgcolor: "#fff", plot_bgcolor: "#fff", annotations: [],
+    xaxis: {
+      title: { text: "time [s]", standoff: 6 }, anchor: panels.length > 1 ? `y${panels.length}` : "y", showgrid: true,
+      gridcolor: "#e8ebee", zeroline: false, range: [signals.time[0], signals.time[signals.time.length - 1]],
+      hoverformat: ".4~f", ticksuffix: "", showspikes: true, spikemode: "across", spikethickness: 1,
+      spikecolor: "#9aa4af", spikedash: "dot",
+    },
+  };
+  panels.forEach((panel, k) => {
+    const top = 1 - (k * (PANEL + GAP)) / inner;
+    layout[k ? `yaxis${k + 1}` : "yaxis"] = {
+      domain: [top - PANEL / inner, top], type: panel.logarithmic ? "log" : "linear", gridcolor: "#e8ebee",
+      zerolinecolor: "#c3cad1", nticks: 5, exponentformat: "e", ...(panel.logarithmic ? powersIn(panel, signals) : {}),
+    };
+    layout[k ? `legend${k + 1}` : "legend"] = {
+      orientation: "h", x: 1, xanchor: "right", y: top + 2 / inner, yanchor: "bottom", font: { size: 11 },
+      bgcolor: "rgba(0,0,0,0)",
+    };
+    layout.annotations.push({
+      text: `<b>${escaped(titled(panel.title, panel.unit))}</b>`, x: 0, xref: "paper", xanchor: "left",
+      y: top + 3 / inner, yref: "paper", yanchor: "bottom", showarrow: false,
+    });
+  });
+  return layout;
+}
+
+/** Ticks of a logarithmic axis at few powers of ten, as 10⁻³. */
+function powersIn(panel, signals) {
+  const values = panel.lines.flatMap((line) => [...(signals.columns[line.column] ?? [])]).filter((value) => value > 0);
+  const powers = values.map(Math.log10);
+  const [low, high] = powers.reduce(([a, b], power) => [Math.min(a, power), Math.max(b, power)], [Infinity, -Infinity]);
+  if (!(high - low > 1)) return {};
+  const step = Math.max(1, Math.round((high - low) / 4));
+  const found = [];
+  for (let power = Math.ceil(low / step) * step; power <= high; power += step) found.push(power);
+  return { tickvals: found.map((power) => 10 ** power), ticktext: found.map((power) => (power < -3 || power > 3 ? `10${superscript(power)}` : String(10 ** power))) };
+}
+
+function listenToTimePlot(holder) {
+  holder.on("plotly_click", (event) => setTime(event.points[0].x));
+  holder.on("plotly_relayout", moveCursor);
+  holder.on("plotly_doubleclick", () => { showSpan(...wholeSpan()); return false; });
+  new ResizeObserver(moveCursor).observe(holder);
+}
+
+function wholeSpan() {
+  const time = timePlot.signals.time;
+  return [time[0], time[time.length - 1]];
+}
+
+/** Show the signals from one time to another, within the run, each panel as high as what is seen there. */
+function showSpan(from, to) {
+  const [first, last] = wholeSpan();
+  const range = [Math.max(first, from), Math.min(last, to)];
+  const update = { "xaxis.range": range };
+  panelsOf(timePlot.signals.layout).forEach((panel, k) => {
+    const own = k ? `y${k + 1}` : "y";
+    const seen = seenRange(byId("time-plot").data.filter((trace) => trace.yaxis === own), range, panel.logarithmic);
+    update[`yaxis${k ? k + 1 : ""}.${seen ? "range" : "autorange"}`] = seen ?? true;
+  });
+  return Plotly.relayout(byId("time-plot"), update);
+}
+
+/** The range of what traces have in a span of time, with some air; null where that is nothing. */
+function seenRange(traces, [from, to], isLogarithmic) {
+  let [low, high] = [Infinity, -Infinity];
+  for (const { x, y } of traces) {
+    for (let i = placeAt(x, from); i < x.length && x[i] <= to; i += 1) {
+      const value = isLogarithmic ? Math.log10(y[i]) : y[i];
+      if (!Number.isFinite(value)) continue;
+      low = Math.min(low, value);
+      high = Math.max(high, value);
+    }
+  }
+  if (low > high) return null;
+  const air = 0.06 * (high - low) || 0.5 * Math.abs(high) || 1;
+  return [low - air, high + air];
+}
+
+/** Zoom about the instant of the replay. */
+function zoomTime(factor) {
+  const range = byId("time-plot").layout.xaxis.range;
+  const half = (factor * (range[1] - range[0])) / 2;
+  return showSpan(player.t - half, player.t + half);
+}
+
+function moveCursor() {
+  const full = byId("time-plot")._fullLayout;
+  const cursor = byId("cursor");
+  if (!full || !full.xaxis || !full.xaxis.l2p) return;
+  const at = full.xaxis.l2p(player.t);
+  const isInside = at >= -0.5 && at <= full.xaxis._length + 0.5;
+  cursor.style.display = isInside ? "block" : "none";
+  cursor.style.left = `${full.xaxis._offset + at}px`;
+  cursor.style.top = `${MARGIN.t}px`;
+  cursor.style.height = `${full.height - MARGIN.t - MARGIN.b}px`;
+}

@@ -1,0 +1,104 @@
+// Numbers, units and small parts of the page.
+
+const COLORS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31"];
+const DASHES = ["solid", "dash", "dashdot", "dot", "longdash", "longdashdot", "solid", "dash"];
+const SUPERSCRIPTS = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+const FONT = { family: 'system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif', size: 12, color: "#1b1f24" };
+const PLOTLY = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["lasso2d", "select2d"], toImageButtonOptions: { format: "svg" } };
+
+/** A number to six digits; a dash for none. */
+function shown(value) {
+  if (value === null || value === undefined || Number.isNaN(value)) return "–";
+  if (typeof value !== "number") return String(value);
+  return String(Number(value.toPrecision(6)));
+}
+
+function superscript(power) {
+  return String(power).replace("-", "⁻").replace(/\d/g, (digit) => SUPERSCRIPTS[digit]);
+}
+
+/** A unit behind a number: all but the degree with a space. */
+function afterNumber(unit) {
+  return unit ? (unit === "°" ? unit : ` ${unit}`) : "";
+}
+
+function withUnit(value, unit) {
+  return !unit || shown(value) === "–" ? shown(value) : shown(value) + afterNumber(unit);
+}
+
+function titled(name, unit) {
+  return unit ? `${name} [${unit}]` : name;
+}
+
+/** Text as Plotly takes it, which knows some tags. */
+function escaped(text) {
+  return String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
+}
+
+function percent(share) {
+  return `${Number((100 * share).toPrecision(3))} %`;
+}
+
+/** "12 of 20 (60 %, 95 % interval 39 % to 78 %)" */
+function shareText(share) {
+  const interval = share.low === null ? "" : `, 95 % interval ${percent(share.low)} to ${percent(share.high)}`;
+  return `${share.good} of ${share.runs} ${report.words[0]} (${percent(share.good / share.runs)}${interval})`;
+}
+
+function byId(id) {
+  return document.getElementById(id);
+}
+
+/** An element with properties and children; text is never read as HTML. */
+function element(tag, properties = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(properties)) {
+    if (name.startsWith("aria") || name === "role") made.setAttribute(name.replace("aria", "aria-").toLowerCase(), value);
+    else made[name] = value;
+  }
+  made.append(...children);
+  return made;
+}
+
+function button(text, action, properties = {}) {
+  return element("button", { type: "button", textContent: text, onclick: action, ...properties });
+}
+
+/** A labelled choice; options are pairs of value and text. */
+function choice(label, options, value, change) {
+  const select = element("select", { onchange: () => change(select.value) });
+  for (const [key, text] of options) select.append(element("option", { value: key, textContent: text }));
+  select.value = value;
+  const whole = element("label", {}, label, select);
+  whole.select = select;
+  return whole;
+}
+
+/** Rows of header and cell; a number is at the right. */
+function tableOf(rows, heads) {
+  const table = element("table");
+  if (heads) table.append(element("thead", {}, element("tr", {}, ...heads.map((text, i) => element("th", { scope: "col", textContent: text, className: i ? "number" : "" })))));
+  const body = element("tbody");
+  for (const [head, ...cells] of rows) {
+    body.append(element("tr", {}, element("th", { scope: "row", textContent: head }), ...cells.map((text) => element("td", { textContent: text, className: "number" }))));
+  }
+  table.append(body);
+  return table;
+}
+
+function badge(outcome) {
+  const symbols = { good: "●", bad: "✕", diverged: "▼" };
+  const kind = kindOf(outcome);
+  return element("span", { className: `badge ${kind}`, textContent: `${symbols[kind]} ${outcome}` });
+}
+
+const isStill = window.matchMedia("(prefers-reduced-motion: reduce)");
+
+/** Whether this browser draws by WebGL. */
+const hasWebGL = (() => {
+  let known;
+  return () => {
+    if (known === undefined) known = Boolean(document.createElement("canvas").getContext("webgl"));
+    return known;
+  };
+})();

@@ -1,0 +1,154 @@
+"""The rows of a store as the table of a report, and what shares of them are good."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from orchestration.report.blobs import Blobs
+from orchestration.report.choice import evenly
+from orchestration.report.model import Column, Share, Shares, Table
+from orchestration.report.words import number
+from orchestration.results import labels
+from orchestration.simulator import Floats
+from orchestration.statistics import wilson
+
+MOST_ROWS = 50_000
+"""of a table; of a larger study every n-th row is in it"""
+MOST_VALUES = 40
+"""of an axis, of which each has a share of its own; others are cut into parts"""
+PARTS = 8
+OUTCOME = "outcome"
+
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Way:
+    """An axis as the page draws it."""
+
+    name: str
+    unit: str | None = None
+    logarithmic: bool = False
+
+
+def table_of(
+    rows: Sequence[Row],
+    ways: Sequence[Way],
+    metrics: Sequence[str],
+    units: Mapping[str, str],
+    blobs: Blobs,
+    *,
+    tracks: Mapping[int, int],
+    messages: Mapping[int, str],
+    is_grid: bool,
+) -> Table:
+    """The table of the rows of a store; `tracks` and `messages` are by index in the design."""
+    kept = rows if len(rows) <= MOST_ROWS else [rows[i] for i in sorted(evenly(len(rows), MOST_ROWS))]
+    places = {row["design_index"]: place for place, row in enumerate(kept)}
+    columns = [
+        Column(
+            name="design_index", label="run", unit=None, kind="index",
+            values=blobs.exact([row["design_index"] for row in kept]),
+        ),
+        *(_axis(way, [row["settings"][way.name] for row in kept], blobs) for way in ways),
+        _words(OUTCOME, [row[OUTCOME] for row in kept], blobs, "metric"),
+        *_metrics(kept, metrics, units, blobs),
+    ]  # fmt: skip
+    return Table(
+        count=len(kept),
+        total=len(rows),
+        columns=tuple(columns),
+        tracks={str(places[index]): run for index, run in tracks.items() if index in places},
+        messages={str(places[index]): text for index, text in messages.items() if index in places},
+        is_grid=is_grid,
+    )
+
+
+def _axis(way: Way, values: Sequence[Any], blobs: Blobs) -> Column:
+    if any(isinstance(value, str | bool) for value in values):
+        return _words(way.name, values, blobs, "axis")
+    return Column(
+        name=way.name, label=way.name.replace("_", " "), unit=way.unit, kind="axis", values=blobs.exact(values),
+        logarithmic=way.logarithmic,
+    )  # fmt: skip
+
+
+def _words(name: str, values: Sequence[Any], blobs: Blobs, kind: Any) -> Column:
+    texts = ["failed" if value is None else str(value) for value in values]
+    words = tuple(dict.fromkeys(texts))
+    places = {word: place for place, word in enumerate(words)}
+    return Column(
+        name=name, label=labels.words(name), unit=None, kind=kind, words=words,
+        values=blobs.exact([places[text] for text in texts]),
+    )  # fmt: skip
+
+
+def _metrics(rows: Sequence[Row], metrics: Sequence[str], units: Mapping[str, str], blobs: Blobs) -> Iterator[Column]:
+    """Those that have a value in some run."""
+    for name in metrics:
+        values = np.array([math.nan if row[name] is None else float(row[name]) for row in rows])
+        known = values[np.isfinite(values)]
+        if len(known) and name not in ("good", "diverged"):
+            spread = bool((known > 0.0).all() and known.max() > 50.0 * known.min())
+            yield Column(
+                name=name, label=labels.metric(name), unit=labels.unit(units.get(name)), kind="metric", values=blobs.exact(values),
+                logarithmic=spread,
+            )  # fmt: skip
+
+
+def is_good(row: Row) -> bool:
+    """Whether a run meets the criterion."""
+    return bool(row["good"] == 1)
+
+
+def share_of(label: str, value: float | None, rows: Sequence[Row], *, by_chance: bool) -> Share:
+    """The share of some rows that is good; with its interval if the runs are a sample of what may happen."""
+    good = sum(map(is_good, rows))
+    low, high = wilson(good, len(rows)) if by_chance else (None, None)
+    return Share(label=label, value=value, good=good, runs=len(rows), low=low, high=high)
+
+
+def shares_along(rows: Sequence[Row], way: Way, *, by_chance: bool) -> Shares | None:
+    """Shares by value of an axis, or by part of its range; None for an axis of one value."""
+    values = [row["settings"][way.name] for row in rows]
+    distinct = list(dict.fromkeys(values))
+    if len(distinct) < 2:
+        return None
+    if len(distinct) <= MOST_VALUES:
+        groups: dict[Any, list[Row]] = {value: [] for value in _ordered(distinct)}
+        for row, value in zip(rows, values):
+            groups[value].append(row)
+        found = [share_of(_text(value), _number(value), some, by_chance=by_chance) for value, some in groups.items()]
+    else:
+        found = [*_by_part(rows, np.array(values, dtype=float), way, by_chance=by_chance)]
+    return Shares(axis=way.name, unit=way.unit, logarithmic=way.logarithmic, shares=tuple(found))
+
+
+def _by_part(rows: Sequence[Row], values: Floats, way: Way, *, by_chance: bool) -> Iterator[Share]:
+    scaled = np.log(values) if way.logarithmic else values
+    edges = np.linspace(scaled.min(), scaled.max(), PARTS + 1)
+    part = np.clip(np.digitize(scaled, edges) - 1, 0, PARTS - 1)
+    ends = np.exp(edges) if way.logarithmic else edges
+    for i in range(PARTS):
+        some = [rows[k] for k in np.flatnonzero(part == i).tolist()]
+        if some:
+            middle = 0.5 * (edges[i] + edges[i + 1])
+            label = f"{ends[i]:.3g} to {ends[i + 1]:.3g}"
+            value = float(np.exp(middle) if way.logarithmic else middle)
+            yield share_of(label, value, some, by_chance=by_chance)
+
+
+def _ordered(values: list[Any]) -> list[Any]:
+    are_numbers = all(isinstance(value, float | int) and not isinstance(value, bool) for value in values)
+    return sorted(values) if are_numbers else values
+
+
+def _text(value: Any) -> str:
+    return number(value) if isinstance(value, float) else str(value)
+
+
+def _number(value: Any) -> float | None:
+    return float(value) if isinstance(value, float | int) and not isinstance(value, bool) else None

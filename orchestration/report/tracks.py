@@ -1,0 +1,83 @@
+"""Signals of runs, thinned to what a page needs."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from orchestration.quadrotor.measures import position_error
+from orchestration.quadrotor.wiring import POSITION_REFERENCE
+from orchestration.report.blobs import Blobs
+from orchestration.report.layouts import POSITION_ERROR, About, is_flight, layout_of
+from orchestration.report.model import Layout, Track
+from orchestration.simulator import Floats
+from orchestration.system.model import System
+
+Signals = Mapping[str, Floats]
+"""Columns of shape (n,), the `time` [s] among them"""
+
+
+class Tracks:
+    """Puts the signals of runs into blobs, and finds the layouts that they share."""
+
+    def __init__(self, blobs: Blobs) -> None:
+        self._blobs = blobs
+        self.layouts: list[Layout] = []
+
+    def whole(self, system: System | None, signals: Signals, about: About, rows: int) -> Track:
+        """Every n-th row, so that they are about `rows`, and with them those at which a signal is at an end."""
+        signals = _with_error(signals)
+        kept = _rows(signals, rows)
+        columns = {name: self._blobs.exact(values[kept]) for name, values in signals.items() if name != "time"}
+        return self._track(system, columns, about, self._blobs.exact(signals["time"][kept]))
+
+    def compact(self, system: System, signals: Signals, about: About, points: int) -> Track:
+        """Values at some times, more where more happens: on the line between rows, of what is held the row before's."""
+        signals = _with_error(signals)
+        time = signals["time"]
+        at = _instants(signals, points)
+        before = np.clip(np.searchsorted(time, at, side="right") - 1, 0, None)
+        layout = layout_of(system, [name for name in signals if name != "time"], about)
+        held = {line.column for panel in layout.panels for line in panel.lines if line.held}
+        columns = {}
+        for name, values in signals.items():
+            if name != "time":
+                found = values[before] if name in held else np.interp(at, time, values)
+                columns[name] = self._blobs.compact(found, logarithmic=name == POSITION_ERROR)
+        return self._track(system, columns, about, self._blobs.exact(at))
+
+    def _track(self, system: System | None, columns: Mapping[str, int], about: About, time: int) -> Track:
+        layout = layout_of(system, [*columns], about)
+        if layout not in self.layouts:
+            self.layouts.append(layout)
+        return Track(layout=self.layouts.index(layout), time=time, columns=tuple(columns.values()))
+
+
+def _with_error(signals: Signals) -> Signals:
+    """With the position error of a flight, where it has a reference."""
+    if not is_flight(signals) or not all(name in signals for name in POSITION_REFERENCE):
+        return signals
+    return {**signals, POSITION_ERROR: position_error(signals)}
+
+
+def _instants(signals: Signals, most: int) -> Floats:
+    """Times between which equal parts of the run go by: half by the clock, half by how far the signals move."""
+    time = signals["time"]
+    if len(time) <= most:
+        return time
+    moved = np.zeros(len(time) - 1)
+    for name, values in signals.items():
+        span = float(np.ptp(values))
+        if name != "time" and 0.0 < span < np.inf:
+            steps = np.abs(np.diff(values))
+            moved += steps / steps.sum()
+    share = np.diff(time) / (time[-1] - time[0]) + moved / max(moved.sum(), 1e-300)
+    gone = np.concatenate([[0.0], np.cumsum(share)])
+    found: Floats = np.interp(np.linspace(0.0, gone[-1], most), gone, time)
+    return found
+
+
+def _rows(signals: Signals, most: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+    count = len(signals["time"])
+    stride = -(-count // most)
+    ends = [pick(values) for values in signals.values() for pick in (np.argmin, np.argmax)] if stride > 1 else []
+    return np.unique([*range(0, count, stride), count - 1, *map(int, ends)])

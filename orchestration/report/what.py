@@ -1,0 +1,92 @@
+"""What a report can be of: directories of runs, one study or its store, one comparison."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from orchestration.documents import read_toml
+from orchestration.errors import UsageError
+from orchestration.report import of_runs
+from orchestration.report.flights import Progress
+from orchestration.report.model import Report
+from orchestration.results.result import Result
+from orchestration.results.run_directory import METRICS, load_run
+
+EXPECTED = "the directory of a run, a study file or its store, or a comparison file"
+STORE = "study.sqlite"
+
+
+def report_of(
+    what: Sequence[Path],
+    command: str,
+    *,
+    store: Path | None = None,
+    wanted: Sequence[int] = (),
+    most: int | None = None,
+    progress: Progress | None = None,
+) -> Report:
+    """The report of what is at these paths; raises `UsageError` for what none can be made of.
+
+    `store` is the folder of the store of a study or a comparison, `results/NAME` unless told. `wanted` and `most` are
+    for studies: runs whose flights are in it, and how many.
+    """
+    if not what:
+        raise UsageError(f"expected {EXPECTED}")
+    kinds = [_kind(path) for path in what]
+    if len(what) > 1 and set(kinds) != {"run"}:
+        raise UsageError(f"{', '.join(map(str, what))}: expected directories of runs, or one study or comparison alone")
+    if kinds[0] == "run":
+        if wanted or most is not None or store is not None:
+            raise UsageError("--run, --flights and --store: expected a study or a comparison with them")
+        return of_runs.report_of(dict(_runs(what)), command)
+    return _of_many(what[0], kinds[0], command, store=store, wanted=wanted, most=most, progress=progress)
+
+
+def _kind(path: Path) -> str:
+    if path.is_dir():
+        if (path / METRICS).is_file():
+            return "run"
+        if (path / STORE).is_file():
+            return "store"
+    elif path.suffix == ".sqlite" and path.is_file():
+        return "store"
+    elif path.suffix == ".toml" and path.is_file():
+        return "comparison" if "controllers" in read_toml(path, "study or comparison file") else "study"
+    raise UsageError(f"{path}: expected {EXPECTED}")
+
+
+def _runs(paths: Sequence[Path]) -> Iterator[tuple[str, Result]]:
+    """Runs by the name of their directory; by their path where that is another's too."""
+    names = [path.resolve().name for path in paths]
+    for path, name in zip(paths, names):
+        yield (name if names.count(name) == 1 else str(path)), load_run(path)
+
+
+def _of_many(
+    path: Path,
+    kind: str,
+    command: str,
+    *,
+    store: Path | None,
+    wanted: Sequence[int],
+    most: int | None,
+    progress: Progress | None,
+) -> Report:
+    # what reads stores comes with an extra
+    from orchestration.report import of_comparison, of_study
+    from orchestration.studies.comparison.file import load_comparison
+    from orchestration.studies.study_file import load_study
+    from orchestration.studies.sweep import store_path
+
+    if kind == "store":
+        if store is not None:
+            raise UsageError("--store: expected a study or comparison file with it")
+        there = path / STORE if path.is_dir() else path
+        name = there.resolve().parent.name
+        return of_study.report_of(name, of_study.read(there), None, command, wanted=wanted, most=most)
+    if kind == "study":
+        study = load_study(path)
+        stored = of_study.read(store_path(study.name, store), study)
+        return of_study.report_of(study.name, stored, study, command, wanted=wanted, most=most, progress=progress)
+    comparison = load_comparison(path)
+    there = store_path(comparison.name, store)
+    return of_comparison.comparison_report(comparison, there, command, wanted=wanted, most=most, progress=progress)
