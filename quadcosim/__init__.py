@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from orchestration.quadrotor.scenario_file import load_scenario
     from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
     from orchestration.quadrotor.timing import Timing
+    from orchestration.report.writing import report
     from orchestration.results.pause import fly_until, resume
     from orchestration.results.result import Result
     from orchestration.results.run_directory import load_run, save_run
@@ -52,6 +53,7 @@ _HOMES = {
     "System": "orchestration.system.model",
     "changed": "orchestration.system.paths",
     "load_system": "orchestration.system.system_file",
+    "report": "orchestration.report.writing",
 }
 
 __all__ = [
@@ -77,6 +79,7 @@ __all__ = [
     "load_run",
     "load_scenario",
     "load_system",
+    "report",
     "resume",
     "run",
     "save_run",

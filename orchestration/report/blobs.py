@@ -12,7 +12,7 @@ Kind = Literal["float32", "int16"]
 STEPS = 2**15 - 4
 """of an int16 to each side of the middle; -2**15 is left for what is no number, a few for rounding"""
 NOTHING = -(2**15)
-"""The int16 of what is no number"""
+"""The int16 of what is no number; of a logarithmic array, of zero"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +51,10 @@ class Blobs:
         return self._place(Blob(kind="float32", data=_text(array)))
 
     def compact(self, values: npt.ArrayLike, *, logarithmic: bool = False) -> int:
-        """The place of an array of int16, right to a part in 65,000 of its range; of its logarithm if so asked."""
+        """The place of an array of int16, right to a part in 65,000 of its range, or of that of its logarithm.
+
+        What is not above zero has none, and counts as zero.
+        """
         given = np.asarray(values, dtype=float)
         if logarithmic:
             given = np.log10(np.where(given > 0.0, given, np.nan))

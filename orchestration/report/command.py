@@ -1,6 +1,5 @@
 """`quadcosim report`."""
 
-import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -9,7 +8,6 @@ import typer
 from orchestration.command import registering
 from orchestration.command.answer import Answer, of_files
 from orchestration.command.terminal import progress_bar
-from orchestration.errors import UsageError
 
 
 def report(
@@ -44,26 +42,10 @@ def report(
     ] = None,
 ) -> Answer:
     """Write runs, a study or a comparison as one HTML file: replay, plots, maps; it needs no network."""
-    from orchestration.report import html
-    from orchestration.report.what import report_of
+    from orchestration.report.writing import report as write
 
-    to = out or Path(f"report_{what[0].resolve().stem}.html")
-    if to.suffix.lower() not in (".html", ".htm") or to.is_dir():
-        raise UsageError(f"--out {to}: expected a file that ends in .html")
     with progress_bar("flying") as progress:
-        made = report_of(
-            what, _again(what, store, flights, run or []), store=store, wanted=run or [], most=flights,
-            progress=progress,
-        )  # fmt: skip
-    return of_files([html.write(made, to)])
-
-
-def _again(what: list[Path], store: Path | None, flights: int | None, runs: list[int]) -> str:
-    """The command that makes this report."""
-    words = ["quadcosim", "report", *map(str, what)]
-    words += ["--store", str(store)] if store is not None else []
-    words += ["--flights", str(flights)] if flights is not None else []
-    return shlex.join([*words, *(word for index in runs for word in ("--run", str(index)))])
+        return of_files([write(*what, out=out, store=store, flights=flights, runs=run or [], progress=progress)])
 
 
 def register(app: typer.Typer) -> None:

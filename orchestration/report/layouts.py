@@ -84,9 +84,10 @@ def _of_connections(system: System | None, columns: Collection[str], about: Abou
         ends = [end if end in columns else start for start, end in zip(x.start, x.end)]
         drawn |= {*x.start, *x.end}
         title = f"connection {x.name}" if x.name.isdigit() else x.name
-        yield from _split(title, [end for end in ends if end in columns], about, held=True)
+        applied = x.end[0] in columns or (system is not None and system.components[x.sender].sampling is not None)
+        yield from _split(title, [end for end in ends if end in columns], about, held=applied)
     rest = [name for name in columns if name not in drawn and name != "time"]
-    yield from _of_components(system, rest, units, shown=not drawn)
+    yield from _of_components(system, rest, about, shown=not drawn)
 
 
 def _of_components(system: System | None, columns: Sequence[str], about: About, *, shown: bool) -> Iterator[Panel]:

@@ -68,7 +68,7 @@ def _run(name: str, result: Result, tracks: Tracks, rows: int) -> Run:
 
 
 def _settings(result: Result) -> dict[str, Setting]:
-    """What its file says, by key."""
+    """What its file says, in words."""
     found: dict[str, Setting] = {}
     waiting: list[tuple[str, Any]] = [("", tables_in(text_of(result.asked)))]
     while waiting:
@@ -76,7 +76,8 @@ def _settings(result: Result) -> dict[str, Setting]:
         if isinstance(value, Mapping):
             waiting = [(f"{place}.{key}".lstrip("."), each) for key, each in value.items()] + waiting
         elif isinstance(value, float | int | bool | str):
-            found[place] = value
+            unit = labels.SETTINGS.get(place, ("", None))[1]
+            found[labels.with_unit(labels.setting(place), unit)] = value
     return found
 
 

@@ -71,7 +71,7 @@ def _axis(way: Way, values: Sequence[Any], blobs: Blobs) -> Column:
     if any(isinstance(value, str | bool) for value in values):
         return _words(way.name, values, blobs, "axis")
     return Column(
-        name=way.name, label=way.name.replace("_", " "), unit=way.unit, kind="axis", values=blobs.exact(values),
+        name=way.name, label=labels.words(way.name), unit=way.unit, kind="axis", values=blobs.exact(values),
         logarithmic=way.logarithmic,
     )  # fmt: skip
 
@@ -94,8 +94,8 @@ def _metrics(rows: Sequence[Row], metrics: Sequence[str], units: Mapping[str, st
         if len(known) and name not in ("good", "diverged"):
             spread = bool((known > 0.0).all() and known.max() > 50.0 * known.min())
             yield Column(
-                name=name, label=labels.metric(name), unit=labels.unit(units.get(name)), kind="metric", values=blobs.exact(values),
-                logarithmic=spread,
+                name=name, label=labels.metric(name), unit=labels.unit(units.get(name)), kind="metric",
+                values=blobs.exact(values), logarithmic=spread,
             )  # fmt: skip
 
 
@@ -124,7 +124,7 @@ def shares_along(rows: Sequence[Row], way: Way, *, by_chance: bool) -> Shares | 
         found = [share_of(_text(value), _number(value), some, by_chance=by_chance) for value, some in groups.items()]
     else:
         found = [*_by_part(rows, np.array(values, dtype=float), way, by_chance=by_chance)]
-    return Shares(axis=way.name, unit=way.unit, logarithmic=way.logarithmic, shares=tuple(found))
+    return Shares(axis=labels.words(way.name), unit=way.unit, logarithmic=way.logarithmic, shares=tuple(found))
 
 
 def _by_part(rows: Sequence[Row], values: Floats, way: Way, *, by_chance: bool) -> Iterator[Share]:

@@ -16,7 +16,7 @@ function decoded(blob) {
   if (offset === undefined) return new Float32Array(bytes.buffer);
   const steps = new Int16Array(bytes.buffer);
   return Float64Array.from(steps, (step) => {
-    if (step === NOTHING) return NaN;
+    if (step === NOTHING) return isLogarithmic ? 0 : NaN;
     const value = offset + scale * step;
     return isLogarithmic ? 10 ** value : value;
   });

@@ -24,7 +24,7 @@ function startPage() {
   drawn.then(() => {
     noteFirstPlot();
     later(openFirst);
-    later(startShares);
+    later(report.compared ? drawSharesOfCells : startShares);
   });
 }
 

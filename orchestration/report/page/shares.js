@@ -34,6 +34,32 @@ function drawShares() {
 
 // -- the cells of a comparison ----------------------------------------------------------------------------
 
+/** Shares over the axis, a line for each controller, with their intervals. */
+function drawSharesOfCells() {
+  const { controllers, axis, unit } = report.compared;
+  byId("shares").hidden = false;
+  byId("shares-title").textContent = `Share that is ${report.words[0]}, with 95 % intervals`;
+  byId("shares-text").textContent = "Wilson intervals, over the starts of each cell.";
+  const traces = controllers.map((controller, i) => {
+    const found = cellsHere().filter((cell) => cell.controller === controller);
+    const share = found.map((cell) => cell.share.good / cell.share.runs);
+    return {
+      type: "scatter", mode: "lines+markers", name: escaped(controller), x: found.map((cell) => cell.value), y: share,
+      line: { color: COLORS[i % 8], dash: DASHES[i % 8], width: 1.6 }, marker: { symbol: SHAPES[i % 8], size: 7 },
+      text: found.map((cell) => `${escaped(controller)}, ${withUnit(cell.value, unit)}<br>${escaped(shareText(cell.share))}`), hovertemplate: "%{text}<extra></extra>",
+      error_y: { type: "data", symmetric: false, array: found.map((cell, k) => cell.share.high - share[k]), arrayminus: found.map((cell, k) => share[k] - cell.share.low), thickness: 1.1, width: 3 },
+    };
+  });
+  const layout = {
+    height: 330, margin: { l: 60, r: 10, t: 10, b: 48 }, font: FONT, hovermode: "closest", legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom" },
+    xaxis: { title: { text: escaped(titled(axis.replace(/_/g, " "), unit)) }, gridcolor: "#e8ebee", zeroline: false },
+    yaxis: { title: { text: `share ${escaped(report.words[0])}` }, range: [-0.03, 1.03], tickformat: ".0%", gridcolor: "#e8ebee", zeroline: false },
+  };
+  Plotly.react(byId("shares-plot"), traces, layout, PLOTLY);
+  const rows = cellsHere().map((cell) => [`${cell.controller}, ${withUnit(cell.value, unit)}`, `${cell.share.good} of ${cell.share.runs}`, percent(cell.share.good / cell.share.runs), `${percent(cell.share.low)} to ${percent(cell.share.high)}`, String(cell.diverged)]);
+  byId("shares-table").replaceChildren(tableOf(rows, ["cell", report.words[0], "share", "95 % interval", "diverged"]));
+}
+
 const cells = { place: 0, open: null };
 
 /** Vehicles and conditions that there are, as pairs. */
@@ -52,7 +78,7 @@ function startCells() {
   const places = placesOfCells();
   byId("map-controls").replaceChildren();
   if (places.length > 1) {
-    byId("map-controls").append(choice("Vehicle and condition", places.map((pair, i) => [i, pair.join(", ")]), 0, (i) => { cells.place = Number(i); drawCells(); openCell(cellsHere()[0]); }));
+    byId("map-controls").append(choice("Vehicle and condition", places.map((pair, i) => [i, pair.join(", ")]), 0, (i) => { cells.place = Number(i); drawCells(); drawSharesOfCells(); openCell(cellsHere()[0]); }));
   }
   byId("map-hint").textContent = `One row a controller. Click a cell, or move with the arrow keys, to see its runs below; hover for its 95 % interval.`;
   return drawCells();
@@ -76,16 +102,16 @@ function drawCells() {
   const rows = [...controllers].reverse();
   const at = (controller, value) => here.find((cell) => cell.controller === controller && cell.value === value);
   const table = (make) => rows.map((controller) => values.map((value) => { const cell = at(controller, value); return cell ? make(cell) : null; }));
-  const room = values.length <= 16;
+  const room = byId("map-plot").clientWidth > 42 * values.length + 180;
   const heat = {
-    type: "heatmap", x: values.map(shown), y: rows, z: table((cell) => cell.share.good / cell.share.runs), zmin: 0, zmax: 1, colorscale: "Cividis", xgap: 1, ygap: 1,
+    type: "heatmap", x: values, y: rows, z: table((cell) => cell.share.good / cell.share.runs), zmin: 0, zmax: 1, colorscale: "Cividis", xgap: 1, ygap: 1,
     text: table((cell) => (room ? String(Math.round((100 * cell.share.good) / cell.share.runs)) : "")), texttemplate: "%{text}", textfont: { size: 11 },
     customdata: table((cell) => cell.number), hovertext: table(hoverOfCell), hovertemplate: "%{hovertext}<extra></extra>",
     colorbar: { tickformat: ".0%", thickness: 14, outlinewidth: 0, title: { text: `share ${escaped(report.words[0])}`, side: "right" } },
   };
   const layout = {
     height: Math.max(220, 110 + 42 * rows.length), margin: { l: 20, r: 10, t: 10, b: 50 }, font: FONT, dragmode: false, hoverlabel: { align: "left" },
-    xaxis: { type: "category", title: { text: escaped(titled(axis.replace(/_/g, " "), unit)), standoff: 8 } }, yaxis: { type: "category", automargin: true },
+    xaxis: { title: { text: escaped(titled(axis.replace(/_/g, " "), unit)), standoff: 8 }, zeroline: false, showgrid: false }, yaxis: { type: "category", automargin: true },
   };
   const holder = byId("map-plot");
   return Plotly.react(holder, [heat, chosenCell()], layout, PLOTLY).then(() => {
@@ -96,7 +122,7 @@ function drawCells() {
 
 function chosenCell() {
   const cell = cells.open;
-  const [x, y] = cell && cellsHere().includes(cell) ? [shown(cell.value), cell.controller] : [null, null];
+  const [x, y] = cell && cellsHere().includes(cell) ? [cell.value, cell.controller] : [null, null];
   return { type: "scatter", mode: "markers", x: [x, x], y: [y, y], hoverinfo: "skip", showlegend: false, marker: { symbol: "square-open", size: [26, 31], color: ["#000", "#fff"], line: { width: [2.5, 2] } } };
 }
 

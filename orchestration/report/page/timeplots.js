@@ -1,10 +1,19 @@
 // Signals over time: a panel under the other over one axis of time, with the instant of the replay as a line.
 
 const PANEL = 128;
-const GAP = 46;
 const MARGIN = { l: 62, r: 14, t: 34, b: 44 };
+const NARROW = 620;
 
 const timePlot = { signals: null, beside: null, shownPanels: new Map(), isDrawn: false };
+
+/** Room between panels: on a narrow page the legend has a line of its own under the title. */
+function gap() {
+  return byId("time-plot").clientWidth < NARROW ? 66 : 46;
+}
+
+function topMargin() {
+  return MARGIN.t + gap() - 46;
+}
 
 /** The panels of a layout that are chosen. */
 function panelsOf(layout) {
@@ -14,7 +23,7 @@ function panelsOf(layout) {
 function drawTimePlot(signals, beside, names) {
   Object.assign(timePlot, { signals, beside });
   const panels = panelsOf(signals.layout);
-  const height = MARGIN.t + MARGIN.b + panels.length * PANEL + (panels.length - 1) * GAP;
+  const height = topMargin() + MARGIN.b + panels.length * PANEL + (panels.length - 1) * gap();
   const traces = panels.flatMap((panel, k) => tracesOf(panel, k, signals, beside, names));
   const holder = byId("time-plot");
   holder.style.height = `${height}px`;
@@ -62,9 +71,10 @@ function traceOf(panel, line, i, k, signals, other) {
 }
 
 function timeLayout(panels, height, signals) {
-  const inner = height - MARGIN.t - MARGIN.b;
+  const inner = height - topMargin() - MARGIN.b;
+  const isNarrow = gap() > 46;
   const layout = {
-    height, margin: MARGIN, font: FONT, hovermode: "x", hoversubplots: "axis", dragmode: "zoom",
+    height, margin: { ...MARGIN, t: topMargin() }, font: FONT, hovermode: "x", hoversubplots: "axis", dragmode: "zoom",
     paper_bgcolor: "#fff", plot_bgcolor: "#fff", annotations: [],
     xaxis: {
       title: { text: "time [s]", standoff: 6 }, anchor: panels.length > 1 ? `y${panels.length}` : "y", showgrid: true,
@@ -74,18 +84,18 @@ function timeLayout(panels, height, signals) {
     },
   };
   panels.forEach((panel, k) => {
-    const top = 1 - (k * (PANEL + GAP)) / inner;
+    const top = 1 - (k * (PANEL + gap())) / inner;
     layout[k ? `yaxis${k + 1}` : "yaxis"] = {
       domain: [top - PANEL / inner, top], type: panel.logarithmic ? "log" : "linear", gridcolor: "#e8ebee",
       zerolinecolor: "#c3cad1", nticks: 5, exponentformat: "e", ...(panel.logarithmic ? powersIn(panel, signals) : {}),
     };
     layout[k ? `legend${k + 1}` : "legend"] = {
-      orientation: "h", x: 1, xanchor: "right", y: top + 2 / inner, yanchor: "bottom", font: { size: 11 },
+      orientation: "h", x: isNarrow ? 0 : 1, xanchor: isNarrow ? "left" : "right", y: top + 2 / inner, yanchor: "bottom", font: { size: 11 },
       bgcolor: "rgba(0,0,0,0)",
     };
     layout.annotations.push({
       text: `<b>${escaped(titled(panel.title, panel.unit))}</b>`, x: 0, xref: "paper", xanchor: "left",
-      y: top + 3 / inner, yref: "paper", yanchor: "bottom", showarrow: false,
+      y: top + (isNarrow && panel.lines.length > 1 ? 22 : 3) / inner, yref: "paper", yanchor: "bottom", showarrow: false,
     });
   });
   return layout;
@@ -159,6 +169,6 @@ function moveCursor() {
   const isInside = at >= -0.5 && at <= full.xaxis._length + 0.5;
   cursor.style.display = isInside ? "block" : "none";
   cursor.style.left = `${full.xaxis._offset + at}px`;
-  cursor.style.top = `${MARGIN.t}px`;
-  cursor.style.height = `${full.height - MARGIN.t - MARGIN.b}px`;
+  cursor.style.top = `${topMargin()}px`;
+  cursor.style.height = `${full.height - topMargin() - MARGIN.b}px`;
 }

@@ -2,9 +2,10 @@
 
 const COLORS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31"];
 const DASHES = ["solid", "dash", "dashdot", "dot", "longdash", "longdashdot", "solid", "dash"];
+const SHAPES = ["circle", "square", "diamond", "triangle-up", "x", "star", "cross", "hexagon"];
 const SUPERSCRIPTS = "⁰¹²³⁴⁵⁶⁷⁸⁹";
 const FONT = { family: 'system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif', size: 12, color: "#1b1f24" };
-const PLOTLY = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["lasso2d", "select2d"], toImageButtonOptions: { format: "svg" } };
+const PLOTLY = { displaylogo: false, responsive: true, modeBarButtons: [["zoom2d", "pan2d", "resetScale2d", "toImage"]], toImageButtonOptions: { format: "svg" } };
 
 /** A number to six digits; a dash for none. */
 function shown(value) {

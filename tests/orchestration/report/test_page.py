@@ -1,0 +1,205 @@
+"""The page in a browser: what is drawn, what keys and clicks do, and that nothing is asked of a network."""
+
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from orchestration.report.writing import report
+from orchestration.simulation import run
+from orchestration.studies.study import Study
+from orchestration.studies.sweep import sweep
+from quadcosim import FmuChoice, Scenario, Timing
+from tests.orchestration.studies.common import axis
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+NATIVE = {"controller": FmuChoice(fmu="native/UnifiedController"), "plant": FmuChoice(fmu="native/QuadrotorPlant")}
+Show = Callable[[Path], Any]
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    path = next((found for name in BROWSERS if (found := shutil.which(name)) is not None), None)
+    if path is None:
+        pytest.skip(f"none of {', '.join(BROWSERS)} is on this machine")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as started:
+        opened = started.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+@pytest.fixture(scope="module")
+def show(browser: Any) -> Iterator[Show]:
+    """Opens a file and waits until it is drawn; in the end nothing was complained of and nothing was loaded."""
+    told: list[str] = []
+    asked: list[str] = []
+
+    def open_page(file: Path) -> Any:
+        page = browser.new_page(viewport={"width": 1400, "height": 900})
+        page.on("console", lambda message: told.append(message.text))
+        page.on("pageerror", lambda error: told.append(str(error)))
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto(file.as_uri())
+        page.wait_for_selector("body[data-drawn]")
+        return page
+
+    yield open_page
+    assert told == []
+    assert [url for url in asked if not url.startswith("file:")] == []
+
+
+def scenario(**timing: float) -> Scenario:
+    return Scenario(stop_time=2.0, timing=Timing(plant_interval=0.005, **timing), **NATIVE)  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def of_runs(show: Show, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Two runs, one of which diverges."""
+    folder = tmp_path_factory.mktemp("runs")
+    return show(report(run(scenario()), run(scenario(period=0.2)), out=folder / "report.html"))
+
+
+@pytest.fixture(scope="module")
+def of_study(show: Show, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """A grid of four runs, of which three have their flight in the file."""
+    folder = tmp_path_factory.mktemp("study")
+    name = "grid"
+    study = Study(name=name, base=scenario(), axes=(axis("timing.period", 0.01, 0.2), axis("timing.delay", 0.0, 0.01)))
+    sweep(study, folder=folder)
+    file = folder / "study.toml"
+    fmus = "".join(f'[base.{side}]\nfmu = "{choice.fmu}"\n' for side, choice in NATIVE.items())
+    axes = "".join(
+        f'[[axes]]\nname = "timing.{key}"\nvalues = {values}\n'
+        for key, values in (("period", [0.01, 0.2]), ("delay", [0.0, 0.01]))
+    )
+    file.write_text(
+        f'name = "{name}"\n[base]\nstop_time = 2.0\n[base.timing]\nplant_interval = 0.005\n{fmus}{axes}',
+        encoding="utf-8",
+    )
+    return show(report(file, out=folder / "report.html", store=folder, flights=3, runs=[0, 1, 2]))
+
+
+def clock(page: Any) -> float:
+    return float(page.inner_text("#player output").split()[0])
+
+
+def title(page: Any) -> str:
+    text: str = page.inner_text("#run-title")
+    return text
+
+
+def test_play_moves_the_vehicle_and_pause_stops_it(of_runs: Any) -> None:
+    picture = "document.getElementById('scene').toDataURL()"
+    before, numbers = of_runs.evaluate(picture), of_runs.inner_text("#readout")
+    of_runs.get_by_role("button", name="Play").click()
+    of_runs.wait_for_function("parseFloat(document.querySelector('#player output').textContent) > 0.1")
+    of_runs.get_by_role("button", name="Pause").click()
+    stopped = clock(of_runs)
+    assert of_runs.evaluate(picture) != before
+    assert of_runs.inner_text("#readout") != numbers
+    of_runs.wait_for_timeout(100)
+    assert clock(of_runs) == stopped
+
+
+def test_the_arrow_keys_on_the_time_slider_move_the_replay(of_runs: Any) -> None:
+    slider = of_runs.get_by_label("Time", exact=True)
+    slider.fill("1")
+    before = clock(of_runs)
+    slider.press("ArrowRight")
+    assert before == 1.0
+    assert clock(of_runs) > before
+    assert of_runs.inner_text("#readout").startswith("north, east, down ")
+
+
+def test_the_arrow_keys_on_the_slider_over_runs_open_the_next_one(of_runs: Any) -> None:
+    assert "run 1" in title(of_runs)
+    of_runs.get_by_label("Runs", exact=True).press("ArrowRight")
+    assert "run 2" in title(of_runs)
+    assert "▼ diverged" in title(of_runs)
+    of_runs.get_by_label("Runs", exact=True).press("ArrowLeft")
+    assert "run 1" in title(of_runs)
+
+
+def test_hovering_over_a_plot_says_the_value_with_its_unit(of_runs: Any) -> None:
+    plot = of_runs.locator("#time-plot .nsewdrag").nth(3)
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    of_runs.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    of_runs.wait_for_selector("#time-plot .hovertext")
+    said = " ".join(of_runs.locator("#time-plot .hovertext").all_text_contents())
+    assert "thrust: " in said
+    assert " N" in said
+    assert " m" in said, "the panels are linked"
+
+
+def test_zooming_by_button_narrows_all_panels(of_runs: Any) -> None:
+    span = "(() => { const r = document.getElementById('time-plot').layout.xaxis.range; return r[1] - r[0]; })()"
+    whole = of_runs.evaluate(span)
+    of_runs.get_by_role("button", name="Zoom in").click()
+    of_runs.wait_for_function(f"{span} < {0.6 * whole}")
+    of_runs.get_by_role("button", name="Whole run").click()
+    of_runs.wait_for_function(f"{span} > {0.9 * whole}")
+
+
+def test_every_control_has_a_name_and_can_be_reached_by_key(of_runs: Any, of_study: Any) -> None:
+    nameless = """[...document.querySelectorAll('main button, main input, main select')]
+        .filter((e) => !(e.textContent.trim() || e.labels?.[0]?.textContent.trim() || e.ariaLabel) || e.tabIndex < 0)
+        .map((e) => e.outerHTML)"""
+    for page in (of_runs, of_study):
+        assert page.evaluate(nameless) == []
+        assert page.locator("main section:visible").count() >= 4
+        assert page.locator("h1").count() == 1
+
+
+def test_a_click_on_a_cell_of_the_map_opens_the_run_behind_it(of_study: Any) -> None:
+    plot = of_study.locator("#map-plot .nsewdrag")
+    box = plot.bounding_box()
+    of_study.mouse.click(box["x"] + 0.3 * box["width"], box["y"] + 0.3 * box["height"])
+    of_study.wait_for_function("document.getElementById('run-title').textContent.startsWith('Run 1')")
+    assert "timing period 0.01" in of_study.inner_text("#run-text")
+    assert of_study.is_visible("#scene")
+    of_study.locator("#map-plot").press("ArrowDown")
+    assert title(of_study).startswith("Run 0")
+
+
+def test_hovering_over_a_cell_says_settings_and_metric(of_study: Any) -> None:
+    box = of_study.locator("#map-plot .nsewdrag").bounding_box()
+    of_study.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 0.7 * box["height"])
+    of_study.wait_for_selector("#map-plot .hovertext")
+    said = of_study.locator("#map-plot .hovertext").text_content()
+    assert "run 0: " in said
+    assert "timing period: 0.01 s" in said
+    assert "largest position error" in said
+
+
+def test_a_run_whose_flight_is_not_in_the_file_shows_its_metrics_and_the_nearest_flight(of_study: Any) -> None:
+    of_study.get_by_label("Run", exact=True).fill("3")
+    of_study.get_by_label("Run", exact=True).press("Enter")
+    assert title(of_study).startswith("Run 3")
+    assert "--run 3" in of_study.inner_text("#run-text")
+    assert not of_study.is_visible("#scene")
+    of_study.get_by_role("button", name="Show the nearest that is").click()
+    assert not title(of_study).startswith("Run 3")
+    assert of_study.is_visible("#scene")
+
+
+def test_the_page_says_what_is_in_it_and_how_it_was_made(of_study: Any) -> None:
+    contents = of_study.inner_text("#contents")
+    assert "Metrics of all 4 runs are in this file, and the signals of 3 of them" in contents
+    assert "All of them came out as the store has it." in contents
+    assert "quadcosim report" in contents
+    assert "GUID of the plant" in contents
+
+
+def test_nobody_who_wants_no_motion_gets_more_than_a_picture_a_second(of_runs: Any) -> None:
+    of_runs.emulate_media(reduced_motion="reduce")
+    of_runs.get_by_label("Time", exact=True).fill("0")
+    of_runs.get_by_role("button", name="Play").click()
+    of_runs.wait_for_timeout(300)
+    assert clock(of_runs) == 0.0
+    of_runs.get_by_role("button", name="Pause").click()
+    of_runs.emulate_media(reduced_motion="no-preference")

@@ -1,0 +1,82 @@
+"""The table of a study, its shares, and which runs are chosen for their flights."""
+
+from itertools import pairwise
+from typing import Any
+
+import pytest
+
+from orchestration.report.blobs import Blobs
+from orchestration.report.choice import LEAST_POINTS, MOST_POINTS, chosen, evenly, points_for
+from orchestration.report.tables import Way, share_of, shares_along, table_of
+from orchestration.statistics import wilson
+from tests.orchestration.report.test_blobs import read
+
+
+def row(index: int, good: bool, **settings: Any) -> dict[str, Any]:
+    outcome = "settled" if good else "diverged"
+    return {
+        "design_index": index, "settings": settings, "status": "done", "message": None, "outcome": outcome,
+        "good": float(good), "diverged": float(not good), "error": 0.1 if good else None, "steps": 3.0,
+    }  # fmt: skip
+
+
+ROWS = [row(i, i < 6, period=0.01 * (i % 4), law="ab"[i % 2]) for i in range(8)]
+
+
+def test_a_table_has_axes_words_and_the_metrics_that_some_run_has() -> None:
+    blobs = Blobs()
+    made = table_of(
+        [{**each, "never": None} for each in ROWS], [Way(name="period", unit="s"), Way(name="law")],
+        ["good", "error", "never", "steps"], {"error": "N.m"}, blobs, tracks={5: 0}, messages={7: "fell"}, is_grid=True,
+    )  # fmt: skip
+    columns = {column.name: column for column in made.columns}
+    assert list(columns) == ["design_index", "period", "law", "outcome", "error", "steps"]
+    assert columns["error"].unit == "N·m"
+    assert columns["law"].words == ("a", "b")
+    assert read(blobs.blobs[columns["law"].values]).tolist() == [0.0, 1.0] * 4
+    assert made.tracks == {"5": 0}
+    assert made.messages == {"7": "fell"}
+
+
+def test_a_share_has_wilsons_interval_only_where_runs_are_drawn_by_chance() -> None:
+    drawn, listed = (share_of("all", None, ROWS, by_chance=chance) for chance in (True, False))
+    assert (drawn.good, drawn.runs) == (6, 8)
+    assert (drawn.low, drawn.high) == wilson(6, 8)
+    assert (listed.low, listed.high) == (None, None)
+
+
+def test_shares_are_by_value_or_by_part_of_the_range() -> None:
+    by_value = shares_along(ROWS, Way(name="period"), by_chance=True)
+    assert by_value is not None
+    assert [share.runs for share in by_value.shares] == [2, 2, 2, 2]
+    many = [row(i, i % 2 == 0, period=10.0 ** (i / 100)) for i in range(100)]
+    by_part = shares_along(many, Way(name="period", logarithmic=True), by_chance=True)
+    assert by_part is not None
+    assert sorted(share.runs for share in by_part.shares) == [12, 12, 12, 12, 13, 13, 13, 13]
+    assert shares_along([ROWS[0], ROWS[4]], Way(name="period"), by_chance=True) is None
+
+
+@pytest.mark.parametrize(("count", "wanted"), [(10, 3), (10, 10), (3, 10), (10_000, 1000)])
+def test_places_are_spread_evenly_and_each_is_taken_once(count: int, wanted: int) -> None:
+    places = sorted(evenly(count, wanted))
+    assert len(set(places)) == len(places) == min(count, wanted)
+    gaps = [b - a for a, b in pairwise(places)]
+    assert max(gaps) <= max(1, 3 * count / wanted)
+    assert {place % 100 for place in places} == set(range(100)) or wanted < 1000
+
+
+def test_more_places_leave_those_that_are() -> None:
+    assert set(evenly(500, 20)) < set(evenly(500, 60))
+
+
+def test_runs_that_are_asked_for_are_chosen_first() -> None:
+    assert chosen(range(100), [17, 3], 2) == [3, 17]
+    found = chosen(range(100), [17], 10)
+    assert 17 in found
+    assert len(found) == 10
+
+
+def test_more_runs_have_fewer_points_each() -> None:
+    assert points_for(1, 20) == MOST_POINTS
+    assert points_for(1000, 20) == 150
+    assert points_for(100_000, 20) == LEAST_POINTS
