@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from orchestration.errors import UsageError
+from orchestration.extras import explained
 from orchestration.report import html, of_runs
 from orchestration.report.flights import Progress
 from orchestration.report.what import report_of
@@ -13,6 +14,7 @@ from orchestration.results.result import Result
 ENDINGS = (".html", ".htm")
 
 
+@explained
 def report(
     *what: Result | str | Path,
     out: str | Path | None = None,
@@ -25,7 +27,8 @@ def report(
 
     It holds all that it needs and loads nothing. `out` is `report_NAME.html` unless told. Of a study, whose store is
     in the folder `store`, `results/NAME` unless told, so many `flights` are flown again for their signals, those of
-    the runs with the numbers `runs` among them. Raises `UsageError` for what no report can be made of.
+    the runs with the numbers `runs` among them. Raises `UsageError` for what no report can be made of,
+    `QuadcosimError` without the plotting library.
     """
     if not what:
         raise UsageError("report: expected runs, a study or a comparison")
