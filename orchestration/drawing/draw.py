@@ -18,6 +18,7 @@ from orchestration.drawing.style import SCREEN, Style
 from orchestration.errors import UsageError
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.wiring import POSITION, POSITION_REFERENCE
+from orchestration.results.differences import told_apart
 from orchestration.results.result import Result
 
 Maker = Callable[[Sequence[Run], Style], Figure | None]
@@ -50,14 +51,16 @@ def draw(
     """
     listed = [results] if isinstance(results, Result) else list(results)
     kinds = {isinstance(result.asked, Scenario) for result in listed}
-    if len(kinds) != 1:
-        raise UsageError("expected runs of one kind to lay over each other: flights, or of one other system")
+    components = {frozenset(result.system.components) for result in listed}
+    if len(kinds) != 1 or len(components) != 1:
+        raise UsageError("expected runs of one system to lay over each other")
     known = FLIGHT if kinds == {True} else SYSTEM
     for name in which or ():
-        if name not in known:
+        if name not in (*FLIGHT, *SYSTEM):
             raise UsageError(f"--figure {name}: expected one of {', '.join(known)}")
     columns = _DRAWN if known is FLIGHT else None
-    runs = runs_of(listed, names or [f"run {i + 1}" for i in range(len(listed))], columns, window)
+    told = names or told_apart(listed, [f"run {i + 1}" for i in range(len(listed))])
+    runs = runs_of(listed, told, columns, window)
     with style.applied():
         made = {name: _MAKERS[name](runs, style) for name in known if which is None or name in which}
     return {name: figure for name, figure in made.items() if figure is not None}

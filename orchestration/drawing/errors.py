@@ -68,14 +68,14 @@ def _laid_over(runs: Sequence[Run], style: Style) -> Figure:
     found = _known(runs)
     figure = style.figure(2.0 + 11.0 * len(found))
     rows = figure.subplots(len(found), 3, sharex=True, squeeze=False)
-    for row, error in zip(rows, found, strict=True):
+    for i, (row, error) in enumerate(zip(rows, found, strict=True)):
         for k, panel in enumerate(row):
             drawn = [(run, values[:, k]) for run in runs if (values := error.of(run)) is not None]
             for run, values in drawn:
                 panel.plot(run.time, values, color=run.color, linestyle=run.dashes, label=run.name)
             see(panel, runs)
             panel.set_ylabel(wrapped(quantity(f"{error.name} {'xyz'[k]}", error.unit), 18))
-            if row is rows[-1]:
+            if i == len(found) - 1:
                 panel.set_xlabel(TIME)
     legend_of_runs(figure, runs, style)
     return figure

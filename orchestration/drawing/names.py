@@ -4,6 +4,8 @@ FLIGHT = ("path", "errors", "components", "commands", "energy", "phase", "spectr
 """Figures of a flight of the quadrotor"""
 SYSTEM = ("signals",)
 """of any other system"""
+FIRST = ("path", "errors", "components", "commands", "energy", *SYSTEM)
+"""Those that a run draws at once; all others when they are asked for"""
 FORMATS = ("png", "svg", "pdf")
 COLUMNS = {"single": 88.9, "double": 181.0}
 """Widths of journals [mm]: 3.5 and 7.13 inches"""

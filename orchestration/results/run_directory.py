@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from orchestration.documents import read_json
-from orchestration.drawing.names import FILES
+from orchestration.drawing.names import FILES, FIRST
 from orchestration.errors import UsageError, shown
 from orchestration.request import load_request, system_meant, text_of
 from orchestration.results import tables
@@ -54,7 +54,7 @@ def _write(result: Result, folder: Path, *, figures: bool) -> None:
     if figures:
         from orchestration.drawing import draw, style  # with it comes matplotlib, which takes longer than a short run
 
-        style.save(draw.draw(result), folder)
+        style.save(draw.draw(result, FIRST), folder)
 
 
 def load_run(folder: str | Path) -> Result:

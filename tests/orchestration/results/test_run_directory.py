@@ -18,7 +18,7 @@ import pytest
 
 import quadcosim
 from orchestration.drawing import draw as drawing
-from orchestration.drawing.names import FLIGHT
+from orchestration.drawing.names import FIRST, FLIGHT
 from orchestration.drawing.style import save
 from orchestration.master.recording import Chunk, Events, InMemory, Recorder
 from orchestration.results.run_directory import keep_flight
@@ -34,7 +34,7 @@ from quadcosim import (  # fmt: skip
 )
 
 FILES = {"signals.parquet", "events.parquet", "metrics.json", "scenario.toml"}
-FIGURES = {f"{name}.png" for name in FLIGHT}
+FIGURES = {f"{name}.png" for name in FIRST if name in FLIGHT}
 
 
 @pytest.fixture(scope="module")
@@ -121,7 +121,7 @@ def test_the_scenario_in_the_directory_flies_to_the_same_bits(result: Result, fo
 
 
 def test_figures_are_pictures_with_something_on_them(result: Result, tmp_path: Path) -> None:
-    written = save(drawing.draw(result, window=(0.1, 0.2)), tmp_path)
+    written = save(drawing.draw(result, FIRST, window=(0.1, 0.2)), tmp_path)
     assert {path.name for path in written} == FIGURES
     for path in written:
         assert path.read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
@@ -139,7 +139,10 @@ def test_the_commands_are_zoomed_on_the_window(result: Result, window: tuple[flo
 
 def test_a_run_without_samples_can_be_drawn(tmp_path: Path) -> None:
     without = quadcosim.run(Scenario(stop_time=0.05, timing=Timing(offset=1.0)))
-    assert {path.name for path in save(drawing.draw(without), tmp_path)} == FIGURES - {"energy.png", "spectrum.png"}
+    assert {path.name for path in save(drawing.draw(without), tmp_path)} == {f"{name}.png" for name in FLIGHT} - {
+        "energy.png",
+        "spectrum.png",
+    }
 
 
 def test_no_energy_is_drawn_of_a_controller_that_has_none() -> None:

@@ -1,0 +1,222 @@
+"""What figures of runs show: names and units everywhere, equal scales, limits, clipped peaks, the window."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.collections import FillBetweenPolyCollection
+from matplotlib.figure import Figure
+
+import quadcosim
+from orchestration.drawing import commands
+from orchestration.drawing.draw import draw
+from orchestration.drawing.lines import clip_peaks
+from orchestration.drawing.names import COLUMNS, FLIGHT
+from orchestration.drawing.phase import surface
+from orchestration.drawing.spectrum import welch
+from orchestration.drawing.style import SCREEN, STYLES, Style
+from orchestration.results.differences import told_apart
+from quadcosim import Result, Scenario, UsageError
+
+TANK = Path(__file__).parents[3] / "examples" / "water_tank" / "system.toml"
+NARROW = replace(STYLES["paper"], width=COLUMNS["single"])
+WINDOW = (0.3, 0.6)
+
+
+@pytest.fixture(scope="module")
+def flight() -> Result:
+    """With torques beyond the limit of the plant."""
+    return quadcosim.run(Scenario(stop_time=1.2).with_changes(parameters={"plant.torque_max": 15.0}))
+
+
+@pytest.fixture(scope="module")
+def slow(flight: Result) -> Result:
+    return quadcosim.run(flight.asked.with_changes(timing={"period": 0.03}))  # type: ignore[union-attr]
+
+
+@pytest.fixture(scope="module")
+def tank() -> Result:
+    return quadcosim.run(quadcosim.load_system(TANK))
+
+
+def seen(figure: Figure) -> Iterator[Axes]:
+    return (axes for axes in figure.axes if axes.get_visible())
+
+
+def inset(axes: Axes) -> Any:
+    found = [child for child in axes.child_axes if child.get_label() == "peak"]
+    return found[0] if found else None
+
+
+# -- names and units --------------------------------------------------------------------------------------
+
+
+def unlabelled(figure: Figure) -> list[str]:
+    """Axes along the left and below whose label has no name or no unit."""
+    found = []
+    for axes in seen(figure):
+        place = axes.get_subplotspec()
+        assert place is not None
+        labels = [axes.get_xlabel()] if place.is_last_row() or axes.get_xlabel() else []
+        labels += [axes.get_ylabel()] if place.is_first_col() or axes.get_ylabel() else []
+        labels += [axes.get_zlabel()] if axes.name == "3d" else []  # type: ignore[attr-defined]
+        found += [label for label in labels if not (len(label) > 4 and label.endswith("]") and "_" not in label)]
+    return found
+
+
+@pytest.mark.parametrize("style", [SCREEN, NARROW, STYLES["slides"]], ids=["screen", "narrow", "slides"])
+def test_every_axis_of_every_figure_has_a_name_and_a_unit(style: Style, flight: Result, slow: Result) -> None:
+    for results in ([flight], [flight, slow]):
+        made = draw(results, style=style)
+        assert set(made) == set(FLIGHT)
+        assert {name: unlabelled(figure) for name, figure in made.items()} == {name: [] for name in FLIGHT}
+
+
+def test_signals_of_any_fmus_have_their_descriptions_and_units(tank: Result) -> None:
+    figure = draw(tank)["signals"]
+    assert unlabelled(figure) == []
+    named = [text.get_text() for axes in figure.axes for text in axes.get_legend().get_texts()]  # type: ignore[union-attr]
+    assert any(": " in name for name in named)
+    assert not any("." in name for name in named)
+
+
+def test_a_legend_tells_what_differs_between_runs(flight: Result, slow: Result) -> None:
+    heavy = replace(flight, asked=flight.asked.with_changes(parameters={"plant.mass": 1.2}))  # type: ignore[union-attr]
+    assert told_apart([flight, slow], ["a", "b"]) == ["period 10 ms", "period 30 ms"]
+    assert told_apart([flight, heavy], ["a", "b"]) == ["mass 1 kg", "mass 1.2 kg"]
+    assert told_apart([flight, flight], ["a", "b"]) == ["a", "b"]
+    for name, figure in draw([flight, slow]).items():
+        told = [[text.get_text() for text in legend.get_texts()] for legend in figure.legends]
+        assert ["period 10 ms", "period 30 ms"] in told, name
+
+
+def test_runs_of_different_systems_are_not_laid_over_each_other(flight: Result, tank: Result) -> None:
+    with pytest.raises(UsageError, match="expected runs of one system"):
+        draw([flight, tank])
+    with pytest.raises(UsageError, match="--figure beauty: expected one of path, errors"):
+        draw(flight, ["beauty"])
+
+
+# -- the path ---------------------------------------------------------------------------------------------
+
+
+def test_a_metre_is_as_long_along_each_axis_of_the_path(flight: Result) -> None:
+    axes: Any = draw(flight, ["path"])["path"].axes[0]
+    spans = np.array([abs(np.subtract(*limits)) for limits in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())])
+    scales = np.array(axes.get_box_aspect()) / spans
+    assert scales == pytest.approx(scales[0])
+
+
+def test_the_path_shows_reference_start_and_end(flight: Result) -> None:
+    axes: Any = draw(flight, ["path"])["path"].axes[0]
+    lines = {line.get_label(): np.transpose(line.get_data_3d()) for line in axes.get_lines()}
+    assert lines["start"][0].tolist() == lines["flown"][0].tolist()
+    assert lines["end"][0].tolist() == lines["flown"][-1].tolist()
+    assert lines["reference"][0].tolist() == [0.0, 0.0, 2.0]
+
+
+# -- the window -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["errors", "components", "energy"])
+def test_figures_over_time_are_zoomed_on_the_window(name: str, flight: Result, slow: Result) -> None:
+    for results in ([flight], [flight, slow]):
+        figure = draw(results, [name], window=WINDOW)[name]
+        assert {axes.get_xlim() for axes in seen(figure)} == {WINDOW}
+
+
+def test_commands_and_signals_are_zoomed_on_the_window(flight: Result, tank: Result) -> None:
+    whole, zoom, *_ = draw(flight, ["commands"], window=WINDOW)["commands"].axes
+    assert (whole.get_xlim(), zoom.get_xlim()) == ((0.0, 1.2), WINDOW)
+    assert {axes.get_xlim() for axes in draw(flight, ["commands"], window=WINDOW, style=NARROW)["commands"].axes} == {
+        WINDOW
+    }
+    assert {axes.get_xlim() for axes in draw(tank, window=(1.0, 2.0))["signals"].axes} == {(1.0, 2.0)}
+
+
+def test_path_and_phase_show_the_window_alone(flight: Result) -> None:
+    made = draw(flight, ["path", "phase"], window=WINDOW)
+    inside = (flight.signals["time"] >= WINDOW[0] - 1e-3 - 1e-9) & (flight.signals["time"] <= WINDOW[1] + 1e-3 + 1e-9)
+    for axes, label, column in (
+        (made["path"].axes[0], "flown", "plant.position.x"),
+        (made["phase"].axes[0], "flown", "controller.position_error.x"),
+    ):
+        (line,) = [one for one in axes.get_lines() if one.get_label() == label]
+        drawn: Any = line.get_data_3d()[0] if axes.name == "3d" else line.get_xdata()  # type: ignore[attr-defined]
+        expected = flight.signals[column][inside]
+        assert len(expected) - 1 <= len(drawn) <= len(expected)
+        assert set(np.asarray(drawn)) <= set(expected)
+
+
+def test_the_spectrum_is_of_the_window_alone(flight: Result) -> None:
+    lowest = [draw(flight, ["spectrum"], window=w)["spectrum"].axes[0].get_xlim()[0] for w in (None, (0.3, 0.4))]
+    assert lowest[0] < lowest[1]
+
+
+# -- peaks, limits, surfaces ------------------------------------------------------------------------------
+
+
+def test_a_peak_that_the_axis_clips_is_said_and_shown_in_an_inset(flight: Result) -> None:
+    t = np.linspace(0.0, 10.0, 2001)
+    peaked, calm = 0.5 * np.sin(t) - 100.0 * np.exp(-20.0 * t), np.sin(t) + 1.0
+    for values, clips in ((peaked, True), (calm, False)):
+        axes = Figure().add_subplot()
+        axes.plot(t, values)
+        axes.set_xlim(0.0, 10.0)
+        assert clip_peaks(axes, [(t, values)], "N.m", SCREEN) is clips
+        shown = inset(axes)
+        assert (shown is not None) is clips
+        if shown is not None:
+            assert axes.get_ylim()[0] > -10.0, "-100 is not on it"
+            assert shown.get_title() == "clipped: peak −100 N·m at 0 s"
+            assert shown.get_ylim()[0] < -100.0
+            assert shown.get_xlim()[1] < 1.0
+
+
+def shaded(axes: Axes) -> Sequence[FillBetweenPolyCollection]:
+    return [one for one in axes.collections if one.get_label() == commands.AT_LIMIT]  # type: ignore[misc]
+
+
+def test_the_time_at_a_limit_of_the_plant_is_marked_and_no_other(flight: Result) -> None:
+    figure = draw(flight, ["commands"], window=(0.0, 1.2))["commands"]
+    thrust, torque = figure.axes[1], figure.axes[5]
+    assert not shaded(thrust)
+    (marked,) = shaded(torque)
+    t, torque_y = flight.signals["time"], flight.signals["plant.torque.y"]
+    held = np.diff(t, append=t[-1])
+    ends = [path.get_extents() for path in marked.get_paths()]
+    assert sum(end.width for end in ends) == pytest.approx(held[np.abs(torque_y) > 15.0].sum(), abs=2e-3)
+    limits = {float(line.get_ydata()[0]) for line in torque.get_lines() if line.get_label() == "limit of the plant"}  # type: ignore[index,arg-type]
+    assert limits == {15.0, -15.0}
+    assert commands.AT_LIMIT in [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_the_sliding_surface_of_the_portrait_is_where_the_law_says_s_is_0(flight: Result) -> None:
+    e = np.array([-0.5, -1e-4, 0.0, 1e-4, 0.5])
+    assert surface(e, flight.parameters) == pytest.approx([5 * 0.5**0.99, 5e-4, 0.0, -5e-4, -5 * 0.5**0.99])
+    assert surface(e, {}) is None
+    error, rate, s = (
+        flight.signals[f"controller.{name}"] for name in ("position_error.z", "velocity_error.z", "sliding.z")
+    )
+    on_surface = surface(error, flight.parameters)
+    assert on_surface is not None
+    assert rate - on_surface == pytest.approx(s, abs=1e-12)
+
+
+def test_a_spectrum_has_the_power_of_the_signal_at_its_frequency() -> None:
+    t = 0.001 * np.arange(4096)
+    frequency, density = welch(np.column_stack([3.0 * np.sin(2.0 * np.pi * 62.5 * t), 0.0 * t]), 0.001)
+    assert frequency[density[:, 0].argmax()] == pytest.approx(62.5, abs=1.0)
+    assert density[:, 0].sum() * frequency[1] == pytest.approx(4.5, rel=1e-3), "mean square: A²/2"
+    assert not density[:, 1].any()
+
+
+def test_the_spectrum_marks_the_rate_at_which_the_controller_samples(slow: Result) -> None:
+    for axes in draw(slow, ["spectrum"])["spectrum"].axes:
+        rates = [line.get_xdata()[0] for line in axes.get_lines() if line.get_label() == "_rate"]  # type: ignore[index]
+        assert rates == pytest.approx([1.0 / 0.03, 0.5 / 0.03])
+        assert any(text.get_text().startswith("sampled at 33.3") for text in axes.texts)
