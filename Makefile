@@ -46,8 +46,8 @@ bench: .venv/.test
 	$(BIN)/python -m benchmarks.batch
 
 figures: .venv/.base
-	$(BIN)/python docs/make_figures.py
-	$(BIN)/python docs/make_icons.py
+	$(BIN)/python -m docs.make_figures
+	$(BIN)/python -m docs.make_icons
 	$(BIN)/python examples/make_figures.py
 
 site: .venv/.test

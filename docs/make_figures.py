@@ -5,6 +5,8 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from docs import paper_flight
+from docs.pages import fill
 from orchestration.drawing.draw import draw
 from orchestration.drawing.palette import BLUE, GREEN, GREY, RED
 from orchestration.drawing.style import DOCS, save
@@ -22,17 +24,23 @@ MILLISECONDS = 1e-6
 
 
 def main() -> None:
-    """Fly what the figures show and write them, small enough for a repository."""
+    """Fly what the figures show and write them, small enough for a repository; fill in what the page says of them."""
     flight = run()
+    slow = run(Scenario(timing=Timing(period=0.07)))
+    limited = run(Scenario(stop_time=4.0).with_changes(parameters={"plant.torque_max": 20.0}))
     lossy = Timing(period=0.02, delay=0.012, jitter=0.006, measurement_loss=0.15, command_loss=0.15)
     figures = {
-        **draw(flight, ("path", "errors"), style=DOCS),
+        **draw(flight, ("path", "errors", "components", "phase", "spectrum"), style=DOCS),
         **draw(run(Scenario(stop_time=2.0, timing=lossy)), ("commands",), window=(0.2, 0.8), style=DOCS),
+        "overlay": draw((flight, slow), ("components",), window=(0.0, 8.0), style=DOCS)["components"],
+        "saturation": draw(limited, ("commands",), window=(0.0, 2.0), style=DOCS)["commands"],
     }
     with DOCS.applied():
         figures["timing"] = timing_diagram()
+        figures["paper_figure_3"] = paper_flight.figure_3(flight, DOCS)
     for path in save(figures, FIGURES, DOCS):
         print(path)
+    fill(FIGURES.with_name("figures.md"), {"statements": paper_flight.statements(flight)})
 
 
 def timing_diagram() -> Figure:

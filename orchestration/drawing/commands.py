@@ -17,6 +17,8 @@ from orchestration.quadrotor.wiring import COMMAND
 NAMES = dict(zip(COMMAND, ("thrust", "torque x", "torque y", "torque z"), strict=True))
 UNITS = dict(zip(COMMAND, ("N", "N.m", "N.m", "N.m"), strict=True))
 COLUMNS = tuple(f"plant.{name}" for name in COMMAND)
+MOST_MARKS = 150
+"""of one kind that are apart in a window"""
 AT_LIMIT = "a limit of the plant is active"
 
 
@@ -30,7 +32,7 @@ def commands(runs: Sequence[Run], style: Style) -> Figure:
     rows = figure.subplots(len(COMMAND), len(spans), sharex="col", squeeze=False, width_ratios=(1.0, 1.3)[: len(spans)])
     for row, name in zip(rows, COMMAND, strict=True):
         for panel, span in zip(row, spans, strict=True):
-            is_zoom = span is not spans[0] or told is not None
+            is_zoom = panel is not row[0] or (len(spans) == 1 and told is not None)
             _draw(panel, runs, name, span, style, clips=not is_zoom)
             if is_zoom and len(runs) == 1:
                 mark_events(panel, runs[0], span)
@@ -42,7 +44,7 @@ def commands(runs: Sequence[Run], style: Style) -> Figure:
     if style.has_titles:
         rows[0][0].set_title(title(runs))
         if len(spans) > 1:
-            rows[0][1].set_title(f"{zoom[0]:g} s to {zoom[1]:g} s, with the instants of the digital loop")
+            rows[0][1].set_title(f"{zoom[0]:g} s to {zoom[1]:g} s")
     _legend(figure, list(rows.ravel()))
     legend_of_runs(figure, runs, style)
     return figure
@@ -89,7 +91,7 @@ def _mark_saturation(panel: Axes, runs: Sequence[Run], name: str) -> None:
 
 
 def mark_events(axes: Axes, run: Run, span: Window) -> None:
-    """Ticks along the lower and upper edge for what happened in the window."""
+    """Ticks along the lower and upper edge for what happened in the window; where too much did, for what was lost."""
     for kind, what, marker, color, height, label in (
         ("sampled", "measurement", "|", GREY, 0.04, "sampled"),
         ("arrived", "command", "^", GREEN, 0.11, "command arrives"),
@@ -98,7 +100,7 @@ def mark_events(axes: Axes, run: Run, span: Window) -> None:
     ):
         times = [e.time / 1e9 for e in run.result.events if e.kind == kind and e.what == what]
         times = [time for time in times if span[0] <= time <= span[1]]
-        if times:
+        if times and (kind == "lost" or len(times) <= MOST_MARKS):
             axes.plot(
                 times, [height] * len(times), linestyle="", marker=marker, color=color, markersize=4,
                 markeredgewidth=0.8,

@@ -19,7 +19,9 @@ AXES = tuple(zip("xyz", (BLUE, RED, GREEN), ("-", "--", "-."), strict=True))
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Error:
+class Error:
+    """One of the four."""
+
     name: str
     unit: str
     of: Callable[[Run], Floats | None]
@@ -47,20 +49,22 @@ def components_of_errors(runs: Sequence[Run], style: Style) -> Figure:
         return _laid_over(runs, style)
     figure, panels = _panels(runs, style)
     for i, (panel, error) in enumerate(panels):
-        _draw_components(panel, runs[0], error, style)
+        draw_components(panel, runs[0], error, style)
         if i == 0:
             panel.legend(loc="upper right", ncols=3)
     return figure
 
 
-def _draw_components(panel: Axes, run: Run, error: _Error, style: Style) -> None:
+def draw_components(panel: Axes, run: Run, error: Error, style: Style, *, clips: bool = True) -> None:
+    """x, y and z of an error that the run tells."""
     values = error.of(run)
     assert values is not None
     for k, (axis, color, dashes) in enumerate(AXES):
         panel.plot(run.time, values[:, k], color=color, linestyle=dashes, label=axis)
     panel.set_ylabel(wrapped(quantity(error.name, error.unit)))
     see(panel, [run])
-    clip_peaks(panel, [(run.time, values[:, k]) for k in range(3)], error.unit, style)
+    if clips:
+        clip_peaks(panel, [(run.time, values[:, k]) for k in range(3)], error.unit, style)
 
 
 def _laid_over(runs: Sequence[Run], style: Style) -> Figure:
@@ -81,7 +85,7 @@ def _laid_over(runs: Sequence[Run], style: Style) -> Figure:
     return figure
 
 
-def _panels(runs: Sequence[Run], style: Style) -> tuple[Figure, list[tuple[Axes, _Error]]]:
+def _panels(runs: Sequence[Run], style: Style) -> tuple[Figure, list[tuple[Axes, Error]]]:
     """A panel for each error that there is; legend and title are there."""
     found = _known(runs)
     columns = 2 if style.is_wide and len(found) > 1 else 1
@@ -98,8 +102,8 @@ def _panels(runs: Sequence[Run], style: Style) -> tuple[Figure, list[tuple[Axes,
     return figure, list(zip(panels, found))
 
 
-def _known(runs: Sequence[Run]) -> list[_Error]:
-    return [error for error in _ERRORS if any(error.of(run) is not None for run in runs)]
+def _known(runs: Sequence[Run]) -> list[Error]:
+    return [error for error in ERRORS if any(error.of(run) is not None for run in runs)]
 
 
 def _position(run: Run) -> Floats | None:
@@ -112,11 +116,11 @@ def _told(name: str) -> Callable[[Run], Floats | None]:
     return lambda run: run.stacked(columns) if run.has(columns) else None
 
 
-_ERRORS = (
-    _Error(name="position error", unit="m", of=_position),
-    _Error(name="velocity error", unit="m/s", of=_told("velocity_error")),
-    _Error(name="attitude error", unit="1", of=_told("attitude_error")),
-    _Error(name="angular velocity error", unit="rad/s", of=_told("angular_velocity_error")),
+ERRORS = (
+    Error(name="position error", unit="m", of=_position),
+    Error(name="velocity error", unit="m/s", of=_told("velocity_error")),
+    Error(name="attitude error", unit="1", of=_told("attitude_error")),
+    Error(name="angular velocity error", unit="rad/s", of=_told("angular_velocity_error")),
 )
 """P̃, Ṽ, q̃ and Ω̃"""
 DRAWN = tuple(

@@ -1,6 +1,7 @@
 """The flight in space."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -21,6 +22,16 @@ def path(runs: Sequence[Run], style: Style) -> Figure:
     """Where it flew and where it should have, a metre being as long along each axis, up being up."""
     figure = style.figure(38.0, width=0.75 if style.is_wide else 1.0)
     axes = figure.add_subplot(projection="3d")
+    draw_in_space(axes, runs, style)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    if style.has_titles:
+        axes.set_title(title(runs))
+    legend_of_runs(figure, runs, style)
+    return figure
+
+
+def draw_in_space(axes: Any, runs: Sequence[Run], style: Style) -> None:
+    """The same on three-dimensional axes that are there."""
     flown = [run.stacked([f"plant.{name}" for name in POSITION]) for run in runs]
     wanted = [run.stacked(POSITION_REFERENCE) for run in runs]
     for i, points in enumerate(wanted):
@@ -38,24 +49,19 @@ def path(runs: Sequence[Run], style: Style) -> Figure:
                 *points[place, :, None], marker, color=color, zorder=3, label=what if run.place == 0 else None,
                 markerfacecolor="white" if what == "start" else color,
             )  # fmt: skip
-    _equal(axes, np.concatenate([*flown, *wanted]))
+    _equal(axes, np.concatenate([*flown, *wanted]), is_wide=style.is_wide)
     axes.set(xlabel="x, north [m]", ylabel="y, east [m]", zlabel="z, down [m]")
     axes.view_init(elev=24, azim=-50)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4)
-    if style.has_titles:
-        axes.set_title(title(runs))
-    legend_of_runs(figure, runs, style)
-    return figure
 
 
-def _equal(axes: "object", points: Floats) -> None:
+def _equal(axes: Any, points: Floats, *, is_wide: bool) -> None:
     """Equal scales in a box that holds all points; x to the viewer's right, z down."""
     points = points[np.isfinite(points).all(axis=1)]
     low, high = points.min(axis=0), points.max(axis=0)
     middle, size = 0.5 * (low + high), 1.08 * (high - low)
     size = np.maximum(size, max(LEAST * float(size.max()), 1e-6))
     starts, ends = middle - 0.5 * size, middle + 0.5 * size
-    axes.set(xlim=(starts[0], ends[0]), ylim=(ends[1], starts[1]), zlim=(ends[2], starts[2]))  # type: ignore[attr-defined]
-    axes.set_box_aspect(size, zoom=0.8)  # type: ignore[attr-defined]
-    for axis, share in zip((axes.xaxis, axes.yaxis, axes.zaxis), size / size.max()):  # type: ignore[attr-defined]
+    axes.set(xlim=(starts[0], ends[0]), ylim=(ends[1], starts[1]), zlim=(ends[2], starts[2]))
+    axes.set_box_aspect(size, zoom=0.95 if is_wide and size[2] < size[:2].max() else 0.8)  # labels have room
+    for axis, share in zip((axes.xaxis, axes.yaxis, axes.zaxis), size / size.max()):
         axis.set_major_locator(MaxNLocator(max(2, round(6 * share))))
