@@ -1,67 +1,129 @@
-"""quadcosim: fly a quadrotor controller FMU and a plant FMU under a realistic digital clock.
+"""Run FMUs under a realistic digital clock: fly a quadrotor's controller, or any system, and find what it stands.
 
-import quadcosim
+One run, here the paper's flight, sampled every 20 ms::
 
-result = quadcosim.run(quadcosim.Scenario(timing=quadcosim.Timing(period=0.02)))
-print(result.metrics["ultimate_bound"])
-quadcosim.save_run(result, "results/20ms")
+    import quadcosim
+    from quadcosim import Scenario, Timing
 
-Any FMUs are a `System`: of `load_system`, or made of `Component`, `Connection` and so on; `run` takes it too.
+    result = quadcosim.run(Scenario(timing=Timing(period=0.02)))
+    result.metrics["ultimate_bound"]    # [m]; result.units has the units
+    result.signals["plant.position.x"]  # an array; result.to_pandas() a table
+    result.plot("errors")               # figures of matplotlib, which a notebook shows
+    quadcosim.save_run(result, "results/20ms")
+
+Where to begin:
+
+- `run` takes a `Scenario` of the quadrotor, with its `Timing`, or a `System` of any FMUs, and gives a `Result`;
+- `load_scenario` and `load_system` read files of them, and the constructors refuse what the files refuse, in one line;
+- `limit` finds the largest period, delay, loss or anything else that is still good;
+- `sweep` flies a `Study` over axes, `compare` controllers against each other, `tune` searches for gains: what is there
+  is not flown again, and what they give becomes a table with `to_pandas`;
+- `report` writes one HTML file of runs, with a replay;
+- `read_model` says what an FMU has.
+
+All times are in seconds, all values in the units that the FMUs declare. What goes wrong is a `QuadcosimError`, of which
+`UsageError` is what cannot be carried out as it is written. Studies and tables need `pip install 'quadcosim[studies]'`.
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from orchestration.errors import QuadcosimError, SimulatorError, UsageError
+    from orchestration.fmi.model import Model, read_model
     from orchestration.quadrotor.scenario import FmuChoice, Record, Scenario
     from orchestration.quadrotor.scenario_file import load_scenario
     from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
     from orchestration.quadrotor.timing import Timing
+    from orchestration.quadrotor.vehicles import Vehicle, load_vehicle
     from orchestration.report.writing import report
     from orchestration.results.pause import fly_until, resume
     from orchestration.results.result import Result
     from orchestration.results.run_directory import load_run, save_run
     from orchestration.simulation import RunInterrupted, run
+    from orchestration.studies.axes import Axis
+    from orchestration.studies.comparison.design import Comparison
+    from orchestration.studies.comparison.file import load_comparison
+    from orchestration.studies.comparison.run import Compared, compare
+    from orchestration.studies.limit import Limit
+    from orchestration.studies.limit import find as limit
+    from orchestration.studies.study import Study
+    from orchestration.studies.study_file import load_study
+    from orchestration.studies.sweep import sweep
+    from orchestration.studies.swept import Swept
+    from orchestration.studies.tune import Tuned, tune
+    from orchestration.studies.tuning import Tuning
+    from orchestration.studies.tuning_file import load_tuning
     from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
     from orchestration.system.paths import changed
     from orchestration.system.system_file import load_system
 
 _HOMES = {
-    "QuadcosimError": "orchestration.errors",
-    "SimulatorError": "orchestration.errors",
-    "UsageError": "orchestration.errors",
-    "RunInterrupted": "orchestration.simulation",
+    # run
     "run": "orchestration.simulation",
     "Result": "orchestration.results.result",
-    "load_run": "orchestration.results.run_directory",
     "save_run": "orchestration.results.run_directory",
+    "load_run": "orchestration.results.run_directory",
     "fly_until": "orchestration.results.pause",
     "resume": "orchestration.results.pause",
-    "FmuChoice": "orchestration.quadrotor.scenario",
-    "Record": "orchestration.quadrotor.scenario",
-    "DisturbanceChoice": "orchestration.quadrotor.signals",
-    "ReferenceChoice": "orchestration.quadrotor.signals",
-    "Scenario": "orchestration.quadrotor.scenario",
-    "load_scenario": "orchestration.quadrotor.scenario_file",
-    "Timing": "orchestration.quadrotor.timing",
-    "Component": "orchestration.system.model",
-    "Connection": "orchestration.system.model",
-    "Criterion": "orchestration.system.model",
-    "Sampling": "orchestration.system.model",
-    "Source": "orchestration.system.model",
-    "System": "orchestration.system.model",
-    "changed": "orchestration.system.paths",
-    "load_system": "orchestration.system.system_file",
     "report": "orchestration.report.writing",
+    # a flight of the quadrotor
+    "Scenario": "orchestration.quadrotor.scenario",
+    "Timing": "orchestration.quadrotor.timing",
+    "FmuChoice": "orchestration.quadrotor.scenario",
+    "ReferenceChoice": "orchestration.quadrotor.signals",
+    "DisturbanceChoice": "orchestration.quadrotor.signals",
+    "Record": "orchestration.quadrotor.scenario",
+    "Vehicle": "orchestration.quadrotor.vehicles",
+    "load_vehicle": "orchestration.quadrotor.vehicles",
+    "load_scenario": "orchestration.quadrotor.scenario_file",
+    # any system
+    "System": "orchestration.system.model",
+    "Component": "orchestration.system.model",
+    "Sampling": "orchestration.system.model",
+    "Connection": "orchestration.system.model",
+    "Source": "orchestration.system.model",
+    "Criterion": "orchestration.system.model",
+    "load_system": "orchestration.system.system_file",
+    "changed": "orchestration.system.paths",
+    "read_model": "orchestration.fmi.model",
+    "Model": "orchestration.fmi.model",
+    # many runs
+    "limit": "orchestration.studies.limit",
+    "Limit": "orchestration.studies.limit",
+    "sweep": "orchestration.studies.sweep",
+    "Study": "orchestration.studies.study",
+    "Axis": "orchestration.studies.axes",
+    "Swept": "orchestration.studies.swept",
+    "load_study": "orchestration.studies.study_file",
+    "compare": "orchestration.studies.comparison.run",
+    "Comparison": "orchestration.studies.comparison.design",
+    "Compared": "orchestration.studies.comparison.run",
+    "load_comparison": "orchestration.studies.comparison.file",
+    "tune": "orchestration.studies.tune",
+    "Tuning": "orchestration.studies.tuning",
+    "Tuned": "orchestration.studies.tune",
+    "load_tuning": "orchestration.studies.tuning_file",
+    # errors
+    "QuadcosimError": "orchestration.errors",
+    "UsageError": "orchestration.errors",
+    "SimulatorError": "orchestration.errors",
+    "RunInterrupted": "orchestration.simulation",
 }
+_OTHERWISE = {"limit": "find"}
+"""Names that go by another one at home"""
 
 __all__ = [
+    "Axis",
+    "Compared",
+    "Comparison",
     "Component",
     "Connection",
     "Criterion",
     "DisturbanceChoice",
     "FmuChoice",
+    "Limit",
+    "Model",
     "QuadcosimError",
     "Record",
     "ReferenceChoice",
@@ -71,26 +133,41 @@ __all__ = [
     "Scenario",
     "SimulatorError",
     "Source",
+    "Study",
+    "Swept",
     "System",
     "Timing",
+    "Tuned",
+    "Tuning",
     "UsageError",
+    "Vehicle",
     "changed",
+    "compare",
     "fly_until",
+    "limit",
+    "load_comparison",
     "load_run",
     "load_scenario",
+    "load_study",
     "load_system",
+    "load_tuning",
+    "load_vehicle",
+    "read_model",
     "report",
     "resume",
     "run",
     "save_run",
+    "sweep",
+    "tune",
 ]
 
+if not TYPE_CHECKING:  # else every name would seem to be there, of type Any
 
-def __getattr__(name: str) -> Any:
-    """Load what is asked for and no more: the command line answers `--help` without numpy."""
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__} has no attribute {name}")
-    return getattr(import_module(_HOMES[name]), name)
+    def __getattr__(name):
+        """Load what is asked for and no more: the command line answers `--help` without numpy."""
+        if name not in _HOMES:
+            raise AttributeError(f"module {__name__} has no attribute {name}")
+        return getattr(import_module(_HOMES[name]), _OTHERWISE.get(name, name))
 
 
 def __dir__() -> list[str]:

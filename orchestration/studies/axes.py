@@ -20,25 +20,37 @@ MOST_POINTS = 1_000_000
 """of a study"""
 
 
+_BY_NAME = ("axis.name",)
+
+
 @strict()
 @dataclass(frozen=True, kw_only=True)
 class Axis:
     """One quantity that a study varies.
 
-    It sets `targets` (`timing.KEY`, `controller.NAME`, `plant.NAME`, `seed`, `stop_time`), or, if it
-    `multiplies`, scales what they are in the base scenario. It takes `values` in turn, or is sampled
-    between `low` and `high` together with all other sampled axes.
+    It takes `values` in turn, or is sampled between `low` and `high` together with all other sampled axes. Raises
+    `UsageError` for values that cannot be.
     """
 
     name: str
-    targets: tuple[str, ...]
+    """The column that it is in the table of runs, and what it sets unless `targets` say it."""
+    targets: tuple[str, ...] = _BY_NAME
+    """What it sets: of the quadrotor `timing.KEY`, `controller.NAME`, `plant.NAME`, of any system paths; `seed`,
+    `stop_time`."""
     multiplies: bool = False
+    """Whether its values are factors on what the targets are in the base, instead of setting them."""
     values: tuple[Value, ...] | None = None
+    """The values, in turn; None: it is sampled."""
     low: float = 0.0
+    """The lower end of the range in which it is sampled, in the unit of its targets."""
     high: float = 1.0
+    """The upper end of that range."""
     scale: Scale = "linear"
+    """Whether it is sampled evenly, or evenly in its logarithm."""
 
     def __post_init__(self) -> None:
+        if self.targets == _BY_NAME:
+            object.__setattr__(self, "targets", (self.name,))
         if self.values is not None and not self.values:
             raise UsageError(f"axis {self.name}: expected at least one value")
         if len({_kind(value) for value in self.values or ()}) > 1:

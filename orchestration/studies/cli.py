@@ -3,7 +3,7 @@
 import dataclasses
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -12,8 +12,11 @@ from orchestration.command.answer import Answer, of_files
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.flags import EngineFlag, FlightFlags, Timing, flies, request_from
 from orchestration.command.shared_flags import takes
-from orchestration.command.terminal import progress_bar, runs_bar, say
+from orchestration.command.terminal import say
 from orchestration.errors import UsageError
+
+if TYPE_CHECKING:
+    from orchestration.master.engine import Engine
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file.", metavar="STUDY.toml", show_default=False)]
 Out = Annotated[
@@ -43,15 +46,12 @@ def sweep(
     engine: BatchFlag = None,
 ) -> Answer:
     """Fly the runs of a study that are missing; kill it and start it again as you like."""
-    from orchestration.master.engine import engine_named
     from orchestration.studies.study_file import load_study
     from orchestration.studies.sweep import sweep as fly
 
-    with runs_bar() as progress:
-        summary = fly(
-            load_study(study), folder=out, workers=workers, dask=dask, retry_failed=retry_failed,
-            engine="batch" if engine == "batch" else engine_named(engine, "batch"), progress=progress, announce=say,
-        )  # fmt: skip
+    summary = fly(
+        load_study(study), folder=out, workers=workers, dask=dask, retry_failed=retry_failed, engine=_batch_or(engine)
+    )
     failed = f", {summary.failed} failed (quadcosim export shows why; --retry-failed)" if summary.failed else ""
     lines = [f"{summary.path}: {summary.total} runs, {summary.flown} flown now{failed}"]
     if summary.agreement is not None:
@@ -141,22 +141,12 @@ def tune(
     engine: BatchFlag = None,
 ) -> Answer:
     """Tune a controller on an ensemble of starts, and judge it on others; goes on where it was stopped."""
-    from orchestration.master.engine import engine_named
-    from orchestration.studies.engine import Pool
     from orchestration.studies.tune import tune as search_all
     from orchestration.studies.tuning_file import load_tuning
 
-    in_lanes = engine == "batch"
-    asked = dataclasses.replace(load_tuning(tuning), native=in_lanes)
-    files, alone = asked.files(), None if in_lanes else engine_named(engine, "batch")
     command = f"quadcosim tune {tuning} --out {out}" + (f" --engine {engine}" if engine else "")
-    with progress_bar("searching") as progress, Pool(files, workers, alone) as pool:
-        written = search_all(
-            asked, files, Path("results") / asked.name, out,
-            lambda systems: pool.fly_all(systems, in_lanes=in_lanes), pool.fly_all,
-            command=command, progress=progress, announce=say,
-        )  # fmt: skip
-    return of_files(written)
+    found = search_all(load_tuning(tuning), out=out, workers=workers, engine=_batch_or(engine), command=command)
+    return of_files(found.written)
 
 
 def compare(
@@ -279,6 +269,12 @@ def margin(
         shown = " ".join(f"{share:g}" for share in value) if isinstance(value, tuple) else value
         lines.append(f"{name:<17}  {f'{value:.6g} s' if isinstance(value, float) else '-' if value is None else shown}")
     return Answer(document=found, lines=lines)
+
+
+def _batch_or(engine: str | None) -> "Engine | Literal['batch'] | None":
+    from orchestration.master.engine import engine_named
+
+    return "batch" if engine == "batch" else engine_named(engine, "batch")
 
 
 def _current_store(study: Path, out: Path | None) -> Path:

@@ -20,7 +20,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import expm
 
 from orchestration.simulator import Floats
 from orchestration.studies.search import bisected
@@ -53,6 +52,8 @@ class SampledLoop:
     def held(self, duration: float) -> tuple[Floats, Floats]:
         """State after `duration` [s] by the state and the held command before."""
         n, m = self.B.shape
+        from scipy.linalg import expm
+
         block = expm(np.block([[self.A, self.B], [np.zeros((m, n + m))]]) * duration)
         return block[:n, :n], block[:n, n:]
 

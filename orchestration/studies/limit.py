@@ -4,14 +4,18 @@ import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
+from orchestration.command.terminal import say
 from orchestration.errors import UsageError
+from orchestration.extras import explained
 from orchestration.master.engine import Engine
 from orchestration.quadrotor.measures import Outcome
 from orchestration.quadrotor.scenario import Record, Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.translation import in_its_own_words
 from orchestration.request import Request, system_meant
+from orchestration.results import html
 from orchestration.simulation import checked
 from orchestration.studies.engine import Pool
 from orchestration.studies.files import Files, files_of
@@ -19,6 +23,9 @@ from orchestration.studies.local import Local, local_limits
 from orchestration.studies.ranges import Range, Varied, range_asked_for
 from orchestration.studies.search import Bracket, bisected, first_failure
 from orchestration.studies.trials import RELIABILITY, Trials, Tried, is_random, said
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 GAP = 0.1
 """of the local limit: a larger difference to the large-signal one is worth saying"""
@@ -41,11 +48,12 @@ class Continuous:
     """[s]"""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Limit:
     """The last value that is good (of the quadrotor: flies) and what it rests on; in the quantity's unit."""
 
     of: str
+    """The quantity: a name, or a path."""
     local_limit: float | None
     """where what is small about the operating point (hover) first ceases to decay; None: not defined, or not reached"""
     local_method: str | None = None
@@ -78,7 +86,23 @@ class Limit:
     note: str
     """what the figures mean together"""
 
+    def __repr__(self) -> str:
+        return f"<Limit of {self.of}: {self.note}>"
 
+    def _repr_html_(self) -> str:
+        """As notebooks show it."""
+        rows = [(name.replace("_", " "), text, "") for name, text in as_text(self).items() if name != "note"]
+        return html.card("A limit", None, None, self.note, rows)
+
+    @explained
+    def to_pandas(self) -> "pd.DataFrame":
+        """A row for each value that was tried, upward: outcome, and how many seeds were run and good."""
+        import pandas as pd
+
+        return pd.DataFrame([vars(one) for one in self.tried])
+
+
+@explained
 def find(
     request: Request,
     of: str,
@@ -91,12 +115,13 @@ def find(
     continuous: bool = False,
     workers: int = 1,
     engine: Engine | None = None,
-    announce: Callable[[str], None] | None = None,
+    announce: Callable[[str], None] | None = say,
 ) -> Limit:
-    """The limit of a system or a scenario in one quantity, all else as it is.
+    """Find the largest value of a quantity of a system or a scenario that is still good, all else as it is.
 
     `of` is a path, or of the quadrotor `period`, `delay`, `jitter` or `loss`; it is looked for from `first` to `last`,
-    `scan` is the step, `continuous` adds that flight (of the quadrotor).
+    `scan` is the step, `continuous` adds that flight (of the quadrotor). The seeds of a random quantity are flown by
+    `workers` processes. `announce` hears a line for each value that was tried; None for silence.
 
     Raises `UsageError` for a quantity, range, tolerance, step or confidence that cannot be.
     """

@@ -13,8 +13,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import filelock
-
 from orchestration.errors import QuadcosimError, UsageError
 
 FIXED = ("outcome", "good", "horizon", "diverged", "divergence_time", "steps")
@@ -247,6 +245,8 @@ def open_for_writing(path: Path, objectives: Iterable[str]) -> Iterator[Store]:
 
     One that is there has the objectives that it was made with.
     """
+    import filelock
+
     with _explained(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         lock = filelock.FileLock(f"{path}.lock", timeout=0)

@@ -3,11 +3,13 @@
 import contextlib
 import json
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
+from orchestration.command.terminal import Count, say
 from orchestration.errors import UsageError
+from orchestration.extras import explained
 from orchestration.interrupt import Interrupted
 from orchestration.master.engine import Engine
 from orchestration.simulation import checked
@@ -16,6 +18,7 @@ from orchestration.studies.checks import described, expect_flyable
 from orchestration.studies.crew import Package
 from orchestration.studies.engine import expect_scheduler, run_locally, run_on_dask
 from orchestration.studies.files import Files
+from orchestration.studies.hearing import CountHeard, of_runs
 from orchestration.studies.identity import (
     design_parts,
     difference,
@@ -28,10 +31,9 @@ from orchestration.studies.lanes import Agreement, chunks, expect_lanes, sample
 from orchestration.studies.ranges import unit_at
 from orchestration.studies.store import Row
 from orchestration.studies.study import Study, paths_in
+from orchestration.studies.swept import Swept
 from orchestration.studies.worker import Chunk, Outcome, Task
 
-Progress = Callable[[int, int], None]
-"""Hears how many of how many runs are done."""
 Announce = Callable[[str], None]
 """Hears of a run that failed."""
 Fly = Callable[[Iterable[Task | Chunk]], Generator[list[Outcome], None, None]]
@@ -44,46 +46,36 @@ _TOLD = 3
 """failed runs that are announced one by one"""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Summary:
-    """How a sweep went."""
-
-    total: int
-    flown: int
-    """runs of this sweep"""
-    failed: int
-    """failed runs in the store"""
-    path: Path
-    agreement: Agreement | None = None
-    """of runs flown in lanes with their FMUs"""
-
-
-def store_path(study: str, folder: Path | None = None) -> Path:
+def store_path(study: str, folder: str | Path | None = None) -> Path:
     """Where the rows of a study are: `results/NAME/study.sqlite` unless a folder is given."""
-    return (folder or Path("results") / study) / "study.sqlite"
+    return Path(folder or Path("results") / study) / "study.sqlite"
 
 
+@explained
 def sweep(
     study: Study,
     *,
-    folder: Path | None = None,
+    folder: str | Path | None = None,
     workers: int = 1,
     dask: str | None = None,
     retry_failed: bool = False,
     engine: Engine | Literal["batch"] | None = None,
-    progress: Progress | None = None,
-    announce: Announce | None = None,
-) -> Summary:
-    """Fly the runs of `study` that its store does not have, writing each row as it comes.
+    progress: CountHeard = "bar",
+    announce: Announce | None = say,
+) -> Swept:
+    """Fly the runs of a study that its store does not have, writing each row as it comes.
+
+    The store is in `folder`, `results/NAME` unless told: what is there is not flown again, so that a sweep may be
+    stopped and called again. Runs are flown by `workers` processes of this machine, which need no guard of the main
+    module and work from a notebook, or by those of a `dask` scheduler at that address; by the engine `batch` they are
+    flown as lanes of native FMUs, and some of them by the FMUs too, to compare. `progress` hears how many of how many
+    are done, `announce` of runs that failed; None for silence.
 
     Raises `UsageError`, before anything is flown, for a design with a run that cannot be, or if the store holds
-    another study, saying what differs; `QuadcosimError` for what is not a run's own failure, without a row. By the
-    engine `batch` runs are flown as lanes of native FMUs, and some of them by the FMUs too, to compare.
+    another study, saying what differs; `QuadcosimError` for what is not a run's own failure, without a row;
+    `KeyboardInterrupt`, which says how far it came, after Ctrl-C.
     """
-    if workers < 1:
-        raise UsageError(f"--workers {workers}: expected at least 1")
-    if dask is not None:
-        expect_scheduler(dask)
+    _expect_workers(workers, dask)
     in_lanes = engine == "batch"
     study = replace(study, native=True) if in_lanes else study
     path = store_path(study.name, folder)
@@ -91,10 +83,10 @@ def sweep(
     expect_flyable(study, files)
     if in_lanes:
         expect_lanes(study.system(0, files.starts_of(study.origin)), files)
-    with store.open_for_writing(path, study.origin.objectives) as opened:
+    with of_runs(progress) as hear, store.open_for_writing(path, study.origin.objectives) as opened:
         _describe(opened, study, files)
         missing = _missing(opened, study, retry_failed)
-        counted = _Counted(len(study.points), opened, progress, announce)
+        counted = _Counted(len(study.points), opened, hear, announce)
         fly = _flying(Package.of(files), workers, dask)
         tasks = (_task(study, index, files, None if engine == "batch" else engine) for index in missing)
         lanes: dict[str, Row] = {}
@@ -111,7 +103,14 @@ def sweep(
             opened.describe({AGREEMENT: agreement.as_text()})
             agreement.expect()
         failed = opened.counts().get("failed", 0)
-    return Summary(total=counted.total, flown=len(missing), failed=failed, path=path, agreement=agreement)
+    return Swept(total=counted.total, flown=len(missing), failed=failed, path=path, agreement=agreement)
+
+
+def _expect_workers(workers: int, dask: str | None) -> None:
+    if workers < 1:
+        raise UsageError(f"--workers {workers}: expected at least 1")
+    if dask is not None:
+        expect_scheduler(dask)
 
 
 def _flying(package: Package, workers: int, dask: str | None) -> Fly:
@@ -149,9 +148,9 @@ def expect_current(opened: store.Store, study: Study) -> None:
 class _Counted:
     """How far a sweep is, for those who want to hear of it."""
 
-    def __init__(self, total: int, opened: store.Store, progress: Progress | None, announce: Announce | None) -> None:
+    def __init__(self, total: int, opened: store.Store, hear: Count, announce: Announce | None) -> None:
         self.total, self.failed = total, 0
-        self._progress, self._announce = progress, announce
+        self._hear, self._announce = hear, announce
         self._lacking = opened.lacking()
         self.done = total - sum(self._lacking.values())
         self._tell()
@@ -168,8 +167,7 @@ class _Counted:
         self._tell()
 
     def _tell(self) -> None:
-        if self._progress is not None:
-            self._progress(self.done, self.total)
+        self._hear(self.done, self.total)
 
 
 def _task(study: Study, index: int, files: Files, engine: Engine | None) -> Task:

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 
 from orchestration.errors import UsageError
 from orchestration.fmi.instance import Instance
@@ -167,6 +166,8 @@ class Tangent:
         """The coordinates that `futures` span, and states that span them."""
         self._axes = np.linalg.svd(futures, full_matrices=False)[0][:, :rank]
         coordinates = self._axes.T @ futures
+        import scipy.linalg
+
         chosen = scipy.linalg.qr(coordinates, mode="r", pivoting=True)[1][:rank] if rank else []
         self._pairs = [pairs[i] for i in chosen]
         self._inverse = np.linalg.inv(coordinates[:, chosen]) if rank else np.zeros((0, 0))

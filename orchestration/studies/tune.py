@@ -3,29 +3,112 @@
 import dataclasses
 import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
+from orchestration.command.terminal import say
+from orchestration.extras import explained
+from orchestration.master.engine import Engine
+from orchestration.results import html
+from orchestration.studies.engine import Pool
 from orchestration.studies.files import Files
+from orchestration.studies.hearing import ShareHeard, of_share
 from orchestration.studies.identity import versions
 from orchestration.studies.tuning import Fly, Found, Tuning, best_by_period, search
 from orchestration.studies.tuning_file import gains_text
 
+if TYPE_CHECKING:
+    import pandas as pd
 
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Tuned:
+    """What a tuning has found."""
+
+    searches: tuple[Found, ...]
+    """Every search, one for each period and seed."""
+    written: tuple[Path, ...]
+    """The files of tuned parameters, one for each period, that scenario files and comparisons read."""
+
+    @property
+    def best(self) -> dict[float, Found]:
+        """By period [s] the search whose parameters cost least on the starts that they were tuned on."""
+        return {one.period: one for one in best_by_period(self.searches)}
+
+    def __repr__(self) -> str:
+        costs = ", ".join(f"{found.judged_cost:.4g} at {period:g} s" for period, found in self.best.items())
+        return f"<Tuned: {len(self.searches)} searches, costs on other starts {costs}>"
+
+    def _repr_html_(self) -> str:
+        """As notebooks show it: the best of each period."""
+        rows = [
+            (f"{name} at {period:g} s", html.number(value), "")
+            for period, found in self.best.items()
+            for name, value in {**found.values, "cost on other starts": found.judged_cost}.items()
+        ]
+        return html.card("A tuning", None, None, f"{len(self.searches)} searches", rows)
+
+    @explained
+    def to_pandas(self) -> "pd.DataFrame":
+        """A row for each search: its period [s] and seed, the tuned values, costs, and how many of other starts fly."""
+        import pandas as pd
+
+        table = pd.DataFrame(
+            [
+                {**{k: v for k, v in dataclasses.asdict(one).items() if k != "values"}, **one.values}
+                for one in self.searches
+            ]
+        )
+        table.attrs["units"] = {"period": "s"}
+        return table
+
+
+@explained
 def tune(
+    tuning: Tuning,
+    *,
+    out: str | Path,
+    folder: str | Path | None = None,
+    workers: int = 1,
+    engine: Engine | Literal["batch"] | None = None,
+    command: str = "quadcosim.tune",
+    progress: ShareHeard = "bar",
+    announce: Callable[[str], None] | None = say,
+) -> Tuned:
+    """Tune the parameters of a controller on an ensemble of starts, and judge them on others.
+
+    For each period of the tuning a file of parameters is written into `out`; it says that it was made by `command`.
+    What each search has found is kept in `folder`, `results/NAME` unless told, so that no search is done twice. Runs
+    are flown by `workers` processes, by the engine `batch` many at once as lanes of native FMUs. `progress` hears the
+    share that is done, `announce` a line for each search; None for silence.
+
+    Raises `UsageError` for what cannot be, `QuadcosimError` if a run fails, `KeyboardInterrupt` after Ctrl-C.
+    """
+    in_lanes = engine == "batch"
+    asked = dataclasses.replace(tuning, native=True) if in_lanes else tuning
+    files = asked.files()
+    with of_share(progress, "searching") as hear, Pool(files, workers, None if engine == "batch" else engine) as pool:
+        done = searched(
+            asked, files, Path(folder or Path("results") / asked.name),
+            lambda systems: pool.fly_all(systems, in_lanes=in_lanes), pool.fly_all,
+            progress=hear, announce=announce or (lambda line: None),
+        )  # fmt: skip
+    return Tuned(searches=tuple(done), written=tuple(write(asked, done, Path(out), command)))
+
+
+def searched(
     tuning: Tuning,
     files: Files,
     folder: Path,
-    out: Path,
     fly: Fly,
     judge: Fly,
     *,
-    command: str,
     progress: Callable[[float], None],
     announce: Callable[[str], None],
-) -> list[Path]:
-    """The files of tuned parameters, one for each period, in `out`; what each search found is kept in `folder`.
+) -> list[Found]:
+    """What each search finds; that is kept in `folder`.
 
     A search that is done, of the same tuning with the same software, is not done again.
     """
@@ -43,8 +126,16 @@ def tune(
         )
         folder.mkdir(parents=True, exist_ok=True)
         record.write_text(json.dumps([dataclasses.asdict(each) for each in done], indent=2))
+    return done
+
+
+def write(tuning: Tuning, done: list[Found], out: Path, command: str) -> Iterator[Path]:
+    """Write the files of tuned parameters, one for each period; their paths."""
     out.mkdir(parents=True, exist_ok=True)
-    return [_write(tuning, best, done, out, command) for best in best_by_period(done)]
+    for best in best_by_period(done):
+        path = out / f"{tuning.name}_{1000.0 * best.period:g}ms.toml"
+        path.write_text(gains_text(tuning, best, done, command))
+        yield path
 
 
 def _part(progress: Callable[[float], None], index: int, count: int) -> Callable[[float], None]:
@@ -52,15 +143,10 @@ def _part(progress: Callable[[float], None], index: int, count: int) -> Callable
     return lambda share: progress((index + share) / count)
 
 
-def _write(tuning: Tuning, best: Found, done: list[Found], out: Path, command: str) -> Path:
-    path = out / f"{tuning.name}_{1000.0 * best.period:g}ms.toml"
-    path.write_text(gains_text(tuning, best, done, command))
-    return path
-
-
 def _key(tuning: Tuning, files: Files) -> str:
     """Of all that a search depends on."""
-    content = [repr(tuning), sorted(files.hashes.items()), sorted(versions().items())]
+    asked = json.dumps(dataclasses.asdict(tuning), default=str)
+    content = [asked, sorted(files.hashes.items()), sorted(versions().items())]
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()
 
 

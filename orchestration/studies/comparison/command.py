@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from orchestration.command.answer import Answer
-from orchestration.command.terminal import runs_bar, say
+from orchestration.command.terminal import say
 from orchestration.errors import UsageError
 from orchestration.master.engine import Engine
 from orchestration.studies.comparison import run, terminal
@@ -23,10 +23,7 @@ def all_cells(
     again: str,
 ) -> Answer:
     """Fly what is missing, and tell what all cells come to; `again` is the command for one of them."""
-    with runs_bar() as progress:
-        found = run.compare(
-            comparison, folder=out, workers=workers, engine=engine, figures=figures, progress=progress, announce=say
-        )
+    found = run.compare(comparison, folder=out, workers=workers, engine=engine, figures=figures)
     summary = found.summary
     say(f"{summary.path}: {summary.total} runs, {summary.flown} flown now; tables and pictures beside it")
     if summary.agreement is not None:

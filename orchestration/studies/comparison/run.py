@@ -1,13 +1,16 @@
 """Flies a comparison, concludes from it, and flies a cell of it again."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from orchestration.command.terminal import say
 from orchestration.errors import UsageError
+from orchestration.extras import explained
 from orchestration.master.engine import Engine
 from orchestration.quadrotor.translation import in_its_own_words
+from orchestration.results import html
 from orchestration.results.run_directory import keep_flight
 from orchestration.simulation import checked
 from orchestration.simulation import run as fly
@@ -16,39 +19,80 @@ from orchestration.studies.comparison.cells import Result, frame_of, results
 from orchestration.studies.comparison.design import Comparison
 from orchestration.studies.comparison.outcome import Outcome, concluded, write
 from orchestration.studies.engine import Pool
+from orchestration.studies.hearing import CountHeard
 from orchestration.studies.lanes import TOLERATED
-from orchestration.studies.sweep import Progress, Summary, store_path, sweep
+from orchestration.studies.sweep import store_path, sweep
+from orchestration.studies.swept import Swept
 from orchestration.studies.table import export, frame
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Compared:
-    """A comparison that was flown."""
+    """A comparison that was flown, and what is concluded from it."""
 
-    summary: Summary
+    axis: str
+    """The name of what it varies."""
+    summary: Swept
+    """How the sweep of its runs went, and where their rows are."""
     table: "pd.DataFrame"
+    """A row for each run."""
     bandwidths: Bandwidths
+    """Of the attitude loop [rad/s], by controller, vehicle and value of the axis."""
     outcome: Outcome
+    """Cells, limits, pairs and fronts, with their intervals."""
     written: list[Path]
+    """The tables and pictures beside the store."""
+
+    def __repr__(self) -> str:
+        return (
+            f"<Compared: {len(self.outcome.cells)} cells of {self.summary.total} runs, in {self.summary.path.parent}>"
+        )
+
+    def _repr_html_(self) -> str:
+        """As notebooks show it: how far each controller flies."""
+        rows = [
+            (
+                f"{one.controller} on {one.vehicle}, {one.condition}: {one.share} of the starts up to",
+                f"{one.value:g}",
+                "",
+            )
+            for one in self.outcome.limits
+        ]
+        return html.card(
+            "A comparison", None, None, f"{len(self.outcome.cells)} cells, {self.summary.total} runs", rows
+        )
+
+    @explained
+    def to_pandas(self, what: Literal["cells", "limits", "runs"] = "cells") -> "pd.DataFrame":
+        """A row for each cell: how many starts fly, and medians with their intervals; or the limits, or the runs."""
+        import pandas as pd
+
+        if what == "runs":
+            return self.table
+        found = self.outcome.limits if what == "limits" else self.outcome.cells
+        return pd.DataFrame([one.row(self.axis) if isinstance(one, Result) else vars(one) for one in found])
 
 
+@explained
 def compare(
     comparison: Comparison,
     *,
-    folder: Path | None = None,
+    folder: str | Path | None = None,
     workers: int = 1,
     engine: Engine | Literal["batch"] | None = None,
     figures: bool = True,
-    progress: Progress | None = None,
-    announce: Callable[[str], None] | None = None,
+    progress: CountHeard = "bar",
+    announce: Callable[[str], None] | None = say,
 ) -> Compared:
     """Fly what is missing of a comparison, conclude, and write its tables and pictures beside its store.
 
-    Raises `UsageError` as `sweep` does. The engine `batch` is for native comparisons.
+    `folder`, `workers`, `progress` and `announce` are those of `sweep`, which raises what this does. By the engine
+    `batch` the native twins of its FMUs are flown as lanes; pictures are left out unless `figures`.
     """
+    comparison = replace(comparison, native=True) if engine == "batch" else comparison
     summary = sweep(
         comparison.study, folder=folder, workers=workers, engine=engine, progress=progress, announce=announce
     )
@@ -61,7 +105,9 @@ def compare(
         from orchestration.studies.comparison import pictures  # with it comes matplotlib
 
         written += pictures.draw(comparison, outcome, table, place)
-    return Compared(summary=summary, table=table, bandwidths=known, outcome=outcome, written=written)
+    return Compared(
+        axis=comparison.axis.name, summary=summary, table=table, bandwidths=known, outcome=outcome, written=written
+    )
 
 
 def cell_again(comparison: Comparison, index: int, *, workers: int = 1, engine: Engine | None = None) -> Result:

@@ -8,7 +8,7 @@ import pytest
 from orchestration.documents import read_toml
 from orchestration.errors import UsageError
 from orchestration.studies.starts import Starts
-from orchestration.studies.tune import tune
+from orchestration.studies.tune import searched, write
 from orchestration.studies.tuning import Tuning, best_by_period, search
 from orchestration.studies.tuning_file import load_tuning
 from orchestration.system.paths import value_at
@@ -127,19 +127,20 @@ def test_a_tuning_goes_on_where_it_was_stopped(tuning, tmp_path):
             raise KeyboardInterrupt
         return bowl(systems)
 
-    how: dict[str, Any] = {"command": "quadcosim tune", "progress": lambda share: None, "announce": told.append}
+    how: dict[str, Any] = {"progress": lambda share: None, "announce": told.append}
     with pytest.raises(KeyboardInterrupt):
-        tune(tuning, files, tmp_path / "kept", tmp_path / "gains", fly, fly, **how)
+        searched(tuning, files, tmp_path / "kept", fly, fly, **how)
     before = list(told)
     assert 0 < len(before) < 4
-    written = tune(tuning, files, tmp_path / "kept", tmp_path / "gains", bowl, bowl, **how)
+    done = searched(tuning, files, tmp_path / "kept", bowl, bowl, **how)
+    written = list(write(tuning, done, tmp_path / "gains", "quadcosim tune"))
     assert len(told) == 4
     assert [path.name for path in written] == ["bowl_10ms.toml", "bowl_20ms.toml"]
 
     def fail(systems):
         pytest.fail("flown again")
 
-    tune(tuning, files, tmp_path / "kept", tmp_path / "gains", fail, fail, **how)
+    assert searched(tuning, files, tmp_path / "kept", fail, fail, **how) == done
     gains = read_toml(written[0], "gains")["controller"]
     assert set(gains) == {"gain.attitude", "gain.theta", "gain.surface"}
     assert "of 2 searches" in written[0].read_text()

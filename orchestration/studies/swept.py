@@ -1,0 +1,58 @@
+"""What a sweep leaves, to look at."""
+
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from orchestration.extras import explained
+from orchestration.results import html
+from orchestration.studies.lanes import Agreement
+from orchestration.studies.store import open_for_reading
+from orchestration.studies.table import dataset, frame, units_in
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Swept:
+    """A study that was flown: how that went, and where its rows are."""
+
+    total: int
+    """How many runs the study has."""
+    flown: int
+    """How many of them this sweep has flown; the others were there."""
+    failed: int
+    """How many runs in the store have failed, as `message` in their row says; a run that diverges has not."""
+    path: Path
+    """The store of the study."""
+    agreement: Agreement | None = None
+    """How runs flown as lanes agree with the same flown by FMUs; None if none were."""
+
+    def __repr__(self) -> str:
+        return f"<Swept: {self._counts()}, in {self.path}>"
+
+    def _counts(self) -> str:
+        failed = f", {self.failed} failed" if self.failed else ""
+        return f"{self.total} runs, {self.flown} flown now{failed}"
+
+    def _repr_html_(self) -> str:
+        """As notebooks show it: what became of how many runs."""
+        with open_for_reading(self.path) as opened:
+            outcomes = Counter(str(outcome or "failed") for block in opened.blocks() for outcome in block["outcome"])
+        rows = [(outcome, str(count), "runs") for outcome, count in outcomes.most_common()]
+        return html.card("A study", None, None, self._counts(), rows)
+
+    @explained
+    def to_pandas(self) -> "pd.DataFrame":
+        """A row for each run: axes, metrics, seed, status; units are in its `attrs["units"]`, by column."""
+        table = frame(self.path)
+        table.attrs["units"] = units_in(self.path)
+        return table
+
+    @explained
+    def to_xarray(self) -> "xr.Dataset":
+        """The metrics over the axes, with units as attributes; raises `UsageError` if some axis is sampled."""
+        return dataset(self.path)

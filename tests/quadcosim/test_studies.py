@@ -1,0 +1,129 @@
+"""Studies from Python: functions that give tables, with workers that need no guard of the main module."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+import quadcosim
+from orchestration.studies.tuning_file import load_tuning
+from quadcosim import Axis, QuadcosimError, Scenario, Study, Swept, UsageError
+from tests.orchestration.studies.test_tuning import FILE
+from tests.quadcosim.conftest import native
+
+PERIODS = Axis(name="timing.period", values=(0.01, 0.02))
+STUDY = Study(name="periods", base=native(stop_time=0.1), axes=(PERIODS,))
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> Swept:
+    return quadcosim.sweep(STUDY, folder=tmp_path_factory.mktemp("study"), progress=None)
+
+
+def test_a_sweep_becomes_a_table_with_units_of_axes_and_metrics(swept: Swept) -> None:
+    table = swept.to_pandas()
+    assert table["timing.period"].tolist() == [0.01, 0.02]
+    assert table["position_rmse"].notna().all()
+    units = table.attrs["units"]
+    assert (units["timing.period"], units["position_rmse"]) == ("s", "m")
+    assert swept.to_xarray()["position_rmse"].attrs["units"] == "m"
+
+
+def test_a_sweep_is_not_flown_twice_and_tells_its_progress(swept: Swept) -> None:
+    heard: list[tuple[int, int]] = []
+    again = quadcosim.sweep(STUDY, folder=swept.path.parent, progress=lambda done, total: heard.append((done, total)))
+    assert (again.total, again.flown, heard) == (2, 0, [(2, 2)])
+    assert repr(again) == f"<Swept: 2 runs, 0 flown now, in {again.path}>"
+
+
+def test_a_notebook_shows_what_became_of_the_runs(swept: Swept) -> None:
+    assert ">bounded<" in swept._repr_html_()
+    assert ">2<" in swept._repr_html_()
+
+
+def test_the_rows_of_a_study_say_the_unit_of_an_axis_in_parquet_and_mat(swept: Swept) -> None:
+    from scipy.io import loadmat
+
+    from orchestration.studies.exporting import of_study
+
+    parquet, mat = of_study(swept.path, ("parquet", "mat"))
+    assert pq.read_schema(parquet).field("timing.period").metadata[b"unit"] == b"s"
+    found = loadmat(mat, simplify_cells=True)
+    assert found["runs"]["timing_period"].tolist() == [0.01, 0.02]
+    assert (found["units"]["timing_period"], found["units"]["position_rmse"]) == ("s", "m")
+    assert list(found["runs"]["outcome"]) == ["bounded", "bounded"]
+
+
+SCRIPT = """
+import quadcosim
+from quadcosim import Axis, Scenario, Study
+base = Scenario(stop_time={stop}).with_fmus(plant="native/QuadrotorPlant", controller="native/UnifiedController")
+study = Study(name="seeds", base=base, axes=(Axis(name="seed", values=tuple(range({runs}))),))
+quadcosim.sweep(study, folder={folder!r}, workers=2, progress=lambda done, total: print("done", done, flush=True))
+"""
+
+
+def script(folder: Path, *, runs: int, stop: float) -> subprocess.Popen[str]:
+    """A program without a guard of its main module, from standard input as a notebook's cell is from a socket."""
+    process = subprocess.Popen(
+        [sys.executable, "-"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdin is not None
+    process.stdin.write(SCRIPT.format(folder=str(folder), runs=runs, stop=stop))
+    process.stdin.close()
+    process.stdin = None
+    return process
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_workers_need_no_guard_of_the_main_module_and_ctrl_c_keeps_what_was_flown(tmp_path: Path) -> None:
+    with script(tmp_path, runs=200, stop=0.5) as process:
+        assert process.stdout is not None
+        while process.stdout.readline() != "done 1\n":
+            assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=100.0)
+    assert process.returncode != 0
+    assert "of 200 runs done" in err.splitlines()[-1]
+    assert (tmp_path / "study.sqlite").is_file()
+
+
+def test_a_limit_is_a_table_of_what_was_tried(capsys: pytest.CaptureFixture[str]) -> None:
+    tank = Path(__file__).parents[2] / "examples" / "water_tank" / "system.toml"
+    system = quadcosim.changed(quadcosim.load_system(tank), {"stop_time": 5.0})
+    found = quadcosim.limit(system, "connections.valve.delay", first=0.0, last=0.2, scan=0.1, tolerance=0.05)
+    assert found.to_pandas()["value"].tolist() == [one.value for one in found.tried]
+    assert repr(found) == f"<Limit of connections.valve.delay: {found.note}>"
+    assert "connections.valve.delay 0.1 s: good" in capsys.readouterr().err
+    assert "large signal limit" in found._repr_html_()
+
+
+def test_a_tuning_gives_its_searches_and_writes_their_files(tmp_path: Path) -> None:
+    text = FILE.replace("stop_time = 5.0", "stop_time = 0.05").replace("evaluations = 100", "evaluations = 1")
+    (tmp_path / "few.toml").write_text(text.replace("seeds = [1, 2]", "seeds = [1]"))
+    found = quadcosim.tune(
+        load_tuning(tmp_path / "few.toml"),
+        out=tmp_path / "gains",
+        folder=tmp_path / "kept",
+        progress=None,
+        announce=None,
+    )
+    assert [path.name for path in found.written] == ["few_10ms.toml", "few_20ms.toml"]
+    assert found.to_pandas()["period"].tolist() == [0.01, 0.02]
+    assert set(found.best) == {0.01, 0.02}
+    assert "controller.gain.attitude" in found.to_pandas()
+    assert "by: quadcosim.tune" in found.written[0].read_text()
+
+
+def test_what_cannot_be_is_refused_in_a_line_before_anything_is_flown(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"timing.perio: expected .*KEY one of period"):
+        Study(name="x", base=Scenario(), axes=(Axis(name="timing.perio", values=(0.1,)),))
+
+
+def test_without_a_package_of_an_extra_one_line_names_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "filelock", None)
+    with pytest.raises(QuadcosimError, match=r"^filelock is not installed; .*quadcosim\[studies\]'$"):
+        quadcosim.sweep(STUDY, folder=tmp_path, progress=None)
