@@ -1,6 +1,8 @@
 # make demo: build the FMUs, fly the paper's scenario, draw it. make test: lint and run all tests.
 # make check: lint and the tests that say most in least time, under a minute, for while you work.
-# make site: the documentation as a site, in site/. make bench: time the loop. make figures, make findings, make interop: what docs/ and examples/ show, and the icons of the FMUs.
+# make coverage: all tests, and which lines they run. make site: the documentation as a site, in site/.
+# make bench: time the loop. make figures, make findings, make interop: what docs/ and examples/ show, and the icons of the FMUs.
+# make release: wheel, sources, native FMUs, SSP and their checksums, in dist/.
 # Each makes its own environment first.
 PYTHON ?= python3
 BIN := .venv/bin
@@ -11,15 +13,15 @@ unexport PYTHONDONTWRITEBYTECODE
 # Other people's masters that need an environment of their own are flown where they are: make interop makes it.
 export QUADCOSIM_COFMUPY ?= $(abspath $(wildcard $(COFMUPY)))
 
-.PHONY: demo check test lint bench figures findings interop site clean
+.PHONY: demo check test coverage lint bench figures findings interop release site clean
 
 demo: .venv/.base
 	$(BIN)/quadcosim build
 	$(BIN)/quadcosim run --period 0.01 --out results/demo
 	@echo "figures: results/demo/path.png errors.png components.png commands.png energy.png"
 
-# Laws, plant, algebra, expressions, timetable, master with stubs, files of systems and scenarios.
-QUICK := $(addprefix tests/,controller_fmu plant_fmu fmu_kit/test_algebra.py fmu_kit/test_trajectory.py fmu_kit/test_units.py) \
+# Laws, plant, algebra, expressions, timetable, master with stubs, files of systems and scenarios; one FMU, built and flown.
+QUICK := $(addprefix tests/,controller_fmu plant_fmu fmus/test_one_fmu.py fmu_kit/test_algebra.py fmu_kit/test_trajectory.py fmu_kit/test_units.py) \
 	$(addprefix tests/orchestration/,expressions master/test_timetable.py master/test_master.py master/test_order.py \
 	master/test_streams.py quadrotor/test_loop.py quadrotor/test_scenario.py quadrotor/test_timing.py \
 	studies/test_axes.py studies/test_study_file.py system exchange/ssp/test_reading.py test_statistics.py)
@@ -29,6 +31,12 @@ check: lint
 
 test: lint
 	$(BIN)/pytest --numprocesses auto --maxprocesses 4 --dist loadfile
+
+coverage: .venv/.test
+	$(BIN)/coverage erase
+	$(BIN)/coverage run -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile
+	$(BIN)/coverage combine --quiet
+	$(BIN)/coverage report
 
 lint: .venv/.test
 	$(BIN)/ruff format --check .
@@ -63,6 +71,14 @@ site: .venv/.test
 	$(BIN)/python -m pip install --quiet --editable ".[test]"
 	touch $@
 
+.venv/.release: pyproject.toml .venv/.base
+	$(BIN)/python -m pip install --quiet --editable ".[release]"
+	touch $@
+
+release: .venv/.release
+	rm -rf dist
+	$(BIN)/python -m docs.make_release
+
 findings: .venv/.test
 	$(BIN)/python -m docs.make_findings
 
@@ -75,4 +91,4 @@ interop: .venv/.test .venv-cofmupy/.made
 	touch $@
 
 clean:
-	rm -rf .venv .venv-cofmupy results site fmus/*.fmu fmus/native fmus/*.ssp examples/*/*.fmu examples/*/native
+	rm -rf .venv .venv-cofmupy results site build dist fmus/*.fmu fmus/native fmus/*.ssp examples/*/*.fmu examples/*/native
