@@ -1,0 +1,78 @@
+"""What the files around the code say of it is so: versions, make targets, paths, Pythons."""
+
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+
+from orchestration.documents import read_toml
+
+ROOT = Path(__file__).parents[1]
+PROJECT = read_toml(ROOT / "pyproject.toml", "project")["project"]
+WORKFLOW = yaml.safe_load((ROOT / ".github/workflows/ci.yml").read_text(encoding="utf-8"))
+JOBS = WORKFLOW["jobs"]
+STEPS = [step for job in JOBS.values() for step in job["steps"]]
+RUN = " ".join(step.get("run", "") for step in STEPS)
+CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
+
+
+def test_the_version_is_cited_and_has_a_place_in_the_changelog() -> None:
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert cited["version"] == PROJECT["version"]
+    assert cited["license"] == PROJECT["license"]
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert f"## [{PROJECT['version']}]" in changes or f"This will be {PROJECT['version']}" in changes
+
+
+@pytest.mark.parametrize(
+    "named",
+    [re.findall(r"\bmake ([a-z]+)", RUN), re.findall(r"`make ([a-z]+)`", CONTRIBUTING)],
+    ids=["workflow", "contributing"],
+)
+def test_every_make_target_that_is_named_exists(named: list[str]) -> None:
+    assert len(set(named)) >= 3
+    assert set(named) <= TARGETS
+
+
+@pytest.mark.parametrize("text", [RUN, CONTRIBUTING], ids=["workflow", "contributing"])
+def test_every_path_that_is_named_exists(text: str) -> None:
+    named = set(
+        re.findall(r"(?<![\w/.-])(?:tests|docs|orchestration|controller_fmu|fmu_kit|examples)/[\w./-]*\w", text)
+    )
+    assert len(named) >= 3
+    assert not [path for path in named if not (ROOT / path).exists()]
+
+
+def test_the_quick_tests_exist() -> None:
+    quick = re.search(r"^QUICK := (.*?)\n\n", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M | re.S)
+    assert quick is not None
+    groups = re.findall(r"addprefix ([\w/]+),([^)]*)\)", quick[1])
+    paths = [ROOT / prefix / name for prefix, names in groups for name in names.replace("\\", " ").split()]
+    assert len(paths) > 10
+    assert not [path for path in paths if not path.exists()]
+
+
+def test_every_python_from_the_oldest_on_is_tried() -> None:
+    oldest = PROJECT["requires-python"].removeprefix(">=")
+    tried = JOBS["check"]["strategy"]["matrix"]["python"]
+    assert tried[0] == oldest
+    assert tried == [f"3.{minor}" for minor in range(int(oldest.partition(".")[2]), 15)]
+    said = {line.rpartition(":: ")[2] for line in PROJECT["classifiers"] if re.search(r":: 3\.\d+$", line)}
+    assert said == set(tried)
+
+
+def test_actions_are_pinned_to_commits_and_nothing_may_be_written() -> None:
+    used = [step["uses"] for step in STEPS if "uses" in step]
+    assert used
+    assert all(re.fullmatch(r"[\w-]+/[\w-]+@[0-9a-f]{40}", action) for action in used)
+    assert WORKFLOW["permissions"] == {"contents": "read"}
+
+
+def test_hooks_call_the_tools_of_the_environment_as_make_does() -> None:
+    hooks = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8"))["repos"][0]["hooks"]
+    tools = {hook["entry"].removeprefix(".venv/bin/").partition(" --")[0] for hook in hooks}
+    lint = re.search(r"^lint:.*?\n\n", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M | re.S)
+    assert lint is not None
+    assert tools == set(re.findall(r"\$\(BIN\)/([a-z-]+(?: [a-z]+)?)", lint[0]))
