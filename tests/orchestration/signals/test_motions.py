@@ -66,7 +66,7 @@ def test_position_to_snap_are_continuous_where_a_motion_changes_its_formula(name
         assert np.array(before) == pytest.approx(np.array(behind), abs=1e-9)
 
 
-@pytest.mark.parametrize("name", set(MOTIONS) - {"step"})
+@pytest.mark.parametrize("name", sorted({*MOTIONS} - {"step"}))
 def test_what_has_a_ramp_begins_at_rest_where_it_is_told(name: str) -> None:
     given = {"x": 1.0, "y": -2.0, "z": 0.5} if name != "paper" else {"start_z": 0.5}
     begin = orders(made(name, given | ({} if name == "hover" else {"ramp": 1.5})).at(0.0))
