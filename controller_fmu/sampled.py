@@ -4,6 +4,7 @@ from abc import abstractmethod
 
 from controller_fmu.sample_clock import SampleClock
 from controller_fmu.vehicle import Measurement, Model
+from fmu_kit.authors import AUTHOR, LICENSE
 from fmu_kit.errors import require
 from fmu_kit.saved_state import State
 from fmu_kit.slave import Slave
@@ -19,6 +20,7 @@ class SampledController(Slave):
     Their variables are those of `controller_fmu.interface` and what they add.
     """
 
+    author, license = AUTHOR, LICENSE
     initial_outputs_depend_on_inputs = True
 
     @abstractmethod

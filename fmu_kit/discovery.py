@@ -10,7 +10,7 @@ BASE = ("fmu_kit.slave", "Slave")
 
 
 def slaves_in(folder: Path) -> list[Target]:
-    """The slave classes of a folder that say what they are (`description`), by module; raises `PackagingError`.
+    """The slave classes of a folder that leave no method open, by module; raises `PackagingError`.
 
     A folder with `__init__.py` is a package, and found by its name where its outermost package lies; in another
     one each module stands for itself.
@@ -22,7 +22,7 @@ def slaves_in(folder: Path) -> list[Target]:
         if not name:
             continue
         for node in tree_of(path.read_text(encoding="utf-8"), path).body:
-            if isinstance(node, ast.ClassDef) and _describes_itself(node) and _is_slave(name, node.name, root):
+            if isinstance(node, ast.ClassDef) and _open_methods(name, node.name, root) == frozenset():
                 found.append(Target(name, node.name, root))
     return found
 
@@ -44,31 +44,41 @@ def _root_of(folder: Path) -> tuple[Path, tuple[str, ...]]:
     return folder, names
 
 
-def _describes_itself(node: ast.ClassDef) -> bool:
-    assigned = [target for each in node.body if isinstance(each, ast.Assign) for target in each.targets]
-    assigned += [each.target for each in node.body if isinstance(each, ast.AnnAssign) and each.value is not None]
-    return any(isinstance(target, ast.Name) and target.id == "description" for target in assigned)
+def _open_methods(module: str, name: str, root: Path | None, deepest: int = 20) -> frozenset[str] | None:
+    """The methods that a class made from `Slave` still leaves to others, whatever modules lie between.
 
-
-def _is_slave(module: str, name: str, root: Path, deepest: int = 20) -> bool:
-    """Whether a name in a module is `Slave` or a class made from it, whatever modules lie between."""
+    None for a name that is no such class.
+    """
     if (module, name) == BASE:
-        return True
+        return frozenset({"step"})
     try:
         path = module_path(module, root)
         body = tree_of(path.read_text(encoding="utf-8"), path).body
     except (OSError, PackagingError):
-        return False
+        return None
     if deepest == 0:
-        return False
+        return None
     for node in reversed(body):
         if isinstance(node, ast.ClassDef) and node.name == name:
             bases = [base.id for base in node.bases if isinstance(base, ast.Name) and base.id != name]
-            return any(_is_slave(module, base, root, deepest - 1) for base in bases)
+            inherited = [_open_methods(module, base, root, deepest - 1) for base in bases]
+            found = [each for each in inherited if each is not None]
+            return _left_open(node, frozenset().union(*found)) if found else None
         if isinstance(node, ast.ImportFrom):
             package = module if path.name == "__init__.py" else module.rpartition(".")[0]
             base = importlib.util.resolve_name("." * node.level + (node.module or ""), package)
             for alias in node.names:
                 if (alias.asname or alias.name) == name:
-                    return _is_slave(base, alias.name, root, deepest - 1)
-    return False
+                    return _open_methods(base, alias.name, root, deepest - 1)
+    return None
+
+
+def _left_open(node: ast.ClassDef, inherited: frozenset[str]) -> frozenset[str]:
+    """What a class leaves open of what those that it is made of do, and what it leaves open itself."""
+    methods = [each for each in node.body if isinstance(each, ast.FunctionDef)]
+    abstract = {
+        each.name
+        for each in methods
+        if any(isinstance(mark, ast.Name) and mark.id == "abstractmethod" for mark in each.decorator_list)
+    }
+    return (inherited - {each.name for each in methods}) | abstract

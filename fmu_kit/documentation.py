@@ -52,7 +52,8 @@ def to_html(slave: Any, making: Making, fragment: str = "") -> str:
     experiment = slave.default_experiment
     said = {
         "model": escape(slave.__name__),
-        "license": escape(slave.license),
+        "whose": escape(_whose(slave)),
+        "licence": escape(slave.license) or "that its author names",
         "python": escape(PYTHON_REQUIRED),
         "source": escape(making.source),
         "fmi": str(making.version),
@@ -61,8 +62,7 @@ def to_html(slave: Any, making: Making, fragment: str = "") -> str:
         model=said["model"],
         fmi=said["fmi"],
         description=escape(slave.description),
-        author=escape(slave.author),
-        license=said["license"],
+        whose=said["whose"],
         start=_number(experiment.start_time),
         stop=_number(experiment.stop_time),
         step=_number(experiment.step_size),
@@ -74,6 +74,12 @@ def to_html(slave: Any, making: Making, fragment: str = "") -> str:
         variables="\n".join(variable_tables(slave.variables)),
         categories=_table(("Category", "Messages"), [(_code(k), escape(v)) for k, v in slave.log_categories.items()]),
     )
+
+
+def _whose(slave: Any) -> str:
+    """Author, copyright and licence, as far as they are named."""
+    named = {"Author": slave.author, "Copyright": slave.copyright, "Licence": slave.license}
+    return "".join(f" {what}: {said}." for what, said in named.items() if said)
 
 
 def files_linked(page: str) -> list[str]:

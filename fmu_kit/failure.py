@@ -3,6 +3,7 @@
 Everything here answers to how the native part of pythonfmu 0.7.0 treats exceptions and references.
 """
 
+import inspect
 import traceback
 from pathlib import Path
 from typing import Any
@@ -40,7 +41,7 @@ class Failure(Exception):
     """What a callback raises: the native part logs its repr, as a printf format."""
 
     def __init__(self, error: Exception) -> None:
-        message = str(error) if isinstance(error, FmuError) else f"{error!r}{_place(error)}"
+        message = str(error) if isinstance(error, FmuError) else f"{error!r}{_in_the_fmu(error)}"
         details = "".join(traceback.format_exception(error)).rstrip()
         self.text = printf_safe(f"{message}\n{details}")
         super().__init__(self.text)
@@ -74,10 +75,30 @@ def printf_safe(text: str) -> str:
     return text.encode("utf-8", "backslashreplace").decode("utf-8").replace("%", "%%")
 
 
-def _place(error: Exception) -> str:
-    """File and line of the statement that failed; the file with its folder, which says whose it is."""
+def place_of(error: BaseException) -> str:
+    """File and line of the statement of the model that failed, before what went wrong; nothing where there is none.
+
+    What fails inside of the kit is the fault of whoever called it.
+    """
+    return next((f"{frame.filename}, line {frame.lineno}: " for frame in reversed(_own_frames(error))), "")
+
+
+def _in_the_fmu(error: BaseException) -> str:
+    """File and line; the file with its folder, which says whose it is, unless that is the bundle of an FMU."""
+    frames = _own_frames(error) or traceback.extract_tb(error.__traceback__)
+    if not frames:
+        return ""
+    folder, name = Path(frames[-1].filename).parts[-2:]
+    return f" in {name if folder.startswith('quadcosim_') else f'{folder}/{name}'}, line {frames[-1].lineno}"
+
+
+def _own_frames(error: BaseException) -> list[traceback.FrameSummary]:
     frames = traceback.extract_tb(error.__traceback__)
-    return "".join(f" in {'/'.join(Path(frame.filename).parts[-2:])}, line {frame.lineno}" for frame in frames[-1:])
+    return [each for each in frames if each.filename.endswith(".py") and Path(each.filename).parent not in _KIT]
+
+
+_HERE = Path(__file__).parent
+_KIT = (_HERE, _HERE / "native", Path(inspect.getfile(LogMsg)).parent)
 
 
 def report(slave: Any, error: Exception, *, again: bool) -> Failure:

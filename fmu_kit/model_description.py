@@ -68,11 +68,11 @@ def to_xml(slave: Any, sources: Sequence[str] | None = None) -> Element:
 
 def about(slave: Any) -> dict[str, str]:
     """What a description says of the model as a whole."""
+    whose = {name: getattr(slave, name) for name in ("author", "copyright", "license")}
     return {
         "modelName": slave.__name__,
         "description": slave.description,
-        "author": slave.author,
-        "license": slave.license,
+        **{name: said for name, said in whose.items() if said},
         "generationTool": "quadcosim",
         "generationDateAndTime": generation_date(),
         "variableNamingConvention": "structured",
@@ -164,7 +164,7 @@ def dependencies(slave: Any) -> tuple[list[int], list[int]]:
         [i for i, v in enumerate(slave.variables) if v.causality == causality] for causality in ("output", "input")
     )
     moving = [i for i in inputs if slave.variables[i].name not in slave.initially_idle]
-    return outputs, moving if slave.initial_outputs_depend_on_inputs else []
+    return outputs, moving if slave.depends_initially() else []
 
 
 def _simple_type(types: Element, name: str) -> Element:

@@ -12,6 +12,7 @@ Packing imports the slave, so it runs in a process of its own: `python -m fmu_ki
 import hashlib
 import importlib
 import importlib.metadata
+import inspect
 import os
 import posixpath
 import re
@@ -27,6 +28,7 @@ from xml.etree.ElementTree import Element, ParseError, fromstring, tostring
 from fmu_kit import bundle, documentation, loader
 from fmu_kit.bundle import PackagingError, Target, bundled_sources, module_path, place, renamed
 from fmu_kit.documentation import Making
+from fmu_kit.failure import place_of
 from fmu_kit.model_description import GUID_PLACEHOLDER, PYTHON_REQUIRED, to_xml
 from fmu_kit.versions import generation_tool, version_of
 
@@ -195,12 +197,18 @@ def write_archive(path: Path, files: dict[str, bytes], *, first: str) -> None:
 
 
 def slave_class(target: Target) -> Any:
-    """The class; raises `PackagingError` if it says nothing of itself, only what its base class says."""
-    slave = getattr(importlib.import_module(target.module), target.model, None)
+    """The class; raises `PackagingError` if its module does not run, or if it does not say what it is and does."""
+    try:
+        slave = getattr(importlib.import_module(target.module), target.model, None)
+    except Exception as error:
+        raise PackagingError(f"{place_of(error)}{type(error).__name__}: {error}") from error
     if slave is None:
         raise PackagingError(f"{target.module}: expected a class {target.model}")
+    if inspect.isabstract(slave):
+        left = ", ".join(sorted(slave.__abstractmethods__))
+        raise PackagingError(f"{target.module}:{target.model}: expected it to define {left}")
     if "description" not in vars(slave):
-        raise PackagingError(f"{target.module}:{target.model}: expected a description of its own")
+        raise PackagingError(f"{target.module}:{target.model}: expected a docstring or a description of its own")
     return slave
 
 

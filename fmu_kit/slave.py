@@ -1,8 +1,8 @@
 """The base of every slave: what FMI asks of an FMU and pythonfmu 0.7.0 leaves to its user.
 
-A model lists its variables and defines `step`; if need be also `read_parameters`, `initialise`, and, for what it
-keeps beside the variables, `internal_state` and `restore`. This class keeps the values in a list, checks every call
-and turns any failure into one readable message.
+A model declares its variables and defines `step`; all else is for those that need it: `read_parameters`, `initialise`,
+and, for what it keeps beside the variables, `internal_state` and `restore`. This class keeps the values in a list,
+checks every call and turns any failure into one readable message.
 """
 
 import contextlib
@@ -20,12 +20,13 @@ from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
 from fmu_kit import model_description
-from fmu_kit.algebra import Inertia, Quaternion, Vec3, is_positive_definite
 from fmu_kit.errors import DivergenceError, FmuError, require
 from fmu_kit.failure import Failure, printf_safe, report
+from fmu_kit.interface import Declared, declared_in, initial_values, variables_of
 from fmu_kit.saved_state import State, expect_state, parsed
 from fmu_kit.unloading import release_at_exit
-from fmu_kit.variables import INERTIA_AXES, Variable
+from fmu_kit.values import Values
+from fmu_kit.variables import Variable
 
 
 class Phase(enum.IntEnum):
@@ -54,23 +55,28 @@ def guarded(method: _Method) -> _Method:
     return call  # type: ignore[return-value]
 
 
-class Slave(Fmi2Slave):  # type: ignore[misc]
+class Slave(Values, Fmi2Slave):  # type: ignore[misc]
     """A co-simulation slave with declared variables, checked calls and a complete saved state.
 
-    Subclasses set `variables` (Reals first) and `description`. The class that is packaged must define
-    `__init__` and `do_step` itself, or pythonfmu crashes on the second instance: the entry script that
-    packaging writes does.
+    Subclasses declare their variables as attributes (`fmu_kit.interface`) and define `step`. An interface that several
+    slaves share, with dots in its names, is a list instead: `variables`, Reals first. The class that is packaged must
+    define `__init__` and `do_step` itself, or pythonfmu crashes on the second instance: the entry script that packaging
+    writes does.
     """
 
     variables: ClassVar[tuple[Variable, ...]]
     description: ClassVar[str]
-    initial_outputs_depend_on_inputs: ClassVar[bool] = True
-    """Whether the first outputs, those at the end of initialisation, depend on the inputs. Later ones never do."""
+    """Of the FMU, in a line; the first of the docstring, unless told."""
+    initial_outputs_depend_on_inputs: ClassVar[bool | None] = None
+    """Whether the first outputs, those at the end of initialisation, depend on the inputs. Later ones never do.
+    Unless told, they do if the model defines `initialise`."""
     initially_idle: ClassVar[frozenset[str]] = frozenset()
     """Inputs on which not even the first outputs depend."""
 
-    author = "The quadcosim authors"
-    license = "MIT"
+    author: ClassVar[str] = ""
+    license: ClassVar[str] = ""
+    copyright: ClassVar[str] = ""
+    """Of the model; each is left out of the description of the FMU where it is empty."""
     default_experiment = DefaultExperiment(start_time=0.0, stop_time=30.0, step_size=0.01)
     # Those that messages carry. All other failures have none: the native part logs them itself, and hides them
     # from a master that asks for categories.
@@ -82,7 +88,18 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        if "variables" in cls.__dict__:
+        if "description" not in cls.__dict__ and (cls.__doc__ or not hasattr(cls, "description")):
+            cls.description = _first_line(cls.__doc__ or cls.__name__)
+        listed = "variables" in cls.__dict__
+        declared = declared_in(cls)
+        if declared:
+            _expect_free_names(cls, declared)
+            if listed or (hasattr(cls, "variables") and not cls._declared):
+                raise TypeError(f"{cls.__name__}: expected its variables as attributes or as a list, not both")
+            cls.variables, cls._declared = variables_of(declared), tuple(declared)
+            cls._initial = initial_values(declared)
+            cls.__setattr__ = _set_declared  # type: ignore[assignment]
+        if listed or declared:
             reals = [v.type == "Real" for v in cls.variables]
             if reals != sorted(reals, reverse=True):
                 raise TypeError(f"{cls.__name__}.variables: expected all Reals before the others")
@@ -93,7 +110,9 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             cls._inputs = frozenset(i for i, v in enumerate(cls.variables) if v.causality == "input")
             cls._tunable = frozenset(i for i, v in enumerate(cls.variables) if v.variability == "tunable")
 
-    _index: ClassVar[dict[str, int]]
+    _declared: ClassVar[tuple[Declared, ...]] = ()
+    _initial: ClassVar[dict[str, str]] = {}
+    _index: ClassVar[dict[str, int]]  # type: ignore[misc]
     _real_count: ClassVar[int]
     _readable: ClassVar[frozenset[int]]
     _given: ClassVar[frozenset[int]]
@@ -101,7 +120,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     _tunable: ClassVar[frozenset[int]]
 
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
+        super().__init__(**{"instance_name": type(self).__name__, **kwargs})
         # All imports are done: the host's import path is left as it was before pythonfmu added to it. In one
         # call, which no other thread can come between; after a reset and while building there is nothing to remove.
         with contextlib.suppress(ValueError):
@@ -119,6 +138,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._quickly_settable: frozenset[int] = frozenset()
         self._warned: list[str] = []
         self._has_failed = False  # of this object, whatever phase a restored state says
+        self._of_the_base = frozenset(vars(self))
 
     # -- what a model defines ---------------------------------------------------------------------------
 
@@ -128,8 +148,10 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     def initialise(self, t: float) -> None:
         """Compute the outputs at the start time `t` [s]; may be called again before initialisation ends.
 
-        Unless a model says more, all variables have their start values.
+        Unless a model says more, states are where they start, and all other variables have their start values.
         """
+        for name, start in self._initial.items():
+            self.put(name, self.real(start))
 
     @abstractmethod
     def step(self, t: float, h: float) -> None:
@@ -137,67 +159,26 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     def internal_state(self) -> State:
         """What a step depends on beyond the variables, in JSON types: nothing, unless a model says so."""
+        kept = sorted(vars(self).keys() - self._of_the_base - {"_of_the_base"})
+        if kept and type(self).read_parameters is Slave.read_parameters:
+            raise FmuError(f"self.{kept[0]} is not saved: expected a Local instead, or internal_state and restore")
         return {}
 
     def restore(self, state: State) -> None:
         """Put back what `internal_state` gave, after the variables have been put back."""
 
-    # -- values, for the model ----------------------------------------------------------------------------
+    @classmethod
+    def depends_initially(cls) -> bool:
+        """Whether outputs depend on the inputs when initialisation ends."""
+        told = cls.initial_outputs_depend_on_inputs
+        return cls.initialise is not Slave.initialise if told is None else told
 
-    def real(self, name: str) -> float:
-        """The value of a Real variable."""
-        return self._reals[self._index[name]]
+    @property
+    def is_fresh(self) -> bool:
+        """Whether nobody steps it yet: then whoever made it may set its inputs and parameters by their names."""
+        return self._phase is Phase.INSTANTIATED
 
-    def boolean(self, name: str) -> bool:
-        """The value of a Boolean variable."""
-        return bool(self._others[self._index[name]])
-
-    def vec3(self, name: str) -> Vec3:
-        """The values of `name.x`, `.y`, `.z`."""
-        i, reals = self._index[name + ".x"], self._reals
-        return Vec3(reals[i], reals[i + 1], reals[i + 2])
-
-    def quaternion(self, name: str) -> Quaternion:
-        """The values of `name.x`, `.y`, `.z`, `.w`."""
-        i, reals = self._index[name + ".x"], self._reals
-        return Quaternion(Vec3(reals[i], reals[i + 1], reals[i + 2]), reals[i + 3])
-
-    def inertia(self) -> Inertia:
-        """The matrix of `inertia.xx` to `.yz`; raises `FmuError` unless it is positive definite."""
-        entries = {axis: self.real(f"inertia.{axis}") for axis in INERTIA_AXES}
-        listed = ", ".join(f"{axis} {value:g}" for axis, value in entries.items())
-        require(is_positive_definite(**entries), "inertia.{xx,yy,zz,xy,xz,yz}", listed, "a positive definite matrix")
-        return Inertia(**entries)
-
-    def enumeration(self, name: str) -> int:
-        """The value of an Enumeration: to be compared with the members of its `IntEnum`."""
-        return int(self._others[self._index[name]])
-
-    def put(self, name: str, value: float) -> None:
-        """Set a Real variable."""
-        self._reals[self._index[name]] = value
-
-    def count(self, name: str) -> int:
-        """The value of an Integer variable."""
-        return int(self._others[self._index[name]])
-
-    def put_count(self, name: str, value: int) -> None:
-        """Set an Integer variable."""
-        self._others[self._index[name]] = value
-
-    def put_boolean(self, name: str, value: bool) -> None:
-        """Set a Boolean variable."""
-        self._others[self._index[name]] = value
-
-    def put_vec3(self, name: str, v: Vec3) -> None:
-        """Set `name.x`, `.y`, `.z`."""
-        i = self._index[name + ".x"]
-        self._reals[i : i + 3] = (v.x, v.y, v.z)
-
-    def put_quaternion(self, name: str, q: Quaternion) -> None:
-        """Set `name.x`, `.y`, `.z`, `.w`."""
-        i, v = self._index[name + ".x"], q.vector
-        self._reals[i : i + 4] = (v.x, v.y, v.z, q.scalar)
+    # -- messages, for the model ------------------------------------------------------------------------
 
     def warn_once(self, key: str, text: str) -> None:
         """Log a warning, the first time only."""
@@ -410,3 +391,28 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._phase = Phase.FAILED
         self._quickly_settable = frozenset()
         return failure
+
+
+def _first_line(text: str) -> str:
+    """What a docstring begins with, in one line without its full stop."""
+    return " ".join(text.strip().partition("\n\n")[0].split()).removesuffix(".")
+
+
+def _set_declared(slave: Slave, name: str, value: Any) -> None:
+    """Set an attribute; raises `AttributeError` for one that is not declared, which is a slip of the pen."""
+    is_made = "_of_the_base" in vars(slave)
+    if is_made and not (name.startswith("_") or name in slave._of_the_base or hasattr(type(slave), name)):
+        own = ", ".join(each.attribute for each in slave._declared if each.own)
+        raise AttributeError(f"self.{name}: no such variable; expected {own}, or a name that begins with _")
+    object.__setattr__(slave, name, value)
+
+
+def _expect_free_names(slave: type[Slave], declared: Iterable[Declared]) -> None:
+    """Raise `TypeError` for an attribute that every slave has for something else."""
+    for each in declared:
+        is_taken = hasattr(Slave, each.attribute) and each.attribute not in vars(Values)
+        if is_taken or each.attribute in _OF_PYTHONFMU:
+            raise TypeError(f"{slave.__name__}.{each.attribute}: every slave has this name; expected another one")
+
+
+_OF_PYTHONFMU = ("vars", "instance_name", "resources", "visible", "log_queue", "guid", "version", "modelName")

@@ -2,6 +2,7 @@
 
 import math
 
+from fmu_kit.authors import AUTHOR, LICENSE
 from fmu_kit.errors import require, require_finite_state
 from fmu_kit.integrator import internal_steps, rk4_step
 from fmu_kit.rigid_body import Body, RigidState, Wrench, acceleration, derivative, tilt
@@ -22,6 +23,7 @@ class QuadrotorPlant(Slave):
 
     variables = QUADROTOR
     description = "Quadrotor as a rigid body: thrust and body torques in, motion out"
+    author, license = AUTHOR, LICENSE
     initial_outputs_depend_on_inputs = False
 
     def read_parameters(self) -> None:

@@ -1,20 +1,17 @@
 """State feedback."""
 
+from fmu_kit.interface import Input, Output, Parameter
 from fmu_kit.slave import Slave
-from fmu_kit.variables import continuous_input, discrete_output, tunable_parameter
 
 
 class StateFeedback(Slave):
-    """u = -k_p x - k_d v."""
+    """State feedback: position and velocity in, acceleration out."""
 
-    variables = (
-        continuous_input("x", "position", "m"),
-        continuous_input("v", "velocity", "m/s"),
-        discrete_output("u", "acceleration", "m/s2"),
-        tunable_parameter("k_p", "gain of the position", "1/s2", 1.0),
-        tunable_parameter("k_d", "gain of the velocity", "1/s", 1.0),
-    )
-    description = "State feedback: position and velocity in, acceleration out"
+    x = Input("position", "m")
+    v = Input("velocity", "m/s")
+    u = Output("acceleration", "m/s2")
+    k_p = Parameter("gain of the position", "1/s2", 1.0)
+    k_d = Parameter("gain of the velocity", "1/s", 1.0)
 
     def initialise(self, t: float) -> None:
         """The command for the initial state."""
@@ -22,4 +19,4 @@ class StateFeedback(Slave):
 
     def step(self, t: float, h: float) -> None:
         """The command for the state that was measured."""
-        self.put("u", -self.real("k_p") * self.real("x") - self.real("k_d") * self.real("v"))
+        self.u = -self.k_p * self.x - self.k_d * self.v

@@ -1,35 +1,34 @@
 """A cruise controller."""
 
+from fmu_kit.interface import Input, Local, Output, Parameter
 from fmu_kit.slave import Slave
-from fmu_kit.variables import continuous_input, discrete_local, discrete_output, fixed_parameter, tunable_parameter
 
 
 class CruiseController(Slave):
-    """PI with an integral that stops where the engine is at its limit."""
+    """Cruise controller: speed in, force out.
 
-    variables = (
-        continuous_input("speed", "measured", "m/s"),
-        continuous_input("set_speed", "desired", "m/s"),
-        discrete_output("force", "asked of the engine", "N"),
-        discrete_local("integral", "part of the force, after the last sample", "N"),
-        tunable_parameter("k_p", "gain of the error", "N.s/m", 1200.0),
-        tunable_parameter("k_i", "gain of its integral", "N/m", 300.0),
-        fixed_parameter("force_max", "that the engine has", "N", 4000.0, above=0.0),
-        fixed_parameter("initial.force", "force before the first sample, and integral(0)", "N", 800.0),
-    )
-    description = "Cruise controller: speed in, force out"
+    PI with an integral that stops where the engine is at its limit.
+    """
+
+    speed = Input("measured", "m/s")
+    set_speed = Input("desired", "m/s")
+    force = Output("asked of the engine", "N")
+    integral = Local("part of the force, after the last sample", "N")
+    k_p = Parameter("gain of the error", "N.s/m", 1200.0)
+    k_i = Parameter("gain of its integral", "N/m", 300.0)
+    force_max = Parameter("that the engine has", "N", 4000.0, above=0.0)
+    first_force = Parameter("force before the first sample, and integral(0)", "N", 800.0, name="initial.force")
+
     initial_outputs_depend_on_inputs = False
 
     def initialise(self, t: float) -> None:
         """Ask for the initial force."""
-        self.put("force", self.real("initial.force"))
-        self.put("integral", self.real("initial.force"))
+        self.force = self.integral = self.first_force
 
     def step(self, t: float, h: float) -> None:
         """Sample; `h` is the time until the next one."""
-        error = self.real("set_speed") - self.real("speed")
-        wanted = self.real("k_p") * error + self.real("integral")
-        force = min(max(wanted, 0.0), self.real("force_max"))
-        if force == wanted:
-            self.put("integral", self.real("integral") + self.real("k_i") * h * error)
-        self.put("force", force)
+        error = self.set_speed - self.speed
+        wanted = self.k_p * error + self.integral
+        self.force = min(max(wanted, 0.0), self.force_max)
+        if self.force == wanted:
+            self.integral = self.integral + self.k_i * h * error

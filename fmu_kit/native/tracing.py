@@ -11,7 +11,6 @@ import contextlib
 import functools
 import inspect
 import textwrap
-import traceback
 import types
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
@@ -22,6 +21,7 @@ from typing import Any
 from pythonfmu.fmi2slave import Fmi2Slave
 
 from fmu_kit import scalar
+from fmu_kit.failure import place_of
 from fmu_kit.native import stand_ins
 from fmu_kit.native.memory import Memory
 from fmu_kit.native.recorder import Recorder
@@ -129,16 +129,9 @@ def _expect_no_override(slave: type[Slave]) -> None:
 
 def _place(error: Exception) -> str:
     """File and line of the slave's code that an error comes from."""
-    if isinstance(error, TraceError) and error.place is not None:
-        return f"{error.place}: "
-    frames = [
-        frame
-        for frame in traceback.extract_tb(error.__traceback__)
-        if Path(frame.filename).suffix == ".py" and Path(frame.filename).parent != _OWN
-    ]
-    where = frames[-1] if frames else None
-    kind = "" if isinstance(error, TraceError) else f"{type(error).__name__}: "
-    return f"{where.filename}, line {where.lineno}: {kind}" if where else kind
+    if isinstance(error, TraceError):
+        return place_of(error) if error.place is None else f"{error.place}: "
+    return f"{place_of(error)}{type(error).__name__}: "
 
 
 @contextlib.contextmanager

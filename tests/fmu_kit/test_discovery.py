@@ -14,9 +14,9 @@ from fmu_kit.slave import Slave
 
 
 class Tank(Slave):
-    description = "a tank"
+    def step(self, t, h): ...
 """
-OTHERS = """
+OTHERS = '''
 from base import Base as Ancestor
 from fmu_kit import slave
 
@@ -24,25 +24,31 @@ raise SystemExit("imported")
 
 
 class Pump(Ancestor):
-    description: str = "a pump, by a base class of another module"
+    """By a base class of another module, whose method it defines."""
+
+    def law(self): ...
 
 
-class Unspoken(Ancestor):
+class Unfinished(Ancestor):
     pass
 
 
 class Law:
-    description = "no slave"
+    def step(self, t, h): ...
 
 
 class Law2(Law):
-    description = "no slave either"
-"""
+    def law(self): ...
+'''
 BASE = """
+from abc import abstractmethod
 from fmu_kit.slave import Slave
 
 class Base(Slave):
-    pass
+    def step(self, t, h): ...
+
+    @abstractmethod
+    def law(self): ...
 """
 
 
@@ -55,7 +61,7 @@ def folder(tmp_path: Path) -> Path:
     return folder
 
 
-def test_classes_made_from_slave_that_say_what_they_are_are_found(folder: Path) -> None:
+def test_classes_made_from_slave_that_leave_no_method_open_are_found(folder: Path) -> None:
     assert slaves_in(folder) == [Target("others", "Pump", folder), Target("tank", "Tank", folder)]
 
 
@@ -64,7 +70,7 @@ def test_modules_of_a_package_are_named_from_where_its_outermost_package_lies(fo
     inner.mkdir()
     for package in (folder, inner):
         (package / "__init__.py").touch()
-    (inner / "tank.py").write_text("from ..base import Base\nclass Tank(Base):\n    description = ''\n")
+    (inner / "tank.py").write_text("from ..base import Base\nclass Tank(Base):\n    def law(self): ...\n")
     assert slaves_in(inner) == [Target("plants.inner.tank", "Tank", folder.parent)]
 
 
@@ -76,7 +82,7 @@ def test_the_projects_own_slaves_are_found() -> None:
 
 def test_an_fmu_goes_with_the_class_of_its_name_in_its_folder(folder: Path) -> None:
     assert slave_beside(folder / "Tank.fmu") == Target("tank", "Tank", folder)
-    for name in ("Unspoken", "Law", "Tan", "Missing"):
+    for name in ("Unfinished", "Law", "Tan", "Missing"):
         assert slave_beside(folder / f"{name}.fmu") is None
     assert slave_beside(folder / "nowhere" / "Tank.fmu") is None
 

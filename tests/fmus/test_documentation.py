@@ -400,4 +400,7 @@ def test_a_second_controller_beside_the_first_has_nothing_of_its_page_icon_and_d
     assert "Another controller" in second.text
     source.write_text(SECOND.replace("description =", "subtitle ="), encoding="utf-8")
     done = python(tree, "-m", "fmu_kit.packaging", str(tmp_path), "controller_fmu.second:Second")
-    assert (done.returncode, done.stderr) == (1, "controller_fmu.second:Second: expected a description of its own\n")
+    assert (done.returncode, done.stderr) == (
+        1,
+        "controller_fmu.second:Second: expected a docstring or a description of its own\n",
+    )
