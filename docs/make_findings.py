@@ -122,7 +122,9 @@ def limits() -> list[str]:
     """Limits of the period over kappa."""
     found = limits_of("limits", [experiments.flight(kappa=kappa) for kappa in KAPPAS])
     paper = next(one for kappa, one in zip(KAPPAS, found, strict=True) if kappa == 1.0)
-    drawn = drawing.draw_limit(PAPER, limit.Limit(**{**paper, "continuous": None, "tried": ()}), RESULTS, DOCS)
+    drawn = drawing.draw_spectral_radius(
+        PAPER, limit.Limit(**{**paper, "continuous": None, "tried": ()}), RESULTS, DOCS
+    )
     (FIGURES / "spectral_radius.png").write_bytes(drawn[0].read_bytes())
     return [
         f"kappa {kappa:<4g} local {_ms(one['local_limit'])}, large-signal {_ms(one['large_signal_limit'])}, "

@@ -226,8 +226,9 @@ def limit(
     workers: Annotated[int, typer.Option("--workers", help="Processes for the seeds.", metavar="N")] = 1,
     engine: EngineFlag = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Draw the spectral radius with both limits here.", metavar="DIR")
+        Path | None, typer.Option("--out", help="Folder for the figure; beside the file unless told.", metavar="DIR")
     ] = None,
+    figures: Annotated[bool, typer.Option(help="Draw what was measured, with both limits.")] = True,
     *,
     flags: FlightFlags,
 ) -> Answer:
@@ -240,11 +241,12 @@ def limit(
         chosen, of, first=first, last=last, tolerance=tolerance, scan=scan, confidence=confidence,
         continuous=continuous, workers=workers, engine=engine_named(engine), announce=say,
     )  # fmt: skip
-    if out is not None:
+    where = out or (None if scenario is None else scenario.parent)
+    if figures and where is not None:
         from orchestration.studies.drawing import draw_limit
 
-        for drawn in draw_limit(chosen, found, out):
-            say(str(drawn))
+        for written in draw_limit(chosen, found, where):
+            say(str(written))
     return Answer(document=found, lines=[f"{name:<19}  {value}" for name, value in limits.as_text(found).items()])
 
 

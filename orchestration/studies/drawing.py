@@ -1,5 +1,7 @@
 """Which figures a study gets: decides by its axes, reads the store, writes beside it."""
 
+import contextlib
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -7,12 +9,12 @@ import numpy as np
 
 from orchestration.drawing.style import SCREEN, Style
 from orchestration.errors import UsageError
-from orchestration.expressions.syntax import Name, Number, Operation, names, parse
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.request import Request
+from orchestration.request import Request, system_meant
 from orchestration.simulator import Floats
-from orchestration.studies import figures, sensitivity
+from orchestration.studies import figures, limit_figure, sensitivity
 from orchestration.studies.axes import Axis, unit_points
+from orchestration.studies.criteria import edge, judged
 from orchestration.studies.limit import Limit
 from orchestration.studies.linear import HoverLoop
 from orchestration.studies.local import radius
@@ -21,7 +23,6 @@ from orchestration.studies.store import TEXTS, metrics_with
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import store_path
 from orchestration.studies.table import frame, units_in
-from orchestration.system.model import System
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,7 +32,7 @@ def metric_of(study: Study, metric: str | None) -> str:
     """The metric that was asked for, else the one that the criterion is about; raises `UsageError` for none."""
     system = study.origin
     known = [name for name in metrics_with(system.objectives) if name not in TEXTS or _is_screened(study)]
-    chosen = judged(system) if metric is None else metric
+    chosen = (judged(system) or "horizon") if metric is None else metric
     if chosen not in known:
         raise UsageError(f"--metric {chosen}: expected one of {', '.join(known)}; every figure shows the outcome")
     return chosen
@@ -65,36 +66,28 @@ def draw_study(study: Study, folder: Path | None, metric: str | None = None, sty
     return written
 
 
-def judged(system: System) -> str:
-    """The objective that the criterion is about, or the first one; `horizon` where there is none."""
-    named = names(parse(system.criterion.good)) if system.criterion.good is not None else ()
-    return next((name for name in named if name in system.objectives), next(iter(system.objectives), "horizon"))
-
-
-def edge(system: System, metric: str) -> float | None:
-    """The bound of a criterion that is `metric < number` and no more, or with another comparison."""
-    if system.criterion.good is None:
-        return None
-    match parse(system.criterion.good):
-        case Operation("<" | "<=" | ">" | ">=", (Name(name), Number(bound))) if name == metric:
-            return bound
-    return None
-
-
 def draw_limit(request: Request, found: Limit, folder: Path, style: Style = SCREEN) -> list[Path]:
-    """Draw the spectral radius over the period or the delay, with both limits; the paths of the figure.
+    """Draw what was measured, with both limits; of the quadrotor over period or delay the spectral radius too."""
+    system = system_meant(request)
+    bound = None if found.judged is None else edge(system, found.judged)
+    name = "limit_" + re.sub(r"[^A-Za-z0-9]+", "_", found.of).strip("_")
+    written = figures.save(lambda how: limit_figure.measured(found, bound, how), folder / name, style)
+    if isinstance(request, Scenario) and found.of in ("period", "delay"):
+        with contextlib.suppress(UsageError):  # where linear theory about hover does not apply
+            written += draw_spectral_radius(request, found, folder, style)
+    return written
 
-    Raises `UsageError` if linear theory does not apply.
+
+def draw_spectral_radius(scenario: Scenario, found: Limit, folder: Path, style: Style = SCREEN) -> list[Path]:
+    """Draw the spectral radius of the loop about hover over the period or the delay; the paths of the figure.
+
+    Raises `UsageError` where linear theory does not apply.
     """
-    if not isinstance(request, Scenario):
-        raise UsageError("--out: the spectral radius is drawn of the quadrotor only")
-    if found.of not in ("period", "delay"):
-        raise UsageError(f"--out: expected --of period or delay to draw the spectral radius over, got {found.of}")
     ends = [limit for limit in (found.local_limit, found.large_signal_limit) if limit is not None]
     last = 1.3 * max(ends, default=0.1)
     values = np.array([0.001 + i / 199.0 * (last - 0.001) for i in range(200)])
-    loop = HoverLoop.of(request)
-    radii = np.array([radius(loop, request, found.of, value) for value in values])
+    loop = HoverLoop.of(scenario)
+    radii = np.array([radius(loop, scenario, found.of, value) for value in values])
     return figures.save(
         lambda how: figures.spectral_radius(
             found.of,

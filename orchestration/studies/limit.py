@@ -17,6 +17,7 @@ from orchestration.quadrotor.translation import in_its_own_words
 from orchestration.request import Request, system_meant
 from orchestration.results import html
 from orchestration.simulation import checked
+from orchestration.studies.criteria import judged
 from orchestration.studies.engine import Pool
 from orchestration.studies.files import Files, files_of
 from orchestration.studies.local import Local, local_limits
@@ -54,6 +55,12 @@ class Limit:
 
     of: str
     """The quantity: a name, or a path."""
+    unit: str | None = None
+    """Of the values; None: none."""
+    judged: str | None = None
+    """The objective that the criterion is about; None: none."""
+    judged_unit: str | None = None
+    """Of that objective."""
     local_limit: float | None
     """where what is small about the operating point (hover) first ceases to decay; None: not defined, or not reached"""
     local_method: str | None = None
@@ -129,8 +136,8 @@ def find(
     models = files.models_of(varied.system)
     span = range_asked_for(varied, models, first=first, last=last, tolerance=tolerance, scan=scan)
     with in_its_own_words(request):
-        for value in span.values():
-            checked(varied.at(value), models)
+        units = [checked(varied.at(value), models).units for value in span.values()]
+    metric = judged(varied.system)
     random = is_random(varied.at(span.last))
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
     local = local_limits(varied, span)
@@ -146,7 +153,8 @@ def find(
         ideal = _near_continuous(request, pool) if continuous and isinstance(request, Scenario) else None
     tried = tuple(trials.tried[value] for value in sorted(trials.tried))
     return Limit(
-        of=of, local_limit=local.limit, local_limit_outside=local.outside, local_method=local.method,
+        of=of, unit=span.unit.strip() or None, judged=metric, judged_unit=units[0].get(metric or ""),
+        local_limit=local.limit, local_limit_outside=local.outside, local_method=local.method,
         local_accuracy=local.accuracy, large_signal_limit=None if bracket is None else bracket.good,
         refuted_limit=refuted, horizon=varied.system.stop_time, tolerance=span.tolerance, scan=span.step,
         confidence=confidence if random else None, seeds=seeds,

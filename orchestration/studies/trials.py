@@ -1,10 +1,12 @@
 """Runs that decide whether a value of a quantity is good, with one seed or many."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 from orchestration.statistics import refutes, wilson
+from orchestration.studies.criteria import judged
 from orchestration.studies.engine import Pool
 from orchestration.studies.ranges import Range, Varied
 from orchestration.system.model import System
@@ -42,6 +44,8 @@ class Tried:
     """how many were run: all seeds, or up to the first that was not good"""
     share: tuple[float, float] | None
     """Wilson interval of the share of seeds that are good, at the confidence; None: no chance, or not all run"""
+    measured: float | None = None
+    """what the criterion is about, of the first seed or of that one; None: it has no value"""
 
 
 class Trials:
@@ -77,6 +81,7 @@ class Trials:
         metrics = self._pool.fly(runs, stop=stop)
         down = next((one for one in metrics if not is_good(one)), None)
         flew = sum(map(is_good, metrics))
+        measured = metrics[0 if down is None else metrics.index(down)].get(judged(system) or "")
         known = self._confidence is not None and len(metrics) == self._seeds
         found = self.tried[value] = Tried(
             value=value,
@@ -85,6 +90,7 @@ class Trials:
             flew=flew,
             runs=len(metrics),
             share=wilson(flew, len(metrics), self._confidence) if known and self._confidence is not None else None,
+            measured=measured if isinstance(measured, float) and math.isfinite(measured) else None,
         )
         self._announce(f"{self._varied.of} {value:.6g}{self._span.unit}: {said(found)}")
         return found

@@ -1,5 +1,6 @@
 """Figures of studies: there, not empty, and what is drawn is what was flown."""
 
+import dataclasses
 import json
 from pathlib import Path
 from typing import Any
@@ -8,10 +9,12 @@ import matplotlib.figure
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from orchestration.drawing import cells
-from orchestration.studies import figures
+from orchestration.statistics import wilson
+from orchestration.studies import figures, limit_figure
 from orchestration.studies.axes import Axis
 from orchestration.studies.drawing import draw_limit, draw_study
 from orchestration.studies.limit import Limit
@@ -20,6 +23,7 @@ from orchestration.studies.sensitivity import Index
 from orchestration.studies.store import open_for_writing
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import store_path
+from orchestration.studies.trials import Tried
 from quadcosim import UsageError
 from tests.orchestration.studies.common import OBJECTIVES, axis, row, short, study
 
@@ -250,23 +254,73 @@ def test_the_spectral_radius_is_drawn_with_the_limits_that_there_are(
     expect_picture(*figures.save(lambda _: figure, tmp_path / "new" / "radius"))
 
 
-def limit(of: str) -> Limit:
-    return Limit(
-        of=of, local_limit=0.08, local_limit_outside=0.08, large_signal_limit=0.05, refuted_limit=None, horizon=30.0,
-        tolerance=0.001, scan=0.005, confidence=None, seeds=1, flies_above=(), continuous=None, tried=(), note="",
+def limit(of: str, **others: Any) -> Limit:
+    tried = tuple(
+        Tried(
+            value=value, outcome="settled", divergence_time=None, flew=int(value < 0.06), runs=1, share=None,
+            measured=value if value < 0.09 else None,
+        )
+        for value in (0.02, 0.04, 0.05, 0.06, 0.08, 0.1)
     )  # fmt: skip
+    known = Limit(
+        of=of, unit="s", judged="ultimate_bound", judged_unit="m", local_limit=0.08, local_limit_outside=0.08,
+        large_signal_limit=0.05, refuted_limit=None, horizon=30.0, tolerance=0.001, scan=0.005, confidence=None,
+        seeds=1, flies_above=(), continuous=None, tried=tried, note="",
+    )  # fmt: skip
+    return dataclasses.replace(known, **others)
 
 
 @pytest.mark.parametrize("of", ["period", "delay"])
 def test_a_limit_is_drawn_with_the_radius_that_crosses_one_there(tmp_path: Path, of: str) -> None:
-    (picture,) = draw_limit(short(), limit(of), tmp_path)
-    assert picture == tmp_path / f"spectral_radius_{of}.png"
-    expect_picture(picture)
+    pictures = draw_limit(short(), limit(of), tmp_path)
+    assert pictures == [tmp_path / f"limit_{of}.png", tmp_path / f"spectral_radius_{of}.png"]
+    for picture in pictures:
+        expect_picture(picture)
 
 
-def test_a_limit_that_linear_theory_does_not_have_is_not_drawn(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="expected --of period or delay to draw the spectral radius over, got loss"):
-        draw_limit(short(), limit("loss"), tmp_path)
+def test_a_limit_that_linear_theory_does_not_have_is_drawn_without_the_radius(tmp_path: Path) -> None:
+    assert draw_limit(short(), limit("timing.loss"), tmp_path) == [tmp_path / "limit_timing_loss.png"]
+
+
+def xs(line: Line2D) -> list[float]:
+    return [float(x) for x in np.asarray(line.get_xdata())]
+
+
+def ys(line: Line2D) -> list[float]:
+    return [float(y) for y in np.asarray(line.get_ydata())]
+
+
+def test_a_limit_shows_each_value_that_was_tried_where_it_was_measured() -> None:
+    figure = limit_figure.measured(limit("components.pilot.sampling.period"), 0.06)
+    (axes,) = figure.axes
+    marks = {line.get_label(): line for line in axes.get_lines()}
+    assert xs(marks["good"]) == pytest.approx([20.0, 40.0, 50.0])
+    assert ys(marks["not good"]) == pytest.approx([0.06, 0.08])
+    assert xs(marks["diverged"]) == pytest.approx([100.0])
+    assert xs(marks["measured limit  50 ms"])[0] == pytest.approx(50.0)
+    assert xs(marks["local limit, by theory  80 ms"])[0] == pytest.approx(80.0)
+    assert ys(marks["the criterion's bound, 0.06 m"])[0] == 0.06
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("period of pilot [ms]", "largest position error, last third [m]")
+    assert axes.get_title(loc="left") == "Good up to 50 ms: period of pilot, in runs of 30 s"
+
+
+def test_a_limit_of_many_seeds_shows_their_share_and_how_well_it_is_known() -> None:
+    tried = tuple(
+        Tried(value=v, outcome="settled", divergence_time=None, flew=n, runs=29, share=wilson(n, 29, 0.95))
+        for v, n in ((0.1, 29), (0.2, 20))
+    )
+    figure = limit_figure.measured(limit("loss", unit=None, confidence=0.95, seeds=29, tried=tried), None)
+    (axes,) = figure.axes
+    marks = {line.get_label(): line for line in axes.get_lines()}
+    assert ys(marks["good"]) == [1.0]
+    assert ys(marks["not good"]) == pytest.approx([20 / 29])
+    assert axes.get_ylabel() == "share of 29 seeds that are good"
+
+
+def test_a_limit_that_nothing_in_the_range_has_says_so() -> None:
+    good = tuple(one for one in limit("delay").tried if one.flew)
+    figure = limit_figure.measured(limit("delay", tried=good, large_signal_limit=None), None)
+    assert figure.axes[0].get_title(loc="left") == "delay: good throughout, in runs of 30 s"
 
 
 def test_dots_of_many_axes_are_apart_by_what_flies() -> None:

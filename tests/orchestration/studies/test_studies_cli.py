@@ -199,11 +199,12 @@ def test_limit_prints_both_figures_and_says_that_they_differ(main: Main) -> None
     assert "more than a tenth from the local limit" in found["note"]
 
 
-def test_limit_draws_the_spectral_radius_on_request(tmp_path: Path, main: Main) -> None:
+def test_limit_draws_what_it_measured_and_the_spectral_radius_on_request(tmp_path: Path, main: Main) -> None:
     done = main(*LIMIT, "--of", "delay", "--out", "drawn")
-    picture = Path("drawn") / "spectral_radius_delay.png"
-    assert done.stderr.splitlines()[-1] == str(picture)
-    assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
+    pictures = [Path("drawn") / name for name in ("limit_delay.png", "spectral_radius_delay.png")]
+    assert done.stderr.splitlines()[-2:] == [*map(str, pictures)]
+    for picture in pictures:
+        assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,139 @@
+"""The figure of a limit: what was measured at each value, where it ceases to be good, and where theory says so."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from orchestration.drawing.palette import BLUE, GREY, ORANGE, RED
+from orchestration.drawing.style import SCREEN, Style
+from orchestration.results import labels
+from orchestration.studies.limit import Limit
+from orchestration.studies.trials import RELIABILITY, Tried
+
+_PLACES = ("components", "connections", "sources")
+
+
+def measured(found: Limit, edge: float | None, style: Style = SCREEN) -> Figure:
+    """What the criterion is about over the quantity, or the share of good seeds, with the limits.
+
+    `edge` is where the criterion draws the line; None where it is no plain bound.
+    """
+    scale, unit = _scale(found)
+    figure = style.figure(38.0)
+    axes = figure.add_subplot()
+    if found.confidence is None:
+        _values(axes, found, scale, edge)
+    else:
+        _shares(axes, found, scale)
+    tried = [one.value * scale for one in found.tried]
+    axes.set_xlim(_with_margin(tried))
+    _limits(axes, found, scale, unit)
+    axes.set_xlabel(labels.with_unit(in_words(found.of), unit))
+    axes.set_title(_title(found, scale, unit), loc="left")
+    figure.legend(loc="outside lower center", ncols=3)
+    return figure
+
+
+def in_words(path: str) -> str:
+    """What a path is of, for people: `components.pilot.sampling.period` is the period of pilot."""
+    place, _, rest = path.partition(".")
+    name, _, what = rest.partition(".")
+    if place in _PLACES and what:
+        return f"{labels.words(what.removeprefix('sampling.').removeprefix('parameters.'))} of {labels.words(name)}"
+    return labels.setting(path if "." in path else f"timing.{path}")
+
+
+def _values(axes: Axes, found: Limit, scale: float, edge: float | None) -> None:
+    """One run a value: what the criterion is about, or good and not good where that has no value."""
+    known = [one for one in found.tried if one.measured is not None]
+    if not known:
+        _drawn(axes, found.tried, [float(is_good(one)) for one in found.tried], scale)
+        axes.set(yticks=(0.0, 1.0), yticklabels=("not good", "good"), ylim=(-0.3, 1.3))
+        return
+    _drawn(axes, known, [one.measured or 0.0 for one in known], scale)
+    down = [one.value * scale for one in found.tried if one.measured is None]
+    axes.plot(
+        down, np.full(len(down), 0.97), "^", color=RED, transform=axes.get_xaxis_transform(),
+        label="diverged" if down else None,
+    )  # fmt: skip
+    if edge is not None:
+        axes.axhline(
+            edge,
+            color=GREY,
+            linewidth=1.0,
+            linestyle=":",
+            label=f"the criterion's bound, {_shown(edge, 1.0, found.judged_unit)}",
+        )
+    values = [one.measured or 0.0 for one in known]
+    if min(values) > 0.0 and max(values) > 20.0 * min(values):
+        axes.set_yscale("log")
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_minor_formatter("{x:g}")
+    axes.set_ylabel(labels.with_unit(labels.metric(found.judged or ""), found.judged_unit))
+
+
+def _shares(axes: Axes, found: Limit, scale: float) -> None:
+    """Many runs a value: the share of seeds that are good, with its interval where all were run."""
+    shares = [one.flew / one.runs for one in found.tried]
+    _drawn(axes, found.tried, shares, scale)
+    known = [one for one in found.tried if one.share is not None]
+    low, high = (np.array([one.share[side] for one in known if one.share is not None]) for side in (0, 1))
+    middle = np.array([one.flew / one.runs for one in known])
+    apart = np.maximum(np.array([middle - low, high - middle]), 0.0)
+    axes.errorbar(
+        [one.value * scale for one in known], middle, apart, fmt="none", ecolor=GREY, capsize=2,
+        label=f"{found.confidence:.0%} interval",
+    )  # fmt: skip
+    axes.axhline(RELIABILITY, color=GREY, linewidth=1.0, linestyle=":", label=f"{RELIABILITY:.0%} of the seeds")
+    axes.set(ylabel=f"share of {found.seeds} seeds that are good", ylim=(-0.05, 1.08))
+
+
+def _drawn(axes: Axes, tried: "list[Tried] | tuple[Tried, ...]", heights: list[float], scale: float) -> None:
+    """A mark a value: dots where all runs were good, crosses where not."""
+    for good, mark, color, label in ((True, "o", BLUE, "good"), (False, "X", RED, "not good")):
+        chosen = [i for i, one in enumerate(tried) if is_good(one) is good]
+        x, y = [tried[i].value * scale for i in chosen], [heights[i] for i in chosen]
+        axes.plot(x, y, mark, color=color, markersize=6, label=label if chosen else None)
+
+
+def is_good(tried: Tried) -> bool:
+    """Whether all runs at a value were."""
+    return tried.flew == tried.runs
+
+
+def _limits(axes: Axes, found: Limit, scale: float, unit: str | None) -> None:
+    """The limits as lines, and what lies beyond the measured one shaded."""
+    named = (
+        (found.large_signal_limit, RED, "-", "measured limit"),
+        (found.local_limit, ORANGE, "--", "local limit, by theory"),
+        (found.refuted_limit, GREY, "-.", f"{RELIABILITY:.0%} refuted"),
+    )
+    left, right = axes.get_xlim()
+    for limit, color, style, name in named:
+        if limit is not None and left <= limit * scale <= right:
+            axes.axvline(limit * scale, color=color, linestyle=style, label=f"{name}  {_shown(limit, scale, unit)}")
+    if found.large_signal_limit is not None:
+        axes.axvspan(found.large_signal_limit * scale, right, color=RED, alpha=0.06, linewidth=0.0)
+
+
+def _title(found: Limit, scale: float, unit: str | None) -> str:
+    what, until = in_words(found.of), f", in runs of {found.horizon:g} s"
+    if found.large_signal_limit is not None:
+        return f"Good up to {_shown(found.large_signal_limit, scale, unit)}: {what}{until}"
+    first = found.tried[0]
+    return f"{what}: {'good throughout' if is_good(first) else 'never good'}{until}"
+
+
+def _scale(found: Limit) -> tuple[float, str | None]:
+    """What to multiply values with to be read, and their unit then: times below two seconds are in milliseconds."""
+    largest = max((one.value for one in found.tried), default=0.0)
+    return (1e3, "ms") if found.unit == "s" and largest < 2.0 else (1.0, found.unit)
+
+
+def _shown(value: float, scale: float, unit: str | None) -> str:
+    return f"{value * scale:.4g} {labels.unit(unit) or ''}".rstrip()
+
+
+def _with_margin(values: list[float]) -> tuple[float, float]:
+    room = 0.03 * (max(values) - min(values)) or 1.0
+    return min(values) - room, max(values) + room
