@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 import typer.core
 
-from orchestration.command import completion, plotting, registering
+from orchestration.command import beginning, completion, plotting, registering
 from orchestration.command import systems as system_commands
 from orchestration.command.answer import Answer, of_files
 from orchestration.command.flags import EngineFlag, FlightFlags, Timing, flies, request_from
@@ -287,6 +287,7 @@ def ssp(
 registering.add(app, FLY, run)
 plotting.register(app)
 reports.register(app)
+beginning.register(app)
 system_commands.register(app)
 studies.register(app)
 registering.add(app, FMUS, build, validate, doctor)

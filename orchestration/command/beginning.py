@@ -1,0 +1,38 @@
+"""The command that begins a controller, a plant or a filter of one's own."""
+
+from pathlib import Path
+from typing import Annotated, get_args
+
+import typer
+
+from orchestration.command import registering
+from orchestration.command.answer import Answer, of_files
+from orchestration.command.registering import FLY
+from orchestration.command.terminal import say
+from orchestration.errors import UsageError
+from orchestration.scaffold.folder import Kind, git_author, write
+
+
+def new(
+    kind: Annotated[str, typer.Argument(help="What to write.", metavar="controller|plant|filter", show_default=False)],
+    name: Annotated[str, typer.Argument(help="Of the folder and its FMU, as hover_pd.", show_default=False)],
+    author: Annotated[
+        str | None, typer.Option("--author", help="Whose it is; unless told, git's user.name.", show_default=False)
+    ] = None,
+    license: Annotated[str, typer.Option("--license", help="Under which it is given to others.", metavar="TEXT")] = "",
+) -> Answer:
+    """Write a folder NAME here: a law in a few lines, its test, a system that flies it, a page of commands."""
+    kinds = {each: each for each in get_args(Kind)}
+    if kind not in kinds:
+        raise UsageError(f"new {kind}: expected {', '.join(kinds)}")
+    whose = git_author() if author is None else author
+    written = write(kinds[kind], name, Path(), author=whose, license=license)
+    if not whose:
+        say("the author is left open; it is the line author = in the class, or --author NAME")
+    say(f"next: quadcosim run {name}/system.toml")
+    return of_files(written)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the command line."""
+    registering.add(app, FLY, new)

@@ -1,0 +1,1 @@
+"""Working folders for what people write themselves: a controller, a plant, a filter."""

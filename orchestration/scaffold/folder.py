@@ -1,0 +1,88 @@
+"""`quadcosim new`: writes a folder with a slave, its test, a system that flies it and a page of commands."""
+
+import importlib.util
+import keyword
+import re
+import subprocess
+import sys
+from pathlib import Path
+from string import Template
+from typing import Literal
+
+from orchestration.errors import UsageError
+from orchestration.quadrotor.wiring import MODELS
+
+Kind = Literal["controller", "plant", "filter"]
+_HERE = Path(__file__).parent
+
+
+def write(kind: Kind, name: str, where: Path, *, author: str, license: str) -> list[Path]:
+    """Write the folder `where`/`name`; the paths of its files.
+
+    The class has the name in CamelCase, its module in snake_case. Raises `UsageError` for a name that cannot be, or
+    for a folder that is there already.
+    """
+    model = class_name(name)
+    module = module_name(model)
+    _expect_usable(name, model, module)
+    folder = where / name
+    if folder.exists():
+        raise UsageError(f"{folder}: is there already; expected a folder that can be made")
+    said = {"Name": model, "module": module, "folder": name, "author": _quoted(author), "license": _quoted(license)}
+    files = {
+        f"{module}.py": "law.py",
+        f"test_{module}.py": "test.py",
+        "system.toml": "system.toml",
+        "README.md": "README.md",
+    }
+    folder.mkdir(parents=True)
+    for file, template in files.items():
+        text = (_HERE / f"{kind}_{template}.tmpl").read_text(encoding="utf-8")
+        (folder / file).write_text(Template(text).substitute(said), encoding="utf-8")
+    return [folder / file for file in files]
+
+
+def class_name(name: str) -> str:
+    """`hover_pd`, `hover-pd` and `HoverPd` are HoverPd."""
+    return "".join(part[:1].upper() + part[1:] for part in re.split(r"[_-]+", name))
+
+
+def module_name(model: str) -> str:
+    """HoverPd is hover_pd."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", model).lower()
+
+
+def git_author() -> str:
+    """Who commits on this machine; empty where git is not there or does not know."""
+    try:
+        done = subprocess.run(
+            ["git", "config", "user.name"], capture_output=True, text=True, encoding="utf-8", errors="replace",
+            check=False,
+        )  # fmt: skip
+    except OSError:
+        return ""
+    return done.stdout.strip()
+
+
+def _expect_usable(name: str, model: str, module: str) -> None:
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name) or not model.isidentifier():
+        raise UsageError(f"{name!a}: expected a name of letters, digits and _ that begins with a letter, as hover_pd")
+    if model in MODELS:
+        raise UsageError(f"{name}: an FMU of this project has this name; expected another one")
+    taken = keyword.iskeyword(module) or module in sys.stdlib_module_names or _is_found(module)
+    if taken or model in _OF_THE_KIT:
+        raise UsageError(f"{name}: Python has a module or a word {module}; expected another name, as my_{module}")
+
+
+_OF_THE_KIT = ("Slave", "Input", "Output", "Parameter", "State", "Local", "Vec3", "Quaternion")
+
+
+def _is_found(module: str) -> bool:
+    """Whether a module of this name is installed; one in the folder of whoever asks does not count."""
+    found = importlib.util.find_spec(module)
+    return found is not None and Path.cwd() not in Path(found.origin or Path.cwd() / "none").parents
+
+
+def _quoted(text: str) -> str:
+    """`text` as it stands between the quotes of a source."""
+    return text.replace("\\", "\\\\").replace('"', '\\"')
