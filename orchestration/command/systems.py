@@ -73,7 +73,7 @@ def show(
 
     meant = system_meant(request_from(system, flags, timing))
     if out is not None:
-        from orchestration.system import diagram
+        from orchestration.drawing import diagram
 
         say(str(diagram.write(meant, out)))
     return Answer(document=to_tables(meant), lines=as_text(meant, _units_of(meant)).splitlines())

@@ -149,6 +149,7 @@ def tune(
     return of_files(found.written)
 
 
+@takes("look", FigureFlags)
 def compare(
     comparison: Annotated[
         Path, typer.Argument(help="What is compared, on what.", metavar="COMPARISON.toml", show_default=False)
@@ -168,6 +169,8 @@ def compare(
         typer.Option("--start", help="Of that cell one flight, kept in --out DIR.", metavar="I", show_default=False),
     ] = None,
     figures: Annotated[bool, typer.Option(help="Draw the pictures beside the tables.")] = True,
+    *,
+    look: FigureFlags,
 ) -> Answer:
     """Fly controllers against each other from the same starts: who flies, how far, how well, at what effort."""
     from orchestration.master.engine import engine_named
@@ -182,7 +185,7 @@ def compare(
     if cell is not None:
         return command.cell(chosen, cell, out, workers=workers, engine=alone)
     return command.all_cells(
-        chosen, out, workers=workers, engine="batch" if engine == "batch" else alone, figures=figures,
+        chosen, out, workers=workers, engine="batch" if engine == "batch" else alone, figures=figures, look=look,
         again=f"quadcosim compare {comparison}{' --native' if native else ''} --cell",
     )  # fmt: skip
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from orchestration.command.answer import Answer
+from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.terminal import say
 from orchestration.errors import UsageError
 from orchestration.master.engine import Engine
@@ -20,10 +21,12 @@ def all_cells(
     workers: int,
     engine: Engine | Literal["batch"] | None,
     figures: bool,
+    look: FigureFlags,
     again: str,
 ) -> Answer:
     """Fly what is missing, and tell what all cells come to; `again` is the command for one of them."""
-    found = run.compare(comparison, folder=out, workers=workers, engine=engine, figures=figures)
+    style = look.chosen if figures else None
+    found = run.compare(comparison, folder=out, workers=workers, engine=engine, figures=figures, style=style)
     summary = found.summary
     say(f"{summary.path}: {summary.total} runs, {summary.flown} flown now; tables and pictures beside it")
     if summary.agreement is not None:

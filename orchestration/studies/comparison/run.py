@@ -28,6 +28,8 @@ from orchestration.studies.table import export, frame
 if TYPE_CHECKING:
     import pandas as pd
 
+    from orchestration.drawing.style import Style
+
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Compared:
@@ -84,13 +86,15 @@ def compare(
     workers: int = 1,
     engine: Engine | Literal["batch"] | None = None,
     figures: bool = True,
+    style: "Style | None" = None,
     progress: CountHeard = "bar",
     announce: Callable[[str], None] | None = say,
 ) -> Compared:
     """Fly what is missing of a comparison, conclude, and write its tables and pictures beside its store.
 
     `folder`, `workers`, `progress` and `announce` are those of `sweep`, which raises what this does. By the engine
-    `batch` the native twins of its FMUs are flown as lanes; pictures are left out unless `figures`.
+    `batch` the native twins of its FMUs are flown as lanes; pictures are left out unless `figures`, drawn
+    in a `style`, for a screen unless told.
     """
     comparison = replace(comparison, native=True) if engine == "batch" else comparison
     summary = sweep(
@@ -102,9 +106,10 @@ def compare(
     outcome = concluded(comparison, table, known)
     written = [*export(summary.path, place), *write(comparison, outcome, known, place)]
     if figures:
-        from orchestration.studies.comparison import pictures  # with it comes matplotlib
+        from orchestration.drawing.style import SCREEN  # with it comes matplotlib
+        from orchestration.studies.comparison import pictures
 
-        written += pictures.draw(comparison, outcome, table, place)
+        written += pictures.draw(comparison, outcome, table, place, style or SCREEN)
     return Compared(
         axis=comparison.axis.name, summary=summary, table=table, bandwidths=known, outcome=outcome, written=written
     )

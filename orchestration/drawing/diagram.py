@@ -2,13 +2,15 @@
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
+from orchestration.drawing.names import FORMATS
+from orchestration.drawing.style import SCREEN, save
 from orchestration.errors import UsageError
 from orchestration.system.description import rate, timing, what
 from orchestration.system.model import System, component_of, variable_of
@@ -44,13 +46,12 @@ class _Arrow:
 
 def write(system: System, path: Path) -> Path:
     """Draw a system into a file whose ending says the format; raises `UsageError` for one that cannot be."""
-    figure = draw(system)
-    formats = figure.canvas.get_supported_filetypes()
-    if path.suffix[1:].lower() not in formats:
-        raise UsageError(f"--out {path}: expected a figure ending in one of {', '.join(sorted(formats))}")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path)
-    return path
+    if path.suffix[1:] not in FORMATS:
+        raise UsageError(f"--out {path}: expected a figure ending in one of {', '.join(FORMATS)}")
+    style = replace(SCREEN, formats=(path.suffix[1:],))
+    with style.applied():
+        figure = draw(system)
+    return save({path.stem: figure}, path.parent, style)[0]
 
 
 def draw(system: System) -> Figure:
@@ -65,7 +66,8 @@ def draw(system: System) -> Figure:
     above, below = (1 + max(lanes.values(), default=-1) for lanes in (ahead, back))
     top, bottom = HEIGHT / 2 + LANE * (above + 0.6), -HEIGHT / 2 - LANE * (below + 0.6)
     left, right = -0.7 * PITCH / 2 - 0.4, PITCH * (len(boxes) - 1) + 0.7 * PITCH / 2 + 0.4
-    figure = Figure(figsize=(right - left, top - bottom), dpi=110)
+    figure = Figure(figsize=(right - left, top - bottom))
+    figure.set_layout_engine("none")
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
     axes.set_axis_off()
