@@ -8,7 +8,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 """The repository."""
-ELSEWHERE = ("README.md", "fmus/README.md", "tests/reference/README.md", "examples/README.md", "examples/*/README.md")
+ELSEWHERE = (
+    "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "fmus/README.md", "tests/reference/README.md", "examples/README.md",
+    "examples/*/README.md",
+)  # fmt: skip
 """Pages that lie beside what they describe."""
 LINK = re.compile(r"(\]\(|^\[(?!\^)[^\]\n]+\]: +)(?![a-z]+:|#|//)([^)\s#]+)", re.MULTILINE)
 """What leads to another file, inline or by reference: what is before its address, and that."""
