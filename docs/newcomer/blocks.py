@@ -1,0 +1,135 @@
+"""The code blocks of a page, and what the comments before them say of running them.
+
+A comment stands before the block that it is about, and readers of the page's source see it:
+
+    <!-- not run: needs MATLAB -->                                            the whole block
+    <!-- not run: `make test`: takes ten minutes -->                          the lines that begin so
+    <!-- instead of `quadcosim sweep`: `quadcosim status`: takes an hour -->  another line in their place
+"""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from markdown_it import MarkdownIt
+
+COMMANDS = {
+    ".",
+    "cc",
+    "cd",
+    "cmake",
+    "cp",
+    "dask",
+    "fmpy",
+    "git",
+    "make",
+    "mkdir",
+    "pip",
+    "pytest",
+    "python",
+    "python3",
+}
+COMMANDS |= {"quadcosim", "OMSimulator"}
+"""First words by which a block without a language is known as lines for a shell"""
+SHELL = ("sh", "bash", "shell", "console")
+SHOWN = ("", "text")
+"""Languages of what is to be looked at: drawings, formulas, output"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Note:
+    """What is not run as it stands, and why."""
+
+    command: str | None
+    """that the lines begin with; None: all of the block"""
+    instead: str | None
+    """what is run in their place"""
+    reason: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Block:
+    """A code block; `name` is the file that it is the text of, empty if it is of none."""
+
+    page: Path
+    line: int
+    language: str
+    name: str
+    text: str
+    notes: tuple[Note, ...]
+
+    @property
+    def place(self) -> str:
+        """Where it begins."""
+        return f"{self.page}:{self.line}"
+
+    @property
+    def is_shell(self) -> bool:
+        """Whether its lines are for a shell."""
+        if self.language or not self.text.strip():
+            return self.language in SHELL
+        first = self.text.split()[0]
+        return first in COMMANDS or first.startswith(".venv") or bool(re.match(r"[A-Z_]+=\S", first))
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether it is only to be looked at."""
+        return self.language in SHOWN and not self.is_shell
+
+    @property
+    def skipped(self) -> str | None:
+        """Why none of it is run; None if some is."""
+        return next((note.reason for note in self.notes if note.command is None), None)
+
+    @property
+    def lines(self) -> list[str]:
+        """The lines for a shell, those that go on joined."""
+        return [line for line in self.text.replace("\\\n", "").splitlines() if line.split("#")[0].strip()]
+
+    def note_on(self, line: str) -> Note | None:
+        """What is said of one line."""
+        return next((n for n in self.notes if n.command is not None and line.startswith(n.command)), None)
+
+
+def blocks_of(page: Path, root: Path) -> list[Block]:
+    """The code blocks of a page in order; raises `ValueError` for a comment that is about none of its lines."""
+    found, notes = [], []
+    for token in MarkdownIt("commonmark").enable("table").parse((root / page).read_text(encoding="utf-8")):
+        line = 1 + (token.map or [0])[0]
+        if token.type == "html_block":
+            notes += _notes(token.content, f"{page}:{line}")
+        elif token.type in ("fence", "code_block"):
+            language, _, name = token.info.strip().partition(" ")
+            block = Block(page=page, line=line, language=language, name=name, text=token.content, notes=tuple(notes))
+            _expect_fitting(block)
+            found.append(block)
+            notes = []
+        elif token.type == "inline" and notes:
+            raise ValueError(f"{page}:{line}: expected a code block after the comment about one")
+    return found
+
+
+def _notes(comments: str, place: str) -> list[Note]:
+    return [
+        _note(" ".join(text.split()), place)
+        for text in re.findall(r"<!-- ((?:not run|instead of)\b.*?) -->", comments, re.S)
+    ]
+
+
+def _note(text: str, place: str) -> Note:
+    whole = re.fullmatch(r"not run: ([^`].*)", text)
+    part = re.fullmatch(r"not run: `([^`]+)`: (.+)", text)
+    other = re.fullmatch(r"instead of `([^`]+)`: `([^`]+)`: (.+)", text)
+    if whole is not None:
+        return Note(command=None, instead=None, reason=whole[1])
+    if part is not None:
+        return Note(command=part[1], instead=None, reason=part[2])
+    if other is not None:
+        return Note(command=other[1], instead=other[2], reason=other[3])
+    raise ValueError(f"{place}: {text}: expected one of the forms that docs/newcomer/blocks.py shows")
+
+
+def _expect_fitting(block: Block) -> None:
+    for note in block.notes:
+        if note.command is not None and not any(line.startswith(note.command) for line in block.lines):
+            raise ValueError(f"{block.place}: no line begins with {note.command}, of which a comment says it does")

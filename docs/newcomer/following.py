@@ -1,0 +1,177 @@
+"""Does what a page says, block by block, and raises `NotAsSaid` where that does not work."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+from docs.newcomer.blocks import Block
+
+LONGEST = 1800.0
+"""[s] that a line may take"""
+SHOWN = 3000
+"""Characters of the output of what failed"""
+KEPT = ("HOME", "LANG", "TMPDIR", "http_proxy", "https_proxy", "no_proxy", "PIP_INDEX_URL", "PIP_CONFIG_FILE")
+"""Of the variables of who starts this, those that a newcomer has too: without them nothing can be installed"""
+
+Tell = Callable[[str], None]
+
+
+class NotAsSaid(Exception):
+    """A block does not do what the page says."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Skipped:
+    """What was not run, or not as it stands, and why."""
+
+    place: str
+    what: str
+    reason: str
+
+
+class Newcomer:
+    """Somebody in `folder`, a copy of the repository and nothing else; `tell` hears of every step."""
+
+    def __init__(self, folder: Path, tell: Tell) -> None:
+        self._folder, self._tell = folder, tell
+        self._here = folder
+        self._printed = ""
+        self._python: _Python | None = None
+        self.skipped: list[Skipped] = []
+        self.done = 0
+        """Blocks that did what is said"""
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """Of the processes: that of the page's `.venv`, once it is there."""
+        own = self._folder / ".venv" / "bin"
+        given = {name: os.environ[name] for name in KEPT if name in os.environ}
+        return {**given, "PATH": f"{own}:/usr/local/bin:/usr/bin:/bin", "MPLBACKEND": "Agg", "COLUMNS": "120"}
+
+    def opens_a_page(self) -> None:
+        """A page begins in the top folder, with no Python open."""
+        self._here = self._folder
+        self.closes()
+
+    def closes(self) -> None:
+        """No Python is open any more."""
+        if self._python is not None:
+            self._python.close()
+            self._python = None
+
+    def follows(self, block: Block) -> None:
+        """Do what one block says; raises `NotAsSaid`."""
+        if block.skipped is not None:
+            self.skipped.append(Skipped(place=block.place, what="the block", reason=block.skipped))
+            return
+        if block.name and not block.is_shell and block.name != "output":
+            (self._here / block.name).write_text(block.text, encoding="utf-8")
+        if block.is_shell:
+            for line in block.lines:
+                self._line(block, line)
+        elif block.language in ("python", "py"):
+            self._run_python(block)
+        elif block.language == "toml":
+            self._read(block)
+        elif block.name == "output":
+            self._expect_printed(block)
+        elif not block.name and not block.is_shown:
+            raise NotAsSaid(f"{block.place}: expected a name for the file, or a comment that says why it is not run")
+        self.done += 1
+
+    def _line(self, block: Block, line: str) -> None:
+        note = block.note_on(line)
+        if note is not None:
+            self.skipped.append(Skipped(place=block.place, what=note.command or line, reason=note.reason))
+            if note.instead is None:
+                return
+            line = note.instead
+        where = self._folder / ".newcomer"
+        began = time.monotonic()
+        done = subprocess.run(
+            ["bash", "-c", f'{line}\nended=$?; pwd > "{where}"; exit $ended'], cwd=self._here, env=self.environment,
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, encoding="utf-8",
+            errors="replace", timeout=LONGEST, check=False,
+        )  # fmt: skip
+        self._tell(f"{block.place}: {line}  [{time.monotonic() - began:.1f} s]")
+        self._printed = done.stdout
+        if done.returncode != 0:
+            raise NotAsSaid(f"{block.place}: {line}\nended with {done.returncode}:\n{done.stdout[-SHOWN:]}")
+        self._here = Path(where.read_text(encoding="utf-8").strip())
+        where.unlink()
+
+    def _run_python(self, block: Block) -> None:
+        began = time.monotonic()
+        if block.name:
+            done = subprocess.run(
+                ["python", block.name], cwd=self._here, env=self.environment, capture_output=True, text=True, check=False
+            )  # fmt: skip
+            said, self._printed = done.stdout + done.stderr if done.returncode else None, done.stdout
+        else:
+            self._python = self._python or _Python(self._here, self.environment)
+            said = self._python.run(block.text)
+        self._tell(f"{block.place}: {block.name or 'Python'}  [{time.monotonic() - began:.1f} s]")
+        if said is not None:
+            raise NotAsSaid(f"{block.place}: {block.name or 'Python'}\n{said[-SHOWN:]}")
+
+    def _read(self, block: Block) -> None:
+        path = self._here / (block.name or "block.toml")
+        path.write_text(block.text, encoding="utf-8")
+        command = [str(self._folder / ".venv" / "bin" / "python"), "-m", "docs.newcomer.readers", str(path)]
+        done = subprocess.run(
+            command, cwd=self._folder, env=self.environment, capture_output=True, text=True, check=False
+        )  # fmt: skip
+        self._tell(f"{block.place}: TOML, {done.stdout.strip()}")
+        if done.returncode != 0:
+            raise NotAsSaid(f"{block.place}: cannot be read:\n{done.stderr[-SHOWN:]}")
+        if not block.name:
+            path.unlink()
+
+    def _expect_printed(self, block: Block) -> None:
+        for line in map(str.strip, block.text.splitlines()):
+            if not all(part in self._printed for part in line.split("…")):
+                raise NotAsSaid(
+                    f"{block.place}: expected the output before it to have {line}:\n{self._printed[-SHOWN:]}"
+                )
+
+
+class _Python:
+    """A Python that stays open."""
+
+    def __init__(self, folder: Path, environment: dict[str, str]) -> None:
+        reading, writing = os.pipe()
+        session = Path(__file__).with_name("session.py")
+        self._process = subprocess.Popen(
+            [f"{environment['PATH'].split(':')[0]}/python", str(session), str(writing)], cwd=folder, env=environment,
+            stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.STDOUT, text=True, pass_fds=[writing],
+        )  # fmt: skip
+        os.close(writing)
+        self._answers: IO[str] = os.fdopen(reading)
+
+    def run(self, code: str) -> str | None:
+        """The traceback; None if there was none."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(json.dumps(code) + "\n")
+        self._process.stdin.flush()
+        answer = self._answers.readline()
+        said: str | None = json.loads(answer) if answer else "Python ended"
+        return said
+
+    def close(self) -> None:
+        """It ends."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        self._process.wait()
+        self._answers.close()
+
+
+def print_now(text: str) -> None:
+    """A line on standard output, at once."""
+    print(text, flush=True)
+    sys.stdout.flush()
