@@ -3,6 +3,7 @@
 # make coverage: all tests, and which lines they run. make site: the documentation as a site, in site/.
 # make bench: time the loop. make figures, make findings, make interop: what docs/ and examples/ show, and the icons of the FMUs.
 # make release: wheel, sources, native FMUs, SSP and their checksums, in dist/.
+# make newcomer: follow every block of every page in a copy of what is committed; about an hour.
 # Each makes its own environment first.
 PYTHON ?= python3
 BIN := .venv/bin
@@ -13,7 +14,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # Other people's masters that need an environment of their own are flown where they are: make interop makes it.
 export QUADCOSIM_COFMUPY ?= $(abspath $(wildcard $(COFMUPY)))
 
-.PHONY: demo check test coverage lint bench figures findings interop release site clean
+.PHONY: demo newcomer check test coverage lint bench figures findings interop release site clean
 
 demo: .venv/.base
 	$(BIN)/quadcosim build
@@ -84,6 +85,9 @@ findings: .venv/.test
 
 interop: .venv/.test .venv-cofmupy/.made
 	QUADCOSIM_COFMUPY=$(abspath $(COFMUPY)) $(BIN)/python -m docs.make_interop
+
+newcomer: .venv/.test
+	$(BIN)/python -m docs.newcomer
 
 .venv-cofmupy/.made:
 	$(PYTHON) -m venv .venv-cofmupy

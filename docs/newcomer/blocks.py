@@ -13,27 +13,10 @@ from pathlib import Path
 
 from markdown_it import MarkdownIt
 
-COMMANDS = {
-    ".",
-    "cc",
-    "cd",
-    "cmake",
-    "cp",
-    "dask",
-    "fmpy",
-    "git",
-    "make",
-    "mkdir",
-    "pip",
-    "pytest",
-    "python",
-    "python3",
-}
-COMMANDS |= {"quadcosim", "OMSimulator"}
-"""First words by which a block without a language is known as lines for a shell"""
-SHELL = ("sh", "bash", "shell", "console")
-SHOWN = ("", "text")
-"""Languages of what is to be looked at: drawings, formulas, output"""
+SHELL = ("", "sh", "bash")
+"""Languages of lines for a shell, an indented block among them"""
+SHOWN, OUTPUT = "text", "output"
+"""Language of what is to be looked at, drawings and formulas; with the name: of what the lines before it print"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,15 +49,12 @@ class Block:
     @property
     def is_shell(self) -> bool:
         """Whether its lines are for a shell."""
-        if self.language or not self.text.strip():
-            return self.language in SHELL
-        first = self.text.split()[0]
-        return first in COMMANDS or first.startswith(".venv") or bool(re.match(r"[A-Z_]+=\S", first))
+        return self.language in SHELL
 
     @property
     def is_shown(self) -> bool:
         """Whether it is only to be looked at."""
-        return self.language in SHOWN and not self.is_shell
+        return self.language == SHOWN and self.name != OUTPUT
 
     @property
     def skipped(self) -> str | None:

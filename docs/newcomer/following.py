@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from docs.newcomer.blocks import Block
+from docs.newcomer.blocks import OUTPUT, Block
 
 LONGEST = 1800.0
 """[s] that a line may take"""
@@ -54,6 +54,10 @@ class Newcomer:
         given = {name: os.environ[name] for name in KEPT if name in os.environ}
         return {**given, "PATH": f"{own}:/usr/local/bin:/usr/bin:/bin", "MPLBACKEND": "Agg", "COLUMNS": "120"}
 
+    def _own(self, program: str) -> str:
+        """Of the environment that the pages set up."""
+        return str(self._folder / ".venv" / "bin" / program)
+
     def opens_a_page(self) -> None:
         """A page begins in the top folder, with no Python open."""
         self._here = self._folder
@@ -70,16 +74,16 @@ class Newcomer:
         if block.skipped is not None:
             self.skipped.append(Skipped(place=block.place, what="the block", reason=block.skipped))
             return
-        if block.name and not block.is_shell and block.name != "output":
+        if block.name and block.name != OUTPUT:
             (self._here / block.name).write_text(block.text, encoding="utf-8")
         if block.is_shell:
-            for line in block.lines:
+            for line in [f"bash {block.name}"] if block.name else block.lines:
                 self._line(block, line)
         elif block.language in ("python", "py"):
             self._run_python(block)
         elif block.language == "toml":
             self._read(block)
-        elif block.name == "output":
+        elif block.name == OUTPUT:
             self._expect_printed(block)
         elif not block.name and not block.is_shown:
             raise NotAsSaid(f"{block.place}: expected a name for the file, or a comment that says why it is not run")
@@ -110,11 +114,12 @@ class Newcomer:
         began = time.monotonic()
         if block.name:
             done = subprocess.run(
-                ["python", block.name], cwd=self._here, env=self.environment, capture_output=True, text=True, check=False
+                [self._own("python"), block.name], cwd=self._here, env=self.environment, capture_output=True, text=True,
+                check=False,
             )  # fmt: skip
             said, self._printed = done.stdout + done.stderr if done.returncode else None, done.stdout
         else:
-            self._python = self._python or _Python(self._here, self.environment)
+            self._python = self._python or _Python(self._own("python"), self._here, self.environment)
             said = self._python.run(block.text)
         self._tell(f"{block.place}: {block.name or 'Python'}  [{time.monotonic() - began:.1f} s]")
         if said is not None:
@@ -123,7 +128,7 @@ class Newcomer:
     def _read(self, block: Block) -> None:
         path = self._here / (block.name or "block.toml")
         path.write_text(block.text, encoding="utf-8")
-        command = [str(self._folder / ".venv" / "bin" / "python"), "-m", "docs.newcomer.readers", str(path)]
+        command = [self._own("python"), "-m", "docs.newcomer.readers", str(path)]
         done = subprocess.run(
             command, cwd=self._folder, env=self.environment, capture_output=True, text=True, check=False
         )  # fmt: skip
@@ -144,11 +149,11 @@ class Newcomer:
 class _Python:
     """A Python that stays open."""
 
-    def __init__(self, folder: Path, environment: dict[str, str]) -> None:
+    def __init__(self, python: str, folder: Path, environment: dict[str, str]) -> None:
         reading, writing = os.pipe()
         session = Path(__file__).with_name("session.py")
         self._process = subprocess.Popen(
-            [f"{environment['PATH'].split(':')[0]}/python", str(session), str(writing)], cwd=folder, env=environment,
+            [python, str(session), str(writing)], cwd=folder, env=environment,
             stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.STDOUT, text=True, pass_fds=[writing],
         )  # fmt: skip
         os.close(writing)
