@@ -59,10 +59,13 @@ class Model:
     """An FMU file and what its description says; read once, it is told from others by identity."""
 
     path: Path
+    """Where the FMU is."""
     description: ModelDescription
+    """Its model description, as fmpy reads it."""
     variables: Mapping[str, Variable]
+    """Its variables by name, arrays by their elements: causality, unit, start value, description."""
     initial_dependencies: Mapping[str, frozenset[str] | None]
-    """by output, the inputs that it depends on at initialisation; None: all"""
+    """By output, the inputs that it depends on at initialisation; None: all."""
 
     @cached_property
     def is_of_this_kit(self) -> bool:

@@ -22,7 +22,10 @@ class FmuChoice:
     """An FMU, by the name of one of this project's or a path, and the parameters to set."""
 
     fmu: str
+    """The name of one of this project's FMUs, as `UnifiedController` or `native/QuadrotorPlant`, or the path of an .fmu
+    file."""
     parameters: dict[str, Parameter] = field(default_factory=dict)
+    """The parameters to set, by their names in the FMU and in the units that it declares."""
 
 
 @strict("record.")
@@ -33,7 +36,9 @@ class Record:
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
     plant: tuple[str, ...] | None = None
+    """The variables of the plant to record; None: all outputs and locals."""
     controller: tuple[str, ...] | None = None
+    """The variables of the controller to record; None: all outputs and locals."""
 
 
 @strict()
@@ -45,19 +50,27 @@ class Scenario:
     """
 
     stop_time: float = 30.0
-    """[s]"""
+    """The end of the flight [s]."""
     seed: int = 0
-    """of all random numbers"""
+    """The seed of all random numbers of the flight."""
     model_mismatch: bool = False
-    """whether it is meant if the controller's nominal mass or inertia is not the plant's; no effect on the flight"""
+    """Whether it is meant if the controller's nominal mass or inertia is not the plant's; it only silences a
+    warning."""
     vehicle: Vehicle | None = None
-    """whose parameters hold where `controller` and `plant` say nothing else"""
+    """The vehicle whose parameters hold where `controller` and `plant` say nothing else; `load_vehicle` has some by
+    name."""
     controller: FmuChoice = field(default_factory=lambda: FmuChoice(fmu=DEFAULT_CONTROLLER))
+    """The FMU of the controller, and its parameters."""
     plant: FmuChoice = field(default_factory=lambda: FmuChoice(fmu=DEFAULT_PLANT))
+    """The FMU of the vehicle, and its parameters."""
     timing: Timing = field(default_factory=Timing)
+    """How the digital loop is clocked."""
     reference: ReferenceChoice = field(default_factory=ReferenceChoice)
+    """What the vehicle is to follow."""
     disturbance: DisturbanceChoice = field(default_factory=DisturbanceChoice)
+    """What pushes the vehicle beside the built-in wind."""
     record: Record = field(default_factory=Record)
+    """What is recorded beside what plant and controller exchange."""
 
     def __post_init__(self) -> None:
         if not (is_finite(self.stop_time) and self.stop_time > 0.0):

@@ -23,12 +23,14 @@ class ReferenceChoice:
     """
 
     name: str | None = None
-    """a motion: hover, step, circle, lemniscate, helix or paper"""
+    """The name of a motion: hover, step, circle, lemniscate, helix or paper."""
     file: Path | None = None
-    """CSV: `time` [s] and reference.position.x … reference.snap.z, linear between rows; or way-points, columns x, y, z
-    [m] with `time`, or with `hold` [s] and `speed` [m/s] where they are told, and a smooth curve through them"""
+    """A CSV file of `time` [s] and reference.position.x … reference.snap.z, linear between rows; or of way-points,
+    columns x, y, z [m] with `time`, or with `hold` [s] and `speed` [m/s] where they are told, and a smooth curve
+    through them."""
     parameters: Mapping[str, float] = field(default_factory=dict)
-    """of the motion, as radius = 2.0; of way-points without times, `speed` [m/s] and `acceleration` [m/s²]"""
+    """Parameters of the motion, as radius = 2.0; of way-points without times, `speed` [m/s] and `acceleration`
+    [m/s²]."""
 
     def __post_init__(self) -> None:
         _expect_one(self, "reference")
@@ -47,15 +49,16 @@ class DisturbanceChoice:
     """
 
     name: str | None = None
-    """gusts of wind: dryden"""
+    """The name of gusts of wind: dryden."""
     file: Path | None = None
-    """CSV: `time` [s] and external_force.x, .y, .z [N], or wind.x, .y, .z [m/s], inertial"""
+    """A CSV file of `time` [s] and external_force.x, .y, .z [N], or wind.x, .y, .z [m/s], in the inertial frame."""
     interpolation: Between = "linear"
-    """of a file, between rows: linear, or the row before"""
+    """What holds between the rows of a file: the line (linear), or the row before (previous)."""
     drag: float | None = None
-    """[N·s/m], force by wind, in the direction of the wind; 0.1 unless told. The vehicle's own motion is left out"""
+    """The force by wind [N·s/m], in the direction of the wind, 0.1 unless told; the vehicle's own motion is left
+    out."""
     parameters: Mapping[str, float] = field(default_factory=dict)
-    """of the gusts, as wind_speed = 8.0"""
+    """Parameters of the gusts, as wind_speed = 8.0 [m/s]."""
 
     def __post_init__(self) -> None:
         _expect_one(self, "disturbance")

@@ -34,37 +34,38 @@ class Timing:
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
     period: float = 0.01
-    """T, of the controller"""
+    """The sampling period T of the controller [s], in its own time: sample k is at offset + kT."""
     offset: float = 0.0
-    """o, of the first sample"""
+    """The time of the first sample [s]."""
     plant_interval: float = 0.001
-    """of the plant's own communication points, each of which is recorded"""
+    """The distance of the plant's own communication points [s], each of which is recorded."""
     order: Order = "gauss-seidel"
-    """whether a command is available at its sample (gauss-seidel) or at the next one (jacobi)"""
+    """Whether a command can be applied at the instant of its sample (gauss-seidel) or at the next one (jacobi)."""
     hold: Hold = "zero"
-    """of the command between arrivals: constant, or the line through the last two applied"""
+    """What the plant gets between arrivals: the last command (zero), or the line through the last two (first)."""
     clock: Clock = "master"
-    """who decides when the controller samples"""
+    """Who decides when the controller samples: the master, or the FMU by its own sample_period."""
     delay: float = 0.0
-    """d, from sample to application; may exceed the period"""
+    """The time d from a sample to the application of its command [s]; it may exceed the period."""
     delay_jitter: float = 0.0
-    """J_d, largest random addition to the delay"""
+    """The largest random addition J_d to the delay [s], drawn for each command."""
     jitter: float = 0.0
-    """J, largest lateness of a sampling instant"""
+    """The largest lateness J of a sampling instant [s], drawn for each; it is less than the period."""
     jitter_distribution: Distribution = "uniform"
-    """of both jitters over [0, J]; normal is centred at J/2 with standard deviation J/6, cut to the range"""
+    """How both are drawn over [0, J]; normal is centred at J/2 with standard deviation J/6, cut to the range."""
     measurement_loss: float = 0.0
-    """probability that a measurement is lost"""
+    """The probability that a measurement is lost."""
     command_loss: float = 0.0
-    """probability that a command is lost"""
+    """The probability that a command is lost."""
     burst_length: float | None = None
-    """mean number of losses in a row (Gilbert-Elliott); None: independent losses"""
+    """The mean number of losses in a row (Gilbert-Elliott); None: losses are independent."""
     clock_ratio: float = 1.0
-    """r, seconds that the controller believes pass per true second"""
+    """The seconds r that the controller believes pass per true second."""
     noise: dict[str, float] = field(default_factory=dict)
-    """standard deviation by measurement name (a vector's name stands for its components)"""
+    """The standard deviation of normal noise on a measurement, in its unit, by its name; a vector's name stands for its
+    components."""
     quantisation: dict[str, float] = field(default_factory=dict)
-    """quantum by measurement name"""
+    """The step to which a measurement is rounded, in its unit, by its name, likewise."""
 
     def __post_init__(self) -> None:
         require_choice(self, place=_PLACE, order=Order, hold=Hold, clock=Clock, jitter_distribution=Distribution)

@@ -21,9 +21,13 @@ class Vehicle:
     """Parameters of the plant, of every controller, and of single controllers by the names of their FMUs."""
 
     name: str
+    """What the vehicle is called."""
     plant: Mapping[str, Parameter] = field(default_factory=dict)
+    """What the plant is made of: parameters by their names in the FMU, in its units."""
     controller: Mapping[str, Parameter] = field(default_factory=dict)
+    """What every controller is told of it, likewise."""
     controllers: Mapping[str, Mapping[str, Parameter]] = field(default_factory=dict)
+    """What single controllers are told beside, by the names of their FMUs."""
 
     def for_controller(self, fmu: str) -> dict[str, Parameter]:
         """The parameters of a controller whose FMU has this name or path."""

@@ -62,36 +62,40 @@ class Limit:
     judged_unit: str | None = None
     """Of that objective."""
     local_limit: float | None
-    """where what is small about the operating point (hover) first ceases to decay; None: not defined, or not reached"""
+    """Where what is small about the operating point (hover) first ceases to decay, in the quantity's unit; None: it is
+    not defined, or not reached."""
     local_method: str | None = None
-    """how it was found; None: it was not"""
+    """How that was found; None: it was not."""
     local_accuracy: float | None = None
-    """of it, in its unit, as far as the method knows"""
+    """How accurate it is, in its unit, as far as the method knows."""
     local_limit_outside: float | None
-    """of the quadrotor: likewise, with the gain that the law has just outside its boundary layer; None also
-    without such a layer"""
+    """Of the quadrotor likewise, with the gain that the law has just outside its boundary layer; None also without such
+    a layer."""
     large_signal_limit: float | None
-    """from the scenario's own initial state; None: nothing in the range failed, or the first value did"""
+    """The last value that is good from the scenario's own initial state, in the quantity's unit; None: nothing in the
+    range failed, or the first value did."""
     refuted_limit: float | None
-    """for random quantities: the lowest value found at which so many seeds do not fly that `RELIABILITY` is refuted
-    at the confidence; None: nothing is random, or none in the range"""
+    """For random quantities the lowest value found at which so many seeds do not fly that `RELIABILITY` is refuted at
+    the confidence; None: nothing is random, or none in the range."""
     horizon: float
-    """[s], the stop time: what does not settle by it does not fly"""
+    """The stop time [s]: what does not settle by it does not fly."""
     tolerance: float
+    """The width of the last bracket, in the quantity's unit."""
     scan: float
-    """step of the scan; what flies or fails between two of its values is not seen"""
+    """The step of the scan, in the quantity's unit; what flies or fails between two of its values is not seen."""
     confidence: float | None
-    """that at least `RELIABILITY` of all seeds fly; None: nothing is random. Of each value, not of the search"""
+    """The confidence that at least `RELIABILITY` of all seeds fly, of each value, not of the search; None: nothing is
+    random."""
     seeds: int
-    """runs for each value, all of which must fly"""
+    """How many runs each value takes, all of which must fly."""
     flies_above: tuple[float, ...]
-    """values tried above the limit that fly again"""
+    """Values tried above the limit that fly again."""
     continuous: Continuous | None
-    """None: not asked for"""
+    """The same flight near continuous time; None: it was not asked for."""
     tried: tuple[Tried, ...]
-    """all values that were flown, upward"""
+    """All values that were flown, upward."""
     note: str
-    """what the figures mean together"""
+    """What the figures mean together, in a sentence."""
 
     def __repr__(self) -> str:
         return f"<Limit of {self.of}: {self.note}>"

@@ -28,19 +28,25 @@ class Study:
     """Runs of a base system, or a scenario of the quadrotor, over axes."""
 
     name: str
+    """The name of the study, and of the folder of its store in `results`."""
     base: Request
+    """The scenario or the system that is varied."""
     axes: tuple[Axis, ...]
+    """What is varied: every combination of the listed values, each with every sampled point."""
     together: tuple[Together, ...] = ()
-    """what values of the axes stand for beside their own targets, each on top of what was before"""
+    """What values of the axes stand for beside their own targets, each on top of what was before."""
     method: Method = "sobol"
+    """How axes without values are sampled; morris and saltelli are for sensitivity."""
     samples: int = 0
+    """How many points are sampled; a power of two for sobol."""
     design_seed: int = 0
+    """The seed of the sampling."""
     vary_seed: bool = False
-    """whether each run has a seed of its own: made of that of the base and the values of the axes"""
+    """Whether each run has a seed of its own, made of that of the base and the values of the axes."""
     keep_signals: tuple[int, ...] | bool = False
-    """indices of the runs whose signals are kept, or all"""
+    """The indices of the runs whose signals are kept, or whether all are."""
     native: bool = False
-    """whether it is flown by the native twins of its FMUs"""
+    """Whether it is flown by the native twins of its FMUs."""
 
     def __post_init__(self) -> None:
         names = [axis.name for axis in self.axes]

@@ -40,25 +40,28 @@ class Tuning:
     """What is tuned, on what, and with how much effort; raises `UsageError` for what cannot be."""
 
     name: str
+    """The name of the tuning, with which its files begin."""
     base: Scenario
+    """The scenario whose controller is tuned."""
     parameters: tuple[Axis, ...]
-    """each between its `low` and its `high`"""
+    """What is tuned, each between its `low` and its `high`."""
     cost: str
-    """of a flight: an expression over the objectives of the base"""
+    """The cost of a flight that flies: an expression over the objectives of the base."""
     bad: float
-    """cost of a flight that does not fly"""
+    """The cost of a flight that does not fly."""
     starts: Starts
-    """those that it is tuned on; those that it is judged on come after them"""
+    """The starts that it is tuned on; those that it is judged on come after them."""
     judged: int
-    """how many these are"""
+    """How many starts it is judged on."""
     periods: tuple[float, ...]
-    """[s]; tuned for each by itself"""
+    """The sampling periods [s]; it is tuned for each by itself."""
     evaluations: int
-    """of the mean cost, for each parameter"""
+    """How often the mean cost is evaluated in a search, for each parameter."""
     native: bool = False
-    """whether native FMUs fly"""
+    """Whether native FMUs fly."""
     seeds: tuple[int, ...]
-    """of the optimiser, each a search of its own; the best by its cost on the starts that it is tuned on is taken"""
+    """The seeds of the optimiser, each a search of its own; the best by its cost on the starts that it is tuned on is
+    taken."""
 
     def __post_init__(self) -> None:
         if len(self.parameters) < 2:

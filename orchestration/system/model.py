@@ -37,16 +37,17 @@ class Sampling:
     """When a digital task runs; times in seconds of the true clock, but for `period` and `offset` (its own)."""
 
     period: float
-    """T; instant k is offset + kT"""
+    """The period T of the task [s], in its own time: instant k is offset + kT."""
     offset: float = 0.0
+    """The time of the first instant [s], in its own time."""
     jitter: float = 0.0
-    """J, largest lateness of an instant"""
+    """The largest lateness J of an instant [s], drawn for each; it is less than the period."""
     jitter_distribution: Distribution = "uniform"
-    """over [0, J]; normal is centred at J/2 with standard deviation J/6, cut to the range"""
+    """How it is drawn over [0, J]; normal is centred at J/2 with standard deviation J/6, cut to the range."""
     clock_ratio: float = 1.0
-    """r, seconds that the component believes pass per true second"""
+    """The seconds r that the component believes pass per true second."""
     clock: Clock = "master"
-    """who decides when it samples: the master, or the FMU by its parameters sample_period and sample_offset"""
+    """Who decides when it samples: the master, or the FMU by its parameters sample_period and sample_offset."""
 
     def __post_init__(self) -> None:
         require_positive(self, "period", "clock_ratio")
@@ -65,16 +66,18 @@ class Component:
     """An FMU, its parameters, and how it is stepped: at sampling instants if it has `sampling`, else continuously."""
 
     fmu: str
-    """the name of one of this project's FMUs, or a path"""
+    """The name of one of this project's FMUs, or the path of an .fmu file."""
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
+    """The parameters to set, by their names in the FMU and in the units that it declares."""
     step: float | None = None
-    """[s] between communication points of a component in continuous time"""
+    """The distance of the communication points [s] of a component in continuous time; None: it has `sampling`."""
     sampling: Sampling | None = None
+    """When a digital task runs; None: it is in continuous time and has a `step`."""
     align: Align = "exact"
-    """of a component that takes its own fixed step only: whether an instant between two of its points is an error
-    (exact) or moves to the next point (next)"""
+    """What becomes of an instant between two points of a component that takes its own fixed step only: an error
+    (exact), or it moves to the next point (next)."""
     record: tuple[str, ...] | None = None
-    """variables to record beside what is exchanged; None: all outputs and local Reals"""
+    """The variables to record beside what is exchanged; None: all outputs and local Reals."""
 
     def __post_init__(self) -> None:
         require_choice(self, align=Align)
@@ -92,30 +95,35 @@ class Connection:
     """One message from a component to another: its signals travel together; times in seconds."""
 
     name: str
-    """as given, else its index"""
+    """The name by which paths and events call it; in files without one, its index."""
     start: tuple[str, ...]
-    """`from`: outputs, as COMPONENT.VARIABLE, of one component"""
+    """The outputs that it carries, as COMPONENT.VARIABLE, of one component; `from` in files."""
     end: tuple[str, ...]
-    """`to`: as many inputs of one component"""
+    """As many inputs of one component, in the same order; `to` in files."""
     order: Order = "gauss-seidel"
+    """Whether a message can be there at the instant at which it was sent (gauss-seidel), or at the next one of its
+    sender (jacobi)."""
     delay: float = 0.0
-    """d, from sending to arrival; may exceed a period"""
+    """The time d from sending to arrival [s]; it may exceed a period."""
     delay_jitter: float = 0.0
-    """J_d, largest random addition to the delay; messages never overtake"""
+    """The largest random addition J_d to the delay [s]; messages never overtake each other."""
     jitter_distribution: Distribution = "uniform"
+    """How that is drawn over [0, J_d]; normal is centred at J_d/2, cut to the range."""
     loss: float = 0.0
-    """probability that a message is lost"""
+    """The probability that a message is lost."""
     burst_length: float | None = None
-    """mean number of losses in a row (Gilbert-Elliott); None: independent losses"""
+    """The mean number of losses in a row (Gilbert-Elliott); None: losses are independent."""
     hold: Hold = "zero"
-    """between arrivals: constant, or the line through the last two"""
+    """What the receiver gets between arrivals: the last value (zero), or the line through the last two (first)."""
     noise: Mapping[str, float] = field(default_factory=dict)
-    """standard deviation by variable of the sender (a vector's name stands for its components)"""
+    """The standard deviation of normal noise by variable of the sender, in its unit; a vector's name stands for its
+    components."""
     quantisation: Mapping[str, float] = field(default_factory=dict)
-    """quantum, likewise"""
+    """The step to which a value is rounded, in its unit, by variable of the sender, likewise."""
     scale: float = 1.0
+    """The factor in scale · value + offset, which is what arrives."""
     offset: float = 0.0
-    """what arrives is scale · value + offset"""
+    """What is added after the scale, in the unit of the receiver."""
 
     def __post_init__(self) -> None:
         require_choice(self, order=Order, hold=Hold, jitter_distribution=Distribution)
@@ -169,27 +177,32 @@ class Source:
     """
 
     to: tuple[str, ...] = ()
-    """inputs, as COMPONENT.VARIABLE; may be empty for what only objectives need"""
+    """The inputs that it feeds, as COMPONENT.VARIABLE; it may be empty for what only objectives need."""
     constant: float | None = None
+    """A constant value, in the unit of the inputs."""
     file: Path | None = None
-    """CSV: `time` and one column for each input, named as the input without its component; or way-points"""
+    """A CSV file with `time` [s] and one column for each input, named as the input without its component; linear
+    between rows."""
     interpolation: Interpolation = "linear"
-    """of a file, between rows: linear, or the row before (previous); spline: its rows are way-points, columns x, y, z
-    [m] and `time` [s] or else `hold` [s] and `speed` [m/s] where they are told"""
+    """What holds between the rows of a file: the line (linear), the row before (previous), or a smooth curve (spline)
+    whose rows are way-points, columns x, y, z [m] and `time` [s], or else `hold` [s] and `speed` [m/s] where they are
+    told."""
     columns: tuple[str, ...] | None = None
-    """of a file, in the order of the inputs, where they are not named as these"""
+    """The columns of the file in the order of the inputs, where they are not named as these; None: they are."""
     noise: float | None = None
-    """intensity [unit² s] of white noise: normal values with variance noise / period, each held over `period`"""
+    """The intensity [unit² s] of white noise: normal values with variance noise / period, each held over `period`."""
     period: float | None = None
-    """[s], of noise"""
+    """How long each value of the noise is held [s]."""
     signal: str | None = None
-    """by name: a motion (hover, step, circle, lemniscate, helix, paper) or gusts of wind (dryden: north, east, down)"""
+    """The name of a motion (hover, step, circle, lemniscate, helix, paper), or of gusts of wind (dryden: north, east,
+    down)."""
     parameters: Mapping[str, float] = field(default_factory=dict)
-    """of a signal; of way-points without times, `speed` [m/s] and `acceleration` [m/s²], which the times follow from"""
+    """Parameters of the signal; of way-points without times, `speed` [m/s] and `acceleration` [m/s²], which the times
+    follow from."""
     scale: float = 1.0
-    """by which all values of a file or a signal are multiplied"""
+    """The factor by which all values of a file or a signal are multiplied."""
     trajectory: str | None = None
-    """the component whose parameters trajectory.* say what the trajectory of `fmu_kit` is"""
+    """The component whose parameters trajectory.* say what the built-in trajectory is."""
 
     @property
     def is_motion(self) -> bool:
@@ -268,11 +281,11 @@ class Criterion:
     """What a good run is, as expressions; None: not asked."""
 
     good: str | None = None
-    """over objectives, at the end"""
+    """The condition over objectives, at the end, by which a run is good; None: it is not asked."""
     diverged: str | None = None
-    """over signals, at every instant: ends the run"""
+    """The condition over signals that ends a run at the first instant at which it holds; None: none does."""
     outcomes: tuple[str, str] = ("good", "bad")
-    """what a run is called that is good, and one that is not; one that diverged is called so"""
+    """What a run is called that is good, and one that is not; one that diverged is called so."""
 
     def __post_init__(self) -> None:
         given = ", ".join(self.outcomes)
@@ -289,22 +302,27 @@ class System:
     """
 
     stop_time: float
-    """[s]"""
+    """The end of a run [s]."""
     seed: int = 0
-    """of all random numbers"""
+    """The seed of all random numbers of a run."""
     components: Mapping[str, Component]
-    """in the order of the file, which decides ties"""
+    """The FMUs by name; their order decides ties."""
     connections: tuple[Connection, ...] = ()
+    """The messages from component to component."""
     sources: Mapping[str, Source] = field(default_factory=dict)
+    """What drives inputs from outside, by name."""
     objectives: Mapping[str, str] = field(default_factory=dict)
-    """expressions by name"""
+    """What a run comes to: expressions by name."""
     optional: tuple[str, ...] = ()
-    """objectives that are without a value where an FMU has no variable of a name in them"""
+    """The objectives that are without a value where an FMU has no variable of a name in them."""
     criterion: Criterion = field(default_factory=Criterion)
+    """When a run is good, and when it has diverged."""
     streams: Mapping[str, int] = field(default_factory=dict)
-    """random streams that have a number instead of a name, as `connections.NAME.CAUSE` and `components.NAME.jitter`"""
+    """The random streams that have a number instead of a name, as `connections.NAME.CAUSE` and
+    `components.NAME.jitter`."""
     operating_point: Mapping[str, Any] = field(default_factory=dict)
-    """what to change, by path, to be at rest: where the local limit is taken"""
+    """What to change, by path, for the system to rest: where the local limit is taken. It is checked when it is
+    used."""
 
     def __repr__(self) -> str:
         named = {

@@ -13,10 +13,12 @@ TOP = ("stop_time", "seed")
 
 
 def changed(system: System, changes: Mapping[str, Any]) -> System:
-    """`system` with other values, by paths such as `components.tank.step`, `components.controller.sampling.period`,
-    `components.controller.parameters.maxlevel`, `connections.valve.delay`, `sources.wind.noise`, `stop_time`.
+    """A system with other values, by path.
 
-    1.0 is the seed 1. Raises `UsageError` for a path that does not exist, naming what does, or a value that cannot be.
+    Paths are such as `components.tank.step`, `components.controller.sampling.period`, `connections.valve.delay`,
+    `components.controller.parameters.maxlevel`, `sources.wind.noise`, `stop_time`. 1.0 is the seed 1.
+
+    Raises `UsageError` for a path that does not exist, naming what does, or a value that cannot be.
     """
     grouped: dict[tuple[str, str], dict[str, Any]] = {}
     top: dict[str, Any] = {}

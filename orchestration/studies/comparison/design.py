@@ -85,15 +85,23 @@ class Comparison:
     """Controllers on vehicles under conditions over an axis, each from all starts; raises `UsageError`."""
 
     name: str
+    """The name of the comparison, and of the folder of its store in `results`."""
     base: Scenario
+    """The scenario that all flights begin from."""
     controllers: tuple[Controller, ...]
+    """Who is compared."""
     vehicles: tuple[Craft, ...]
+    """The vehicles that they fly."""
     conditions: tuple[Condition, ...]
+    """What differs from what a controller believes, or goes wrong."""
     axis: Axis
+    """What is varied, over growing values."""
     starts: Starts
+    """The initial states, the same for all."""
     front: Front = field(default_factory=Front)
+    """The two objectives that are weighed against each other."""
     native: bool = False
-    """whether it is flown by the native twins of its FMUs"""
+    """Whether it is flown by the native twins of its FMUs."""
 
     def __post_init__(self) -> None:
         for kind in ("controllers", "vehicles", "conditions"):
