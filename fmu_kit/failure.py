@@ -42,6 +42,8 @@ class Failure(Exception):
 
     def __init__(self, error: Exception) -> None:
         message = str(error) if isinstance(error, FmuError) else f"{error!r}{_in_the_fmu(error)}"
+        if isinstance(error, DivergenceError) and isinstance(error.__cause__, Exception):
+            message += f" ({_in_the_fmu(error.__cause__).strip()})"
         details = "".join(traceback.format_exception(error)).rstrip()
         self.text = printf_safe(f"{message}\n{details}")
         super().__init__(self.text)

@@ -92,9 +92,8 @@ class Declared:
 
     def __set__(self, slave: Any, value: Any) -> None:
         if not (self.own or slave.is_fresh):
-            raise AttributeError(
-                f"self.{self.attribute} cannot be set: it is an {self.causality}, which is given to the FMU"
-            )
+            what = "an input" if self.causality == "input" else "a parameter"
+            raise AttributeError(f"self.{self.attribute} cannot be set: it is {what}, which is given to the FMU")
         fits = isinstance(value, self._kind.type) if self._kind.axes else not isinstance(value, _NO_NUMBER)
         if not fits:
             raise TypeError(f"self.{self.attribute} = {value}: expected {self._kind.expected}")

@@ -411,7 +411,7 @@ def _expect_free_names(slave: type[Slave], declared: Iterable[Declared]) -> None
     """Raise `TypeError` for an attribute that every slave has for something else."""
     for each in declared:
         is_taken = hasattr(Slave, each.attribute) and each.attribute not in vars(Values)
-        if is_taken or each.attribute in _OF_PYTHONFMU:
+        if is_taken or each.attribute in (*Slave.__annotations__, *_OF_PYTHONFMU):
             raise TypeError(f"{slave.__name__}.{each.attribute}: every slave has this name; expected another one")
 
 

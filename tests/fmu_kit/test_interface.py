@@ -1,0 +1,169 @@
+"""Variables that are declared as attributes: what FMI sees of them, and what a law may do with them."""
+
+import enum
+from typing import Any
+
+import pytest
+
+from fmu_kit.algebra import ZERO, Quaternion, Vec3
+from fmu_kit.failure import Failure
+from fmu_kit.interface import Declared, Input, Local, Output, Parameter, State
+from fmu_kit.slave import Slave
+
+
+class Mode(enum.IntEnum):
+    OFF = 1
+    ON = 2
+
+
+class Law(Slave):
+    """Everything that can be declared.
+
+    And a second paragraph, which the FMU does not show.
+    """
+
+    position = Input("measured", "m", ZERO)
+    attitude = Input("measured", "1", Quaternion(ZERO, 1.0))
+    x = Input("measured", "m")
+    angle = State("evolves", "rad", 0.5)
+    place = State("evolves", "m", Vec3(1.0, 2.0, 3.0))
+    force = Output("command", "N", ZERO)
+    is_on = Output("whether it is on", start=False)
+    samples = Local("so far", unit=None, start=0)
+    gain = Parameter("of x", "N/m", 2, minimum=0.0)
+    first = Parameter("at the start", "N", 1.5, name="initial.force")
+    mode = Parameter("what it does", start=Mode.ON)
+
+    def step(self, t: float, h: float) -> None:
+        self.force = Vec3(-self.gain * self.x, self.position.y, self.first)
+        self.is_on = self.mode == Mode.ON
+        self.samples = self.samples + 1
+        self.angle = self.angle + h
+
+
+def ready(law: Slave) -> Slave:
+    law.setup_experiment(0.0)
+    law.enter_initialization_mode()
+    law.exit_initialization_mode()
+    return law
+
+
+def test_attributes_are_fmi_variables_in_order_reals_first():
+    assert [v.name for v in Law.variables] == [
+        "position.x", "position.y", "position.z", "attitude.x", "attitude.y", "attitude.z", "attitude.w", "x", "angle",
+        "place.x", "place.y", "place.z", "force.x", "force.y", "force.z", "gain", "initial.force", "initial.angle",
+        "initial.place.x", "initial.place.y", "initial.place.z", "is_on", "samples", "mode",
+    ]  # fmt: skip
+    found = {v.name: v for v in Law.variables}
+    assert {name: found[name].type for name in ("gain", "is_on", "samples", "mode")} == {
+        "gain": "Real", "is_on": "Boolean", "samples": "Integer", "mode": "Enumeration",
+    }  # fmt: skip
+    assert (found["attitude.w"].start, found["initial.place.y"].start, found["gain"].minimum) == (1.0, 2.0, 0.0)
+    assert [found[name].variability for name in ("force.x", "angle", "initial.angle", "gain")] == [
+        "discrete", "continuous", "fixed", "tunable",
+    ]  # fmt: skip
+
+
+def test_a_law_reads_and_sets_its_attributes():
+    law = Law()
+    law.x, law.position, law.gain = 3.0, Vec3(0.0, 4.0, 0.0), 5.0
+    law.step(0.0, 0.1)
+    assert (law.force, law.is_on, law.samples) == (Vec3(-15.0, 4.0, 1.5), True, 1)
+
+
+def test_states_start_from_their_parameters():
+    law = Law()
+    law.set_real([law._index["initial.angle"]], [0.25])
+    ready(law)
+    assert (law.angle, law.place) == (0.25, Vec3(1.0, 2.0, 3.0))
+    law.do_step(0.0, 0.5)
+    assert law.angle == 0.75
+
+
+def test_its_description_is_the_first_line_of_its_docstring():
+    assert Law.description == "Everything that can be declared"
+
+
+def test_first_outputs_depend_on_inputs_where_the_law_says_how_it_begins():
+    class Begins(Law):
+        """Begins."""
+
+        def initialise(self, t: float) -> None: ...
+
+    assert (Law.depends_initially(), Begins.depends_initially()) == (False, True)
+
+
+@pytest.mark.parametrize(
+    ("statement", "words"),
+    [
+        ("self.froce = 1.0", "self.froce: no such variable; expected angle, place, force, is_on, samples, or a name"),
+        ("self.force = 1.0", "self.force = 1.0: expected a Vec3"),
+        ("self.angle = Vec3(0.0, 0.0, 0.0)", "expected a number"),
+        ("self.angle = None", "self.angle = None: expected a number"),
+        ("self.x = 1.0", "self.x cannot be set: it is an input"),
+        ("self.gain = 1.0", "self.gain cannot be set: it is a parameter"),
+        ("self.angle = 1.0 / 0.0", "at t = 0.0: float division by zero, expected finite values (in "),
+    ],
+)
+def test_what_a_law_may_not_do_is_said_in_a_line_with_its_own_place(statement, words, tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text(f"def law(self):\n    {statement}\n", encoding="utf-8")
+    space: dict[str, Any] = {"Vec3": Vec3}
+    exec(compile(path.read_text(encoding="utf-8"), str(path), "exec"), space)
+    law = ready(type("Wrong", (Law,), {"step": lambda self, t, h: space["law"](self)})())
+    with pytest.raises(Failure) as caught:
+        law.do_step(0.0, 0.1)
+    first = str(caught.value).partition("\n")[0]
+    assert words in first
+    assert f"{tmp_path.name}/mine.py, line 2" in first
+
+
+def test_what_is_kept_beside_the_variables_is_not_lost_in_silence():
+    class Forgetful(Law):
+        """Forgets."""
+
+        def step(self, t: float, h: float) -> None:
+            self._last = t
+
+    law = ready(Forgetful())
+    law.do_step(0.0, 0.1)
+    with pytest.raises(Failure, match=r"self\._last is not saved: expected a Local instead"):
+        law._get_fmu_state()
+
+
+@pytest.mark.parametrize("name", ["step", "description", "log_queue", "version"])
+def test_names_that_every_slave_has_are_refused(name):
+    with pytest.raises(TypeError, match=rf"Taken.{name}: every slave has this name"):
+        type("Taken", (Slave,), {name: _named(name)})
+
+
+def test_a_unit_that_is_none_is_refused_where_it_is_written():
+    with pytest.raises(ValueError, match="unit m/sq: expected powers of"):
+        Input("speed", "m/sq")
+
+
+def test_variables_are_attributes_or_a_list():
+    with pytest.raises(TypeError, match="Both: expected its variables as attributes or as a list, not both"):
+        type("Both", (Law,), {"variables": ()})
+
+
+def test_without_author_and_licence_an_fmu_says_nothing_of_them():
+    assert not {"author", "license", "copyright"} & Law.to_xml(Law()).attrib.keys()
+    theirs: Any = type("Theirs", (Law,), {"author": "Ada", "license": "MIT", "copyright": "Ada, 2026"})
+    said = theirs.to_xml(theirs()).attrib
+    assert (said["author"], said["license"], said["copyright"]) == ("Ada", "MIT", "Ada, 2026")
+
+
+def test_a_state_is_whole_without_a_word_of_the_law():
+    law = ready(Law())
+    law.do_step(0.0, 0.1)
+    state = law._get_fmu_state()
+    other = Law()
+    other._set_fmu_state(state)
+    assert (other.angle, other.samples) == (0.6, 1)
+
+
+def _named(name: str) -> Declared:
+    declared = Output("taken", "1")
+    declared.__set_name__(Slave, name)
+    return declared
