@@ -19,7 +19,7 @@ export QUADCOSIM_COFMUPY ?= $(abspath $(wildcard $(COFMUPY)))
 demo: .venv/.base
 	$(BIN)/quadcosim build
 	$(BIN)/quadcosim run --period 0.01 --out results/demo
-	@echo "figures: results/demo/path.png errors.png components.png commands.png energy.png"
+	@echo "figures: results/demo/path.png errors.png components.png commands.png"
 
 # Laws, plant, algebra, expressions, timetable, master with stubs, files of systems and scenarios; one FMU, built and flown.
 QUICK := $(addprefix tests/,controller_fmu plant_fmu fmus/test_one_fmu.py fmu_kit/test_algebra.py fmu_kit/test_trajectory.py fmu_kit/test_units.py) \

@@ -98,9 +98,9 @@ def mark_events(axes: Axes, run: Run, span: Window) -> None:
         ("lost", "measurement", "x", ORANGE, 0.93, "measurement lost"),
         ("lost", "command", "x", PURPLE, 0.98, "command lost"),
     ):
-        times = [e.time / 1e9 for e in run.result.events if e.kind == kind and e.what == what]
-        times = [time for time in times if span[0] <= time <= span[1]]
-        if times and (kind == "lost" or len(times) <= MOST_MARKS):
+        times = run.instants(kind, what)
+        times = times[(times >= span[0]) & (times <= span[1])]
+        if len(times) and (kind == "lost" or len(times) <= MOST_MARKS):
             axes.plot(
                 times, [height] * len(times), linestyle="", marker=marker, color=color, markersize=4,
                 markeredgewidth=0.8,

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+import numpy.typing as npt
 from matplotlib.figure import Figure
 
 from orchestration.drawing.lines import TIME, legend_of_runs, positive, quantity, see
@@ -15,13 +17,13 @@ COLUMN = f"controller.{ENERGY}"
 
 def energy(runs: Sequence[Run], style: Style) -> Figure | None:
     """L (33) at the samples; None if no controller has one, or none has sampled."""
-    with_energy = [run for run in runs if COLUMN in run and run.result.sampled[run.seen].any()]
+    with_energy = [run for run in runs if COLUMN in run and _sampled(run).any()]
     if not with_energy:
         return None
     figure = style.figure(24.0)
     panel = figure.add_subplot()
     for run in with_energy:
-        at = run.result.sampled[run.seen]
+        at = _sampled(run)
         color = BLUE if len(runs) == 1 else run.color
         panel.plot(run.time[at], positive(run[COLUMN][at]), color=color, linestyle=run.dashes, label=run.name)
     unit = with_energy[0].whole.described[COLUMN].unit
@@ -31,3 +33,8 @@ def energy(runs: Sequence[Run], style: Style) -> Figure | None:
         panel.set_title(title(runs))
     legend_of_runs(figure, runs, style)
     return figure
+
+
+def _sampled(run: Run) -> npt.NDArray[np.bool_]:
+    """Which of the rows that are seen are sampling instants."""
+    return np.isin(np.round(run.time * 1e9), np.round(run.instants("sampled") * 1e9))

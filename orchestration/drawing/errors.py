@@ -39,6 +39,7 @@ def errors(runs: Sequence[Run], style: Style) -> Figure:
                 norm = positive(np.linalg.norm(values, axis=1))
                 panel.plot(run.time, norm, color=color, linestyle=run.dashes, label=run.name)
         panel.set(yscale="log", ylabel=wrapped(quantity(f"{error.name}, norm", error.unit)))
+        panel.minorticks_off()
         see(panel, runs)
     return figure
 

@@ -88,14 +88,19 @@ def _inset(axes: Axes, lines: Lines, seen: tuple[float, float], unit: str, style
     span = axes.get_xlim()[1] - axes.get_xlim()[0]
     width = max(float(np.ptp(outside)), 0.01 * span)
     inset = axes.inset_axes((0.42, 0.5, 0.56, 0.48), label="peak")
+    start, end = max(outside.min() - 0.15 * width, axes.get_xlim()[0]), outside.max() + 0.4 * width
     for drawn in axes.get_lines():
+        times, values = (np.asarray(data, float) for data in drawn.get_data())
+        first, last = np.searchsorted(times, (start, end))
+        near = slice(max(int(first) - 1, 0), int(last) + 1)
         inset.plot(
-            drawn.get_xdata(), drawn.get_ydata(), color=drawn.get_color(), linestyle=drawn.get_linestyle(),
+            times[near], values[near], color=drawn.get_color(), linestyle=drawn.get_linestyle(),
             linewidth=0.8 * style.line, drawstyle=drawn.get_drawstyle(),
         )  # fmt: skip
-    inset.set_xlim(max(outside.min() - 0.15 * width, axes.get_xlim()[0]), outside.max() + 0.4 * width)
+    inset.set_xlim(start, end)
     inset.tick_params(labelsize=0.7 * style.font, length=0.2 * style.font, pad=0.15 * style.font)
     inset.locator_params(nbins=4)
+    inset.set_in_layout(False)  # it lies inside
     inset.set_title(
         f"clipped: peak {labels.amount(float(y[k]), unit)} at {t[k]:.3g} s".replace("-", "−"),
         fontsize=0.8 * style.font, color=BLACK, pad=0.2 * style.font,

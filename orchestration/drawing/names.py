@@ -4,7 +4,7 @@ FLIGHT = ("path", "errors", "components", "commands", "energy", "phase", "spectr
 """Figures of a flight of the quadrotor"""
 SYSTEM = ("signals",)
 """of any other system"""
-FIRST = ("path", "errors", "components", "commands", "energy", *SYSTEM)
+FIRST = ("path", "errors", "components", "commands", *SYSTEM)
 """Those that a run draws at once; all others when they are asked for"""
 FORMATS = ("png", "svg", "pdf")
 COLUMNS = {"single": 88.9, "double": 181.0}

@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from orchestration.drawing.palette import CYCLE, DASHES
-from orchestration.master.recording import thinned
+from orchestration.master.recording import Events, thinned
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.results.result import Result
 from orchestration.simulator import Floats
@@ -62,6 +62,23 @@ class Run:
     def time(self) -> Floats:
         """Of the rows that are seen [s], shape (n,)."""
         return self.result.rows[self.seen, 0]
+
+    @cached_property
+    def events(self) -> Events:
+        """Of the rows that are drawn."""
+        parts = [chunk.events for chunk in self.result.recording.chunks(("time",))]
+        names = tuple(dict.fromkeys(name for part in parts for name in part.names))
+        places = [np.array([names.index(name) for name in part.names], dtype=np.int64) for part in parts]
+        tables = [
+            np.column_stack([part.table[:, :2], place[part.table[:, 2]], part.table[:, 3]])
+            for part, place in zip(parts, places, strict=True)
+        ]
+        return Events(names, np.concatenate(tables))
+
+    def instants(self, kind: str, what: str | None = None) -> Floats:
+        """When something of a kind happened to messages, of one connection if it is named [s], shape (n,)."""
+        found: Floats = self.events.table[self.events.are(kind, what), 0] / 1e9
+        return found
 
     def __contains__(self, signal: str) -> bool:
         return signal in self.result.signals

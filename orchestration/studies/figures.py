@@ -45,7 +45,7 @@ def lines(
     x = axes[0]
     groups = [(None, table)] if len(axes) == 1 else list(table.groupby(axes[1].name, sort=True))
     colors = matplotlib.colormaps[SHADES](np.linspace(0.0, 0.9, len(groups)))
-    for (value, group), color in zip(groups, colors, strict=True):
+    for (value, group), color in zip(groups, [BLUE] if len(groups) == 1 else colors, strict=True):
         ordered = group.sort_values(x.name)
         fell = ~flew(ordered)
         at, y = drawn(x, ordered[x.name].to_numpy(float)), ordered[metric].to_numpy(float)
@@ -56,6 +56,7 @@ def lines(
         panel.plot(
             down, np.full(len(down), 0.02), "v", color=color, markersize=4, transform=panel.get_xaxis_transform()
         )
+    panel.plot([], [], ".-", color=BLUE if len(groups) == 1 else GREY, label=words[0])
     panel.plot([], [], "x", color=GREY, label=words[1])
     panel.plot([], [], "v", color=GREY, markersize=4, label="diverged")
     panel.set(xlabel=label(x), ylabel=labels.metric_with_unit(metric, unit), yscale=_scale(table[metric]))
