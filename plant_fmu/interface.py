@@ -100,6 +100,8 @@ PARAMETERS = (
     ),
     fixed_parameter("max_internal_step", "largest internal integration step", "s", LARGEST_INTERNAL_STEP, above=0.0),
     *MOTOR,
+    tunable_parameter("payload.mass", "payload at the centre of gravity, added to the mass", "kg", 0.0, minimum=0.0),
+    tunable_parameter("payload.drop_time", "when the payload is let go; 0: never", "s", 0.0, minimum=0.0),
 )
 
 LOCALS = (

@@ -7,10 +7,11 @@ from fmu_kit.errors import require, require_finite_state
 from fmu_kit.integrator import internal_steps, rk4_step
 from fmu_kit.rigid_body import Body, RigidState, Wrench, acceleration, derivative, tilt
 from fmu_kit.saved_state import State
-from fmu_kit.scalar import repeat
+from fmu_kit.scalar import FLOAT, repeat
 from fmu_kit.slave import Slave
 from plant_fmu.actuators import Actuators, Box, Channels, Motors
 from plant_fmu.interface import MOTION, QUADROTOR
+from plant_fmu.payload import Payload
 from plant_fmu.wind import Wind
 
 MOST_INTERNAL_STEPS = 100_000
@@ -27,9 +28,10 @@ class QuadrotorPlant(Slave):
     initial_outputs_depend_on_inputs = False
 
     def read_parameters(self) -> None:
-        """Build the body, the wind and the actuators."""
+        """Build the body, the wind, the payload and the actuators."""
         self._body = Body(mass=self.real("mass"), inertia=self.inertia(), gravity=self.real("gravity"))
         self._wind = Wind(amplitude=self.vec3("wind.amplitude"), frequency=self.real("wind.frequency"))
+        self._payload = Payload(mass=self.real("payload.mass"), drop_time=self.real("payload.drop_time"))
         self._actuators = self._read_actuators()
         self._largest_step = self.real("max_internal_step")
 
@@ -47,26 +49,36 @@ class QuadrotorPlant(Slave):
         self._write(t)
 
     def step(self, t: float, h: float) -> None:
-        """Integrate from `t` to `t + h` in equal internal steps, the command held."""
-        body, wind, actuators = self._body, self._wind, self._actuators
+        """Integrate from `t` to `t + h` in equal internal steps, the command held.
+
+        Where the payload is let go inside of it, both parts of the step have equal internal steps of their own.
+        """
+        wind, actuators, largest = self._wind, self._actuators, self._largest_step
         start, target = self._channels, actuators.limited(self._command())
         external = self.vec3("external_force")
-
-        def f(time: float, x: RigidState) -> RigidState:
-            wrench = actuators.wrench(actuators.response(start, target, time - t))
-            return derivative(x, wrench, wind.force(time) + external, body)
-
         require(
             h <= MOST_INTERNAL_STEPS * self._largest_step,
             "communicationStepSize",
             h,
             f"at most {MOST_INTERNAL_STEPS} times max_internal_step = {self._largest_step} s",
         )
-        count = internal_steps(h, self._largest_step)
-        internal = h / count
-        self._state = repeat(
-            count, lambda i, state: rk4_step(f, t + i * internal, state, internal).normalised(), self._state
-        )
+        carried = self._payload.until_drop(t, h)
+        loaded, bare, drop = self._mass_at(t), self._mass_at(t + carried), t + carried
+        first = FLOAT.where(carried > 0.0, internal_steps(carried, largest), 0)
+        second = internal_steps(h - carried, largest)
+        before, behind = carried / internal_steps(carried, largest), (h - carried) / second
+
+        def move(i: int, state: RigidState) -> RigidState:
+            body = self._body_of(FLOAT.where(i < first, loaded, bare))
+            time = FLOAT.where(i < first, t + i * before, drop + (i - first) * behind)
+
+            def f(at: float, x: RigidState) -> RigidState:
+                wrench = actuators.wrench(actuators.response(start, target, at - t))
+                return derivative(x, wrench, wind.force(at) + external, body)
+
+            return rk4_step(f, time, state, FLOAT.where(i < first, before, behind)).normalised()
+
+        self._state = repeat(first + second, move, self._state)
         self._channels = actuators.response(start, target, h)
         self._write(t + h)
 
@@ -104,6 +116,13 @@ class QuadrotorPlant(Slave):
             )
         return Actuators(box=box, motors=motors)
 
+    def _mass_at(self, t: float) -> float:
+        mass: float = self.real("mass") + self._payload.carried(t)
+        return mass
+
+    def _body_of(self, mass: float) -> Body:
+        return Body(mass=mass, inertia=self._body.inertia, gravity=self._body.gravity)
+
     def _command(self) -> Wrench:
         return Wrench(self.real("thrust"), self.vec3("torque"))
 
@@ -117,7 +136,8 @@ class QuadrotorPlant(Slave):
         wind = self._wind.force(t)
         force = wind + self.vec3("external_force")
         thrust = self._actuators.wrench(self._channels).thrust
-        self.put_vec3("acceleration", acceleration(state.quaternion, thrust, force, self._body))
+        body = self._body_of(self._mass_at(t))
+        self.put_vec3("acceleration", acceleration(state.quaternion, thrust, force, body))
         self.put_vec3("wind.force", wind)
         self.put("tilt", tilt(state.quaternion))
 

@@ -50,6 +50,8 @@ ENERGY = "energy"
 EXTERNAL_FORCE = components("external_force")
 DISTURBANCE = components("wind.amplitude") + EXTERNAL_FORCE
 """What moves the plant beside its commands."""
+PAYLOAD = "payload.mass"
+"""What it carries beside its own mass, which its controller is not told of."""
 
 BOUNDARY_LAYER = "boundary_layer"
 SURFACE_GAIN, SURFACE_EXPONENT = "gain.surface", "surface_exponent"

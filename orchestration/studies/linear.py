@@ -48,11 +48,12 @@ class NotSmooth(UsageError):
 
 
 def hover_of(scenario: Scenario) -> Scenario:
-    """`scenario` with the vehicle at rest at the origin, where its reference rests too, and no wind."""
+    """`scenario` with the vehicle at rest at the origin, where its reference rests too, and no wind and no payload."""
     scenario = scenario.resolved()
     controller = {k: v for k, v in scenario.controller.parameters.items() if k != wiring.USE_REFERENCE_INPUTS}
     controller |= dict.fromkeys(wiring.TRAJECTORY, 0.0)
     plant = dict(scenario.plant.parameters) | dict.fromkeys(wiring.DISTURBANCE, 0.0)
+    plant |= {wiring.PAYLOAD: 0.0} if wiring.PAYLOAD in plant else {}
     plant |= {f"initial.{name}": 0.0 for name in wiring.MEASUREMENT} | {f"initial.{SCALAR_PART}": 1.0}
     return dataclasses.replace(
         scenario,

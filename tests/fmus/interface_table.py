@@ -72,6 +72,8 @@ PLANT = (
     *row("motor.arm", "parameter fixed", "m", 0.1, axes=("x", "y")),
     *row("motor.drag_to_thrust", "parameter fixed", "m", 0.016),
     *row("motor.time_constant", "parameter fixed", "s", 0.0, axes=("up", "down")),
+    *row("payload.mass", "parameter tunable", "kg", 0.0),
+    *row("payload.drop_time", "parameter tunable", "s", 0.0),
     *row("acceleration", "local continuous", "m/s2", axes=XYZ),
     *row("wind.force", "local continuous", "N", axes=XYZ),
     *row("tilt", "local continuous", "rad"),

@@ -200,3 +200,15 @@ def test_a_drag_beside_forces_is_refused(tmp_path: Path) -> None:
     force = written(tmp_path / "force.csv", FORCE)
     with pytest.raises(UsageError, match=r"disturbance\.drag: expected columns wind\.x, wind\.y, wind\.z in"):
         system_of(Scenario(disturbance=DisturbanceChoice(file=force, drag=1.0)))
+
+
+@needs_compiler
+def test_payloads_are_let_go_at_their_times_in_every_lane() -> None:
+    base = plain(located(system_of(Scenario(stop_time=0.12))))
+    loads = [(0.0, 0.0), (0.4, 0.0503), (0.2, 0.0997), (0.3, 0.0)]
+    path = "components.plant.parameters.payload"
+    systems = [changed(base, {f"{path}.mass": mass, f"{path}.drop_time": time}) for mass, time in loads]
+    shape = shape_of(base)
+    found = landed(shape, systems)
+    for lane, what in enumerate(systems):
+        assert_the_same_signals(shape, found, lane, quadcosim.run(what, engine="compiled"))
