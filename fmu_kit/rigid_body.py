@@ -22,6 +22,10 @@ class Body:
     gravity: float = 9.81
     """g [m/s²], along +z of the inertial frame"""
 
+    def with_mass(self, mass: Scalar) -> "Body":
+        """The same body with another mass [kg]."""
+        return Body(mass=mass, inertia=self.inertia, gravity=self.gravity)
+
 
 class Wrench(NamedTuple):
     """What the propellers exert."""

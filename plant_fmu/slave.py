@@ -53,7 +53,8 @@ class QuadrotorPlant(Slave):
 
         Where the payload is let go inside of it, both parts of the step have equal internal steps of their own.
         """
-        wind, actuators, largest = self._wind, self._actuators, self._largest_step
+        body, wind, actuators = self._body, self._wind, self._actuators
+        largest = self._largest_step
         start, target = self._channels, actuators.limited(self._command())
         external = self.vec3("external_force")
         require(
@@ -69,12 +70,12 @@ class QuadrotorPlant(Slave):
         before, behind = carried / internal_steps(carried, largest), (h - carried) / second
 
         def move(i: int, state: RigidState) -> RigidState:
-            body = self._body_of(FLOAT.where(i < first, loaded, bare))
+            flying = body.with_mass(FLOAT.where(i < first, loaded, bare))
             time = FLOAT.where(i < first, t + i * before, drop + (i - first) * behind)
 
             def f(at: float, x: RigidState) -> RigidState:
                 wrench = actuators.wrench(actuators.response(start, target, at - t))
-                return derivative(x, wrench, wind.force(at) + external, body)
+                return derivative(x, wrench, wind.force(at) + external, flying)
 
             return rk4_step(f, time, state, FLOAT.where(i < first, before, behind)).normalised()
 
@@ -117,11 +118,8 @@ class QuadrotorPlant(Slave):
         return Actuators(box=box, motors=motors)
 
     def _mass_at(self, t: float) -> float:
-        mass: float = self.real("mass") + self._payload.carried(t)
+        mass: float = self._body.mass + self._payload.carried(t)
         return mass
-
-    def _body_of(self, mass: float) -> Body:
-        return Body(mass=mass, inertia=self._body.inertia, gravity=self._body.gravity)
 
     def _command(self) -> Wrench:
         return Wrench(self.real("thrust"), self.vec3("torque"))
@@ -136,7 +134,7 @@ class QuadrotorPlant(Slave):
         wind = self._wind.force(t)
         force = wind + self.vec3("external_force")
         thrust = self._actuators.wrench(self._channels).thrust
-        body = self._body_of(self._mass_at(t))
+        body = self._body.with_mass(self._mass_at(t))
         self.put_vec3("acceleration", acceleration(state.quaternion, thrust, force, body))
         self.put_vec3("wind.force", wind)
         self.put("tilt", tilt(state.quaternion))
