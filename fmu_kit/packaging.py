@@ -300,7 +300,7 @@ def main(arguments: list[str], build: Callable[[Target, Path], Path] = build) ->
         sys.path.insert(0, str(root))
     try:
         for text in targets:
-            print(build(Target.parse(text, root), Path(folder)))
+            print(build(Target.parse(text, root), Path(folder)), flush=True)
     except PackagingError as error:
         print(error, file=sys.stderr)
         return 1

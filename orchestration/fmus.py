@@ -4,6 +4,7 @@ import functools
 import logging
 import os
 import subprocess
+import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -148,10 +149,11 @@ def build(
     *,
     packing: Packing = IN_PYTHON,
     systems: str | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> list[Path]:
     """Build FMUs of this project into `folder`; their paths. Else as `build_slaves`."""
     targets = [Target.parse(MODELS[name]) for name in names]
-    return build_slaves(targets, folder, announce, packing=packing, systems=systems)
+    return build_slaves(targets, folder, announce, packing=packing, systems=systems, progress=progress)
 
 
 def slaves_of(folder: Path) -> list[Target]:
@@ -192,15 +194,16 @@ def build_slaves(
     *,
     packing: Packing = IN_PYTHON,
     systems: str | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> list[Path]:
     """Build slaves whose modules are found in one place into `folder`, in a process of its own; the FMUs' paths.
 
     Those without Python inside are for this machine, or for `systems`, `all` or some with commas.
-    `announce` hears, a line each, of what could not be packed. Raises `QuadcosimError` with what the build said if
-    it fails.
+    `announce` hears, a line each, of what could not be packed, `progress` the share that is built. Raises
+    `QuadcosimError` with what the build said if it fails.
     """
     options = [] if systems is None else ["--target", systems]
-    return _packed([*packing.command, *options], targets, folder, announce)
+    return _packed([*packing.command, *options], targets, folder, announce, progress)
 
 
 def export_c(targets: Sequence[Target], folder: Path, *, single: bool = False) -> list[Path]:
@@ -216,22 +219,30 @@ def _packed(
     targets: Sequence[Target],
     folder: Path,
     announce: Callable[[str], None] | None,
+    progress: Callable[[float], None] | None = None,
 ) -> list[Path]:
-    """What a module of the kit makes of slaves, in a process of its own; the paths that it prints."""
+    """What a module of the kit makes of slaves, in a process of its own; the paths that it prints one by one."""
     named = [f"{target.module}:{target.model}" for target in targets]
     root = targets[0].root if targets else None
     roots = [] if root is None else ["--root", root]
-    done = subprocess.run(
-        subprocesses.command(*command, folder.resolve(), *roots, *named),
-        capture_output=True, text=True, env=subprocesses.environment(), check=False,
-    )  # fmt: skip
-    if done.returncode != 0:
-        lines = done.stderr.strip().splitlines() or ["no output"]
-        raise QuadcosimError(f"building {', '.join(named)} in {folder} failed: {lines[-1]}")
+    whole = subprocesses.command(*command, folder.resolve(), *roots, *named)
+    made = []
+    with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as remarks:
+        with subprocess.Popen(
+            whole, stdout=subprocess.PIPE, stderr=remarks, text=True, env=subprocesses.environment()
+        ) as process:
+            for line in process.stdout or ():
+                made.append(Path(line.rstrip("\n")))
+                if progress is not None:
+                    progress(len(made) / len(targets))
+        remarks.seek(0)
+        said = remarks.read().splitlines()
+    if process.returncode != 0:
+        raise QuadcosimError(f"building {', '.join(named)} in {folder} failed: {(said or ['no output'])[-1]}")
     if announce is not None:
-        for line in done.stderr.splitlines():
+        for line in said:
             announce(line)
-    return [Path(line) for line in done.stdout.splitlines()]
+    return made
 
 
 def _is_old(path: Path, target: Target, packing: Packing) -> bool:

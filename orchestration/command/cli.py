@@ -52,7 +52,6 @@ class _Commands(typer.core.TyperGroup):
 app = typer.Typer(
     name="quadcosim",
     cls=_Commands,
-    help="Fly a quadrotor controller FMU under a realistic digital clock.",
     epilog="A first flight: quadcosim run --out results/paper. Exit codes: 0 done, 1 it failed or something is not as "
     "it should be, 2 wrong usage, 130 stopped by Ctrl-C, 141 the reader of the output has gone.",
     invoke_without_command=True,
@@ -66,12 +65,15 @@ app = typer.Typer(
 def quadcosim(
     context: typer.Context,
     version: Annotated[
-        bool, typer.Option("--version", help="Print the version and stop; with -v also those of what it stands on.")
+        bool,
+        typer.Option(
+            "--version", metavar="", help="Print the version and stop; with -v also those of what it stands on."
+        ),
     ] = False,
     *,
     manners: Manners,
 ) -> None:
-    """Fly a quadrotor controller, or any FMUs, under a realistic digital clock."""
+    """Fly a quadrotor controller, or run any FMUs, under a realistic digital clock."""
     registering.behave(manners, anew=True)
     if version:
         from orchestration.command.version import versions
@@ -121,11 +123,11 @@ def build(
         raise UsageError("--fmi 3: expected --native with it; FMUs with Python inside are of FMI 2.0")
     packing = fmus.IN_PYTHON if not native else fmus.NATIVE_FMI_3 if fmi == 3 else fmus.NATIVE
     where = out or (folder or fmus.default_folder()) / packing.folder
-    if folder is None:
-        built = fmus.build(MODELS, where, say, packing=packing, systems=target)
-    else:
-        built = fmus.build_slaves(fmus.slaves_of(folder), where, say, packing=packing, systems=target)
-    return of_files(built)
+    with progress_bar("building") as progress:
+        how: Any = {"packing": packing, "systems": target, "progress": progress}
+        if folder is None:
+            return of_files(fmus.build(MODELS, where, say, **how))
+        return of_files(fmus.build_slaves(fmus.slaves_of(folder), where, say, **how))
 
 
 def export_c(

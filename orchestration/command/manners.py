@@ -11,8 +11,8 @@ from orchestration.command import terminal
 from orchestration.errors import UsageError
 
 
-def _option(*names: str, text: str, **options: Any) -> Any:
-    return typer.Option(*names, help=text, rich_help_panel="Output", show_default=False, **options)
+def _option(*names: str, text: str, metavar: str = "") -> Any:
+    return typer.Option(*names, help=text, rich_help_panel="Output", show_default=False, metavar=metavar)
 
 
 @dataclass(frozen=True, kw_only=True)

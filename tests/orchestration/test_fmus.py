@@ -1,13 +1,13 @@
 """Where FMUs are found, and when they are built."""
 
 import os
-import subprocess
+import sys
 from pathlib import Path
 
 import platformdirs
 import pytest
 
-from orchestration import fmus
+from orchestration import fmus, subprocesses
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.model import read_model
 from orchestration.quadrotor.wiring import MODELS
@@ -112,13 +112,26 @@ def test_modification_times_do_not_matter(project: Path, built: dict[str, Path])
     assert fmus.out_of_date(["QuadrotorPlant"], path.parent) == []
 
 
+def builds_by(code: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In place of what packs slaves, a process with this code."""
+    monkeypatch.setattr(subprocesses, "command", lambda *_: [sys.executable, "-c", code])
+
+
 def test_a_build_that_fails_says_why_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    done = subprocess.CompletedProcess(
-        [], 1, stdout="", stderr="Traceback …\ncontroller_fmu/sliding_mode/law.py:3: imports numpy\n"
-    )
-    monkeypatch.setattr(subprocess, "run", lambda *_, **__: done)
+    said = "Traceback …\ncontroller_fmu/sliding_mode/law.py:3: imports numpy\n"
+    builds_by(f"import sys; sys.stderr.reconfigure(encoding='utf-8'); sys.exit({said!r})", monkeypatch)
     with pytest.raises(QuadcosimError, match=r"failed: controller_fmu/sliding_mode/law.py:3: imports numpy$"):
         fmus.build(["UnifiedController"], tmp_path)
+
+
+def test_a_build_says_how_far_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    builds_by("print('a.fmu'); print('b.fmu')", monkeypatch)
+    heard: list[float] = []
+    assert fmus.build(["UnifiedController", "QuadrotorPlant"], tmp_path, progress=heard.append) == [
+        Path("a.fmu"),
+        Path("b.fmu"),
+    ]
+    assert heard == [0.5, 1.0]
 
 
 # -- slaves of anybody ------------------------------------------------------------------------------------
