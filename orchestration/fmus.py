@@ -236,7 +236,7 @@ def _packed(
                 if progress is not None:
                     progress(len(made) / len(targets))
         remarks.seek(0)
-        said = remarks.read().splitlines()
+        said = remarks.read().strip().splitlines()
     if process.returncode != 0:
         raise QuadcosimError(f"building {', '.join(named)} in {folder} failed: {(said or ['no output'])[-1]}")
     if announce is not None:
