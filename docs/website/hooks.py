@@ -34,7 +34,12 @@ def on_files(files: Files, config: Any) -> Files:
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
     """The page as a code host shows it, with its links and code blocks as the site has them."""
-    links = Links(repo_url=config.repo_url)
     address = page.file.src_uri
-    shows_source = address in links.sources() or address.endswith(".ipynb")
-    return markdown if shows_source else for_the_site(links.rewritten(markdown, address))
+    shows_source = page.file.inclusion.is_not_in_nav() or address.endswith(".ipynb")
+    return markdown if shows_source else for_the_site(Links(repo_url=config.repo_url).rewritten(markdown, address))
+
+
+def on_page_content(html: str, page: Any, config: Any, files: Files) -> str:
+    """A page that was a notebook, with its links as the site has them."""
+    address = page.file.src_uri
+    return Links(repo_url=config.repo_url).rewritten_html(html, address) if address.endswith(".ipynb") else html

@@ -53,15 +53,17 @@ class Links:
 
     def rewritten(self, markdown: str, address: str) -> str:
         """The text of the page at `address` with its links as they are on the site."""
+        led = self._leading(address)
+        return _outside_of_code(LINK, led, self.rewritten_html(markdown, address))
+
+    def rewritten_html(self, html: str, address: str) -> str:
+        """The same of links in HTML, to the pages as they are in the end."""
+        led = self._leading(address)
+        return HREF.sub(lambda match: re.sub(r"\.(md|ipynb)$", ".html", led(match)), html)
+
+    def _leading(self, address: str) -> Callable[[re.Match[str]], str]:
         path = (pages_elsewhere() | documentation()).get(address, f"docs/{address}")
-
-        def led(match: re.Match[str]) -> str:
-            return match[1] + self._to(_target(path, match[2]), posixpath.dirname(address))
-
-        def led_from_html(match: re.Match[str]) -> str:
-            return re.sub(r"\.md$", ".html", led(match))
-
-        return _outside_of_code(LINK, led, HREF.sub(led_from_html, markdown))
+        return lambda match: match[1] + self._to(_target(path, match[2]), posixpath.dirname(address))
 
     def pictures(self) -> dict[str, Path]:
         """The pictures outside `docs/` that pages show, by their addresses."""
