@@ -333,10 +333,9 @@ def test_an_instance_may_be_freed_in_any_phase_without_terminate(model: str, bui
     assert run_script("freed_anywhere", built[model]) == {"freed": 50, "flies as before": True}
 
 
-@pytest.mark.parametrize("seed", ["1", "2"])
 @pytest.mark.parametrize("model", PAIR)
-def test_no_order_of_calls_brings_the_process_down(model: str, seed: str, built: dict[str, Path]) -> None:
-    result = run_script("any_calls", built[model], seed)
+def test_no_order_of_calls_brings_the_process_down(model: str, built: dict[str, Path]) -> None:
+    result = run_script("any_calls", built[model], str(1 + [*PAIR].index(model)))
     assert result["failures"] > 500  # or too little was out of order
     assert result["revived"] > 50
 
