@@ -54,7 +54,7 @@ SETTINGS: Mapping[str, tuple[str, str | None]] = {
     "timing.measurement_loss": ("loss of measurements", None),
     "timing.command_loss": ("loss of commands", None),
     "timing.clock_ratio": ("clock ratio", None),
-    "controller.coupling": ("κ", None),
+    "controller.coupling": ("κ", "kg"),
     "controller.surface_exponent": ("exponent of the surface β_t", None),
     "controller.gain.surface": ("surface gain k_s", None),
     "controller.gain.eta": ("gain k_η", "rad/s"),
