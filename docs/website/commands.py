@@ -5,7 +5,7 @@ from typing import Any
 
 import typer.main
 
-from docs.website.tables import table
+from docs.website.tables import table, words
 from orchestration.command.cli import app
 
 INTRODUCTION = """\
@@ -37,11 +37,11 @@ def _section(name: str, command: Any) -> str:
         kind = "Arguments" if parameter.param_type_name == "argument" else "Options"
         names, said = parameter.get_help_record(context)
         panel = panels.setdefault(getattr(parameter, "rich_help_panel", None) or kind, [])
-        panel.append((f"<code>{escape(names)}</code>", escape(said)))
+        panel.append((f"<code>{escape(names)}</code>", words(said)))
     tables = "".join(table(rows, heading=title) for title, rows in panels.items() if rows)
     return f"\n## {name}\n\n```text\n{usage}\n```\n\n{escape(command.help or '', quote=False)}\n\n{tables}"
 
 
 def _first(text: str | None) -> str:
     """The first sentence of a help, which is what the list of commands has."""
-    return escape((text or "").split("\n\n")[0].split(". ")[0].rstrip("."))
+    return words((text or "").split("\n\n")[0].split(". ")[0].rstrip("."))

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import griffe
 import pydantic
 
-from docs.website.tables import table
+from docs.website.tables import table, words
 from orchestration.quadrotor.scenario_file import ScenarioFile
 from orchestration.studies.comparison.file import ComparisonFile
 from orchestration.studies.study_file import StudyFile
@@ -63,7 +63,7 @@ def _file(title: str, shape: type, said: str) -> str:
 
 def _section(place: str, shape: type, file: str) -> str:
     heading = f"### `{place}` of a {file.lower()}\n\n{_summary(shape)}\n\n" if place else ""
-    rows = [(f"<code>{key.name}</code>", _kind(key.kind), key.default, escape(key.said)) for key in _keys(shape)]
+    rows = [(f"<code>{key.name}</code>", _kind(key.kind), key.default, words(key.said)) for key in _keys(shape)]
     return heading + table(rows, columns=("Key", "Value", "Without it", "Meaning"))
 
 
@@ -145,6 +145,8 @@ def _kind(kind: Any) -> str:
     origin, parts = typing.get_origin(kind), typing.get_args(kind)
     if origin is typing.Literal:
         return " or ".join(f"<code>{part}</code>" for part in parts)
+    if {float, int, bool, str} <= set(parts):
+        return "number, <code>true</code>, <code>false</code> or text"
     if origin in (types.UnionType, typing.Union):
         return " or ".join(dict.fromkeys(_kind(part) for part in parts if part is not types.NoneType))
     if origin in (list, tuple):
