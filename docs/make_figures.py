@@ -5,7 +5,7 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from docs import paper_flight
+from docs import paper_flight, reference_figures
 from docs.pages import fill
 from orchestration.drawing.draw import draw
 from orchestration.drawing.palette import BLUE, GREEN, GREY, RED
@@ -37,6 +37,9 @@ def main() -> None:
     }
     with DOCS.applied():
         figures["timing"] = timing_diagram()
+        figures["references"] = reference_figures.references(DOCS)
+        figures["gusts"] = reference_figures.wind(DOCS)
+        figures["payload"] = reference_figures.payload(DOCS)
         figures["paper_figure_3"] = paper_flight.figure_3(flight, DOCS)
     for path in save(figures, FIGURES, DOCS):
         print(path)
