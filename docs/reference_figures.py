@@ -70,7 +70,7 @@ def wind(style: Style) -> Figure:
     window = np.hanning(count)[:, None]
     values = np.array(air.velocities(draws)).reshape(stretches, count, 3) * window
     power = (np.abs(np.fft.rfft(values, axis=1)) ** 2).mean(axis=0) * air.step / (math.pi * (window**2).sum())
-    omega = 2.0 * math.pi * np.fft.rfftfreq(count, air.step)
+    omega: Floats = 2.0 * math.pi * np.fft.rfftfreq(count, air.step).astype(np.float64)
     for axis, (name, color) in enumerate(AXES):
         below.loglog(omega[2:900], power[2:900, axis], color=color, linewidth=0.7, alpha=0.7, label=f"{name}, drawn")
         label = "formulas" if axis == 0 else None
