@@ -13,7 +13,7 @@ def table(rows: Sequence[Sequence[str]], heading: str = "", columns: Sequence[st
     elif heading:
         lines.insert(0, f'<th colspan="{len(rows[0])}">{heading}</th>')
     body = "\n".join(f"<tr>{line}</tr>" for line in lines)
-    return f"<table>\n{body}\n</table>\n\n"
+    return f"<table data-made>\n{body}\n</table>\n\n"
 
 
 def words(text: str) -> str:
