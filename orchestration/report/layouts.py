@@ -24,6 +24,7 @@ ANGLES = ("roll", "pitch", "yaw")
 PLACE, ATTITUDE = (tuple(f"plant.{name}" for name in names) for names in (POSITION, QUATERNION))
 COMPACT = tuple(f"plant.{name}" for name in (*POSITION, *QUATERNION, *ANGULAR_VELOCITY, *COMMAND))
 """Columns of the plant that a track of a flight has, if it is to be short"""
+OF_REFERENCE = ("x of the reference", "y of the reference", "z of the reference")
 MOST_LINES = 8
 """in one panel"""
 
@@ -52,7 +53,7 @@ def _of_flight(system: System | None, columns: Collection[str], about: About) ->
             unit="m",
             lines=(
                 *_vector(PLACE, "xyz"),
-                *(_vector(POSITION_REFERENCE, ("x wanted", "y wanted", "z wanted"), reference=True) if aims else ()),
+                *(_vector(POSITION_REFERENCE, OF_REFERENCE, reference=True) if aims else ()),
             ),
         ),
         Panel(title="attitude", unit="°", lines=(*_vector(ANGLES, ANGLES),)),

@@ -12,7 +12,9 @@ function numbersOf(place) {
 
 function decoded(blob) {
   const [text, offset, scale, isLogarithmic] = blob;
-  const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const letters = atob(text);
+  const bytes = new Uint8Array(letters.length);
+  for (let i = 0; i < letters.length; i += 1) bytes[i] = letters.charCodeAt(i);
   if (offset === undefined) return new Float32Array(bytes.buffer);
   const steps = new Int16Array(bytes.buffer);
   return Float64Array.from(steps, (step) => {

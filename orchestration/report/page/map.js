@@ -93,12 +93,20 @@ function rowOfPoint(point) {
 
 /** What hovering over a run says. */
 function hoverOf(row) {
-  const lines = axes.map((axis) => `${escaped(axis.label)}: ${escaped(withUnit(cellOf(axis, row), axis.unit))}`);
-  const index = shown(cellOf(columnsByName.get("design_index"), row));
+  const lines = axes.map((axis) => lineOf(axis, row));
+  const index = cellOf(columnsByName.get("design_index"), row);
   lines.unshift(`<b>run ${index}: ${escaped(outcomeOf(row))}</b>`);
-  if (map.metric) lines.push(`${escaped(map.metric.label)}: ${escaped(withUnit(cellOf(map.metric, row), map.metric.unit))}`);
+  lines.push(`${escaped(map.metric.label)}: ${withUnit(cellOf(map.metric, row), escaped(map.metric.unit ?? ""))}`);
   if (report.runs.length && !runOfRow(row)) lines.push("<i>metrics only</i>");
   return lines.join("<br>");
+}
+
+/** An axis in a hover text; ten thousand cells have few values of it. */
+function lineOf(axis, row) {
+  const value = numbersOf(axis.values)[row];
+  if (!axis.lines) axis.lines = new Map();
+  if (!axis.lines.has(value)) axis.lines.set(value, `${escaped(axis.label)}: ${escaped(withUnit(cellOf(axis, row), axis.unit))}`);
+  return axis.lines.get(value);
 }
 
 /** Whether colour and height go by the logarithm of the metric. */
@@ -138,11 +146,12 @@ function colorBar([low, high]) {
 
 function gridTraces() {
   const [across, up] = [valuesOf(map.x), valuesOf(map.y)];
-  const place = (axis, row) => valuesOf(axis).indexOf(cellOf(axis, row));
+  const place = (axis) => new Map(valuesOf(axis).map((value, i) => [value, i]));
+  const [columns, lines] = [place(map.x), place(map.y)];
   const empty = () => up.map(() => new Array(across.length).fill(null));
   const [colors, codes, texts, rows, kinds] = [empty(), empty(), empty(), empty(), empty()];
   for (const row of map.rows) {
-    const [i, j] = [place(map.y, row), place(map.x, row)];
+    const [i, j] = [lines.get(cellOf(map.y, row)), columns.get(cellOf(map.x, row))];
     const kind = kindOf(outcomeOf(row));
     kinds[i][j] = kind;
     rows[i][j] = row;
@@ -295,7 +304,7 @@ function mapLayout() {
     height: 470, margin: { l: 66, r: 10, t: 26, b: 50 }, font: FONT, hovermode: "closest", dragmode: "pan",
     paper_bgcolor: "#fff", plot_bgcolor: map.isGrid ? "#fff" : "#fbfcfd", xaxis: axisLayout(map.x),
     yaxis: { ...y, gridcolor: "#e8ebee" }, showlegend: !map.isGrid,
-    legend: { orientation: "h", x: 0, y: 1.0, yanchor: "bottom" }, hoverlabel: { align: "left" },
+    legend: { orientation: "h", x: 0, y: 1.0, yanchor: "bottom" }, hoverlabel: HOVER,
     uirevision: [map.x.name, map.y === VALUE ? VALUE : map.y.name].join(),
   };
 }

@@ -31,8 +31,7 @@ function startPage() {
 /** The run that is open at first: one that is good and has its flight here, if there is one. */
 function openFirst() {
   if (report.compared) return openCell(cellsHere()[0]);
-  const rows = Object.keys(report.table.tracks).map(Number);
-  return openRow(rows.find((row) => kindOf(outcomeOf(row)) === "good") ?? rows[0] ?? 0);
+  return openRow(firstOf([...Array(report.table.count).keys()]));
 }
 
 startPage();

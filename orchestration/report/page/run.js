@@ -173,7 +173,7 @@ function buildSignalControls() {
   controlsOf.panels = element("details", { className: "panels" }, element("summary", { textContent: "Panels" }), element("fieldset"));
   byId("signals-controls").append(
     button("Zoom in", () => zoomTime(0.4)), button("Zoom out", () => zoomTime(2.5)),
-    button("Whole run", () => showSpan(...wholeSpan())), controlsOf.panels,
+    button("Whole run", () => showSpan(...wholeSpan())), button("Save as SVG", saveSignals), controlsOf.panels,
   );
 }
 

@@ -107,7 +107,7 @@ function cornersOf({ low, high, size }) {
   const step = niceStep(size);
   const from = [0, 1].map((i) => Math.floor(low[i] / step) * step);
   const to = [0, 1].map((i) => Math.ceil(high[i] / step) * step);
-  const levels = [low[2], Math.ceil(high[2] / step) * step];
+  const levels = [(Math.floor(low[2] / step) - 0.6) * step, Math.ceil(high[2] / step) * step];
   return levels.flatMap((z) => [from[0], to[0]].flatMap((n) => [from[1], to[1]].map((e) => [n, e, z])));
 }
 

@@ -23,7 +23,7 @@ function drawShares() {
     ...(has ? { error_y: { type: "data", symmetric: false, array: found.map((each, i) => each.high - share[i]), arrayminus: found.map((each, i) => share[i] - each.low), thickness: 1.4, width: 4 } } : {}),
   };
   const layout = {
-    height: 270, margin: { l: 60, r: 10, t: 10, b: 48 }, font: FONT, paper_bgcolor: "#fff", plot_bgcolor: "#fff", hovermode: "closest",
+    height: 270, margin: { l: 60, r: 10, t: 10, b: 48 }, font: FONT, paper_bgcolor: "#fff", plot_bgcolor: "#fff", hovermode: "closest", hoverlabel: HOVER,
     xaxis: { title: { text: escaped(titled(axis.replace(/_/g, " "), unit)) }, type: isNumber ? (logarithmic ? "log" : "linear") : "category", gridcolor: "#e8ebee", zeroline: false },
     yaxis: { title: { text: `share ${escaped(report.words[0])}` }, range: [-0.03, 1.03], tickformat: ".0%", gridcolor: "#e8ebee", zeroline: false },
   };
@@ -51,7 +51,7 @@ function drawSharesOfCells() {
     };
   });
   const layout = {
-    height: 330, margin: { l: 60, r: 10, t: 10, b: 48 }, font: FONT, hovermode: "closest", legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom" },
+    height: 330, margin: { l: 60, r: 10, t: 10, b: 48 }, font: FONT, hovermode: "closest", hoverlabel: HOVER, legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom" },
     xaxis: { title: { text: escaped(titled(axis.replace(/_/g, " "), unit)) }, gridcolor: "#e8ebee", zeroline: false },
     yaxis: { title: { text: `share ${escaped(report.words[0])}` }, range: [-0.03, 1.03], tickformat: ".0%", gridcolor: "#e8ebee", zeroline: false },
   };
@@ -80,7 +80,7 @@ function startCells() {
   if (places.length > 1) {
     byId("map-controls").append(choice("Vehicle and condition", places.map((pair, i) => [i, pair.join(", ")]), 0, (i) => { cells.place = Number(i); drawCells(); drawSharesOfCells(); openCell(cellsHere()[0]); }));
   }
-  byId("map-hint").textContent = `One row a controller. Click a cell, or move with the arrow keys, to see its runs below; hover for its 95 % interval.`;
+  byId("map-hint").textContent = `One row a controller, numbers in per cent. Click a cell, or move with the arrow keys, to see its runs below; hover for its 95 % interval.`;
   return drawCells();
 }
 
@@ -110,7 +110,7 @@ function drawCells() {
     colorbar: { tickformat: ".0%", thickness: 14, outlinewidth: 0, title: { text: `share ${escaped(report.words[0])}`, side: "right" } },
   };
   const layout = {
-    height: Math.max(220, 110 + 42 * rows.length), margin: { l: 20, r: 10, t: 10, b: 50 }, font: FONT, dragmode: false, hoverlabel: { align: "left" },
+    height: Math.max(220, 110 + 42 * rows.length), margin: { l: 20, r: 10, t: 10, b: 50 }, font: FONT, dragmode: false, hoverlabel: HOVER,
     xaxis: { title: { text: escaped(titled(axis.replace(/_/g, " "), unit)), standoff: 8 }, zeroline: false, showgrid: false }, yaxis: { type: "category", automargin: true },
   };
   const holder = byId("map-plot");
@@ -152,7 +152,13 @@ function openCell(cell) {
   map.x = columnsByName.get("size of the initial error");
   map.y = VALUE;
   byId("cell-controls").replaceChildren(choice("Metric", drawable.map((column) => [column.name, column.label]), map.metric.name, (name) => { map.metric = columnsByName.get(name); drawRunsOfCell(); }));
-  drawRunsOfCell().then(() => openRow(map.rows.find((row) => runOfRow(row)) ?? map.rows[0]));
+  drawRunsOfCell().then(() => openRow(firstOf(map.rows)));
+}
+
+/** Of some rows the first that is good and has its flight in the file, or else that has it. */
+function firstOf(rows) {
+  const there = rows.filter((row) => runOfRow(row));
+  return there.find((row) => kindOf(outcomeOf(row)) === "good") ?? there[0] ?? rows[0];
 }
 
 function rowsOfCell(cell) {

@@ -27,7 +27,7 @@ function drawTimePlot(signals, beside, names) {
   const traces = panels.flatMap((panel, k) => tracesOf(panel, k, signals, beside, names));
   const holder = byId("time-plot");
   holder.style.height = `${height}px`;
-  return Plotly.react(holder, traces, timeLayout(panels, height, signals), PLOTLY).then(() => {
+  return Plotly.react(holder, traces, timeLayout(panels, height, signals), { ...PLOTLY, displayModeBar: false }).then(() => {
     if (!timePlot.isDrawn) listenToTimePlot(holder);
     timePlot.isDrawn = true;
     moveCursor();
@@ -74,12 +74,12 @@ function timeLayout(panels, height, signals) {
   const inner = height - topMargin() - MARGIN.b;
   const isNarrow = gap() > 46;
   const layout = {
-    height, margin: { ...MARGIN, t: topMargin() }, font: FONT, hovermode: "x", hoversubplots: "axis", dragmode: "zoom",
+    height, margin: { ...MARGIN, t: topMargin() }, font: FONT, hovermode: "x", hoversubplots: "axis", hoverlabel: HOVER, dragmode: "zoom",
     paper_bgcolor: "#fff", plot_bgcolor: "#fff", annotations: [],
     xaxis: {
       title: { text: "time [s]", standoff: 6 }, anchor: panels.length > 1 ? `y${panels.length}` : "y", showgrid: true,
       gridcolor: "#e8ebee", zeroline: false, range: [signals.time[0], signals.time[signals.time.length - 1]],
-      hoverformat: ".4~f", ticksuffix: "", showspikes: true, spikemode: "across", spikethickness: 1,
+      hoverformat: ".4~f", ticksuffix: " s", showticksuffix: "last", showspikes: true, spikemode: "across", spikethickness: 1,
       spikecolor: "#9aa4af", spikedash: "dot",
     },
   };
@@ -152,6 +152,12 @@ function seenRange(traces, [from, to], isLogarithmic) {
   if (low > high) return null;
   const air = 0.06 * (high - low) || 0.5 * Math.abs(high) || 1;
   return [low - air, high + air];
+}
+
+/** Save what is seen as a picture. */
+function saveSignals() {
+  const holder = byId("time-plot");
+  return Plotly.downloadImage(holder, { format: "svg", width: holder.clientWidth, height: holder.clientHeight, filename: "signals" });
 }
 
 /** Zoom about the instant of the replay. */

@@ -5,6 +5,7 @@ const DASHES = ["solid", "dash", "dashdot", "dot", "longdash", "longdashdot", "s
 const SHAPES = ["circle", "square", "diamond", "triangle-up", "x", "star", "cross", "hexagon"];
 const SUPERSCRIPTS = "⁰¹²³⁴⁵⁶⁷⁸⁹";
 const FONT = { family: 'system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif', size: 12, color: "#1b1f24" };
+const HOVER = { align: "left", font: { family: FONT.family, size: 12 } };
 const PLOTLY = { displaylogo: false, responsive: true, modeBarButtons: [["zoom2d", "pan2d", "resetScale2d", "toImage"]], toImageButtonOptions: { format: "svg" } };
 
 /** A number to six digits; a dash for none. */
