@@ -76,11 +76,12 @@ def main() -> None:
     """Print size and times."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--side", type=int, default=100, help="runs along each of two axes")
+    parser.add_argument("--file", type=Path, help="open this report instead of making one")
     parser.add_argument("--browser", default=shutil.which("chromium") or "chromium")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        file = written(given.side, Path(folder))
-        times = opened(file, given.browser)
+        file = given.file or written(given.side, Path(folder))
+        times = opened(file.resolve(), given.browser)
         print(f"size {file.stat().st_size / 1e6:.1f} MB")
     for name, text in (("parsed", "DOMContentLoaded"), ("drawn", "first plot drawn")):
         values = [each[name] / 1e3 for each in times]
