@@ -5,6 +5,7 @@ import functools
 import itertools
 import math
 import zipfile
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -54,7 +55,7 @@ class Variable:
         return self.causality in ("parameter", "input", "structuralParameter")
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, repr=False, eq=False)
 class Model:
     """An FMU file and what its description says; read once, it is told from others by identity."""
 
@@ -66,6 +67,10 @@ class Model:
     """Its variables by name, arrays by their elements: causality, unit, start value, description."""
     initial_dependencies: Mapping[str, frozenset[str] | None]
     """By output, the inputs that it depends on at initialisation; None: all."""
+
+    def __repr__(self) -> str:
+        counts = Counter(v.causality for v in self.variables.values())
+        return f"<Model {self.name}, FMI {self.version}: {', '.join(f'{n} {what}' for what, n in counts.items())}>"
 
     @cached_property
     def is_of_this_kit(self) -> bool:
@@ -146,11 +151,13 @@ def read_description(path: Path) -> ModelDescription:
     return description
 
 
-def read_model(path: Path) -> Model:
-    """Read what a co-simulation FMU says of itself; raises `UsageError` as `read_description` does.
+def read_model(path: str | Path) -> Model:
+    """Read what a co-simulation FMU says of itself.
 
-    It is read once in a process, as long as the file is the same.
+    It is read once in a process, as long as the file is the same. Raises `UsageError` for a file that is no FMU for
+    co-simulation of FMI 2.0 or 3.0.
     """
+    path = Path(path)
     try:
         about = path.stat()
     except OSError:

@@ -28,6 +28,8 @@ from orchestration.studies.trials import RELIABILITY, Trials, Tried, is_random, 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from orchestration.drawing.gallery import Figures
+
 GAP = 0.1
 """of the local limit: a larger difference to the large-signal one is worth saying"""
 FINER = 5
@@ -56,11 +58,11 @@ class Limit:
     of: str
     """The quantity: a name, or a path."""
     unit: str | None = None
-    """Of the values; None: none."""
+    """The unit of the quantity; None: it has none."""
     judged: str | None = None
-    """The objective that the criterion is about; None: none."""
+    """The objective that the criterion is about; None: it is about none."""
     judged_unit: str | None = None
-    """Of that objective."""
+    """The unit of that objective; None: it has none."""
     local_limit: float | None
     """Where what is small about the operating point (hover) first ceases to decay, in the quantity's unit; None: it is
     not defined, or not reached."""
@@ -102,8 +104,25 @@ class Limit:
 
     def _repr_html_(self) -> str:
         """As notebooks show it."""
-        rows = [(name.replace("_", " "), text, "") for name, text in as_text(self).items() if name != "note"]
-        return html.card("A limit", None, None, self.note, rows)
+        found = {
+            "last value that is good": self.large_signal_limit,
+            "local limit, of small errors at rest": self.local_limit,
+            "refuted from": self.refuted_limit,
+        }
+        rows = [(name, html.number(value), self.unit or "") for name, value in found.items() if value is not None]
+        return html.card(
+            f"The limit of {self.of}", None, None, self.note, [*rows, ("values tried", str(len(self.tried)), "")]
+        )
+
+    @explained
+    def plot(self) -> "Figures":
+        """The figure of what was measured over the quantity, with both limits; a notebook shows it."""
+        from orchestration.drawing.gallery import Figures
+        from orchestration.drawing.style import SCREEN
+        from orchestration.studies import limit_figure
+
+        with SCREEN.applied():
+            return Figures({"limit": limit_figure.measured(self, None, SCREEN)}, SCREEN)
 
     @explained
     def to_pandas(self) -> "pd.DataFrame":

@@ -10,6 +10,7 @@ import pytest
 from scipy.io import loadmat
 
 import quadcosim
+from orchestration import fmus
 from quadcosim import QuadcosimError, Result, Scenario, System, UsageError
 from tests.commands import Main
 
@@ -28,6 +29,13 @@ def test_a_system_names_its_parts(flown: Result) -> None:
     assert isinstance(flown.system, System)
     assert repr(flown.system).startswith("<System of 0.2 s; components: plant, controller; connections: measurement,")
     assert len(repr(flown.system)) < 300
+
+
+def test_an_fmu_tells_what_it_has_in_a_line() -> None:
+    model = quadcosim.read_model(str(fmus.locate("native/QuadrotorPlant")))
+    assert repr(model).startswith("<Model QuadrotorPlant, FMI 2: ")
+    assert len(repr(model)) < 120
+    assert model.variables["torque.x"].unit == "N.m"
 
 
 def test_a_notebook_shows_metrics_by_names_for_people_with_units_and_the_outcome(flown: Result) -> None:

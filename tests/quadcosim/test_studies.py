@@ -98,7 +98,8 @@ def test_a_limit_is_a_table_of_what_was_tried(capsys: pytest.CaptureFixture[str]
     assert found.to_pandas()["value"].tolist() == [one.value for one in found.tried]
     assert repr(found) == f"<Limit of connections.valve.delay: {found.note}>"
     assert "connections.valve.delay 0.1 s: good" in capsys.readouterr().err
-    assert "large signal limit" in found._repr_html_()
+    assert "last value that is good" in found._repr_html_()
+    assert list(found.plot()) == ["limit"]
 
 
 def test_a_tuning_gives_its_searches_and_writes_their_files(tmp_path: Path) -> None:
