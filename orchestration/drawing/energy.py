@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from orchestration.drawing.lines import TIME, legend_of_runs, positive, quantity, see
+from orchestration.drawing.lines import TIME, legend_of_runs, logarithmic, positive, quantity, see
 from orchestration.drawing.palette import BLUE
 from orchestration.drawing.run import Run, title
 from orchestration.drawing.style import Style
@@ -27,7 +27,8 @@ def energy(runs: Sequence[Run], style: Style) -> Figure | None:
         color = BLUE if len(runs) == 1 else run.color
         panel.plot(run.time[at], positive(run[COLUMN][at]), color=color, linestyle=run.dashes, label=run.name)
     unit = with_energy[0].whole.described[COLUMN].unit
-    panel.set(xlabel=TIME, ylabel=quantity("energy L", unit), yscale="log")
+    logarithmic(panel)
+    panel.set(xlabel=TIME, ylabel=quantity("energy L", unit))
     see(panel, runs)
     if style.has_titles:
         panel.set_title(title(runs))

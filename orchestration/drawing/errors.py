@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration.drawing.lines import TIME, clip_peaks, legend_of_runs, positive, quantity, see, wrapped
+from orchestration.drawing.lines import TIME, clip_peaks, legend_of_runs, logarithmic, positive, quantity, see, wrapped
 from orchestration.drawing.palette import BLUE, GREEN, RED
 from orchestration.drawing.run import Run, title
 from orchestration.drawing.style import Style
@@ -38,7 +38,8 @@ def errors(runs: Sequence[Run], style: Style) -> Figure:
                 color = BLUE if len(runs) == 1 else run.color
                 norm = positive(np.linalg.norm(values, axis=1))
                 panel.plot(run.time, norm, color=color, linestyle=run.dashes, label=run.name)
-        panel.set(yscale="log", ylabel=wrapped(quantity(f"{error.name}, norm", error.unit)))
+        logarithmic(panel)
+        panel.set_ylabel(wrapped(quantity(f"{error.name}, norm", error.unit)))
         panel.minorticks_off()
         see(panel, runs)
     return figure

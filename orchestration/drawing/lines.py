@@ -28,6 +28,13 @@ def positive(values: Floats) -> Floats:
     return np.where(values > 0.0, values, np.nan)
 
 
+def logarithmic(axes: Axes) -> None:
+    """The vertical axis, as far as anything on it is positive: what is zero throughout stays on a linear one."""
+    values = [np.asarray(line.get_ydata(), float) for line in axes.get_lines()]
+    if any((one > 0.0).any() for one in values):
+        axes.set_yscale("log")
+
+
 def see(axes: Axes, runs: Sequence[Run]) -> None:
     """The axis of time as far as there is anything on it, or over the window."""
     axes.set_xlim(min(run.span[0] for run in runs), max(run.span[1] for run in runs))

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from orchestration.drawing.commands import COLUMNS
-from orchestration.drawing.lines import legend_of_runs, positive, wrapped
+from orchestration.drawing.lines import legend_of_runs, logarithmic, positive, wrapped
 from orchestration.drawing.palette import BLACK, BLUE, GREEN, RED
 from orchestration.drawing.run import Run, title
 from orchestration.drawing.style import Style
@@ -40,7 +40,8 @@ def spectrum(runs: Sequence[Run], style: Style) -> Figure | None:
     thrust.set(ylabel=wrapped("thrust, power spectral density [N²/Hz]"))
     torque.set(ylabel=wrapped(f"torque{all_three}, power spectral density [(N·m)²/Hz]"))
     for panel in (thrust, torque):
-        panel.set(xscale="log", yscale="log", xlabel="frequency [Hz]")
+        logarithmic(panel)
+        panel.set(xscale="log", xlabel="frequency [Hz]")
         panel.set_xlim(frequency[1], frequency[-1])
         _mark_rates(panel, runs, style)
     if len(runs) == 1:

@@ -18,7 +18,7 @@ from orchestration.drawing.lines import clip_peaks
 from orchestration.drawing.names import COLUMNS, FLIGHT
 from orchestration.drawing.phase import surface
 from orchestration.drawing.spectrum import welch
-from orchestration.drawing.style import SCREEN, STYLES, Style
+from orchestration.drawing.style import SCREEN, STYLES, Style, save
 from orchestration.results.differences import told_apart
 from quadcosim import Result, Scenario, UsageError
 
@@ -99,6 +99,20 @@ def test_runs_of_different_systems_are_not_laid_over_each_other(flight: Result, 
         draw([flight, tank])
     with pytest.raises(UsageError, match="--figure beauty: expected one of path, errors"):
         draw(flight, ["beauty"])
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_flight_that_rests_where_it_should_is_drawn_too(tmp_path: Path) -> None:
+    """All its errors are zero, of which there is no logarithm."""
+    zero = [f"plant.initial.{what}.{axis}" for what in ("position", "quaternion") for axis in "xyz"]
+    zero += [f"plant.wind.amplitude.{axis}" for axis in "xyz"]
+    zero += [f"controller.trajectory.{what}" for what in ("amplitude_x", "amplitude_y", "start_z", "rate_z")]
+    still = Scenario(stop_time=0.1).with_changes(
+        parameters={**dict.fromkeys(zero, 0.0), "plant.initial.quaternion.w": 1.0}
+    )
+    made = draw(quadcosim.run(still))
+    assert {path.stem for path in save(made, tmp_path, replace(SCREEN, dpi=40.0))} == set(FLIGHT)
+    assert made["errors"].axes[0].get_yscale() == "linear"
 
 
 # -- the path ---------------------------------------------------------------------------------------------
