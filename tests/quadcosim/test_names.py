@@ -70,6 +70,12 @@ def documented(cls: type) -> dict[str, str]:
     return found
 
 
+def test_the_packages_that_its_types_are_of_say_that_they_are_typed() -> None:
+    homes = {inspect.getmodule(getattr(quadcosim, name)).__name__.partition(".")[0] for name in CLASSES}  # type: ignore[union-attr]
+    for package in {"quadcosim", "fmu_kit", *homes}:  # else type checkers take what is installed for Any
+        assert (ROOT / package / "py.typed").is_file()
+
+
 def test_a_program_that_uses_the_api_is_typed(tmp_path: Path, request: pytest.FixtureRequest) -> None:
     (tmp_path / "program.py").write_text(PROGRAM)
     (tmp_path / "mypy.ini").write_text(SETTINGS)
