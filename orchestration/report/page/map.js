@@ -34,7 +34,7 @@ function valuesOf(axis) {
 function buildMapControls() {
   const controls = byId("map-controls");
   controls.replaceChildren(
-    choice("Colour", drawable.map((column) => [column.name, column.label]), map.metric.name, (name) => changeMap({ metric: columnsByName.get(name) })),
+    choice("Metric", drawable.map((column) => [column.name, column.label]), map.metric.name, (name) => changeMap({ metric: columnsByName.get(name) })),
     choice("across", axes.map((axis) => [axis.name, axis.label]), map.x.name, (name) => changeMap({ x: columnsByName.get(name) })),
     choice("up", [...axes.map((axis) => [axis.name, axis.label]), [VALUE, "the metric"]], map.y === VALUE ? VALUE : map.y.name, (name) => changeMap({ y: name === VALUE ? VALUE : columnsByName.get(name) })),
   );
