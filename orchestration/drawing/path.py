@@ -14,7 +14,7 @@ from orchestration.drawing.style import Style
 from orchestration.quadrotor.wiring import POSITION, POSITION_REFERENCE
 from orchestration.simulator import Floats
 
-LEAST = 0.2
+LEAST = 0.45
 """of the longest side: so long at least is each side of the box"""
 
 

@@ -11,10 +11,13 @@ from orchestration.drawing.lines import legend_of_runs, logarithmic, positive, w
 from orchestration.drawing.palette import BLACK, BLUE, GREEN, RED
 from orchestration.drawing.run import Run, title
 from orchestration.drawing.style import Style
+from orchestration.drawing.ticks import plain
 from orchestration.simulator import Floats
 
 SEGMENTS = 8
 """Of the run, before they overlap by half"""
+ROUNDING = 1e-18
+"""of the largest density: what is below is not of the signal"""
 FEWEST = 64
 """Values that a segment has at least"""
 
@@ -43,6 +46,10 @@ def spectrum(runs: Sequence[Run], style: Style) -> Figure | None:
         logarithmic(panel)
         panel.set(xscale="log", xlabel="frequency [Hz]")
         panel.set_xlim(frequency[1], frequency[-1])
+        plain(panel.xaxis)
+        if panel.get_yscale() == "log":
+            low, high = panel.get_ylim()
+            panel.set_ylim(max(low, ROUNDING * high), high)
         _mark_rates(panel, runs, style)
     if len(runs) == 1:
         torque.legend(loc="lower left")
