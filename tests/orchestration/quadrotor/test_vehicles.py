@@ -133,7 +133,10 @@ def test_a_file_that_is_no_vehicle_is_refused_in_a_line(text: str, words: str, t
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ("crazyfly", "vehicle crazyfly: expected one of agilicious, crazyflie, hummingbird, paper, or a path that"),
+        (
+            "crazyfly",
+            "vehicle crazyfly: did you mean crazyflie? expected one of agilicious, crazyflie, hummingbird, paper, or",
+        ),
         ("nowhere.toml", "nowhere.toml: expected a readable vehicle file: no such file or directory"),
     ],
 )
