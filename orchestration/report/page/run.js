@@ -252,10 +252,15 @@ function setTime(t) {
   if (timePlot.isDrawn) moveCursor();
 }
 
+/** A number with so many digits behind the point, and no sign on a zero. */
+function fixed(value, digits) {
+  return value.toFixed(digits).replace(/^-(0\.?0*)$/, "$1");
+}
+
 function readout(signals) {
   const { position } = signals.layout.scene;
-  const place = position.map((name) => valueAt(signals, name, player.t).toFixed(3)).join(", ");
-  const angles = ["roll", "pitch", "yaw"].map((name) => `${name} ${valueAt(signals, name, player.t).toFixed(1)}°`).join(", ");
+  const place = position.map((name) => fixed(valueAt(signals, name, player.t), 3)).join(", ");
+  const angles = ["roll", "pitch", "yaw"].map((name) => `${name} ${fixed(valueAt(signals, name, player.t), 1)}°`).join(", ");
   const error = "position error" in signals.columns ? `, ${Number(valueAt(signals, "position error", player.t).toPrecision(3))} m from the reference` : "";
   return `north, east, down ${place} m${error}; ${angles}`;
 }
