@@ -55,6 +55,11 @@ def test_every_block_is_run_read_written_or_said_not_to_be() -> None:
     assert [block.place for block in BLOCKS if block not in known and block.skipped is None] == []
 
 
+def test_an_indented_block_is_lines_for_a_shell_and_formulas_are_marked_as_text() -> None:
+    begins = re.compile(r"[A-Z_]+=\S+ |[\w./-]+( |$)", re.ASCII)
+    assert [f"{block.place}: {line}" for block, line in LINES if not begins.match(line)] == []
+
+
 def test_every_reason_is_one_that_a_reader_understands() -> None:
     reasons = {note.reason for block in BLOCKS for note in block.notes}
     assert all(len(reason.split()) > 1 for reason in reasons)
@@ -101,7 +106,9 @@ def test_every_python_block_compiles(block: Block) -> None:
 FLIGHTS = [words for _, words in COMMANDS if words[0] == "run" and not {"--resume", "--help", "--out"} & set(words)]
 
 
-@pytest.mark.parametrize("words", [w for w in FLIGHTS if not any(".toml" in word for word in w)], ids=" ".join)
+@pytest.mark.parametrize(
+    "words", [w for w in FLIGHTS if not any(word.endswith((".toml", ".csv")) for word in w)], ids=" ".join
+)
 def test_flights_of_the_pages_begin(words: list[str], main: Main) -> None:
     flags = [] if "--stop-time" in words else ["--stop-time", "0.02"]
     main(*(words if flags else words[: words.index("--stop-time")]), "--native", "-q", "--stop-time", "0.02")
