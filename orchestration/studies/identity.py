@@ -26,8 +26,13 @@ ROOTS = ("orchestration.simulation", "orchestration.studies.worker")
 """Where the code that flies begins."""
 QUADROTOR = Path(translation.__file__).with_name("system.toml")
 """What every scenario is a change of"""
-_ASIDE = ("orchestration.fmus", "orchestration.results.tables", "orchestration.studies.store")
-"""What finds FMUs and keeps results; it is imported there and changes no bit of them."""
+_ASIDE = (
+    "orchestration.fmus",
+    "orchestration.drawing.gallery",
+    "orchestration.results.tables",
+    "orchestration.studies.store",
+)
+"""What finds FMUs, keeps results and draws them; it is imported there and changes no bit of them."""
 _PACKAGES = ("orchestration", "fmu_kit")
 _FEATURES = ("fma", "fma4", "avx2", "avx512f")
 """of a processor, by which the C library and numpy choose among their mathematical functions"""
