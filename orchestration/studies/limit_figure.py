@@ -68,7 +68,7 @@ def _values(axes: Axes, found: Limit, scale: float, edge: float | None) -> None:
     if min(values) > 0.0 and max(values) > 20.0 * min(values):
         axes.set_yscale("log")
         axes.yaxis.set_major_formatter("{x:g}")
-        axes.yaxis.set_minor_formatter("{x:g}")
+        axes.yaxis.set_minor_formatter("" if max(values) > 100.0 * min(values) else "{x:g}")
     axes.set_ylabel(labels.with_unit(labels.metric(found.judged or ""), found.judged_unit))
 
 
