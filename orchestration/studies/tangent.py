@@ -166,9 +166,7 @@ class Tangent:
         """The coordinates that `futures` span, and states that span them."""
         self._axes = np.linalg.svd(futures, full_matrices=False)[0][:, :rank]
         coordinates = self._axes.T @ futures
-        import scipy.linalg
-
-        chosen = scipy.linalg.qr(coordinates, mode="r", pivoting=True)[1][:rank] if rank else []
+        chosen = _furthest_apart(coordinates, rank)
         self._pairs = [pairs[i] for i in chosen]
         self._inverse = np.linalg.inv(coordinates[:, chosen]) if rank else np.zeros((0, 0))
 
@@ -265,3 +263,15 @@ def _rank(futures: Floats) -> int:
         return 0
     values = np.linalg.svd(futures, compute_uv=False)
     return int((values > max(SEEN * values[0], NOISE * np.sqrt(futures.size) / PULSE)).sum())
+
+
+def _furthest_apart(columns: Floats, count: int) -> list[int]:
+    """So many columns that span what all do, shape (n, m): each the longest beyond those before (QR with pivoting)."""
+    rest, chosen = columns.copy(), list[int]()
+    for _ in range(count):
+        longest = int(np.argmax(np.linalg.norm(rest, axis=0)))
+        direction = rest[:, longest] / np.linalg.norm(rest[:, longest])
+        rest -= np.outer(direction, direction @ rest)
+        rest[:, longest] = 0.0
+        chosen.append(longest)
+    return chosen
