@@ -3,7 +3,7 @@
 # make coverage: all tests, and which lines they run. make site: the documentation as a site, in site/.
 # make bench: time the loop. make figures, make findings, make interop: what docs/ and examples/ show, and the icons of the FMUs.
 # make release: wheel, sources, native FMUs, SSP and their checksums, in dist/.
-# make newcomer: follow every block of every page in a copy of what is committed; about an hour.
+# make newcomer: follow every block of every page in a copy of what is committed; an hour or more.
 # Each makes its own environment first.
 PYTHON ?= python3
 BIN := .venv/bin

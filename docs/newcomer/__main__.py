@@ -1,6 +1,6 @@
 """python -m docs.newcomer: clones what is committed into an empty folder, and follows all pages there.
 
-It ends at the first block that does not do what its page says, with exit code 1. All of it takes about an hour; some
+It ends at the first block that does not do what its page says, with exit code 1. All of it takes an hour or more; some
 pages only: python -m docs.newcomer README.md docs/start.md, which are followed in the order in which they are given.
 """
 
