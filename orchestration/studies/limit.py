@@ -109,7 +109,7 @@ class Limit:
             "local limit, of small errors at rest": self.local_limit,
             "refuted from": self.refuted_limit,
         }
-        rows = [(name, html.number(value), self.unit or "") for name, value in found.items() if value is not None]
+        rows = [(name, html.number(value), "" if value is None else self.unit or "") for name, value in found.items()]
         return html.card(
             f"The limit of {self.of}", None, None, self.note, [*rows, ("values tried", str(len(self.tried)), "")]
         )
