@@ -68,7 +68,7 @@ def unlabelled(figure: Figure) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("style", [SCREEN, NARROW, STYLES["slides"]], ids=["screen", "narrow", "slides"])
+@pytest.mark.parametrize("style", [SCREEN, NARROW], ids=["screen", "narrow"])
 def test_every_axis_of_every_figure_has_a_name_and_a_unit(style: Style, flight: Result, slow: Result) -> None:
     for results in ([flight], [flight, slow]):
         made = draw(results, style=style)
