@@ -1,5 +1,6 @@
 """Settings and fixtures that all tests share."""
 
+import math
 import os
 from pathlib import Path
 
@@ -7,7 +8,7 @@ import hypothesis
 import pytest
 
 from orchestration import fmus
-from orchestration.command import cli
+from orchestration.command import cli, terminal
 from orchestration.quadrotor.wiring import MODELS
 from tests.commands import Done, Main
 from tests.fmus.making import MAKINGS, Making
@@ -41,8 +42,12 @@ def built(making: Making, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
 
 
 @pytest.fixture
-def main(capsys: pytest.CaptureFixture[str]) -> Main:
-    """The command `quadcosim` in this process, which saves the imports: for what does not hang on the process."""
+def main(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Main:
+    """The command `quadcosim` in this process, which saves the imports: for what does not hang on the process.
+
+    It does not say how far it is, as it does where work takes long: how fast the machine is changes no test.
+    """
+    monkeypatch.setattr(terminal, "SPARSE", math.inf)
 
     def call(*arguments: str | Path, code: int = 0) -> Done:
         capsys.readouterr()

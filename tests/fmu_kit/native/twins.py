@@ -1,5 +1,6 @@
 """A slave in Python and the same one compiled, called alike: what they answer, to the last bit."""
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -41,6 +42,10 @@ def exact(value: float | int | bool) -> str:
     return "nan" if value != value else float(value).hex()
 
 
+PLACE = re.compile(r" \(in [^()]+, line \d+\)$")
+"""Where in Python something diverged, which C does not say"""
+
+
 @dataclass
 class InPython:
     """The slave as it is."""
@@ -75,7 +80,8 @@ class InPython:
             call()
         except Exception as error:
             diverged = any(getattr(message, "category", "") == "divergence" for message in self.slave.log_queue)
-            return "diverged" if diverged else "failed", str(error).splitlines()[0].replace("%%", "%")
+            line = str(error).splitlines()[0].replace("%%", "%")
+            return ("diverged", PLACE.sub("", line)) if diverged else ("failed", line)
         words = [message.msg.replace("%%", "%") for message in self.slave.log_queue]
         self.slave.log_queue.clear()
         found = [*self.slave._reals, *self.slave._others.values()]

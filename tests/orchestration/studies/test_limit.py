@@ -591,7 +591,7 @@ def test_find_flies_the_scenario_and_its_result_is_json() -> None:
     found = find(base, "period", tolerance=0.02)
     fields = json.loads(json.dumps(dataclasses.asdict(found)))
     assert fields.keys() == {
-        "of", "local_limit", "local_method", "local_accuracy", "local_limit_outside",
+        "of", "unit", "judged", "judged_unit", "local_limit", "local_method", "local_accuracy", "local_limit_outside",
         "large_signal_limit", "refuted_limit", "horizon", "tolerance",
         "scan", "confidence", "seeds", "flies_above", "continuous", "tried", "note",
     }  # fmt: skip
@@ -602,6 +602,7 @@ def test_find_flies_the_scenario_and_its_result_is_json() -> None:
     assert (fields["of"], fields["tolerance"], fields["confidence"]) == ("period", 0.02, None)
     assert (fields["horizon"], fields["scan"], fields["continuous"]) == (2.0, 0.005, None)
     assert [one["value"] for one in fields["tried"]][:5] == [0.001, 0.002, 0.003, 0.004, 0.005]
+    assert 0.0 < fields["tried"][0].pop("measured") < 0.005
     assert fields["tried"][0] == {
         "value": 0.001, "outcome": "settled", "divergence_time": None, "flew": 1, "runs": 1, "share": None,
     }  # fmt: skip

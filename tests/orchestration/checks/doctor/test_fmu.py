@@ -1,6 +1,7 @@
 """What an .fmu file says of its needs."""
 
 import math
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -46,7 +47,7 @@ def test_the_declared_python_is_read(plant: Path, tmp_path: Path) -> None:
 
 def test_an_execution_tool_is_named(plant: Path, tmp_path: Path) -> None:
     old, new = 'needsExecutionTool="false"', 'needsExecutionTool="true"'
-    assert read_fmu(described(plant, tmp_path / "a.fmu", old, new)).needs_tool == "quadcosim"
+    assert read_fmu(described(plant, tmp_path / "a.fmu", old, new)).needs_tool == f"quadcosim {version('quadcosim')}"
 
 
 # -- binaries -------------------------------------------------------------------------------------------------
