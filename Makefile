@@ -53,6 +53,8 @@ bench: .venv/.test
 	$(BIN)/python -m benchmarks.native
 	$(BIN)/python -m benchmarks.engines
 	$(BIN)/python -m benchmarks.batch
+	$(BIN)/python -m benchmarks.stores
+	$(BIN)/python -m benchmarks.cluster
 
 figures: .venv/.base
 	$(BIN)/python -m docs.make_figures
