@@ -78,9 +78,12 @@ _OF_THE_KIT = ("Slave", "Input", "Output", "Parameter", "State", "Local", "Vec3"
 
 
 def _is_found(module: str) -> bool:
-    """Whether a module of this name is installed; one in the folder of whoever asks does not count."""
+    """Whether a module of this name is installed; one that lies in the folder of whoever asks does not count."""
     found = importlib.util.find_spec(module)
-    return found is not None and Path.cwd() not in Path(found.origin or Path.cwd() / "none").parents
+    if found is None or found.origin is None:  # a folder that is no package
+        return False
+    here = Path.cwd()
+    return Path(found.origin) not in (here / f"{module}.py", here / module / "__init__.py")
 
 
 def _quoted(text: str) -> str:
