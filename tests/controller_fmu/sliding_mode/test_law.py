@@ -31,6 +31,7 @@ from fmu_kit.trajectory import Reference, Trajectory
 from orchestration.master.sources import NUMPY
 from tests.controller_fmu.closed_loop import assert_is_the_rate, between, inertias, quaternions, trajectories, triple
 from tests.reference.tables import LAWS, law_at
+from tests.scalars import PRECISE
 
 Z = Vec3(0.0, 0.0, 1.0)
 IDENTITY = Quaternion.from_xyzw(0.0, 0.0, 0.0, 1.0)
@@ -469,18 +470,6 @@ def test_exponent_of_one_has_no_boundary_layer() -> None:
 
 # -- (g) other scalars --------------------------------------------------------------------------------------
 
-PRECISE = ScalarOps(
-    sqrt=mpmath.sqrt,
-    tanh=mpmath.tanh,
-    sin=mpmath.sin,
-    cos=mpmath.cos,
-    atan2=mpmath.atan2,
-    sign=mpmath.sign,
-    maximum=max,
-    where=lambda condition, a, b: a if condition else b,
-    all=bool,
-)
-"""Scalars of as many digits as wanted."""
 SYMBOLIC = ScalarOps(
     sqrt=sympy.sqrt,
     tanh=sympy.tanh,

@@ -10,26 +10,15 @@ import pytest
 from controller_fmu.sliding_mode.law import Gains, evaluate
 from controller_fmu.vehicle import Measurement, Model
 from fmu_kit.algebra import Quaternion, Vec3
-from fmu_kit.scalar import ScalarOps
 from fmu_kit.trajectory import Trajectory
 from orchestration import fmus
 from tests.fmus.expected import COMMAND, MEASUREMENT
 from tests.fmus.instance import Instance
+from tests.scalars import PRECISE
 
 START = 0.3
 """[s]"""
 OUTPUTS = (*COMMAND, "energy", "theta.x", "desired_quaternion.w", "desired_angular_velocity.y")
-EXACT = ScalarOps(
-    sqrt=mpmath.sqrt,
-    tanh=mpmath.tanh,
-    sin=mpmath.sin,
-    cos=mpmath.cos,
-    atan2=mpmath.atan2,
-    sign=mpmath.sign,
-    maximum=max,
-    where=lambda condition, a, b: a if condition else b,
-    all=bool,
-)
 Matrix = npt.NDArray[np.float64]
 
 
@@ -65,9 +54,9 @@ def exact_outputs(values: list[mpmath.mpf]) -> list[mpmath.mpf]:
     vectors = {
         name: Vec3(*(at[f"{name}.{axis}"] for axis in "xyz")) for name in ("position", "velocity", "angular_velocity")
     }
-    quaternion = Quaternion.from_xyzw(*(at[f"quaternion.{axis}"] for axis in "xyzw")).normalised(EXACT)
+    quaternion = Quaternion.from_xyzw(*(at[f"quaternion.{axis}"] for axis in "xyzw")).normalised(PRECISE)
     measurement = Measurement(vectors["position"], vectors["velocity"], quaternion, vectors["angular_velocity"])
-    found = evaluate(measurement, Trajectory().at(mpmath.mpf(START), EXACT), Gains(), Model(), EXACT)
+    found = evaluate(measurement, Trajectory().at(mpmath.mpf(START), PRECISE), Gains(), Model(), PRECISE)
     return [
         found.thrust, *found.torque, found.energy, found.theta.x, found.desired_quaternion.scalar,
         found.desired_angular_velocity.y,

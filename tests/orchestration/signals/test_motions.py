@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import sympy
 
-from fmu_kit.scalar import ScalarOps
 from fmu_kit.trajectory import Reference, Trajectory
 from orchestration.master.sources import EXACT, by_name
 from orchestration.signals.library import KINDS, SIGNALS, made
 from orchestration.signals.motions import MOTIONS, Circle, Helix, Lemniscate, Motion, Paper, Step
 from orchestration.system.model import MOTION
 from quadcosim import UsageError
+from tests.scalars import PRECISE
 
 EXAMPLES = {
     "hover": {"x": 1.0, "z": -2.0},
@@ -23,17 +23,6 @@ EXAMPLES = {
     "helix": {"radius": 1.5, "period": 7.0, "ramp": 2.0, "rate_z": -0.3},
     "paper": {"ramp": 2.0},
 }
-MPMATH = ScalarOps(
-    sqrt=mpmath.sqrt,
-    tanh=mpmath.tanh,
-    sin=mpmath.sin,
-    cos=mpmath.cos,
-    atan2=mpmath.atan2,
-    sign=mpmath.sign,
-    maximum=max,
-    where=lambda condition, a, b: a if condition else b,
-    all=bool,
-)
 
 
 def orders(one: Reference) -> list[list[float]]:
@@ -51,10 +40,10 @@ def test_derivatives_are_those_of_the_position_in_fifty_digits(name: str, t: str
     motion = of(name)
     with mpmath.workdps(50):
         time = mpmath.mpf(t)
-        found = orders(motion.at(time, MPMATH))
+        found = orders(motion.at(time, PRECISE))
         for axis in range(3):
             for order in range(1, 5):
-                true = mpmath.diff(lambda x, axis=axis: orders(motion.at(x, MPMATH))[0][axis], time, order)
+                true = mpmath.diff(lambda x, axis=axis: orders(motion.at(x, PRECISE))[0][axis], time, order)
                 assert abs(found[order][axis] - true) < mpmath.mpf("1e-8")  # the coefficients are floats
 
 
