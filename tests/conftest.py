@@ -2,6 +2,8 @@
 
 import math
 import os
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import hypothesis
@@ -18,6 +20,20 @@ hypothesis.settings.register_profile("local", deadline=None)
 hypothesis.settings.load_profile("ci" if os.environ.get("CI") else "local")
 
 DATA = Path(__file__).parent / "data"
+
+
+def surroundings() -> dict[str, object]:
+    """What all tests of a process share: its environment, its folder, where its temporary files go."""
+    variables = {name: value for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST"}
+    return {"environment": variables, "folder": os.getcwd(), "temporary": tempfile.gettempdir()}
+
+
+@pytest.fixture(autouse=True)
+def leaves_its_surroundings() -> Iterator[None]:
+    """A test that changes them would be a fault of another one."""
+    before = surroundings()
+    yield
+    assert surroundings() == before
 
 
 @pytest.fixture(scope="session")

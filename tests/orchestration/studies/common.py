@@ -128,12 +128,14 @@ def bits(path: Path) -> list[dict[str, Any]]:
 # -- the command ------------------------------------------------------------------------------------------
 
 
-def start(*arguments: str | Path, cwd: Path) -> "subprocess.Popen[str]":
-    """The installed script in a process of its own."""
+def start(*arguments: str | Path, cwd: Path, temporary: Path | None = None) -> "subprocess.Popen[str]":
+    """The installed script in a process of its own, with a temporary folder of its own where one is given."""
     assert SCRIPT is not None, "expected the script beside this Python: pip install -e ."
     return subprocess.Popen(
         [SCRIPT, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8",
-        cwd=cwd, env={**os.environ, "PYTHONIOENCODING": "utf-8", "COLUMNS": "200", "NO_COLOR": "1"},
+        cwd=cwd,
+        env={**os.environ, "PYTHONIOENCODING": "utf-8", "COLUMNS": "200", "NO_COLOR": "1"}
+        | ({} if temporary is None else {"TMPDIR": str(temporary)}),
     )  # fmt: skip
 
 

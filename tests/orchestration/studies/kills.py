@@ -4,9 +4,9 @@ Whatever is killed, the table is in the end that of an undisturbed sweep to the 
 """
 
 import argparse
-import os
 import random
 import shutil
+import subprocess
 import tempfile
 import time
 from pathlib import Path
@@ -24,6 +24,7 @@ from tests.orchestration.studies.common import (
 )
 
 STORE = Path("results") / "study" / "study.sqlite"
+TEMPORARY = "temporary"
 LONGEST = 1.5
 """[s] from one kill to the next: into the start of workers, their flights and the end"""
 
@@ -42,6 +43,10 @@ class Tally:
         return f"{self.coordinators} coordinators, {self.workers} workers killed; {self.compared} whole tables compared"
 
 
+def sweep_in(folder: Path, workers: int) -> "subprocess.Popen[str]":
+    return start("sweep", "study.toml", "--workers", str(workers), cwd=folder, temporary=folder / TEMPORARY)
+
+
 def disturbed(folder: Path, reference: list[dict[str, Any]], *, workers: int, kills: int, seed: int = 0) -> Tally:
     """Fly the noisy study again and again until so many processes have been killed, and once to its end.
 
@@ -49,26 +54,25 @@ def disturbed(folder: Path, reference: list[dict[str, Any]], *, workers: int, ki
     """
     draw, tally = random.Random(seed), Tally()
     (folder / "study.toml").write_text(NOISY)
-    (folder / "temporary").mkdir()
-    os.environ["TMPDIR"] = str(folder / "temporary")
+    (folder / TEMPORARY).mkdir()
     while tally.kills < kills:
         one_start(folder, workers, kills, draw, tally)
         if (folder / STORE).is_file() and bits(folder / STORE) == reference:
             tally.compared += 1
             shutil.rmtree(folder / "results")
-    with start("sweep", "study.toml", "--workers", str(workers), cwd=folder) as coordinator:
+    with sweep_in(folder, workers) as coordinator:
         out, err = coordinator.communicate(timeout=120)
     assert coordinator.returncode == 0, out + err
     assert bits(folder / STORE) == reference
     tally.compared += 1
     wait_until(lambda: processes_in(folder) == [], seconds=15.0)
-    assert list((folder / "temporary").iterdir()) == []
+    assert list((folder / TEMPORARY).iterdir()) == []
     return tally
 
 
 def one_start(folder: Path, workers: int, kills: int, draw: random.Random, tally: Tally) -> None:
     """Start the sweep and kill parts of it until it ends."""
-    with start("sweep", "study.toml", "--workers", str(workers), cwd=folder) as coordinator:
+    with sweep_in(folder, workers) as coordinator:
         while coordinator.poll() is None:
             time.sleep(draw.uniform(0.0, LONGEST))
             mates = workers_of(coordinator.pid)
@@ -91,7 +95,7 @@ def processes_in(folder: Path) -> list[int]:
     found = []
     for process in Path("/proc").iterdir():
         try:
-            of_here = process.name.isdigit() and str(folder / "temporary").encode() in (
+            of_here = process.name.isdigit() and str(folder / TEMPORARY).encode() in (
                 process / "cmdline"
             ).read_bytes()  # fmt: skip
         except OSError:  # has ended meanwhile
