@@ -56,7 +56,8 @@ def sweep(
     lines = [f"{summary.path}: {summary.total} runs, {summary.flown} flown now{failed}"]
     if summary.agreement is not None:
         lines.append(f"--engine batch: {summary.agreement}")
-    return Answer(document=summary, lines=lines, good=not summary.failed)
+    document = {name: getattr(summary, name) for name in ("total", "flown", "failed", "path", "agreement")}
+    return Answer(document=document, lines=lines, good=not summary.failed)
 
 
 def status(study: StudyFile, out: Out = None) -> Answer:

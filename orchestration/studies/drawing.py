@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure
 
-from orchestration.drawing.style import SCREEN, Style
+from orchestration.drawing.style import SCREEN, Style, save
 from orchestration.errors import UsageError
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.request import Request, system_meant
@@ -34,7 +35,7 @@ def metric_of(study: Study, metric: str | None) -> str:
     known = [name for name in metrics_with(system.objectives) if name not in TEXTS or _is_screened(study)]
     chosen = (judged(system) or "horizon") if metric is None else metric
     if chosen not in known:
-        raise UsageError(f"--metric {chosen}: expected one of {', '.join(known)}; every figure shows the outcome")
+        raise UsageError(f"metric {chosen}: expected one of {', '.join(known)}; every figure shows the outcome")
     return chosen
 
 
@@ -43,27 +44,40 @@ def draw_study(study: Study, folder: Path | None, metric: str | None = None, sty
 
     Raises `UsageError` for a metric that does not exist, or axes that no figure here is for.
     """
-    metric, system = metric_of(study, metric), study.origin
     path = store_path(study.name, folder)
-    table, unit = frame(path), units_in(path).get(metric)
-    if _is_screened(study):
-        indices = indices_of(study, numbers(table, metric), metric)
-        listed = sensitivity.write(indices, path.parent / f"sensitivity_{metric}.csv")
-        bars = figures.save(lambda how: figures.sensitivity_bars(indices, metric, how), listed.with_suffix(""), style)
-        return [listed, *bars]
+    made, indices = study_figures(study, path, metric, style)
+    listed = [sensitivity.write(indices, (path.parent / next(iter(made))).with_suffix(".csv"))] if indices else []
+    return listed + save(made, path.parent, style)
+
+
+def study_figures(
+    study: Study, store: Path, metric: str | None = None, style: Style = SCREEN
+) -> tuple[dict[str, Figure], list[sensitivity.Index]]:
+    """The figures of a metric over the axes of `study` by name, and the sensitivity indices that they show, if any.
+
+    Raises `UsageError` as `draw_study` does.
+    """
+    metric = metric_of(study, metric)
+    table, unit = frame(store), units_in(store).get(metric)
+    indices = indices_of(study, numbers(table, metric), metric) if _is_screened(study) else []
+    with style.applied():
+        if indices:
+            return {f"sensitivity_{metric}": figures.sensitivity_bars(indices, metric, style)}, indices
+        return _over_axes(study, table, metric, unit, style), []
+
+
+def _over_axes(study: Study, table: "pd.DataFrame", metric: str, unit: str | None, style: Style) -> dict[str, Figure]:
     axes = tuple(axis for axis in study.axes if _is_numeric(axis))
     if len(axes) != len(study.axes):
         raise UsageError(f"{study.name}: expected axes of numbers to draw")
-    words, plain, mapped = system.criterion.outcomes, path.parent / metric, path.parent / f"{metric}_map"
+    system = study.origin
+    words = system.criterion.outcomes
     if len(axes) > 2:
-        return figures.save(lambda how: figures.scatter(table, axes, metric, words, unit=unit, style=how), plain, style)
-    bound = edge(system, metric)
-    written = figures.save(
-        lambda how: figures.lines(table, axes, metric, words, bound, unit=unit, style=how), plain, style
-    )
+        return {metric: figures.scatter(table, axes, metric, words, unit=unit, style=style)}
+    made = {metric: figures.lines(table, axes, metric, words, edge(system, metric), unit=unit, style=style)}
     if len(axes) == 2 and all(axis.values is not None for axis in axes):
-        written += figures.save(lambda how: heat_map(table, axes, metric, words, unit=unit, style=how), mapped, style)
-    return written
+        made[f"{metric}_map"] = heat_map(table, axes, metric, words, unit=unit, style=style)
+    return made
 
 
 def draw_limit(request: Request, found: Limit, folder: Path, style: Style = SCREEN) -> list[Path]:

@@ -103,7 +103,9 @@ def sweep(
             opened.describe({AGREEMENT: agreement.as_text()})
             agreement.expect()
         failed = opened.counts().get("failed", 0)
-    return Swept(total=counted.total, flown=len(missing), failed=failed, path=path, agreement=agreement)
+    return Swept(
+        study=study, total=counted.total, flown=len(missing), failed=failed, path=path, agreement=agreement
+    )  # fmt: skip
 
 
 def _expect_workers(workers: int, dask: str | None) -> None:

@@ -9,11 +9,14 @@ from orchestration.extras import explained
 from orchestration.results import html
 from orchestration.studies.lanes import Agreement
 from orchestration.studies.store import open_for_reading
+from orchestration.studies.study import Study
 from orchestration.studies.table import dataset, frame, units_in
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+
+    from orchestration.drawing.gallery import Figures
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -26,6 +29,8 @@ class Swept:
     """How many of them this sweep has flown; the others were there."""
     failed: int
     """How many runs in the store have failed, as `message` in their row says; a run that diverges has not."""
+    study: Study
+    """What was flown."""
     path: Path
     """The store of the study."""
     agreement: Agreement | None = None
@@ -44,6 +49,19 @@ class Swept:
             outcomes = Counter(str(outcome or "failed") for block in opened.blocks() for outcome in block["outcome"])
         rows = [(outcome, str(count), "runs") for outcome, count in outcomes.most_common()]
         return html.card("A study", None, None, self._counts(), rows)
+
+    @explained
+    def plot(self, metric: str | None = None) -> "Figures":
+        """The figures of a metric over the axes, by default of what the criterion is about; a notebook shows them.
+
+        Raises `UsageError` for a metric that does not exist, or axes that no figure is for.
+        """
+        from orchestration.drawing.gallery import Figures
+        from orchestration.drawing.style import SCREEN
+        from orchestration.studies.drawing import study_figures
+
+        made, _ = study_figures(self.study, self.path, metric, SCREEN)
+        return Figures(made, SCREEN)
 
     @explained
     def to_pandas(self) -> "pd.DataFrame":

@@ -44,6 +44,16 @@ def test_a_notebook_shows_what_became_of_the_runs(swept: Swept) -> None:
     assert ">2<" in swept._repr_html_()
 
 
+def test_a_sweep_draws_what_its_criterion_is_about_or_what_is_asked_for(swept: Swept) -> None:
+    assert list(swept.plot()) == ["ultimate_bound"]
+    figures = swept.plot("position_rmse")
+    (panel,) = figures["position_rmse"].axes
+    assert panel.get_xlabel() == "period [ms]"
+    assert figures._repr_html_().startswith("<img")
+    with pytest.raises(UsageError, match="metric beauty: expected one of"):
+        swept.plot("beauty")
+
+
 def test_the_rows_of_a_study_say_the_unit_of_an_axis_in_parquet_and_mat(swept: Swept) -> None:
     from scipy.io import loadmat
 

@@ -117,7 +117,7 @@ def test_more_axes_are_drawn_as_dots_over_each(tmp_path: Path) -> None:
 
 
 def test_a_metric_that_does_not_exist_is_told_with_those_that_do(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="--metric beauty: expected one of good, horizon, position_rmse"):
+    with pytest.raises(UsageError, match="metric beauty: expected one of good, horizon, position_rmse"):
         draw_study(invented(tmp_path, study(PERIODS)), tmp_path, "beauty")
 
 

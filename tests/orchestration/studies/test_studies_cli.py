@@ -149,7 +149,7 @@ def test_a_study_that_was_never_flown_is_wrong_usage(folder: Path, command: str,
     ("arguments", "said"),
     [
         (("sweep", "study.toml", "--workers", "0"), "--workers 0: expected at least 1"),
-        (("draw", "study.toml", "--metric", "beauty"), "--metric beauty: expected one of good, horizon"),
+        (("draw", "study.toml", "--metric", "beauty"), "metric beauty: expected one of good, horizon"),
     ],
 )
 def test_options_that_cannot_be_are_wrong_usage(

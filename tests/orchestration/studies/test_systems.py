@@ -91,7 +91,7 @@ def test_a_study_of_a_system_is_not_flown_again_unless_an_objective_changes(swep
 def test_the_figure_of_a_system_is_of_what_its_criterion_is_about(swept: tuple[Study, Path]) -> None:
     chosen, folder = swept
     assert [path.name for path in draw_study(chosen, folder)] == ["late.png", "late_map.png"]
-    with pytest.raises(UsageError, match="--metric ultimate_bound: expected one of good, horizon, late, peak, "):
+    with pytest.raises(UsageError, match="metric ultimate_bound: expected one of good, horizon, late, peak, "):
         draw_study(chosen, folder, "ultimate_bound")
 
 
