@@ -26,6 +26,8 @@ class Tool:
     """the component that it flies, if it is no master"""
     converts: bool = False
     """whether it passes on values between variables of different types"""
+    sets_reals_only: bool = False
+    """whether it sets any parameter as a Real, which one of another type refuses"""
     python: str | None = None
     """environment variable that names a Python with its packages, where they do not go with those of this project"""
 
@@ -92,8 +94,14 @@ TOOLS = {
             call="container:fly_sequential",
             converts=True,
         ),
-        Tool(name="cofmupy", packages=("cofmupy",), call="cofmupy:fly_jacobi", python=COFMUPY),
-        Tool(name="cofmupy gauss_seidel", packages=("cofmupy",), call="cofmupy:fly_gauss_seidel", python=COFMUPY),
+        Tool(name="cofmupy", packages=("cofmupy",), call="cofmupy:fly_jacobi", python=COFMUPY, sets_reals_only=True),
+        Tool(
+            name="cofmupy gauss_seidel",
+            packages=("cofmupy",),
+            call="cofmupy:fly_gauss_seidel",
+            python=COFMUPY,
+            sets_reals_only=True,
+        ),
         Tool(name="fmpy, plant alone", packages=("fmpy",), call="fmpy:fly_plant", alone="plant"),
         Tool(name="fmpy, controller alone", packages=("fmpy",), call="fmpy:fly_controller", alone="controller"),
     )

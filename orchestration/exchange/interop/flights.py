@@ -14,7 +14,7 @@ from orchestration.exchange.interop.catalogue import Tool
 from orchestration.exchange.interop.copies import expect_traceable, traced_copy
 from orchestration.exchange.interop.trace import Trace, read_trace
 from orchestration.exchange.ssp import writing
-from orchestration.exchange.ssp.carried import carried, has_clock, wholly_carried
+from orchestration.exchange.ssp.carried import Part, carried, has_clock, wholly_carried
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_instance
@@ -22,7 +22,7 @@ from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import in_its_own_words, system_of
 from orchestration.simulation import prepared
 from orchestration.simulator import Floats, Transfer
-from orchestration.system.model import System
+from orchestration.system.model import Parameter, System
 from orchestration.system.paths import changed
 from orchestration.system.times import exact_nanoseconds
 
@@ -79,7 +79,7 @@ class Flights:
             ssp=writing.write(system, folder / "loop.ssp"),
             step=self.step,
             stop=system.stop_time,
-            parameters={part.name: part.parameters for part in parts},
+            parameters={part.name: parameters_for(tool, part) for part in parts},
             connections=self.loop.connections,
             signals=self.loop.signals,
             recorded=self._folder / "recorded.npy",
@@ -117,6 +117,20 @@ class Flights:
                 raise QuadcosimError(f"in this project's master, {order}: {result.divergence}; nothing to compare")
             self._own[key] = np.column_stack([result.signals[name] for name in ("time", *self.loop.signals)])
         return self._own[key]
+
+
+def parameters_for(tool: Tool, part: Part) -> dict[str, Parameter]:
+    """The parameters that a tool is to set; raises `UsageError` for one that it cannot and that is not as it starts."""
+    if not tool.sets_reals_only:
+        return part.parameters
+    others = {name: value for name, value in part.parameters.items() if part.variable(name).kind != "Real"}
+    for name, value in others.items():
+        start = part.variable(name).start
+        if str(value) != start:
+            raise UsageError(
+                f"{tool.name}: {part.name}.{name} = {value}: it sets parameters of type Real only; expected {start}"
+            )
+    return {name: value for name, value in part.parameters.items() if name not in others}
 
 
 def _with_fmus(system: System, fmus: Mapping[str, Path]) -> System:

@@ -92,6 +92,14 @@ __attribute__((constructor)) static void open_own(void)
 #undef CALL
 }
 
+EXPORT void finalizePythonInterpreter(void); /* what an FMU with Python inside asks of its library as a process ends */
+void finalizePythonInterpreter(void)
+{
+    void (*finalize)(void) = (void (*)(void))dlsym(own, "finalizePythonInterpreter");
+    if (finalize)
+        finalize();
+}
+
 __attribute__((destructor)) static void close_own(void)
 {
     fclose(record);

@@ -12,6 +12,9 @@ import pytest
 from orchestration.exchange.interop import tools
 from orchestration.exchange.interop.assignment import Job
 from orchestration.exchange.interop.catalogue import TOOLS
+from orchestration.exchange.interop.flights import parameters_for
+from orchestration.exchange.ssp.carried import Part, carried
+from quadcosim import Scenario, UsageError
 from tests.orchestration.exchange.interop.common import LOOP
 
 COORDINATOR = """
@@ -80,3 +83,23 @@ def test_its_rows_have_the_time_at_the_end_of_each_step(tmp_path: Path) -> None:
     assert rows.shape == (10, 1 + len(LOOP.signals))
     assert rows[:, 0] == pytest.approx(0.01 * np.arange(1, 11))
     assert (rows[:, 1:] == 7.0).all()
+
+
+def part(name: str, **parameters: float) -> Part:
+    """A component of the paper's flight, with some parameters of its own."""
+    asked = Scenario().with_changes(parameters={f"{name}.{variable}": value for variable, value in parameters.items()})
+    return next(part for part in carried(asked).parts if part.name == name)
+
+
+def test_a_parameter_that_is_no_real_is_left_where_it_starts() -> None:
+    given = part("controller", coupling=2.0)
+    assert given.parameters["stages"] == 3
+    assert parameters_for(TOOLS["ecos"], given) == given.parameters
+    reals = parameters_for(TOOLS["cofmupy"], given)
+    assert given.parameters.keys() - reals.keys() == {"stages"}
+    assert reals["coupling"] == 2.0
+
+
+def test_a_parameter_that_is_no_real_and_is_changed_is_refused() -> None:
+    with pytest.raises(UsageError, match=r"cofmupy: controller.stages = 2: it sets .* type Real only; expected 3"):
+        parameters_for(TOOLS["cofmupy"], part("controller", stages=2))
