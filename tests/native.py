@@ -1,4 +1,4 @@
-"""The same slaves twice, in Python and written out as C, and what two flights of them have in common."""
+"""Slaves written out as C: the flight of them, and what it has in common with that of the same slaves in Python."""
 
 import sys
 from collections.abc import Iterable
@@ -9,7 +9,11 @@ import numpy as np
 from fmu_kit.bundle import Target
 from fmu_kit.native.compiler import Mathematics
 from orchestration.results.result import Result
+from quadcosim import Scenario
 from tests.fmus.process import run
+
+NATIVE = Scenario().with_fmus(plant="native/QuadrotorPlant", controller="native/UnifiedController")
+"""The paper's flight by the FMUs that fly fastest, with the same rows as those with Python inside."""
 
 
 def natives(targets: Iterable[Target], folder: Path, mathematics: Mathematics) -> dict[str, Path]:

@@ -1,15 +1,18 @@
 """Flights that the tests of the API share."""
 
+import dataclasses
+from typing import Any
+
 import pytest
 
 import quadcosim
 from quadcosim import Result, Scenario
+from tests.native import NATIVE
 
 
-def native(**fields: object) -> Scenario:
+def native(**fields: Any) -> Scenario:
     """A short flight of native FMUs."""
-    scenario = Scenario(**{"stop_time": 0.2, **fields})  # type: ignore[arg-type]
-    return scenario.with_fmus(plant="native/QuadrotorPlant", controller="native/UnifiedController")
+    return dataclasses.replace(NATIVE, **{"stop_time": 0.2, **fields})
 
 
 @pytest.fixture(scope="session")

@@ -1,5 +1,6 @@
 """The page in a browser: what is drawn, what keys and clicks do, and that nothing is asked of a network."""
 
+import dataclasses
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,11 +12,11 @@ from orchestration.report.writing import report
 from orchestration.simulation import run
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import sweep
-from quadcosim import FmuChoice, Scenario, Timing
+from quadcosim import Scenario, Timing
+from tests.native import NATIVE
 from tests.orchestration.studies.common import axis
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
-NATIVE = {"controller": FmuChoice(fmu="native/UnifiedController"), "plant": FmuChoice(fmu="native/QuadrotorPlant")}
 Show = Callable[[Path], Any]
 
 
@@ -52,8 +53,8 @@ def show(browser: Any) -> Iterator[Show]:
     assert [url for url in asked if not url.startswith("file:")] == []
 
 
-def scenario(**timing: float) -> Scenario:
-    return Scenario(stop_time=2.0, timing=Timing(plant_interval=0.005, **timing), **NATIVE)  # type: ignore[arg-type]
+def scenario(**timing: Any) -> Scenario:
+    return dataclasses.replace(NATIVE, stop_time=2.0, timing=Timing(plant_interval=0.005, **timing))
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +72,7 @@ def of_study(show: Show, tmp_path_factory: pytest.TempPathFactory) -> Any:
     study = Study(name=name, base=scenario(), axes=(axis("timing.period", 0.01, 0.2), axis("timing.delay", 0.0, 0.01)))
     sweep(study, folder=folder)
     file = folder / "study.toml"
-    fmus = "".join(f'[base.{side}]\nfmu = "{choice.fmu}"\n' for side, choice in NATIVE.items())
+    fmus = f'[base.plant]\nfmu = "{NATIVE.plant.fmu}"\n[base.controller]\nfmu = "{NATIVE.controller.fmu}"\n'
     axes = "".join(
         f'[[axes]]\nname = "timing.{key}"\nvalues = {values}\n'
         for key, values in (("period", [0.01, 0.2]), ("delay", [0.0, 0.01]))

@@ -1,5 +1,6 @@
 """The files of a run say themselves what unit their columns have."""
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -8,14 +9,15 @@ import pytest
 
 import quadcosim
 from orchestration.results.run_directory import keep_flight
-from quadcosim import Result, Scenario, save_run
+from quadcosim import Result, save_run
+from tests.native import NATIVE
 
-NATIVE = Scenario(stop_time=0.05).with_fmus(plant="native/QuadrotorPlant", controller="native/UnifiedController")
+SHORT = dataclasses.replace(NATIVE, stop_time=0.05)
 
 
 @pytest.fixture(scope="module")
 def result() -> Result:
-    return quadcosim.run(NATIVE)
+    return quadcosim.run(SHORT)
 
 
 def said(path: Path) -> dict[str, dict[bytes, bytes]]:
@@ -28,7 +30,7 @@ def test_a_run_that_is_saved_and_one_written_as_it_flies_say_the_units_of_their_
     result: Result, tmp_path: Path
 ) -> None:
     saved = save_run(result, tmp_path / "saved", figures=False)
-    keep_flight(tmp_path / "flown", lambda to: quadcosim.run(NATIVE, recorder=to), figures=False)
+    keep_flight(tmp_path / "flown", lambda to: quadcosim.run(SHORT, recorder=to), figures=False)
     for folder in (saved, tmp_path / "flown"):
         columns = said(folder / "signals.parquet")
         assert columns["time"][b"unit"] == b"s"

@@ -34,6 +34,7 @@ from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS
 from quadcosim import Result, Scenario, Timing, UsageError
 from tests.fmus import source_tree
+from tests.native import NATIVE
 from tests.orchestration.studies.common import at, one_line, short
 
 SAMPLED = [f"plant.{name}" for name in COORDINATES]
@@ -135,7 +136,7 @@ def test_what_is_good_meets_the_criterion(given: float | None, expected: bool) -
 
 
 def scenario_of(coupling: float = 1.0, **timing: Any) -> Scenario:
-    base = Scenario(timing=Timing(**{"plant_interval": 0.02, **timing}))
+    base = dataclasses.replace(NATIVE, timing=Timing(**{"plant_interval": 0.02, **timing}))
     return base.with_changes(parameters={"controller.coupling": coupling})
 
 

@@ -18,7 +18,6 @@ from orchestration import fmus
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.quadrotor.scenario import FmuChoice, Record, Scenario
 from orchestration.quadrotor.translation import system_of
-from orchestration.quadrotor.wiring import DEFAULT_PLANT
 from orchestration.studies import engine
 from orchestration.studies.axes import Axis
 from orchestration.studies.crew import Crew
@@ -30,6 +29,7 @@ from orchestration.studies.study_file import load_study
 from orchestration.studies.sweep import store_path, sweep
 from orchestration.studies.worker import BrokenPlaceError, Hangar, Outcome, Task
 from quadcosim import QuadcosimError, UsageError, run
+from tests.native import NATIVE
 from tests.orchestration.studies.common import (
     GRID,
     NOISY,
@@ -245,7 +245,7 @@ def test_a_run_that_is_killed_over_and_over_stops_the_sweep_without_a_row(tmp_pa
 
 def test_an_fmu_that_is_moved_away_meanwhile_changes_nothing(folder: Path, reference: list[dict[str, Any]]) -> None:
     plant = folder / "plant.fmu"
-    shutil.copy(fmus.locate(DEFAULT_PLANT), plant)
+    shutil.copy(fmus.locate("QuadrotorPlant"), plant)
     text = NOISY.replace("[base.timing]", '[base.plant]\nfmu = "plant.fmu"\n[base.timing]')
     (folder / "study.toml").write_text(text)
     with start("sweep", "study.toml", cwd=folder) as coordinator:
@@ -367,7 +367,7 @@ def test_other_fmus_machines_and_sources_are_a_changed_study(
 ) -> None:
     def other(chosen: Study) -> Files:
         files = files_of(chosen.origin)
-        files.__dict__["hashes"] = {**files.hashes, DEFAULT_PLANT: "other"}
+        files.__dict__["hashes"] = {**files.hashes, NATIVE.plant.fmu: "other"}
         return files
 
     edited = {**versions(), "sources": "edited"}
@@ -677,7 +677,7 @@ def test_without_a_worker_nothing_is_flown(tmp_path: Path) -> None:
 
 
 def test_the_store_says_what_it_is_about(finished: Path) -> None:
-    models = files_in().models_of(system_of(Scenario()))
+    models = files_in().models_of(system_of(short()))
     with open_for_reading(store_path("study", finished)) as store:
         about = store.about()
     assert about["total"] == "2"

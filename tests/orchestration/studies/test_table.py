@@ -58,7 +58,7 @@ def test_a_frame_has_settings_metrics_seeds_guids_and_versions(grid: tuple[Study
         "duration",
         "machine",
     }
-    models = files_in().models_of(system_of(Scenario()))
+    models = files_in(Scenario()).models_of(system_of(Scenario()))
     guids, software = {name: model.description.guid for name, model in models.items()}, versions()
     origin = {f"guid.{side}" for side in guids} | {f"version.{name}" for name in software}
     assert set(table.columns) == expected | set(METRICS) | origin
