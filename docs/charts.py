@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from docs import experiments, theory
 from docs.experiments import CASES, DIRECTIONS, PERIODS, SIZES
 from orchestration.drawing.palette import BLUE, GREY, ORANGE, RED, SHADES
+from orchestration.results import labels
 from orchestration.statistics import wilson
 from orchestration.studies import figures
 
@@ -100,12 +101,15 @@ def sobol(names: list[str], outcome: Array, rank: Array) -> Figure:
     for panel, designs, title in zip(panels, (outcome, rank), titles, strict=True):
         for i, (design, color) in enumerate(zip(designs, (BLUE, ORANGE, RED, GREY), strict=False)):
             at = np.arange(len(names)) + 0.15 * (i - 1.5)
-            panel.errorbar(design[:, 0], at, xerr=design[:, 1], fmt="o", color=color, markersize=3, capsize=2)
+            panel.errorbar(
+                design[:, 0], at, xerr=design[:, 1], fmt="o", color=color, markersize=3, capsize=2, label=f"{i + 1}"
+            )
         panel.set_title(title)
         panel.set_xlabel("total Sobol index [1]")
         panel.axvline(0.0, color=GREY, linewidth=0.8)
-    panels[0].set_yticks(range(len(names)), names)
+    panels[0].set_yticks(range(len(names)), map(labels.words, names))
     panels[0].invert_yaxis()
+    panels[1].legend(title="design, with 95 % intervals", loc="center right")
     return figure
 
 
