@@ -14,7 +14,7 @@ from tests.orchestration.studies.common import GRID, NOISY, RUNS, error_line, ki
 
 STORE = Path("results") / "study" / "study.sqlite"
 LONG = NOISY.replace("stop_time = 0.2", "stop_time = 5.0")  # is killed before it ends
-LIMIT = ("limit", "--plant-interval", "0.01", "--stop-time", "0.05", "--set", "plant.wind.amplitude.x=0")
+LIMIT = ("limit", "--native", "--plant-interval", "0.01", "--stop-time", "0.05", "--set", "plant.wind.amplitude.x=0")
 
 
 @pytest.fixture(autouse=True)

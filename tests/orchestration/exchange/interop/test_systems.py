@@ -49,6 +49,8 @@ CARRIED: dict[str, dict[str, Any]] = {
     },
 }
 """By example, what takes away all that other masters cannot say: one step for all, nothing late, lost or noisy."""
+ALL = "four_components"
+"""Flown by every tool; of the others one of each order says what they add, their types and steps."""
 ORDERS = {
     "libcosim": "jacobi",
     "libcosim, SSP": "jacobi",
@@ -71,8 +73,9 @@ def carried(name: str) -> System:
 def test_an_example_equals_other_masters_in_the_order_that_each_has(name: str) -> None:
     system = carried(name)
     heard: list[str] = []
-    found = agreements(system, chosen(list(ORDERS), system.components), announce=heard.append)
-    expected = {tool: order for tool, order in ORDERS.items() if TOOLS[tool].converts or name != "water_tank"}
+    asked = ORDERS if name == ALL else {tool: ORDERS[tool] for tool in ("libcosim", "fmucontainer -sequential")}
+    found = agreements(system, chosen(list(asked), system.components), announce=heard.append)
+    expected = {tool: order for tool, order in asked.items() if TOOLS[tool].converts or name != "water_tank"}
     assert {agreement.tool.name: agreement.trace.order for agreement in found} == expected
     assert any(line.startswith("left out libcosim") for line in heard) == (name == "water_tank")
     for agreement in found:
