@@ -10,7 +10,7 @@ def fill(page: Path, blocks: dict[str, str]) -> None:
     for name, text in blocks.items():
         start = f"<!-- {name} -->"
         between = f"(?<={re.escape(start)}\n).*?(?=<!-- end -->)"
-        content, count = re.subn(between, f"{text}\n\n".replace("\\", r"\\"), content, flags=re.S)
+        content, count = re.subn(between, f"\n{text}\n\n".replace("\\", r"\\"), content, flags=re.S)
         if count != 1:
             raise ValueError(f"{page}: expected one {start}, found {count}")
     page.write_text(content, encoding="utf-8")
