@@ -10,6 +10,7 @@ import subprocess
 import sys
 import sysconfig
 import types
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 from unittest.mock import MagicMock
@@ -27,6 +28,7 @@ from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
 from quadcosim import run
 from tests.fmus.expected import law_command
+from tests.native import NATIVE
 
 GUIDES = Path(__file__).parent.parent.parent / "docs" / "guides"
 POSITION = [f"plant.position.{axis}" for axis in "xyz"]
@@ -63,12 +65,12 @@ HIDDEN = ("fmu_kit", "controller_fmu", "plant_fmu", "orchestration", "pythonfmu"
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory, built: dict[str, Path]) -> Path:
-    """Both FMUs and the SSP, and nothing else of this project."""
+    """Both FMUs and the SSP, and nothing else of this project; in the SSP the plant, which steps most, is native."""
     folder = tmp_path_factory.mktemp("guide")
     for path in built.values():
         shutil.copy(path, folder)
     writing.write(
-        Scenario().with_fmus(plant=built["QuadrotorPlant"], controller=built["UnifiedController"]),
+        Scenario().with_fmus(plant=fmus.locate("native/QuadrotorPlant"), controller=built["UnifiedController"]),
         folder / "QuadrotorLoop.ssp",
     )
     return folder
@@ -120,7 +122,7 @@ def test_the_fmpy_guide_flies_the_papers_scenario(folder: Path, environment: dic
     printed = follow("fmpy.md", folder, environment)
     assert printed["fly_paper.py"].startswith("position error at the end: 0.00127")
     flight = np.genfromtxt(folder / "flight.csv", delimiter=",", names=True, deletechars="")
-    own = run(Scenario(timing=Timing(clock="fmu"))).signals
+    own = run(replace(NATIVE, timing=Timing(clock="fmu"))).signals
     assert len(flight) == 30_000
     assert flight.dtype.names is not None
     for name in flight.dtype.names[1:18]:
@@ -139,11 +141,11 @@ def test_the_ssp_guide_flies_the_same_file_in_three_tools_and_the_container(
     folder: Path, environment: dict[str, str]
 ) -> None:
     printed = follow("ssp.md", folder, environment)
-    late = run(Scenario(timing=Timing(clock="fmu", delay=0.001)))
+    late = run(replace(NATIVE, timing=Timing(clock="fmu", delay=0.001)))
     expected = [late.signals[name][-1] for name in POSITION]
     for program in ("libcosim.py", "ecos.py", "fmpy_ssp.py"):
         assert positions(printed, program) == pytest.approx(expected, abs=1e-9), program
-    at_once = run(Scenario(timing=Timing(clock="fmu"))).signals
+    at_once = run(replace(NATIVE, timing=Timing(clock="fmu"))).signals
     container = np.genfromtxt(folder / "loop.csv", delimiter=",", names=True, deletechars="")
     for name in POSITION:
         assert np.abs(container[name.removeprefix("plant.")] - at_once[name]).max() < 1e-9, name

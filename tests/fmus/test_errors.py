@@ -446,8 +446,7 @@ def test_a_failure_does_not_disturb_another_instance(make: Make) -> None:
     assert healthy.get("sample_count") == 2
 
 
-@pytest.mark.parametrize("logger", ["own", "default"])
-@pytest.mark.parametrize("model", PAIR)
+@pytest.mark.parametrize(("model", "logger"), [(CONTROLLER, "own"), (PLANT, "default")])
 def test_calls_after_a_failure_do_not_crash_and_reset_revives(
     model: str, logger: str, making: Making, built: dict[str, Path]
 ) -> None:

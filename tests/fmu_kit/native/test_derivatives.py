@@ -23,10 +23,9 @@ Matrix = npt.NDArray[np.float64]
 
 
 @pytest.fixture(scope="module")
-def controller(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def controller() -> Path:
     """The native one."""
-    (path,) = fmus.build(["UnifiedController"], tmp_path_factory.mktemp("native"), packing=fmus.NATIVE)
-    return path
+    return fmus.locate("native/UnifiedController")
 
 
 def initialising(controller: Path, values: dict[str, float]) -> Instance:
