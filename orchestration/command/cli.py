@@ -281,7 +281,7 @@ def ssp(
         usual = fmus.default_folder() / f"{writing.NAME}.ssp"
     else:
         usual = Path(f"{scenario.stem}.ssp")
-    written, timing = writing.write_with_timing(asked, out or usual, say)
+    written, timing = writing.write_with_timing(asked, out or usual, say, warn)
     say(f"{timing} has its timing, for quadcosim run")
     return Answer(document={"files": [written, timing]}, lines=[str(written)])
 

@@ -11,8 +11,8 @@ position error and is largest at the edge of the layer: `at_edge` is the scenari
 
 import dataclasses
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
@@ -219,41 +219,46 @@ class PlantStep:
 
         Raises `NotSmooth` where there is none, as with motors that rise faster than they fall.
         """
-        with self._plant() as plant:
-            still = self._after(plant, self._at_hover, self._trim, h)
-            flown = [[self._after(plant, *start, h) - still for start in pair] for pair in self._moved]
+        with self._fleet.load(Path(self._hover.plant.fmu), "plant") as plant:
+            after = self._answer(plant, h)
+            still = after(self._at_hover, self._trim)
+            flown = [[after(*start) - still for start in pair] for pair in self._moved]
         for plus, minus in flown:
             if np.abs(plus + minus).max() > _BENT * np.abs(plus - minus).max() + STEP**2:
                 raise NotSmooth("the plant answers to a rise otherwise than to a fall, so hover has no linear loop")
         return np.column_stack([(plus - minus) / (2.0 * STEP) for plus, minus in flown])
 
-    @contextmanager
-    def _plant(self, parameters: dict[str, float] | None = None) -> Iterator[Instance]:
-        changed = {f"plant.{name}": value for name, value in (parameters or {}).items()}
-        with prepared(self._hover.with_changes(parameters=changed), load=self._fleet.load) as flight:
-            yield flight.instances["plant"]
-
     def _saved(self, parameters: dict[str, float], command: Floats) -> bytes:
         """The plant's state after initialisation with these parameters and this first command."""
-        with self._plant(parameters) as plant:
+        changed = {f"plant.{name}": value for name, value in parameters.items()}
+        with prepared(self._hover.with_changes(parameters=changed), load=self._fleet.load) as flight:
+            plant = flight.instances["plant"]
             _initialise(plant, wiring.COMMAND, command)
             return plant.save()
 
-    def _after(self, plant: Instance, state: bytes, command: Floats, h: float) -> Floats:
-        """The vehicle after `h` [s] under `command`, and if the actuators lag a plant interval later under the trim."""
-        plant.restore(state)
-        found = []
-        for start, duration, held in ((0.0, h, command), (h, self.interval, self._trim))[: 1 + self._lags]:
-            plant.writer(wiring.COMMAND, held)()
-            plant.step(start, duration)
-            measured: Floats = np.zeros(len(wiring.MEASUREMENT))
-            plant.reader(wiring.MEASUREMENT, measured)()
-            found.append(measured[_MEASURED])
-        return np.concatenate(found)
+    def _answer(self, plant: Instance, h: float) -> Callable[[bytes, Floats], Floats]:
+        """The vehicle `h` [s] after a state under a command, and if the actuators lag a plant interval later too,
+        under the trim. All parameters are those of the state.
+        """
+        command, measured = np.zeros(_COMMANDS), np.zeros(len(wiring.MEASUREMENT))
+        write, read = plant.writer(wiring.COMMAND, command), plant.reader(wiring.MEASUREMENT, measured)
+
+        def after(state: bytes, given: Floats) -> Floats:
+            plant.restore(state)
+            found = []
+            for start, duration, held in ((0.0, h, given), (h, self.interval, self._trim))[: 1 + self._lags]:
+                command[:] = held
+                write()
+                plant.step(start, duration)
+                read()
+                found.append(measured[_MEASURED])
+            return np.concatenate(found)
+
+        return after
 
     def _expect_equilibrium(self, at_hover: bytes) -> None:
-        with self._plant() as plant:
-            drift = float(np.abs(self._after(plant, at_hover, self._trim, self.interval)).max())
+        with self._fleet.load(Path(self._hover.plant.fmu), "plant") as plant:
+            drift = float(np.abs(self._answer(plant, self.interval)(at_hover, self._trim)).max())
         if drift > 1e-9:
             raise UsageError(
                 f"hover is no equilibrium, the vehicle drifts by {drift:.2g} in a plant interval; expected a "

@@ -159,12 +159,6 @@ class Store:
                 )
             )
 
-    def statuses(self) -> dict[str, str]:
-        """The status of every row, by the key of its run."""
-        self.expect_whole()
-        with _explained(self.path):
-            return dict(self._connection.execute("SELECT key, status FROM runs"))
-
     def counts(self) -> dict[str, int]:
         """How many places of the design have a row of which status."""
         self.expect_whole()

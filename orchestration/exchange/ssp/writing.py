@@ -34,16 +34,21 @@ TYPED: tuple[Kind, ...] = ("Real", "Integer", "Boolean", "String")
 """Types of connectors that need no list of items"""
 
 
-def write(asked: Scenario | System, path: Path, announce: Callable[[str], None] | None = None) -> Path:
+def write(
+    asked: Scenario | System,
+    path: Path,
+    announce: Callable[[str], None] | None = None,
+    warn: Callable[[str], None] | None = None,
+) -> Path:
     """Write a system as an SSP; the same system and FMUs give the same bytes.
 
-    `announce` hears, a line each, of what the SSP has no words for: it is another system without its file with timing.
-    Raises `UsageError` for different FMUs of one file name.
+    `announce` hears of FMUs that are built for it. `warn` hears, a line each, of what the SSP has no words for: it is
+    another system without its file with timing. Raises `UsageError` for different FMUs of one file name.
     """
     given = carried(asked, announce)
-    if announce is not None:
+    if warn is not None:
         for line in given.unsaid:
-            announce(f"warning: {line.partition('; expected')[0]}; only its file with timing does")
+            warn(f"{line.partition('; expected')[0]}; only its file with timing does")
     files = {source: fmu.read_bytes() for source, fmu in _sources(given.parts).items()}
     for part in given.parts:
         files[_parameter_file(part)] = document(_parameter_set({"": part}))
@@ -57,10 +62,13 @@ def write(asked: Scenario | System, path: Path, announce: Callable[[str], None] 
 
 
 def write_with_timing(
-    asked: Scenario | System, path: Path, announce: Callable[[str], None] | None = None
+    asked: Scenario | System,
+    path: Path,
+    announce: Callable[[str], None] | None = None,
+    warn: Callable[[str], None] | None = None,
 ) -> tuple[Path, Path]:
     """As `write`, and beside it the file that makes the system of it again."""
-    write(asked, path, announce)
+    write(asked, path, announce, warn)
     return path, timing.written(system_of(asked) if isinstance(asked, Scenario) else asked, path)
 
 

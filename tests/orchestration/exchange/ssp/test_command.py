@@ -48,6 +48,11 @@ def test_flags_and_out_are_those_of_a_flight(here: Path, main: Main) -> None:
     assert not (here / "fmus" / "QuadrotorLoop.ssp").exists()
 
 
+def test_what_an_ssp_cannot_say_is_warned_of_even_quietly(here: Path, main: Main) -> None:
+    said = "timing.delay = 0.005: an SSP cannot say that; only its file with timing does"
+    assert main("ssp", "-q", "--delay", "0.005", "--out", "loop.ssp").stderr == f"warning: {said}\n"
+
+
 def test_a_scenario_file_may_name_fmus_beside_it(here: Path, main: Main) -> None:
     folder = here / "my flights"
     folder.mkdir()
@@ -119,7 +124,7 @@ def test_a_timing_that_an_ssp_cannot_say_is_said_to_be_in_its_file_only(
     value = UNSAYABLE[key]
     given = "" if isinstance(value, dict) else f" = {value}"
     assert heard(short.with_changes(timing={key: value}), tmp_path) == [
-        f"warning: timing.{key}{given}: an SSP cannot say that; only its file with timing does"
+        f"timing.{key}{given}: an SSP cannot say that; only its file with timing does"
     ]
 
 
@@ -128,10 +133,10 @@ def test_nothing_is_said_of_a_scenario_that_an_ssp_can_say(short: Scenario, tmp_
 
 
 def heard(scenario: Scenario, folder: Path) -> list[str]:
-    """What is announced as an SSP is written."""
+    """What is warned of as an SSP is written."""
     lines: list[str] = []
-    writing.write(scenario, folder / "loop.ssp", lines.append)
-    return [line for line in lines if not line.startswith("building ")]
+    writing.write(scenario, folder / "loop.ssp", warn=lines.append)
+    return lines
 
 
 UNCONNECTED = "expected a parameter or an input that nothing is connected to"
