@@ -68,13 +68,15 @@ def bundled_sources(target: Target) -> dict[str, str]:
     Raises `PackagingError` if one of them imports what is neither bundled nor the standard library.
     """
     sources: dict[str, str] = {}
+    found: set[str] = set()
     waiting = [target.module, "fmu_kit.failure"]
     while waiting:
         module = waiting.pop()
-        path = module_path(module, target.root)
-        key = place(module, target.root)
-        if key in sources:
+        if module in found:
             continue
+        found.add(module)
+        path = module_path(module, target.root)
+        key = _place(module, path)
         sources[key] = "" if key in EMPTY_INIT else path.read_text(encoding="utf-8")
         package = module if path.name == "__init__.py" else module.rpartition(".")[0]
         waiting += _imported_modules(sources[key], package, path, target)
@@ -104,16 +106,29 @@ def _top_level(name: str, root: Path | None) -> Path | None:
             return root / name
         if (root / f"{name}.py").is_file():
             return root / f"{name}.py"
+    try:
+        return _installed(name, tuple(sys.path))
+    except LookupError:
+        return None
+
+
+@functools.cache
+def _installed(name: str, path: tuple[str, ...]) -> Path:
+    """Where Python finds a package or module as long as `sys.path` is `path`; raises `LookupError` if it does not."""
     spec = importlib.util.find_spec(name) if name else None
     if spec is None or spec.origin is None or not spec.has_location:
-        return None
+        raise LookupError(name)
     origin = Path(spec.origin)
     return origin.parent if origin.name == "__init__.py" else origin
 
 
 def place(module: str, root: Path | None = None) -> str:
     """Where a module is in the bundle."""
-    return "/".join(module.split(".")) + ("/__init__.py" if module_path(module, root).name == "__init__.py" else ".py")
+    return _place(module, module_path(module, root))
+
+
+def _place(module: str, path: Path) -> str:
+    return "/".join(module.split(".")) + ("/__init__.py" if path.name == "__init__.py" else ".py")
 
 
 def tree_of(text: str, path: Path) -> ast.Module:
@@ -129,24 +144,28 @@ def tree_of(text: str, path: Path) -> ast.Module:
 def _imported_modules(text: str, package: str, path: Path, target: Target) -> tuple[str, ...]:
     """The bundled modules that a source imports; only the forms that renaming understands are allowed."""
     found = []
-    for node in statements(tree_of(text, path)):
+    for node in _imports(text, path):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
             if any(target.bundles(name) for name in names):
                 raise PackagingError(f"{path}:{node.lineno}: expected `from package.module import name` in an FMU")
-        elif isinstance(node, ast.ImportFrom):
+        else:
             base = importlib.util.resolve_name("." * node.level + (node.module or ""), package)
             names = [base]
             if target.bundles(base):
                 root = target.root
                 found += [base, *(f"{base}.{alias.name}" for alias in node.names if _is_module(base, alias.name, root))]
                 continue
-        else:
-            continue
         for name in names:
             if name.partition(".")[0] not in sys.stdlib_module_names:
                 raise PackagingError(f"{path}:{node.lineno}: imports {name}, but an FMU has the standard library only")
     return tuple(found)
+
+
+@functools.cache
+def _imports(text: str, path: Path) -> tuple[ast.Import | ast.ImportFrom, ...]:
+    """The imports of a source, whichever slave it is needed by."""
+    return tuple(node for node in statements(tree_of(text, path)) if isinstance(node, ast.Import | ast.ImportFrom))
 
 
 def _is_module(package: str, name: str, root: Path | None) -> bool:
