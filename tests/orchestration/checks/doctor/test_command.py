@@ -11,7 +11,10 @@ import pytest
 
 from orchestration.checks.confined import Limits
 from orchestration.checks.doctor import loading
+from orchestration.checks.doctor.as_lines import as_text
+from orchestration.checks.doctor.report import as_tables, examine
 from orchestration.quadrotor.wiring import MODELS
+from tests.commands import Main
 from tests.fmus.foreign import lag, needs_compiler
 from tests.fmus.process import ROOT, run
 from tests.orchestration.checks.doctor.common import (
@@ -37,12 +40,21 @@ def doctor(*arguments: str | Path, environment: dict[str, str] | None = None) ->
     )  # fmt: skip
 
 
-def examined(fmu: Path, environment: dict[str, str] | None = None) -> dict[str, Any]:
-    """What is said of one FMU as JSON; the exit code must agree with it."""
+def examined(fmu: Path) -> dict[str, Any]:
+    """What is said of one FMU."""
+    return only(as_tables(examine([fmu], Limits())))
+
+
+def examined_with(fmu: Path, environment: dict[str, str]) -> dict[str, Any]:
+    """What the command says as JSON in another environment; the exit code must agree with it."""
     done = doctor(fmu, "--json", environment=environment)
     assert done.stderr == ""
     report = json.loads(done.stdout)
     assert done.returncode == (0 if report["good"] else 1)
+    return only(report)
+
+
+def only(report: dict[str, Any]) -> dict[str, Any]:
     (table,) = report["fmus"]
     assert report["good"] == table["good"]
     return {"machine": report["machine"], **table}
@@ -61,8 +73,9 @@ def test_all_fmus_of_the_project_load_here() -> None:
 
 
 def test_the_text_has_a_block_for_the_machine_and_one_for_each_fmu(built: dict[str, Path]) -> None:
-    blocks = doctor(*built.values()).stdout.split("\n\n")
-    assert [block.splitlines()[0] for block in blocks] == ["this machine", *map(str, built.values())]
+    fmus = [built["QuadrotorPlant"], built["UnifiedController"]]
+    blocks = "\n".join(as_text(examine(fmus, Limits())).splitlines()).split("\n\n")
+    assert [block.splitlines()[0] for block in blocks] == ["this machine", *map(str, fmus)]
     for block in blocks[1:]:
         assert "Linux, x86-64" in block
         assert "fmpy and others: ready" in block
@@ -122,7 +135,7 @@ def test_a_package_that_is_not_here_is_found_out(plant: Path, tmp_path: Path) ->
 def test_a_temp_folder_that_is_not_ascii_is_found_out(plant: Path, tmp_path: Path) -> None:
     folder = tmp_path / "café"
     folder.mkdir()
-    table = examined(plant, {"TMPDIR": str(folder)})
+    table = examined_with(plant, {"TMPDIR": str(folder)})
     for host in table["hosts"].values():
         assert any("a temp folder" in need and "café" in need for need in host["needs"])
     assert not table["loads"]
@@ -131,7 +144,7 @@ def test_a_temp_folder_that_is_not_ascii_is_found_out(plant: Path, tmp_path: Pat
 def test_a_temp_folder_with_a_space_is_none_of_pythonfmus_troubles(plant: Path, tmp_path: Path) -> None:
     folder = tmp_path / "with space"
     folder.mkdir()
-    table = examined(plant, {"TMPDIR": str(folder)})
+    table = examined_with(plant, {"TMPDIR": str(folder)})
     assert table["loads"]
     assert table["hosts"]["python"]["ready"]
 
@@ -219,12 +232,11 @@ def test_a_foreign_pythonhome_or_pythonpath_is_what_the_doctor_finds(tmp_path: P
     )  # fmt: skip
 
 
-def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(plant: Path, tmp_path: Path) -> None:
+def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(plant: Path, tmp_path: Path, main: Main) -> None:
     path = changed(plant, tmp_path / "a.fmu", {})
     with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("resources/zeros", bytes(20_000_000))
-    done = doctor(path, "--size-limit", "10")
-    assert done.returncode == 2
+    done = main("doctor", path, "--size-limit", "10", code=2)
     assert done.stderr == f"quadcosim: {path}: unpacks to 21 MB: expected at most 10 MB (--size-limit)\n"
 
 
@@ -235,18 +247,19 @@ def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(plant: Path, tmp_p
         (b"no zip", "expected a zip archive that is whole: File is not a zip file"),
     ],
 )
-def test_what_is_no_fmu_is_wrong_usage_in_one_line(content: bytes | None, text: str, tmp_path: Path) -> None:
+def test_what_is_no_fmu_is_wrong_usage_in_one_line(
+    content: bytes | None, text: str, tmp_path: Path, main: Main
+) -> None:
     path = tmp_path / "a.fmu"
     if content is not None:
         path.write_bytes(content)
-    done = doctor(path)
-    assert (done.returncode, done.stdout) == (2, "")
+    done = main("doctor", path, code=2)
+    assert done.stdout == ""
     assert done.stderr == f"quadcosim: {path}: {text}\n"
 
 
-def test_an_archive_without_a_description_is_wrong_usage_in_one_line(plant: Path, tmp_path: Path) -> None:
-    done = doctor(changed(plant, tmp_path / "a.fmu", {"modelDescription.xml": None}))
-    assert done.returncode == 2
+def test_an_archive_without_a_description_is_wrong_usage_in_one_line(plant: Path, tmp_path: Path, main: Main) -> None:
+    done = main("doctor", changed(plant, tmp_path / "a.fmu", {"modelDescription.xml": None}), code=2)
     assert done.stderr.splitlines() == [
         f"quadcosim: {tmp_path / 'a.fmu'}: expected an FMU, with modelDescription.xml at the top of the archive"
     ]
