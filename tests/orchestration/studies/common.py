@@ -78,6 +78,13 @@ def axis(target: str, *values: Any) -> Axis:
     return Axis(name=target, targets=(target,), values=values)
 
 
+FAILS = 0.0
+"""A mass that the description of the plant allows and the plant does not"""
+PERIODS = axis("timing.period", 0.01, 0.02)
+STORE = Path("results") / "study" / "study.sqlite"
+"""Where the command keeps the study of `study.toml`"""
+
+
 def study(*axes: Axis, base: Scenario | None = None, **fields: Any) -> Study:
     return Study(name="study", base=base or short(), axes=axes, **fields)
 

@@ -14,6 +14,7 @@ from typing import Any
 
 from tests.orchestration.studies.common import (
     NOISY,
+    STORE,
     bits,
     is_running,
     kill,
@@ -23,7 +24,6 @@ from tests.orchestration.studies.common import (
     workers_of,
 )
 
-STORE = Path("results") / "study" / "study.sqlite"
 TEMPORARY = "temporary"
 LONGEST = 1.5
 """[s] from one kill to the next: into the start of workers, their flights and the end"""

@@ -10,9 +10,18 @@ import pytest
 
 from orchestration.studies.sweep import store_path
 from tests.commands import Done, Main
-from tests.orchestration.studies.common import GRID, NOISY, RUNS, error_line, kill, quadcosim, start, wait_for_rows
+from tests.orchestration.studies.common import (
+    GRID,
+    NOISY,
+    RUNS,
+    STORE,
+    error_line,
+    kill,
+    quadcosim,
+    start,
+    wait_for_rows,
+)
 
-STORE = Path("results") / "study" / "study.sqlite"
 LONG = NOISY.replace("stop_time = 0.2", "stop_time = 5.0")  # is killed before it ends
 LIMIT = ("limit", "--native", "--plant-interval", "0.01", "--stop-time", "0.05", "--set", "plant.wind.amplitude.x=0")
 

@@ -4,9 +4,7 @@ import dataclasses
 import json
 import os
 import shutil
-import signal
 import subprocess
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,81 +12,36 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from orchestration import fmus
-from orchestration.fmi.fmi2 import Fmi2Instance
-from orchestration.quadrotor.scenario import FmuChoice, Record, Scenario
+from orchestration.quadrotor.scenario import Record
 from orchestration.quadrotor.translation import system_of
 from orchestration.studies import engine
 from orchestration.studies.axes import Axis
-from orchestration.studies.crew import Crew
 from orchestration.studies.files import Files, files_of, with_files
 from orchestration.studies.identity import machine, versions
 from orchestration.studies.store import open_for_reading
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
 from orchestration.studies.sweep import store_path, sweep
-from orchestration.studies.worker import BrokenPlaceError, Hangar, Outcome, Task
+from orchestration.studies.worker import Hangar, Task
 from quadcosim import QuadcosimError, UsageError, run
 from tests.native import NATIVE
 from tests.orchestration.studies.common import (
+    FAILS,
     GRID,
-    NOISY,
+    PERIODS,
     RUNS,
     SCRIPT,
-    Cluster,
+    STORE,
     axis,
     bits,
     files_in,
-    is_running,
-    kill,
     one_line,
     quadcosim,
-    reference_store,
-    rows_in,
     short,
-    start,
     starts,
     study,
     swept,
-    wait_for_rows,
-    wait_until,
-    workers_of,
 )
-from tests.orchestration.studies.kills import disturbed
-from tests.orchestration.studies.sick import ABORTS, KILLED, SPENT, sick_plant
-
-STORE = Path("results") / "study" / "study.sqlite"
-PERIODS = axis("timing.period", 0.01, 0.02)
-
-
-@pytest.fixture(scope="module")
-def reference(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
-    """The rows of the noisy study, flown by one worker without interruption."""
-    found = bits(reference_store(tmp_path_factory.mktemp("reference")))
-    assert len(found) == RUNS
-    return found
-
-
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    """A folder with the noisy study."""
-    (tmp_path / "study.toml").write_text(NOISY)
-    return tmp_path
-
-
-@pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[Callable[[int], Cluster]]:
-    """Starts a dask scheduler with a number of workers."""
-    made: list[Cluster] = []
-
-    def make(workers: int) -> Cluster:
-        made.append(Cluster(tmp_path, workers))
-        return made[-1]
-
-    yield make
-    for each in made:
-        each.close()
-
 
 # -- the same bits ----------------------------------------------------------------------------------------
 
@@ -121,192 +74,6 @@ def test_a_row_has_the_metrics_of_a_direct_run(folder: Path, reference: list[dic
     for name, value in direct.items():
         expected = value if value is None or isinstance(value, str) else float(value).hex()
         assert reference[9][name] == expected, name
-
-
-def test_a_dask_cluster_makes_the_same_rows(
-    folder: Path, reference: list[dict[str, Any]], cluster: Callable[[int], Cluster]
-) -> None:
-    quadcosim("sweep", "study.toml", "--dask", cluster(1).address, cwd=folder)
-    assert bits(folder / STORE) == reference
-
-
-def test_the_death_of_a_dask_worker_loses_nothing(
-    folder: Path, reference: list[dict[str, Any]], cluster: Callable[[int], Cluster]
-) -> None:
-    made = cluster(2)
-    with start("sweep", "study.toml", "--dask", made.address, cwd=folder) as coordinator:
-        wait_for_rows(folder / STORE, 1)
-        made.workers[0].kill()
-        assert rows_in(folder / STORE) < RUNS
-        out, err = coordinator.communicate(timeout=60)
-    assert coordinator.returncode == 0, out + err
-    assert bits(folder / STORE) == reference
-
-
-# -- killed -----------------------------------------------------------------------------------------------
-
-
-def test_a_killed_sweep_flies_only_what_is_missing_and_ends_with_the_same_rows(
-    folder: Path, reference: list[dict[str, Any]]
-) -> None:
-    with start("sweep", "study.toml", cwd=folder) as coordinator:
-        wait_for_rows(folder / STORE, 2)
-        coordinator.kill()
-    there = rows_in(folder / STORE)
-    assert 2 <= there < RUNS
-    with open_for_reading(folder / STORE) as store:
-        before = {found["design_index"]: found["duration"] for found in store.rows()}
-    done = quadcosim("sweep", "study.toml", "--workers", "2", cwd=folder)
-    assert done.stdout == f"{STORE}: {RUNS} runs, {RUNS - there} flown now\n"
-    assert bits(folder / STORE) == reference
-    with open_for_reading(folder / STORE) as store:
-        after = {found["design_index"]: found["duration"] for found in store.rows()}
-    assert {index: after[index] for index in before} == before, "expected no run flown twice"
-
-
-def test_workers_end_when_the_coordinator_is_killed(folder: Path) -> None:
-    with start("sweep", "study.toml", "--workers", "2", cwd=folder) as coordinator:
-        wait_for_rows(folder / STORE, 1)
-        workers = workers_of(coordinator.pid)
-        coordinator.kill()
-    assert len(workers) == 2
-    wait_until(lambda: not any(map(is_running, workers)), seconds=10.0)
-
-
-def test_the_death_of_a_worker_loses_nothing(folder: Path, reference: list[dict[str, Any]]) -> None:
-    with start("sweep", "study.toml", "--workers", "2", cwd=folder) as coordinator:
-        wait_for_rows(folder / STORE, 1)
-        kill(workers_of(coordinator.pid)[0])
-        assert rows_in(folder / STORE) < RUNS
-        out, err = coordinator.communicate(timeout=60)
-    assert coordinator.returncode == 0, out + err
-    assert bits(folder / STORE) == reference
-
-
-def test_a_run_whose_worker_is_killed_from_outside_stops_the_sweep_and_has_no_row(tmp_path: Path) -> None:
-    (tmp_path / "study.toml").write_text('[base]\nstop_time = 2.0\n[[axes]]\nname = "seed"\nvalues = [1]\n')
-    with start("sweep", "study.toml", cwd=tmp_path) as coordinator:
-        while coordinator.poll() is None:
-            for process in workers_of(coordinator.pid):
-                kill(process)
-        _, err = coordinator.communicate()
-    assert coordinator.returncode == 1
-    assert len(err.splitlines()) == 1, err
-    assert rows_in(tmp_path / STORE) == 0
-    assert quadcosim("sweep", "study.toml", cwd=tmp_path).stdout == f"{STORE}: 1 runs, 1 flown now\n"
-
-
-@pytest.mark.parametrize(("workers", "kills"), [(1, 1), (2, 3)])
-def test_whatever_is_killed_the_table_is_that_of_an_undisturbed_sweep(
-    tmp_path: Path, reference: list[dict[str, Any]], workers: int, kills: int
-) -> None:
-    tally = disturbed(tmp_path, reference, workers=workers, kills=kills, seed=workers)
-    assert tally.kills == kills
-
-
-@pytest.mark.parametrize("whom", ["the coordinator", "a worker"])
-def test_an_interrupt_is_one_line_that_says_how_far_the_sweep_is(
-    folder: Path, reference: list[dict[str, Any]], whom: str
-) -> None:
-    with start("sweep", "study.toml", cwd=folder) as coordinator:
-        wait_for_rows(folder / STORE, 1)
-        os.kill(coordinator.pid if whom == "the coordinator" else workers_of(coordinator.pid)[0], signal.SIGINT)
-        out, err = coordinator.communicate(timeout=60)
-    assert (coordinator.returncode, out) == (130, "")
-    assert err == f"quadcosim: interrupted with {rows_in(folder / STORE)} of {RUNS} runs done\n"
-    assert all(row in reference for row in bits(folder / STORE))
-
-
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_run_that_ends_its_process_fails_and_no_other_run_does(tmp_path: Path, workers: int) -> None:
-    base = dataclasses.replace(short(), plant=FmuChoice(fmu=str(sick_plant(tmp_path))))
-    masses = axis("plant.mass", 1.0, ABORTS, 1.01, SPENT, 1.02)
-    told: list[str] = []
-    summary = sweep(study(masses, base=base), folder=tmp_path, workers=workers, announce=told.append)
-    rows = bits(summary.path)
-    assert [row["design_index"] for row in rows if row["status"] == "failed"] == [1]
-    assert [row["message"].partition(",")[0] for row in rows if row["status"] == "failed"] == [
-        "its worker process ended by SIGABRT"
-    ]  # fmt: skip
-    assert (summary.failed, len(told)) == (1, 1)
-    assert told[0].startswith("run 1 (plant.mass = 1.11) failed: its worker process ended by SIGABRT, 3 times")
-
-
-def test_a_run_that_is_killed_over_and_over_stops_the_sweep_without_a_row(tmp_path: Path) -> None:
-    base = dataclasses.replace(short(), plant=FmuChoice(fmu=str(sick_plant(tmp_path))))
-    with pytest.raises(QuadcosimError, match=r"run 1 ended by SIGKILL 3 times: not the run's doing") as caught:
-        sweep(study(axis("plant.mass", 1.0, KILLED), base=base), folder=tmp_path)
-    one_line(caught.value)
-    assert rows_in(store_path("study", tmp_path)) == 1
-
-
-# -- the place, not the run -------------------------------------------------------------------------------
-
-
-def test_an_fmu_that_is_moved_away_meanwhile_changes_nothing(folder: Path, reference: list[dict[str, Any]]) -> None:
-    plant = folder / "plant.fmu"
-    shutil.copy(fmus.locate("QuadrotorPlant"), plant)
-    text = NOISY.replace("[base.timing]", '[base.plant]\nfmu = "plant.fmu"\n[base.timing]')
-    (folder / "study.toml").write_text(text)
-    with start("sweep", "study.toml", cwd=folder) as coordinator:
-        wait_for_rows(folder / STORE, 1)
-        plant.unlink()
-        kill(workers_of(coordinator.pid)[0])
-        out, err = coordinator.communicate(timeout=60)
-    assert coordinator.returncode == 0, out + err
-    assert bits(folder / STORE) == reference
-
-
-@pytest.mark.parametrize("what", ["no space", "no file"])
-def test_a_place_where_nothing_can_be_flown_stops_the_sweep_without_a_row(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str
-) -> None:
-    genuine = Crew._unpack
-
-    def unpack(crew: Crew, number: int, name: str) -> Path:
-        path = genuine(crew, number, name)
-        if what == "no file":
-            path.unlink()
-        else:
-            path.write_bytes(path.read_bytes()[:-2000])  # as much as there was room for
-        return path
-
-    monkeypatch.setattr(Crew, "_unpack", unpack)
-    with pytest.raises(QuadcosimError, match="no run's own failure: ") as caught:
-        sweep(study(PERIODS), folder=tmp_path, workers=2)
-    one_line(caught.value)
-    monkeypatch.undo()
-    assert rows_in(store_path("study", tmp_path)) == 0
-    assert sweep(study(PERIODS), folder=tmp_path).flown == 2
-
-
-@pytest.mark.parametrize(
-    "error", [OSError(28, "No space left on device"), MemoryError(), QuadcosimError("does not load")]
-)
-def test_what_is_not_the_runs_own_failure_is_no_row(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
-    def load(path: Path, instance_name: str) -> Any:
-        raise error
-
-    hangar = Hangar()
-    monkeypatch.setattr(hangar._fleet, "load", load)
-    with pytest.raises(BrokenPlaceError):
-        hangar.fly(task(short()))
-
-
-def test_an_fmu_that_cannot_be_reset_is_made_anew_for_the_next_run(instantiated: list[str]) -> None:
-    hangar = Hangar()
-    before = rmse(hangar.fly(task(short())))
-    next(iter(hangar._fleet._kept.values())).failed = True  # it refuses the reset
-    assert rmse(hangar.fly(task(short()))) == before
-    assert len(instantiated) == 3
-
-
-def test_other_software_where_it_is_flown_stops_the_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    other = {**versions(), "sources": "other"}
-    monkeypatch.setattr("orchestration.studies.crew.versions", lambda: other)
-    with pytest.raises(QuadcosimError, match="has another version of sources than the coordinator; expected the same"):
-        sweep(study(PERIODS), folder=tmp_path)
-    assert rows_in(store_path("study", tmp_path)) == 0
 
 
 # -- what a store holds -----------------------------------------------------------------------------------
@@ -437,10 +204,6 @@ def test_axes_of_seeds_fly_those_seeds(tmp_path: Path) -> None:
 # -- runs that fail and runs that diverge -----------------------------------------------------------------
 
 
-FAILS = 0.0
-"""a mass that the description of the plant allows and the plant does not"""
-
-
 def test_a_run_that_fails_is_a_row_with_its_message_and_is_flown_again_on_request_only(tmp_path: Path) -> None:
     chosen = study(axis("plant.mass", 1.0, FAILS, 2.0))
     path = swept(chosen, tmp_path)
@@ -545,97 +308,6 @@ def test_workers_leave_no_files_behind(tmp_path: Path, monkeypatch: pytest.Monke
         [str(SCRIPT), "sweep", file, "--workers", "2", "--out", tmp_path / "out"], env=environment, check=True
     )
     assert list(temporary.iterdir()) == []
-
-
-# -- dask -------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A client that waits less than ten seconds for what is not there."""
-    import distributed
-
-    class Impatient(distributed.Client):  # type: ignore[misc]
-        def __init__(self, address: str, **options: Any) -> None:
-            super().__init__(address, **{**options, "timeout": 0.5})
-
-        def wait_for_workers(self, n_workers: int, timeout: float | None = None) -> None:
-            super().wait_for_workers(n_workers, timeout=0.5)
-
-    monkeypatch.setattr(distributed, "Client", Impatient)
-
-
-@pytest.mark.usefixtures("impatient")
-@pytest.mark.parametrize(
-    ("address", "said"),
-    [("tcp://127.0.0.1:1", "expected a dask scheduler with workers there: .*refused"),
-     *((wrong, r"expected the address of a scheduler, as in tcp://host:8786")
-       for wrong in ("nonsense://127.0.0.1:1", "nonsense", "tcp://host", "host:99999", ""))],
-)  # fmt: skip
-def test_a_scheduler_that_is_not_there_is_one_line(tmp_path: Path, address: str, said: str) -> None:
-    with pytest.raises(QuadcosimError, match=rf"--dask {address}: {said}") as caught:
-        sweep(study(PERIODS), folder=tmp_path, dask=address)
-    one_line(caught.value)
-    assert sweep(study(PERIODS), folder=tmp_path).flown == 2, "expected the store to be of use still"
-
-
-@pytest.mark.usefixtures("impatient")
-def test_a_scheduler_without_workers_is_one_line(tmp_path: Path, cluster: Callable[[int], Cluster]) -> None:
-    with pytest.raises(QuadcosimError, match="expected a dask scheduler with workers there") as caught:
-        sweep(study(PERIODS), folder=tmp_path / "out", dask=cluster(0).address)
-    one_line(caught.value)
-
-
-# -- FMUs in a process ------------------------------------------------------------------------------------
-
-
-def task(scenario: Scenario, index: int = 0) -> Task:
-    system = with_files(system_of(scenario), files_in(scenario).fmus)
-    return Task(index=index, key="", settings={}, system=system, keep_signals=False)
-
-
-@pytest.fixture
-def instantiated(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Names of the instances that are made, in order."""
-    names: list[str] = []
-
-    class Counted(Fmi2Instance):
-        def __init__(self, path: Path, instance_name: str) -> None:
-            names.append(instance_name)
-            super().__init__(path, instance_name)
-
-    monkeypatch.setattr("orchestration.fmi.reuse.open_instance", Counted)
-    return names
-
-
-def rmse(outcome: Outcome) -> str:
-    assert outcome.row.metrics is not None, outcome.row.message
-    return str(outcome.row.metrics["position_rmse"].hex())
-
-
-def test_each_fmu_is_instantiated_once_in_a_process(instantiated: list[str]) -> None:
-    hangar = Hangar()
-    for period in (0.01, 0.02, 0.03, 0.01):
-        hangar.fly(task(short(period=period)))
-    assert sorted(instantiated) == ["controller", "plant"]
-
-
-def test_an_fmu_that_failed_is_made_anew_and_the_next_run_is_as_if_nothing_had_been(instantiated: list[str]) -> None:
-    hangar = Hangar()
-    before = rmse(hangar.fly(task(short())))
-    assert hangar.fly(task(short().with_changes(parameters={"plant.mass": FAILS}))).row.metrics is None
-    assert rmse(hangar.fly(task(short()))) == before
-    assert instantiated.count("plant") == 2
-
-
-def test_nothing_of_a_run_is_left_in_the_next() -> None:
-    hangar, plain = Hangar(), short(period=0.02)
-    odd = short(order="jacobi", hold="first", delay=0.03, noise={"position": 0.1}).with_changes(
-        parameters={"plant.mass": 3.0, "controller.coupling": 5.0, "plant.initial.position.z": 1.0}
-    )
-    before = rmse(hangar.fly(task(plain)))
-    assert rmse(hangar.fly(task(odd))) != before
-    assert rmse(hangar.fly(task(plain))) == before
 
 
 # -- a few runs at a time ---------------------------------------------------------------------------------

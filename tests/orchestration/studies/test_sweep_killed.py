@@ -1,0 +1,183 @@
+"""Whatever is killed in a sweep, a process or the place where it is flown, no row is lost and none is wrong."""
+
+import dataclasses
+import os
+import shutil
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from orchestration import fmus
+from orchestration.quadrotor.scenario import FmuChoice
+from orchestration.studies.crew import Crew
+from orchestration.studies.identity import versions
+from orchestration.studies.store import open_for_reading
+from orchestration.studies.sweep import store_path, sweep
+from quadcosim import QuadcosimError
+from tests.orchestration.studies.common import (
+    NOISY,
+    PERIODS,
+    RUNS,
+    STORE,
+    axis,
+    bits,
+    is_running,
+    kill,
+    one_line,
+    quadcosim,
+    rows_in,
+    short,
+    start,
+    study,
+    wait_for_rows,
+    wait_until,
+    workers_of,
+)
+from tests.orchestration.studies.kills import disturbed
+from tests.orchestration.studies.sick import ABORTS, KILLED, SPENT, sick_plant
+
+# -- killed -----------------------------------------------------------------------------------------------
+
+
+def test_a_killed_sweep_flies_only_what_is_missing_and_ends_with_the_same_rows(
+    folder: Path, reference: list[dict[str, Any]]
+) -> None:
+    with start("sweep", "study.toml", cwd=folder) as coordinator:
+        wait_for_rows(folder / STORE, 2)
+        coordinator.kill()
+    there = rows_in(folder / STORE)
+    assert 2 <= there < RUNS
+    with open_for_reading(folder / STORE) as store:
+        before = {found["design_index"]: found["duration"] for found in store.rows()}
+    done = quadcosim("sweep", "study.toml", "--workers", "2", cwd=folder)
+    assert done.stdout == f"{STORE}: {RUNS} runs, {RUNS - there} flown now\n"
+    assert bits(folder / STORE) == reference
+    with open_for_reading(folder / STORE) as store:
+        after = {found["design_index"]: found["duration"] for found in store.rows()}
+    assert {index: after[index] for index in before} == before, "expected no run flown twice"
+
+
+def test_workers_end_when_the_coordinator_is_killed(folder: Path) -> None:
+    with start("sweep", "study.toml", "--workers", "2", cwd=folder) as coordinator:
+        wait_for_rows(folder / STORE, 1)
+        workers = workers_of(coordinator.pid)
+        coordinator.kill()
+    assert len(workers) == 2
+    wait_until(lambda: not any(map(is_running, workers)), seconds=10.0)
+
+
+def test_the_death_of_a_worker_loses_nothing(folder: Path, reference: list[dict[str, Any]]) -> None:
+    with start("sweep", "study.toml", "--workers", "2", cwd=folder) as coordinator:
+        wait_for_rows(folder / STORE, 1)
+        kill(workers_of(coordinator.pid)[0])
+        assert rows_in(folder / STORE) < RUNS
+        out, err = coordinator.communicate(timeout=60)
+    assert coordinator.returncode == 0, out + err
+    assert bits(folder / STORE) == reference
+
+
+def test_a_run_whose_worker_is_killed_from_outside_stops_the_sweep_and_has_no_row(tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text('[base]\nstop_time = 2.0\n[[axes]]\nname = "seed"\nvalues = [1]\n')
+    with start("sweep", "study.toml", cwd=tmp_path) as coordinator:
+        while coordinator.poll() is None:
+            for process in workers_of(coordinator.pid):
+                kill(process)
+        _, err = coordinator.communicate()
+    assert coordinator.returncode == 1
+    assert len(err.splitlines()) == 1, err
+    assert rows_in(tmp_path / STORE) == 0
+    assert quadcosim("sweep", "study.toml", cwd=tmp_path).stdout == f"{STORE}: 1 runs, 1 flown now\n"
+
+
+@pytest.mark.parametrize(("workers", "kills"), [(1, 1), (2, 3)])
+def test_whatever_is_killed_the_table_is_that_of_an_undisturbed_sweep(
+    tmp_path: Path, reference: list[dict[str, Any]], workers: int, kills: int
+) -> None:
+    tally = disturbed(tmp_path, reference, workers=workers, kills=kills, seed=workers)
+    assert tally.kills == kills
+
+
+@pytest.mark.parametrize("whom", ["the coordinator", "a worker"])
+def test_an_interrupt_is_one_line_that_says_how_far_the_sweep_is(
+    folder: Path, reference: list[dict[str, Any]], whom: str
+) -> None:
+    with start("sweep", "study.toml", cwd=folder) as coordinator:
+        wait_for_rows(folder / STORE, 1)
+        os.kill(coordinator.pid if whom == "the coordinator" else workers_of(coordinator.pid)[0], signal.SIGINT)
+        out, err = coordinator.communicate(timeout=60)
+    assert (coordinator.returncode, out) == (130, "")
+    assert err == f"quadcosim: interrupted with {rows_in(folder / STORE)} of {RUNS} runs done\n"
+    assert all(row in reference for row in bits(folder / STORE))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_run_that_ends_its_process_fails_and_no_other_run_does(tmp_path: Path, workers: int) -> None:
+    base = dataclasses.replace(short(), plant=FmuChoice(fmu=str(sick_plant(tmp_path))))
+    masses = axis("plant.mass", 1.0, ABORTS, 1.01, SPENT, 1.02)
+    told: list[str] = []
+    summary = sweep(study(masses, base=base), folder=tmp_path, workers=workers, announce=told.append)
+    rows = bits(summary.path)
+    assert [row["design_index"] for row in rows if row["status"] == "failed"] == [1]
+    assert [row["message"].partition(",")[0] for row in rows if row["status"] == "failed"] == [
+        "its worker process ended by SIGABRT"
+    ]  # fmt: skip
+    assert (summary.failed, len(told)) == (1, 1)
+    assert told[0].startswith("run 1 (plant.mass = 1.11) failed: its worker process ended by SIGABRT, 3 times")
+
+
+def test_a_run_that_is_killed_over_and_over_stops_the_sweep_without_a_row(tmp_path: Path) -> None:
+    base = dataclasses.replace(short(), plant=FmuChoice(fmu=str(sick_plant(tmp_path))))
+    with pytest.raises(QuadcosimError, match=r"run 1 ended by SIGKILL 3 times: not the run's doing") as caught:
+        sweep(study(axis("plant.mass", 1.0, KILLED), base=base), folder=tmp_path)
+    one_line(caught.value)
+    assert rows_in(store_path("study", tmp_path)) == 1
+
+
+# -- the place, not the run -------------------------------------------------------------------------------
+
+
+def test_an_fmu_that_is_moved_away_meanwhile_changes_nothing(folder: Path, reference: list[dict[str, Any]]) -> None:
+    plant = folder / "plant.fmu"
+    shutil.copy(fmus.locate("QuadrotorPlant"), plant)
+    text = NOISY.replace("[base.timing]", '[base.plant]\nfmu = "plant.fmu"\n[base.timing]')
+    (folder / "study.toml").write_text(text)
+    with start("sweep", "study.toml", cwd=folder) as coordinator:
+        wait_for_rows(folder / STORE, 1)
+        plant.unlink()
+        kill(workers_of(coordinator.pid)[0])
+        out, err = coordinator.communicate(timeout=60)
+    assert coordinator.returncode == 0, out + err
+    assert bits(folder / STORE) == reference
+
+
+@pytest.mark.parametrize("what", ["no space", "no file"])
+def test_a_place_where_nothing_can_be_flown_stops_the_sweep_without_a_row(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str
+) -> None:
+    genuine = Crew._unpack
+
+    def unpack(crew: Crew, number: int, name: str) -> Path:
+        path = genuine(crew, number, name)
+        if what == "no file":
+            path.unlink()
+        else:
+            path.write_bytes(path.read_bytes()[:-2000])  # as much as there was room for
+        return path
+
+    monkeypatch.setattr(Crew, "_unpack", unpack)
+    with pytest.raises(QuadcosimError, match="no run's own failure: ") as caught:
+        sweep(study(PERIODS), folder=tmp_path, workers=2)
+    one_line(caught.value)
+    monkeypatch.undo()
+    assert rows_in(store_path("study", tmp_path)) == 0
+    assert sweep(study(PERIODS), folder=tmp_path).flown == 2
+
+
+def test_other_software_where_it_is_flown_stops_the_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    other = {**versions(), "sources": "other"}
+    monkeypatch.setattr("orchestration.studies.crew.versions", lambda: other)
+    with pytest.raises(QuadcosimError, match="has another version of sources than the coordinator; expected the same"):
+        sweep(study(PERIODS), folder=tmp_path)
+    assert rows_in(store_path("study", tmp_path)) == 0
