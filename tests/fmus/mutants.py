@@ -243,6 +243,10 @@ VARIABLES = (
         name="two names swapped", rule="own-description", words=("velocity.x", "velocity.y", "place"),
         damage=_swap("name", "velocity.x", "velocity.y"),
     ),
+    Mutant(
+        name="name of no convention", rule="names", words=("velocity,x", "structured"),
+        damage=variable("velocity.x", name="velocity,x"),
+    ),
     Mutant(name="name twice", rule="standard", words=("velocity.x",), damage=variable("velocity.y", name="velocity.x")),
     Mutant(
         name="causality that there is none of", rule="standard", words=("causality", "result"),

@@ -1,12 +1,15 @@
 """Validation of FMUs that are sound, of this project and of others, and rules that no damage of ours can reach."""
 
+import re
 import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
-from xml.etree.ElementTree import Element, SubElement, fromstring
+from xml.etree.ElementTree import Element, SubElement, fromstring, tostring
 
 import pytest
+from fmpy import read_model_description
+from fmpy.model_description import ValidationError
 
 from orchestration.checks import confined
 from orchestration.checks.archive import Archive
@@ -19,7 +22,7 @@ from orchestration.checks.validation.own_description import differences, element
 from orchestration.checks.validation.progress import REPORT, Told
 from orchestration.checks.validation.structure import initial_unknowns, known_dependencies, outputs
 from orchestration.checks.validation.units import dimensions, unit_meaning
-from orchestration.checks.validation.variables import aliases
+from orchestration.checks.validation.variables import aliases, names
 from orchestration.command import cli
 from orchestration.errors import QuadcosimError
 from orchestration.quadrotor.wiring import MODELS
@@ -295,6 +298,51 @@ def fmu(variables: str, structure: str = "", units: str = "", tool: str = "anoth
 def read(text: str) -> Fmu:
     archive = Archive(Path("m.fmu"), (), {DESCRIPTION: text.encode()})
     return read_fmu(archive, read_co_simulation(archive))
+
+
+def named(convention: str | None, *names: str) -> Element:
+    """A description with variables of these names."""
+    attribute = {} if convention is None else {"variableNamingConvention": convention}
+    root = Element("fmiModelDescription", {"fmiVersion": "2.0", "modelName": "M", "guid": "g", **attribute})
+    SubElement(root, "CoSimulation", modelIdentifier="M")
+    variables = SubElement(root, "ModelVariables")
+    for i, name in enumerate(names):
+        SubElement(SubElement(variables, "ScalarVariable", name=name, valueReference=str(i)), "Real")
+    SubElement(root, "ModelStructure")
+    return root
+
+
+def illegal(convention: str | None, *given: str) -> list[str]:
+    return list(names(read_fmu(Archive(Path("m.fmu"), (), {}), named(convention, *given))))
+
+
+STRUCTURED = ["mass", "_1", "a.b[1,2].c", "der(x)", "der(a.b[1].c)", "der(x,2)", "'odd name'.x", "'a'[3]", "der"]
+NOT_STRUCTURED = [
+    "", "1a", "a b", "a..b", "a.", ".a", "a[", "a[]", "a[x]", "a[1", "der(der(x))", "der(x", "$cse1", "''", "'a", "ä",
+]  # fmt: skip
+
+
+def test_names_are_structured_by_the_grammar_of_the_standard() -> None:
+    assert illegal("structured", *STRUCTURED, r"'it\'s'") == []
+    assert illegal("structured", *NOT_STRUCTURED) == [
+        f"{name!r}: expected a name by the convention structured" for name in NOT_STRUCTURED
+    ]
+
+
+def test_fmpy_calls_the_same_names_structured(tmp_path: Path) -> None:
+    path = tmp_path / "modelDescription.xml"
+    path.write_bytes(tostring(named("structured", *STRUCTURED, *NOT_STRUCTURED)))
+    with pytest.raises(ValidationError) as caught:
+        read_model_description(str(path), validate_variable_names=True)
+    found = [re.match(r'"(.*)" \(line .* is not a legal variable name', text) for text in caught.value.problems]
+    assert [match[1] for match in found if match] == NOT_STRUCTURED
+
+
+@pytest.mark.parametrize("convention", ["flat", None])
+def test_flat_names_are_any_text_on_one_line(convention: str | None) -> None:
+    assert illegal(convention, "any thing, at all", "two\nlines") == [
+        "'two\\nlines': expected a name by the convention flat"
+    ]
 
 
 def scalar(name: str, reference: int, attributes: str = "", real: str = "") -> str:

@@ -14,11 +14,15 @@ SLAVE_MODULE = "resources/slavemodule.txt"
 
 
 def standard(archive: Archive) -> list[str]:
-    """All that fmpy finds: the schema, names, required starts, combinations of attributes, units, structure."""
-    from fmpy.validation import validate_fmu
+    """All that fmpy finds: the schema, names twice, required starts, combinations of attributes, units, structure."""
+    from fmpy import read_model_description
+    from fmpy.model_description import ValidationError
 
+    problems = []
     try:
-        problems = validate_fmu(str(archive.path))
+        read_model_description(str(archive.path), validate_model_structure=True)  # names: by `variables.names`
+    except ValidationError as error:
+        problems = error.problems
     except Exception as error:  # it reads attributes strictly, and trips over damage in its own ways
         problems = [f"fmpy does not read it: {type(error).__name__}: {error}"]
     return [" ".join(str(problem).split()) for problem in problems]

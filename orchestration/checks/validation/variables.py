@@ -1,10 +1,29 @@
-"""Rules on variables: their bounds, and those that share a value reference."""
+"""Rules on variables: their names, their bounds, and those that share a value reference."""
 
 import math
+import re
 from collections import defaultdict
 from collections.abc import Iterator
 
 from orchestration.checks.validation.fmu import NUMBERS, Fmu, Variable
+
+_QUOTED = r"""'(?:[0-9A-Za-z_!#$%&()*+,\-./:;<>=?@\[\]^{}|~ ]|\\['"?\\abfnrtv])+'"""
+_PART = rf"(?:[A-Za-z_][0-9A-Za-z_]*|{_QUOTED})(?:\[[0-9]+(?:,[0-9]+)*\])?"
+_IDENTIFIER = rf"{_PART}(?:\.{_PART})*"
+_NAMES = {
+    "structured": re.compile(rf"{_IDENTIFIER}|der\({_IDENTIFIER}(?:,[0-9]+)?\)"),
+    "flat": re.compile(r"[^\r\n\t]+"),
+}
+"""What a name is by each convention"""
+
+
+def names(fmu: Fmu) -> Iterator[str]:
+    """A name is one by the convention that the FMU declares (FMI 2.0.4, section 2.2.9)."""
+    convention = fmu.root.get("variableNamingConvention", "flat")
+    legal = _NAMES.get(convention, _NAMES["flat"])  # that there is another one the schema finds
+    for v in fmu.variables:
+        if not legal.fullmatch(v.name):
+            yield f"{v.name!r}: expected a name by the convention {convention}"
 
 
 def bounds(fmu: Fmu) -> Iterator[str]:
@@ -57,4 +76,4 @@ def _wrong_with_aliases(members: list[Variable]) -> Iterator[str]:
         yield f"their units are {', '.join(str(v.unit) for v in members)}"
 
 
-RULES = (bounds, aliases)
+RULES = (names, bounds, aliases)
