@@ -65,14 +65,12 @@ HIDDEN = ("fmu_kit", "controller_fmu", "plant_fmu", "orchestration", "pythonfmu"
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory, built: dict[str, Path]) -> Path:
-    """Both FMUs and the SSP, and nothing else of this project; in the SSP the plant, which steps most, is native."""
+    """Both FMUs and the SSP, and nothing else of this project; the plant, which steps most, is the native one."""
     folder = tmp_path_factory.mktemp("guide")
-    for path in built.values():
+    plant, controller = fmus.locate("native/QuadrotorPlant"), built["UnifiedController"]
+    for path in (plant, controller):
         shutil.copy(path, folder)
-    writing.write(
-        Scenario().with_fmus(plant=fmus.locate("native/QuadrotorPlant"), controller=built["UnifiedController"]),
-        folder / "QuadrotorLoop.ssp",
-    )
+    writing.write(Scenario().with_fmus(plant=plant, controller=controller), folder / "QuadrotorLoop.ssp")
     return folder
 
 
