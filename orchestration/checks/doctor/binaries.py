@@ -159,10 +159,10 @@ def _read_elf(stream: BinaryIO, symbols: bool) -> Binary:
 def _read_pe(stream: BinaryIO) -> Binary:
     import pefile
 
-    with pefile.PE(data=stream.read(), fast_load=True) as pe:
-        pe.parse_data_directories([pefile.DIRECTORY_ENTRY["IMAGE_DIRECTORY_ENTRY_IMPORT"]])
-        machine = pe.FILE_HEADER.Machine
-        imported = [entry.dll.decode() for entry in getattr(pe, "DIRECTORY_ENTRY_IMPORT", ())]
+    pe = pefile.PE(data=stream.read(), fast_load=True)  # no file to close, which takes a collection of all garbage
+    pe.parse_data_directories([pefile.DIRECTORY_ENTRY["IMAGE_DIRECTORY_ENTRY_IMPORT"]])
+    machine = pe.FILE_HEADER.Machine
+    imported = [entry.dll.decode() for entry in getattr(pe, "DIRECTORY_ENTRY_IMPORT", ())]
     return Binary(
         system=WINDOWS,
         architectures=(_PE_MACHINES.get(machine, hex(machine)),),
