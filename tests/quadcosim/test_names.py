@@ -79,7 +79,7 @@ def test_the_packages_that_its_types_are_of_say_that_they_are_typed() -> None:
 def test_a_program_that_uses_the_api_is_typed(tmp_path: Path) -> None:
     """Read with what mypy already knows of the packages, if they have been looked at as `make lint` does."""
     (tmp_path / "program.py").write_text(PROGRAM)
-    command = [sys.executable, "-m", "mypy", tmp_path / "program.py"]
+    command = [sys.executable, "-m", "mypy", str(tmp_path / "program.py")]
     done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
     told = [line.partition(": ")[2] for line in done.stdout.splitlines() if "program.py" in line]
     assert told == ERRORS, done.stderr
