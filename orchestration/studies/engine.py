@@ -56,10 +56,12 @@ class Pool:
                 found[outcome.row.index] = _metrics(outcome)
         return found
 
-    def fly(self, systems: Sequence[System], stop: Callable[[Any], bool]) -> list[Any]:
+    def fly(
+        self, systems: Sequence[System], stop: Callable[[Any], bool], hear: Callable[[int], None] = lambda done: None
+    ) -> list[Any]:
         """The metrics of the runs in their order, up to the first whose metrics `stop`, with any number of workers.
 
-        Raises `QuadcosimError` if a run fails.
+        `hear` is told after each how many are done. Raises `QuadcosimError` if a run fails.
         """
         futures = [self._submit(self._task(i, system)) for i, system in enumerate(systems)]
         found = []
@@ -67,6 +69,7 @@ class Pool:
             for future in futures:
                 (outcome,) = future.result()
                 found.append(_metrics(outcome))
+                hear(len(found))
                 if stop(found[-1]):
                     break
         finally:

@@ -20,6 +20,7 @@ from orchestration.simulation import checked
 from orchestration.studies.criteria import judged
 from orchestration.studies.engine import Pool
 from orchestration.studies.files import Files, files_of
+from orchestration.studies.hearing import ShareHeard, of_share
 from orchestration.studies.local import Local, local_limits
 from orchestration.studies.ranges import Range, Varied, range_asked_for
 from orchestration.studies.search import Bracket, bisected, first_failure
@@ -145,13 +146,15 @@ def find(
     continuous: bool = False,
     workers: int = 1,
     engine: Engine | None = None,
+    progress: ShareHeard = "bar",
     announce: Callable[[str], None] | None = say,
 ) -> Limit:
     """Find the largest value of a quantity of a system or a scenario that is still good, all else as it is.
 
     `of` is a path, or of the quadrotor `period`, `delay`, `jitter` or `loss`; it is looked for from `first` to `last`,
     `scan` is the step, `continuous` adds that flight (of the quadrotor). The seeds of a random quantity are flown by
-    `workers` processes. `announce` hears a line for each value that was tried; None for silence.
+    `workers` processes. `progress` hears the share that is done of the longest search, in which nothing fails before
+    the end of the scan; `announce` a line for each value that was tried; None for silence.
 
     Raises `UsageError` for a quantity, range, tolerance, step or confidence that cannot be.
     """
@@ -164,16 +167,22 @@ def find(
     random = is_random(varied.at(span.last))
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
     local = local_limits(varied, span)
-    with Pool(files, workers, engine) as pool:
-        trials = Trials(varied, span, seeds, confidence if random else None, pool, announce or (lambda line: None))
+    with of_share(progress, "longest search") as hear, Pool(files, workers, engine) as pool:
+        trials = Trials(
+            varied, span, seeds, confidence if random else None, pool, announce or (lambda line: None), hear
+        )
         values = span.values()
-        bracket = first_failure(trials.fails, values, span.tolerance, parts=FINER)
+        later = lambda left: trials.expect(left + BEYOND)  # noqa: E731
+        bracket = first_failure(trials.fails, values, span.tolerance, parts=FINER, left=later)
         above = [value for value in values if bracket is not None and value >= bracket.bad]
         refuted = _refuted(trials, bracket, above) if random else None
         if not random:
-            for value in [value for value in above if value not in trials.tried][:BEYOND]:
+            beyond = [value for value in above if value not in trials.tried][:BEYOND]
+            for left, value in zip(reversed(range(len(beyond))), beyond):
+                trials.expect(left)
                 trials.fails(value)
         ideal = _near_continuous(request, pool) if continuous and isinstance(request, Scenario) else None
+        hear(1.0)
     tried = tuple(trials.tried[value] for value in sorted(trials.tried))
     return Limit(
         of=of, unit=span.unit.strip() or None, judged=metric, judged_unit=units[0].get(metric or ""),
@@ -216,9 +225,12 @@ def _refuted(trials: Trials, bracket: Bracket | None, above: list[float]) -> flo
     if bracket is None:
         return None
     below = bracket.good
-    for value in above:
+    for left, value in zip(reversed(range(len(above))), above):
+        trials.expect(left)
         if trials.is_refuted(value):
-            return value if below is None else bisected(trials.is_refuted, below, value, trials.tolerance).bad
+            if below is None:
+                return value
+            return bisected(trials.is_refuted, below, value, trials.tolerance, left=trials.expect).bad
         below = value
     return None
 

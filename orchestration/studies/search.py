@@ -1,9 +1,13 @@
 """Looking for the first value that fails, by a scan upward and bisection."""
 
+import math
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 Fails = Callable[[float], bool]
+Left = Callable[[int], None]
+"""Hears, before a value is tried, how many at most come after it."""
 
 
 class Bracket(NamedTuple):
@@ -15,14 +19,22 @@ class Bracket(NamedTuple):
     """fails"""
 
 
-def first_failure(fails: Fails, values: Sequence[float], tolerance: float, *, parts: int = 1) -> Bracket | None:
+def unheard(left: int) -> None:
+    """For those who do not ask how many are left."""
+
+
+def first_failure(
+    fails: Fails, values: Sequence[float], tolerance: float, *, parts: int = 1, left: Left = unheard
+) -> Bracket | None:
     """The last value that does not fail and the first that does, at most `tolerance` apart; None if none fails.
 
     Goes up through `values`, up again in `parts` of the step before the first that fails, and bisects. The set
     that does not fail need not be an interval: what is narrower than these steps is not seen.
     """
     good = None
-    for value in values:
+    widest = max((b - a for a, b in pairwise(values)), default=0.0)
+    for above, value in zip(reversed(range(len(values))), values):
+        left(above + _most(widest, tolerance, parts))
         if not fails(value):
             good = value
             continue
@@ -32,20 +44,33 @@ def first_failure(fails: Fails, values: Sequence[float], tolerance: float, *, pa
         if step >= tolerance:
             for i in range(1, parts):
                 finer = float(f"{low + i * step:.12g}")
+                left(parts - 1 - i + _halvings(step, tolerance))
                 if fails(finer):
                     bad = finer
                     break
                 good = finer
-        return bisected(fails, good, bad, tolerance)
+        return bisected(fails, good, bad, tolerance, left=left)
     return None
 
 
-def bisected(fails: Fails, good: float, bad: float, tolerance: float) -> Bracket:
+def bisected(fails: Fails, good: float, bad: float, tolerance: float, *, left: Left = unheard) -> Bracket:
     """`good`, which does not fail, and `bad`, which does, brought together to `tolerance`."""
     while bad - good > tolerance:
         middle = 0.5 * (good + bad)
+        left(_halvings(middle - good, tolerance))
         if fails(middle):
             bad = middle
         else:
             good = middle
     return Bracket(good, bad)
+
+
+def _most(width: float, tolerance: float, parts: int) -> int:
+    """How many values are tried at most between two so far apart, of which the upper one fails."""
+    if width / parts < tolerance:
+        return _halvings(width, tolerance)
+    return parts - 1 + _halvings(width / parts, tolerance)
+
+
+def _halvings(width: float, tolerance: float) -> int:
+    return max(0, math.ceil(math.log2(width / tolerance))) if width > 0.0 else 0

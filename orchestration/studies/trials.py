@@ -59,11 +59,17 @@ class Trials:
         confidence: float | None,
         pool: Pool,
         announce: Callable[[str], None],
+        progress: Callable[[float], None],
     ) -> None:
         self._varied, self._span, self._seeds = varied, span, seeds
-        self._confidence, self._pool, self._announce = confidence, pool, announce
+        self._confidence, self._pool, self._announce, self._progress = confidence, pool, announce, progress
+        self._done = self._left = 0
         self.tolerance = span.tolerance
         self.tried: dict[float, Tried] = {}
+
+    def expect(self, left: int) -> None:
+        """Hear how many values come after the next one, at most: of this the progress is a share."""
+        self._left = left
 
     def fails(self, value: float) -> bool:
         """Whether a seed is not good; the rest is not run then."""
@@ -78,7 +84,11 @@ class Trials:
     def _run(self, value: float, stop: Callable[[Any], bool]) -> Tried:
         system = self._varied.at(value)
         runs = [replace(system, seed=system.seed + i) for i in range(self._seeds)]
-        metrics = self._pool.fly(runs, stop=stop)
+        all_values = self._done + 1 + self._left
+        metrics = self._pool.fly(
+            runs, stop=stop, hear=lambda seeds: self._progress((self._done + seeds / len(runs)) / all_values)
+        )
+        self._done += 1
         down = next((one for one in metrics if not is_good(one)), None)
         flew = sum(map(is_good, metrics))
         measured = metrics[0 if down is None else metrics.index(down)].get(judged(system) or "")

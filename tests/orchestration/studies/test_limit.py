@@ -100,6 +100,20 @@ def test_an_island_of_failure_within_the_bracket_is_seen_by_the_finer_steps() ->
     assert (good, bad) == pytest.approx((1.15, 1.16), abs=0.01)
 
 
+@given(
+    edge=st.floats(0.0, 12.0),
+    tolerance=st.sampled_from([1.1e-6, 0.011, 0.13, 0.21, 0.31, 0.97, 4.1]),
+    parts=st.integers(1, 6),
+)
+def test_how_many_values_are_left_is_a_bound_that_comes_down(edge: float, tolerance: float, parts: int) -> None:
+    bounds: list[int] = []
+    values = [0.0, 1.0, 2.0, 3.0, 5.0, 8.0, 11.0]
+    first_failure(lambda value: value > edge, values, tolerance, parts=parts, left=bounds.append)
+    assert all(bound >= really for bound, really in zip(reversed(bounds), range(len(bounds))))
+    assert bounds == sorted(bounds, reverse=True)
+    assert bounds[0] < len(values) + parts + 22  # halvings of the widest step to the finest tolerance
+
+
 def test_steps_finer_than_the_tolerance_are_not_taken() -> None:
     tried = []
 
@@ -373,7 +387,7 @@ class StubPool:
     def __exit__(self, *exception: object) -> None:
         return None
 
-    def fly(self, systems: Sequence[System], stop: Any) -> list[dict[str, Any]]:
+    def fly(self, systems: Sequence[System], stop: Any, hear: Any = lambda done: None) -> list[dict[str, Any]]:
         found: list[dict[str, Any]] = []
         for system in systems:
             self.flown.append(system)
@@ -383,6 +397,7 @@ class StubPool:
             found.append(
                 {"outcome": outcome, "good": bound < 0.05, "divergence_time": divergence_time, "settling_time": 1.5}
             )
+            hear(len(found))
             if stop(found[-1]):
                 break
         return found
@@ -575,6 +590,17 @@ def test_each_value_is_announced() -> None:
     assert said[0] == "period 0.001 s: settled"
     assert "period 0.03 s: settled" in said
     assert "period 0.035 s: fails, bounded" in said
+
+
+@pytest.mark.usefixtures("stubbed")
+@pytest.mark.parametrize("of", ["period", "jitter"])
+def test_the_share_that_is_done_is_of_the_longest_search_and_comes_to_all(of: str) -> None:
+    shares: list[float] = []
+    found = find(scenario_of(), of, progress=shares.append)
+    assert len(shares) > len(found.tried)
+    assert 0.0 < shares[0] < 0.1
+    assert all(0.0 < share <= 1.0 for share in shares)
+    assert shares[-1] == 1.0
 
 
 @pytest.mark.usefixtures("stubbed")
