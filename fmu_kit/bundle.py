@@ -114,7 +114,10 @@ def _top_level(name: str, root: Path | None) -> Path | None:
 
 @functools.cache
 def _installed(name: str, path: tuple[str, ...]) -> Path:
-    """Where Python finds a package or module as long as `sys.path` is `path`; raises `LookupError` if it does not."""
+    """Where Python finds a package or module as long as `sys.path` is `path`.
+
+    Raises `LookupError` if it does not: that is not kept, as it may be there the next time.
+    """
     spec = importlib.util.find_spec(name) if name else None
     if spec is None or spec.origin is None or not spec.has_location:
         raise LookupError(name)

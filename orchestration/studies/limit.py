@@ -153,8 +153,8 @@ def find(
 
     `of` is a path, or of the quadrotor `period`, `delay`, `jitter` or `loss`; it is looked for from `first` to `last`,
     `scan` is the step, `continuous` adds that flight (of the quadrotor). The seeds of a random quantity are flown by
-    `workers` processes. `progress` hears the share that is done of the longest search, in which nothing fails before
-    the end of the scan; `announce` a line for each value that was tried; None for silence.
+    `workers` processes. `progress` hears the share that is done of a search in which nothing fails before the end of
+    the scan, `announce` a line for each value that was tried; None for silence.
 
     Raises `UsageError` for a quantity, range, tolerance, step or confidence that cannot be.
     """
@@ -168,18 +168,18 @@ def find(
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
     local = local_limits(varied, span)
     with of_share(progress, "longest search") as hear, Pool(files, workers, engine) as pool:
-        trials = Trials(
-            varied, span, seeds, confidence if random else None, pool, announce or (lambda line: None), hear
-        )
+        tell = announce or (lambda line: None)
+        trials = Trials(varied, span, seeds, confidence if random else None, pool, tell, hear)
         values = span.values()
-        later = lambda left: trials.expect(left + BEYOND)  # noqa: E731
-        bracket = first_failure(trials.fails, values, span.tolerance, parts=FINER, left=later)
+        bracket = first_failure(
+            trials.fails, values, span.tolerance, parts=FINER, left=lambda left: trials.expect(left + BEYOND)
+        )
         above = [value for value in values if bracket is not None and value >= bracket.bad]
         refuted = _refuted(trials, bracket, above) if random else None
         if not random:
             beyond = [value for value in above if value not in trials.tried][:BEYOND]
-            for left, value in zip(reversed(range(len(beyond))), beyond):
-                trials.expect(left)
+            for i, value in enumerate(beyond, start=1):
+                trials.expect(len(beyond) - i)
                 trials.fails(value)
         ideal = _near_continuous(request, pool) if continuous and isinstance(request, Scenario) else None
         hear(1.0)
@@ -225,8 +225,8 @@ def _refuted(trials: Trials, bracket: Bracket | None, above: list[float]) -> flo
     if bracket is None:
         return None
     below = bracket.good
-    for left, value in zip(reversed(range(len(above))), above):
-        trials.expect(left)
+    for i, value in enumerate(above, start=1):
+        trials.expect(len(above) - i)
         if trials.is_refuted(value):
             if below is None:
                 return value

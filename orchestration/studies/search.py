@@ -19,12 +19,8 @@ class Bracket(NamedTuple):
     """fails"""
 
 
-def unheard(left: int) -> None:
-    """For those who do not ask how many are left."""
-
-
 def first_failure(
-    fails: Fails, values: Sequence[float], tolerance: float, *, parts: int = 1, left: Left = unheard
+    fails: Fails, values: Sequence[float], tolerance: float, *, parts: int = 1, left: Left = lambda most: None
 ) -> Bracket | None:
     """The last value that does not fail and the first that does, at most `tolerance` apart; None if none fails.
 
@@ -33,8 +29,8 @@ def first_failure(
     """
     good = None
     widest = max((b - a for a, b in pairwise(values)), default=0.0)
-    for above, value in zip(reversed(range(len(values))), values):
-        left(above + _most(widest, tolerance, parts))
+    for i, value in enumerate(values, start=1):
+        left(len(values) - i + _most(widest, tolerance, parts))
         if not fails(value):
             good = value
             continue
@@ -53,7 +49,7 @@ def first_failure(
     return None
 
 
-def bisected(fails: Fails, good: float, bad: float, tolerance: float, *, left: Left = unheard) -> Bracket:
+def bisected(fails: Fails, good: float, bad: float, tolerance: float, *, left: Left = lambda most: None) -> Bracket:
     """`good`, which does not fail, and `bad`, which does, brought together to `tolerance`."""
     while bad - good > tolerance:
         middle = 0.5 * (good + bad)

@@ -68,7 +68,7 @@ class Trials:
         self.tried: dict[float, Tried] = {}
 
     def expect(self, left: int) -> None:
-        """Hear how many values come after the next one, at most: of this the progress is a share."""
+        """Hear how many values may come after the next one: the progress is a share of all of them."""
         self._left = left
 
     def fails(self, value: float) -> bool:

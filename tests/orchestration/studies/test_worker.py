@@ -11,11 +11,7 @@ from orchestration.quadrotor.translation import system_of
 from orchestration.studies.files import with_files
 from orchestration.studies.worker import BrokenPlaceError, Hangar, Outcome, Task
 from quadcosim import QuadcosimError
-from tests.orchestration.studies.common import (
-    FAILS,
-    files_in,
-    short,
-)
+from tests.orchestration.studies.common import FAILS, files_in, short
 
 
 def task(scenario: Scenario, index: int = 0) -> Task:
