@@ -17,17 +17,18 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestration import fmus
-from orchestration.batch.flight import Batch
-from orchestration.batch.kernels import lanes_here
-from orchestration.batch.shape import Shape
-from orchestration.batch.windows import Windows, timing
+from orchestration.building import fmus
+from orchestration.engines.batch.flight import Batch
+from orchestration.engines.batch.kernels import lanes_here
+from orchestration.engines.batch.shape import Shape
+from orchestration.engines.structures import address
+from orchestration.engines.wiring import checked
 from orchestration.fmi.model import read_model
-from orchestration.master.structures import address
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.translation import system_of
-from orchestration.simulation import checked, prepared
+from orchestration.runs.simulation import prepared
+from orchestration.schedule.schedule_cache import Windows, timing
 from orchestration.studies.axes import Axis
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import sweep

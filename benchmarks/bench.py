@@ -17,18 +17,18 @@ from fmu_kit.bundle import Target
 from fmu_kit.integrator import rk4_step
 from fmu_kit.rigid_body import Body, RigidState, Wrench, derivative
 from fmu_kit.trajectory import Trajectory
+from orchestration.basics.simulator import Floats
+from orchestration.engines.board import Board
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.model import read_model
-from orchestration.master.board import Board
-from orchestration.master.position import Position
-from orchestration.master.streams import Streams
-from orchestration.master.timetable import Timetable
 from orchestration.quadrotor import wiring
 from orchestration.quadrotor.scenario import FmuChoice, Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.translation import system_of
-from orchestration.simulation import prepared
-from orchestration.simulator import Floats
+from orchestration.runs.simulation import prepared
+from orchestration.schedule.cursor import Position
+from orchestration.schedule.streams import Streams
+from orchestration.schedule.timetable import Timetable
 from orchestration.system.check import recorded
 from plant_fmu.wind import Wind
 

@@ -6,13 +6,13 @@ import tempfile
 import time
 from pathlib import Path
 
+from orchestration.building.inputs import files_of, with_files
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import system_of
 from orchestration.studies.axes import Axis
-from orchestration.studies.files import files_of, with_files
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import sweep
-from orchestration.studies.worker import Hangar, Task
+from orchestration.workers.task import Hangar, Task
 
 RUNS, SECONDS = 200, 10.0
 """of the study that two workers are compared on"""

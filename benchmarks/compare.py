@@ -15,8 +15,8 @@ from pathlib import Path
 from benchmarks.flights import CASES, STEPS
 from fmu_kit import packaging
 from fmu_kit.bundle import Target
-from orchestration import fmus
-from orchestration.quadrotor.wiring import MODELS
+from orchestration.building import fmus
+from orchestration.building.models import MODELS
 
 HERE = Path(__file__).parent.parent
 PAIRS = 9

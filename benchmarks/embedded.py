@@ -12,10 +12,10 @@ from pathlib import Path
 from benchmarks.mathematics import table
 from docs.pages import fill
 from fmu_kit.bundle import Target
-from fmu_kit.native.embedded import write
-from orchestration.quadrotor.wiring import MODELS
-from tests.fmu_kit.native.compiled import HERE as BOARD_FILES
-from tests.fmu_kit.native.embedded import ARM, BOARDS, M4F, M7, QEMU, on_cortex_m, rows_of, to_note
+from fmu_kit.compiler.pack.embedded import write
+from orchestration.building.models import MODELS
+from tests.fmu_kit.compiler.compiled import HERE as BOARD_FILES
+from tests.fmu_kit.compiler.embedded import ARM, BOARDS, M4F, M7, QEMU, on_cortex_m, rows_of, to_note
 
 HERE = Path(__file__).parent
 OPTIONS = ("-std=c99", "-fno-math-errno")

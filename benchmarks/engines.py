@@ -9,11 +9,11 @@ import time
 from collections import defaultdict
 from typing import get_args
 
-from orchestration.fmus import native_twin
-from orchestration.master.engine import Engine
+from orchestration.building.fmus import native_twin
+from orchestration.engines.engine import Engine
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.simulation import prepared
+from orchestration.runs.simulation import prepared
 
 REPETITIONS = 9
 CASES = {

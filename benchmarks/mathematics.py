@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from docs.pages import fill
-from tests.fmu_kit.native.accuracy import STATED, largest_error
-from tests.fmu_kit.native.compiled import Floats, library, processor, results
+from tests.fmu_kit.compiler.accuracy import STATED, largest_error
+from tests.fmu_kit.compiler.compiled import Floats, library, processor, results
 
 SAMPLES = 20_000  # of each set of arguments
 NUMBERS = 4096

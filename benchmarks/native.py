@@ -13,9 +13,9 @@ from pathlib import Path
 
 import fmpy
 
-from fmu_kit.native.lanes import compiled_lanes
-from orchestration import subprocesses
-from orchestration.quadrotor.wiring import MODELS
+from fmu_kit.compiler.pack.lanes import compiled_lanes
+from orchestration.building.models import MODELS
+from orchestration.processes import subprocesses
 
 STEPS = 100_000
 LANES = (1, 4, 8, 16)

@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestration.drawing.palette import GREY
-from orchestration.master.master import Master
-from orchestration.master.recording import InMemory
-from orchestration.master.streams import Streams
-from orchestration.master.timetable import Timetable
-from orchestration.simulator import Floats, Transfer
+from orchestration.basics.simulator import Floats, Transfer
+from orchestration.engines.master import Master
+from orchestration.figures.palette import GREY
+from orchestration.recording.recording import InMemory
+from orchestration.schedule.streams import Streams
+from orchestration.schedule.timetable import Timetable
 from orchestration.system.model import Component, Connection, Sampling, System
 
 SIZES = (2, 4, 10, 20, 50, 100, 200)

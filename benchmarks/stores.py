@@ -19,9 +19,10 @@ from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import system_of
 from orchestration.studies.axes import Axis
 from orchestration.studies.drawing import draw_study
-from orchestration.studies.store import Row, Store, open_for_reading, open_for_writing
+from orchestration.studies.store import Store, open_for_reading, open_for_writing
 from orchestration.studies.study import Study
 from orchestration.studies.table import export, frame
+from orchestration.workers.row import Row
 
 ROWS = 1_000_000
 TOGETHER = 1000

@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 
 from docs import experiments, theory
 from docs.experiments import CASES, DIRECTIONS, PERIODS, SIZES
-from orchestration.drawing.palette import BLUE, GREY, ORANGE, RED, SHADES
-from orchestration.results import labels
-from orchestration.statistics import wilson
+from orchestration.basics.statistics import wilson
+from orchestration.figures.palette import BLUE, GREY, ORANGE, RED, SHADES
+from orchestration.results import display_names as labels
 from orchestration.studies import figures
 
 Array = Any

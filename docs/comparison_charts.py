@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from orchestration.drawing import cells as cells_of
-from orchestration.drawing.palette import BLUE, BROWN, GREEN, GREY, ORANGE, PURPLE, RED
-from orchestration.statistics import wilson
+from orchestration.basics.statistics import wilson
+from orchestration.figures import cells as cells_of
+from orchestration.figures.palette import BLUE, BROWN, GREEN, GREY, ORANGE, PURPLE, RED
 
 Rows = Sequence[Mapping[str, Any]]
 

@@ -18,15 +18,15 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from docs import comparison_charts as charts
-from orchestration.batch import fly
+from orchestration.basics.statistics import wilson
+from orchestration.comparison.bandwidth import bandwidths
+from orchestration.comparison.cells import frame_of
+from orchestration.comparison.design import Comparison
+from orchestration.comparison.file import load_comparison
+from orchestration.comparison.outcome import as_json, concluded
+from orchestration.engines.batch import fly
 from orchestration.fmi.model import read_model
-from orchestration.simulation import run
-from orchestration.statistics import wilson
-from orchestration.studies.comparison.bandwidth import bandwidths
-from orchestration.studies.comparison.cells import frame_of
-from orchestration.studies.comparison.design import Comparison
-from orchestration.studies.comparison.file import load_comparison
-from orchestration.studies.comparison.outcome import as_json, concluded
+from orchestration.runs.simulation import run
 from orchestration.system.model import System
 
 ROOT = Path(__file__).parent.parent
@@ -135,7 +135,7 @@ def _batches() -> _Lanes:
 
 def _short(cell: dict[str, Any], rows: Any, comparison: Comparison) -> dict[str, Any]:
     """A cell as it is kept: counts, medians with their intervals, and counts by the size of the initial error."""
-    from orchestration.studies.comparison.cells import Median, sizes
+    from orchestration.comparison.cells import Median, sizes
     from orchestration.studies.figures import flew
 
     good = flew(rows)

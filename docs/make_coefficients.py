@@ -1,4 +1,4 @@
-"""The series of fmu_kit/native/mathematics.h, put into it: python -m docs.make_coefficients.
+"""The series of fmu_kit/compiler/runtime/mathematics.h, put into it: python -m docs.make_coefficients.
 
 Each is the polynomial through a function at Chebyshev points, in 40 digits, its coefficients rounded to doubles.
 """
@@ -9,7 +9,7 @@ from pathlib import Path
 
 from mpmath import binomial, chebyfit, factorial, mp, mpf
 
-HEADER = Path(__file__).parent.parent / "fmu_kit" / "native" / "mathematics.h"
+HEADER = Path(__file__).parent.parent / "fmu_kit" / "compiler" / "runtime" / "mathematics.h"
 
 SERIES: dict[str, tuple[str, str, Callable[[int], mpf], tuple[float, float], int]] = {
     # name: what it is, its variable, its Taylor coefficients, range, number of coefficients

@@ -7,15 +7,15 @@ from matplotlib.figure import Figure
 
 from docs import paper_flight, reference_figures
 from docs.pages import fill
-from orchestration.drawing.draw import draw
-from orchestration.drawing.palette import BLUE, GREEN, GREY, RED
-from orchestration.drawing.style import DOCS, save
-from orchestration.master.position import Position
-from orchestration.master.streams import Streams
-from orchestration.master.timetable import Timetable
+from orchestration.figures.palette import BLUE, GREEN, GREY, RED
+from orchestration.figures.style import DOCS, save
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.translation import system_of
+from orchestration.runs.draw import draw
+from orchestration.schedule.cursor import Position
+from orchestration.schedule.streams import Streams
+from orchestration.schedule.timetable import Timetable
 from quadcosim import run
 
 FIGURES = Path(__file__).parent / "figures"

@@ -22,25 +22,26 @@ import pandas as pd
 
 from docs import charts, comparisons, experiments, theory
 from docs.experiments import PAPER
-from orchestration.drawing.style import DOCS, save
+from orchestration.basics.statistics import quantile, wilson
+from orchestration.building.inputs import files_of
+from orchestration.figures.style import DOCS, save
+from orchestration.limits import figure, limit
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import system_of
 from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
-from orchestration.statistics import quantile, wilson
-from orchestration.studies import drawing, figures, limit
-from orchestration.studies.engine import Pool
-from orchestration.studies.files import files_of
-from orchestration.studies.identity import versions
-from orchestration.studies.lanes import Agreement
-from orchestration.studies.linear import HoverLoop
-from orchestration.studies.local import about_hover
-from orchestration.studies.margin import margin_of
+from orchestration.stability.hover_loop import HoverLoop
+from orchestration.stability.local_limit import about_hover
+from orchestration.stability.margin import margin_of
+from orchestration.studies import drawing, figures
 from orchestration.studies.sensitivity import Index
 from orchestration.studies.store import open_for_reading
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
 from orchestration.studies.sweep import AGREEMENT, store_path, sweep
 from orchestration.studies.table import frame
+from orchestration.workers.batching import Agreement
+from orchestration.workers.executors import Pool
+from orchestration.workers.provenance import versions
 
 ROOT = Path(__file__).parent.parent
 FIGURES = Path(__file__).parent / "figures"
@@ -122,9 +123,7 @@ def limits() -> list[str]:
     """Limits of the period over kappa."""
     found = limits_of("limits", [experiments.flight(kappa=kappa) for kappa in KAPPAS])
     paper = next(one for kappa, one in zip(KAPPAS, found, strict=True) if kappa == 1.0)
-    drawn = drawing.draw_spectral_radius(
-        PAPER, limit.Limit(**{**paper, "continuous": None, "tried": ()}), RESULTS, DOCS
-    )
+    drawn = figure.draw_spectral_radius(PAPER, limit.Limit(**{**paper, "continuous": None, "tried": ()}), RESULTS, DOCS)
     (FIGURES / "spectral_radius.png").write_bytes(drawn[0].read_bytes())
     return [
         f"kappa {kappa:<4g} local {_ms(one['local_limit'])}, large-signal {_ms(one['large_signal_limit'])}, "

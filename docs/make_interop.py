@@ -9,17 +9,17 @@ import tempfile
 from pathlib import Path
 
 from docs.pages import fill
-from orchestration import fmus
+from orchestration.building import fmus
+from orchestration.building.models import MODELS
 from orchestration.checks.validation import rules
 from orchestration.checks.validation.finding import name_of
-from orchestration.drawing import style
-from orchestration.exchange.interop import table
-from orchestration.exchange.interop.catalogue import chosen
-from orchestration.exchange.interop.compare import agreements
-from orchestration.exchange.interop.figure import agreement_chart
+from orchestration.figures import style
+from orchestration.interop import table
+from orchestration.interop.catalogue import chosen
+from orchestration.interop.compare import agreements
+from orchestration.interop.figure import agreement_chart
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.quadrotor.wiring import MODELS
 from tests.fmus.mutants import MUTANTS
 from tests.fmus.verdicts import as_markdown, verdicts
 

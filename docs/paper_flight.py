@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestration.drawing.errors import ERRORS, Error, draw_components
-from orchestration.drawing.lines import TIME
-from orchestration.drawing.path import draw_in_space
-from orchestration.drawing.run import Run, runs_of
-from orchestration.drawing.style import Style
+from orchestration.basics.simulator import Floats
+from orchestration.figures.errors import ERRORS, Error, draw_components
+from orchestration.figures.lines import TIME
+from orchestration.figures.path import draw_in_space
+from orchestration.figures.run import Run
+from orchestration.figures.style import Style
 from orchestration.quadrotor.measures import position_error
-from orchestration.results.result import Result
-from orchestration.simulator import Floats
+from orchestration.runs.draw import runs_of
+from orchestration.runs.result import Result
 
 BELOW = (0.05, 0.01)
 """[m]"""

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestration.drawing.palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED
-from orchestration.drawing.style import Style
-from orchestration.master.sources import by_name, gusts
+from orchestration.basics.simulator import Floats
+from orchestration.engines.sources import by_name, gusts
+from orchestration.figures.palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED
+from orchestration.figures.style import Style
 from orchestration.signals.dryden import DRAWS, Dryden
 from orchestration.signals.library import made
 from orchestration.signals.waypoints import read_waypoints
-from orchestration.simulator import Floats
 from quadcosim import load_scenario, run
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "references"

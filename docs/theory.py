@@ -9,8 +9,8 @@ import quadcosim
 from docs.experiments import random_starts
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.studies.linear import HoverLoop
-from orchestration.studies.local import local_limit
+from orchestration.stability.hover_loop import HoverLoop
+from orchestration.stability.local_limit import local_limit
 
 Array = Any
 

@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration.drawing.palette import BLUE, GREEN, GREY, ORANGE, RED
-from orchestration.drawing.style import DOCS, save
-from orchestration.results.result import Result
-from orchestration.simulation import run
+from orchestration.figures.palette import BLUE, GREEN, GREY, ORANGE, RED
+from orchestration.figures.style import DOCS, save
+from orchestration.runs.result import Result
+from orchestration.runs.simulation import run
 from orchestration.system.paths import changed
 from orchestration.system.system_file import load_system
 

@@ -96,11 +96,10 @@ def _in_the_fmu(error: BaseException) -> str:
 
 def _own_frames(error: BaseException) -> list[traceback.FrameSummary]:
     frames = traceback.extract_tb(error.__traceback__)
-    return [each for each in frames if each.filename.endswith(".py") and Path(each.filename).parent not in _KIT]
+    return [each for each in frames if each.filename.endswith(".py") and not _KIT & {*Path(each.filename).parents}]
 
 
-_HERE = Path(__file__).parent
-_KIT = (_HERE, _HERE / "native", Path(inspect.getfile(LogMsg)).parent)
+_KIT = {Path(__file__).parent, Path(inspect.getfile(LogMsg)).parent}
 
 
 def report(slave: Any, error: Exception, *, again: bool) -> Failure:

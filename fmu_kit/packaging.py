@@ -86,13 +86,17 @@ def source_hash(target: Target) -> str:
 def hash_of(target: Target, packaging: Iterable[Path], facts: dict[str, str], unchanged: dict[str, bytes]) -> str:
     """The hash of what a slave's modules are, of the files that pack it, of facts, and of what is packed as it is."""
     digest = hashlib.sha256()
-    texts = bundled_sources(target) | {path.name: _text(path) for path in packaging}
+    texts = bundled_sources(target) | {_place_in_kit(path): _text(path) for path in packaging}
     texts |= {"tool": generation_tool(), **facts}
     for name, text in {**texts, "fragment": fragment_of(target)}.items():
         digest.update(f"{name}\0{text}\0".encode())
     for name, content in unchanged.items():
         digest.update(name.encode() + b"\0" + hashlib.sha256(content).digest())
     return digest.hexdigest()
+
+
+def _place_in_kit(path: Path) -> str:
+    return path.relative_to(Path(__file__).parent).as_posix()
 
 
 def read_source_hash(fmu: Path) -> str | None:

@@ -29,43 +29,43 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from orchestration.errors import QuadcosimError, SimulatorError, UsageError
+    from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageError
+    from orchestration.comparison.design import Comparison
+    from orchestration.comparison.file import load_comparison
+    from orchestration.comparison.run import Compared, compare
     from orchestration.fmi.model import Model, read_model
+    from orchestration.limits.limit import Limit
+    from orchestration.limits.limit import find as limit
     from orchestration.quadrotor.scenario import FmuChoice, Record, Scenario
     from orchestration.quadrotor.scenario_file import load_scenario
     from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
     from orchestration.quadrotor.timing import Timing
-    from orchestration.quadrotor.vehicles import Vehicle, load_vehicle
+    from orchestration.quadrotor.vehicle import Vehicle, load_vehicle
     from orchestration.report.writing import report
-    from orchestration.results.pause import fly_until, resume
-    from orchestration.results.result import Result
-    from orchestration.results.run_directory import load_run, save_run
-    from orchestration.simulation import RunInterrupted, run
+    from orchestration.runs.pause import fly_until, resume
+    from orchestration.runs.result import Result
+    from orchestration.runs.run_directory import load_run, save_run
+    from orchestration.runs.simulation import RunInterrupted, run
     from orchestration.studies.axes import Axis
-    from orchestration.studies.comparison.design import Comparison
-    from orchestration.studies.comparison.file import load_comparison
-    from orchestration.studies.comparison.run import Compared, compare
-    from orchestration.studies.limit import Limit
-    from orchestration.studies.limit import find as limit
     from orchestration.studies.study import Study
     from orchestration.studies.study_file import load_study
     from orchestration.studies.sweep import sweep
     from orchestration.studies.swept import Swept
-    from orchestration.studies.tune import Tuned, tune
-    from orchestration.studies.tuning import Tuning
-    from orchestration.studies.tuning_file import load_tuning
     from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
     from orchestration.system.paths import changed
     from orchestration.system.system_file import load_system
+    from orchestration.tuning.tune import Tuned, tune
+    from orchestration.tuning.tuning import Tuning
+    from orchestration.tuning.tuning_file import load_tuning
 
 _HOMES = {
     # run
-    "run": "orchestration.simulation",
-    "Result": "orchestration.results.result",
-    "save_run": "orchestration.results.run_directory",
-    "load_run": "orchestration.results.run_directory",
-    "fly_until": "orchestration.results.pause",
-    "resume": "orchestration.results.pause",
+    "run": "orchestration.runs.simulation",
+    "Result": "orchestration.runs.result",
+    "save_run": "orchestration.runs.run_directory",
+    "load_run": "orchestration.runs.run_directory",
+    "fly_until": "orchestration.runs.pause",
+    "resume": "orchestration.runs.pause",
     "report": "orchestration.report.writing",
     # a flight of the quadrotor
     "Scenario": "orchestration.quadrotor.scenario",
@@ -74,8 +74,8 @@ _HOMES = {
     "ReferenceChoice": "orchestration.quadrotor.signals",
     "DisturbanceChoice": "orchestration.quadrotor.signals",
     "Record": "orchestration.quadrotor.scenario",
-    "Vehicle": "orchestration.quadrotor.vehicles",
-    "load_vehicle": "orchestration.quadrotor.vehicles",
+    "Vehicle": "orchestration.quadrotor.vehicle",
+    "load_vehicle": "orchestration.quadrotor.vehicle",
     "load_scenario": "orchestration.quadrotor.scenario_file",
     # any system
     "System": "orchestration.system.model",
@@ -89,26 +89,26 @@ _HOMES = {
     "read_model": "orchestration.fmi.model",
     "Model": "orchestration.fmi.model",
     # many runs
-    "limit": "orchestration.studies.limit",
-    "Limit": "orchestration.studies.limit",
+    "limit": "orchestration.limits.limit",
+    "Limit": "orchestration.limits.limit",
     "sweep": "orchestration.studies.sweep",
     "Study": "orchestration.studies.study",
     "Axis": "orchestration.studies.axes",
     "Swept": "orchestration.studies.swept",
     "load_study": "orchestration.studies.study_file",
-    "compare": "orchestration.studies.comparison.run",
-    "Comparison": "orchestration.studies.comparison.design",
-    "Compared": "orchestration.studies.comparison.run",
-    "load_comparison": "orchestration.studies.comparison.file",
-    "tune": "orchestration.studies.tune",
-    "Tuning": "orchestration.studies.tuning",
-    "Tuned": "orchestration.studies.tune",
-    "load_tuning": "orchestration.studies.tuning_file",
+    "compare": "orchestration.comparison.run",
+    "Comparison": "orchestration.comparison.design",
+    "Compared": "orchestration.comparison.run",
+    "load_comparison": "orchestration.comparison.file",
+    "tune": "orchestration.tuning.tune",
+    "Tuning": "orchestration.tuning.tuning",
+    "Tuned": "orchestration.tuning.tune",
+    "load_tuning": "orchestration.tuning.tuning_file",
     # errors
-    "QuadcosimError": "orchestration.errors",
-    "UsageError": "orchestration.errors",
-    "SimulatorError": "orchestration.errors",
-    "RunInterrupted": "orchestration.simulation",
+    "QuadcosimError": "orchestration.basics.errors",
+    "UsageError": "orchestration.basics.errors",
+    "SimulatorError": "orchestration.basics.errors",
+    "RunInterrupted": "orchestration.runs.simulation",
 }
 _OTHERWISE = {"limit": "find"}
 """Names that go by another one at home"""

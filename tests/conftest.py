@@ -10,9 +10,10 @@ from pathlib import Path
 import hypothesis
 import pytest
 
-from orchestration import fmus
-from orchestration.command import cli, terminal
-from orchestration.quadrotor.wiring import MODELS
+from orchestration.basics import terminal
+from orchestration.building import fmus
+from orchestration.building.models import MODELS
+from orchestration.command import cli
 from tests.commands import Done, Main
 from tests.fmus.making import MAKINGS, Making
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from fmu_kit.bundle import Target
-from fmu_kit.native.compiler import Mathematics
-from orchestration.results.result import Result
+from fmu_kit.compiler.pack.c_compiler import Mathematics
+from orchestration.runs.result import Result
 from quadcosim import Scenario
 from tests.fmus.process import run
 

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.documents import read_toml
+from orchestration.basics.documents import read_toml
 
 ROOT = Path(__file__).parents[1]
 SETTINGS = read_toml(ROOT / "pyproject.toml", "settings")["tool"]["setuptools"]

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from orchestration.documents import read_toml
+from orchestration.basics.documents import read_toml
 
 ROOT = Path(__file__).parents[1]
 PROJECT = read_toml(ROOT / "pyproject.toml", "project")["project"]

@@ -5,19 +5,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from orchestration.documents import read_toml
+from orchestration.basics.documents import read_toml
 
 Tables = dict[str, Any]
 
 
 def reader_of(tables: Tables) -> tuple[str, Callable[[Path], object]]:
     """What a file with these tables is, and what reads it."""
+    from orchestration.comparison.file import load_comparison
     from orchestration.expressions.syntax import parse
-    from orchestration.quadrotor.vehicles import load_vehicle
-    from orchestration.request import load_request
-    from orchestration.studies.comparison.file import load_comparison
+    from orchestration.quadrotor.vehicle import load_vehicle
+    from orchestration.requests.request import load_request
     from orchestration.studies.study_file import load_study
-    from orchestration.studies.tuning_file import load_tuning
+    from orchestration.tuning.tuning_file import load_tuning
 
     def load_expressions(path: Path) -> object:
         return [parse(text) for text in tables.values()]

@@ -12,11 +12,11 @@ import griffe
 import pydantic
 
 from docs.website.tables import table, words
+from orchestration.comparison.file import ComparisonFile
 from orchestration.quadrotor.scenario_file import ScenarioFile
-from orchestration.studies.comparison.file import ComparisonFile
 from orchestration.studies.study_file import StudyFile
-from orchestration.studies.tuning_file import TuningFile
 from orchestration.system.system_file import SystemTable
+from orchestration.tuning.tuning_file import TuningFile
 
 FILES = {
     "System file": (SystemTable, "Any FMUs; [how to write one](systems.md)."),

@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence, S
 from pathlib import Path
 from typing import Any, TypeVar
 
-from orchestration.errors import UsageError, expected_name, shown
+from orchestration.basics.errors import UsageError, expected_name, shown
 
 Class = TypeVar("Class", bound=type)
 Check = Callable[[str, Any], Any]

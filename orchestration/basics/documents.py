@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from orchestration.errors import UsageError, shown
+from orchestration.basics.errors import UsageError, shown
 
 if sys.version_info >= (3, 11):
     import tomllib

@@ -4,7 +4,7 @@ import functools
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
-from orchestration.errors import QuadcosimError
+from orchestration.basics.errors import QuadcosimError
 
 EXTRAS = {
     "studies": ("cma", "dask", "distributed", "filelock", "pandas", "SALib", "scipy", "xarray"),

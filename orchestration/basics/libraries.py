@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fmu_kit.bundle import PackagingError
-from orchestration.errors import QuadcosimError
+from orchestration.basics.errors import QuadcosimError
 
 
 def kept(folder: str, sources: Mapping[str, bytes], how: Any, compiled: Callable[[], bytes]) -> Path:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from typing import Literal, TypeAlias, TypeVar
 
-from orchestration.command.terminal import Count, Share, progress_bar, runs_bar
+from orchestration.basics.terminal import Count, Share, progress_bar, runs_bar
 
 Heard = TypeVar("Heard")
 ShareHeard: TypeAlias = Share | Literal["bar"] | None

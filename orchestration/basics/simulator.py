@@ -34,3 +34,6 @@ class Simulator(Protocol):
 
     def restore(self, state: bytes) -> None:
         """Put back what `save` gave."""
+
+
+Integers: TypeAlias = npt.NDArray[np.int64]

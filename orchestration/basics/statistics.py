@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from statistics import NormalDist
 from typing import NamedTuple
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 
 
 def wilson(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:

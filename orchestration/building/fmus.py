@@ -12,12 +12,12 @@ from typing import TypeVar
 
 from fmu_kit import packaging
 from fmu_kit.bundle import PackagingError, Target
+from fmu_kit.compiler.pack import freshness
 from fmu_kit.discovery import slave_beside, slaves_in
-from fmu_kit.native import freshness
 from fmu_kit.packaging import read_source_hash
-from orchestration import subprocesses
-from orchestration.errors import QuadcosimError, UsageError
-from orchestration.quadrotor.wiring import MODELS
+from orchestration.basics.errors import QuadcosimError, UsageError
+from orchestration.building.models import MODELS
+from orchestration.processes import subprocesses
 from orchestration.system.model import System
 
 _NOTES = logging.getLogger("quadcosim")
@@ -25,7 +25,7 @@ _NOTES = logging.getLogger("quadcosim")
 
 def default_folder() -> Path:
     """`fmus/` of the project, or the user's cache directory where that is not there to be written."""
-    root = Path(__file__).resolve().parents[1]
+    root = Path(__file__).resolve().parents[2]
     folder = root / "fmus"
     if (root / "pyproject.toml").is_file() and os.access(folder, os.W_OK):
         return folder
@@ -53,11 +53,11 @@ class Packing:
 
 
 IN_PYTHON = Packing(folder="", command=("fmu_kit.packaging",), source_hash=packaging.source_hash)
-NATIVE = Packing(folder="native", command=("fmu_kit.native.building",), source_hash=freshness.source_hash)
+NATIVE = Packing(folder="native", command=("fmu_kit.compiler.pack.building",), source_hash=freshness.source_hash)
 """Without Python inside, by a C compiler."""
 NATIVE_FMI_3 = Packing(
     folder="native/fmi3",
-    command=("fmu_kit.native.building", "--fmi", "3"),
+    command=("fmu_kit.compiler.pack.building", "--fmi", "3"),
     source_hash=functools.partial(freshness.source_hash, version=3),
 )
 PACKINGS = (NATIVE_FMI_3, NATIVE, IN_PYTHON)
@@ -211,7 +211,7 @@ def export_c(targets: Sequence[Target], folder: Path, *, single: bool = False) -
 
     `single`: in single precision. Raises `QuadcosimError` saying what could not be written.
     """
-    return _packed(["fmu_kit.native.embedded", *(["--single"] if single else [])], targets, folder, None)
+    return _packed(["fmu_kit.compiler.pack.embedded", *(["--single"] if single else [])], targets, folder, None)
 
 
 def _packed(

@@ -7,8 +7,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
-from orchestration import fmus
-from orchestration.errors import QuadcosimError
+from orchestration.basics.errors import QuadcosimError
+from orchestration.building import fmus
 from orchestration.fmi.model import Model, read_model
 from orchestration.system.model import Component, Source, System
 

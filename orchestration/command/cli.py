@@ -9,26 +9,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 import typer.core
 
-from orchestration.command import beginning, completion, plotting, registering
+from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageError
+from orchestration.basics.extras import extra_of
+from orchestration.basics.terminal import complain, progress_bar, say, warn
+from orchestration.basics.units import after
+from orchestration.command import completion, interop, plotting, studies
+from orchestration.command import new as beginning
+from orchestration.command import registry as registering
+from orchestration.command import report as reports
 from orchestration.command import systems as system_commands
 from orchestration.command.answer import Answer, of_files
 from orchestration.command.flags import EngineFlag, FlightFlags, Timing, flies, request_from
 from orchestration.command.limit_flags import LimitFlags
-from orchestration.command.manners import Manners
-from orchestration.command.registering import FLY, FMUS, TOOLS
+from orchestration.command.output_options import Manners
+from orchestration.command.registry import FLY, FMUS, TOOLS
 from orchestration.command.shared_flags import takes
-from orchestration.command.terminal import complain, progress_bar, say, warn
-from orchestration.errors import QuadcosimError, SimulatorError, UsageError
-from orchestration.exchange.interop import cli as interop
-from orchestration.extras import extra_of
 from orchestration.fmi.banners import banners_to_stderr
-from orchestration.report import command as reports
-from orchestration.studies import cli as studies
-from orchestration.subprocesses import misleading_variables
-from orchestration.units import after
+from orchestration.processes.subprocesses import misleading_variables
 
 if TYPE_CHECKING:
-    from orchestration.results.result import Result
+    from orchestration.runs.result import Result
 
 
 class _Stopped(Exception):
@@ -114,8 +114,8 @@ def build(
     ] = 2,
 ) -> Answer:
     """Build every slave that the modules of FOLDER define, each as an .fmu. Same sources give the same bytes."""
-    from orchestration import fmus
-    from orchestration.quadrotor.wiring import MODELS
+    from orchestration.building import fmus
+    from orchestration.building.models import MODELS
 
     if target is not None and not native:
         raise UsageError("--target: expected --native with it; FMUs with Python inside are the same for all systems")
@@ -143,7 +143,7 @@ def export_c(
     ] = False,
 ) -> Answer:
     """Write a controller, or any slave, as two files in C for a microcontroller: no allocation, C99."""
-    from orchestration import fmus
+    from orchestration.building import fmus
 
     written = fmus.export_c(fmus.slaves_named(slave), out, single=single)
     return of_files(each for path in written for each in (path.with_suffix(".h"), path))
@@ -171,8 +171,8 @@ def run(
     flags: FlightFlags,
 ) -> Answer:
     """Fly a scenario and print its metrics. FMUs that are missing or out of date are built first."""
-    from orchestration.master.engine import engine_named
-    from orchestration.simulation import run as fly  # what reads and writes files is loaded where there are any
+    from orchestration.engines.engine import engine_named
+    from orchestration.runs.simulation import run as fly  # what reads and writes files is loaded where there are any
 
     if resume is not None and (scenario is not None or pause_at is not None or flags != FlightFlags()):
         raise UsageError("--resume: expected no scenario and no flags of the flight; the paused run has its own")
@@ -181,16 +181,16 @@ def run(
     with progress_bar("flying") as progress:
         how: Any = {"progress": progress, "announce": say, "engine": engine_named(engine)}
         if resume is not None:
-            from orchestration.results import pause
+            from orchestration.runs import pause
 
             result: Result | None = pause.resume(resume, out, figures=figures, **how)
         elif pause_at is not None and out is not None:
-            from orchestration.results import pause
+            from orchestration.runs import pause
 
             chosen = request_from(scenario, flags, timing)
             result = pause.fly_until(chosen, pause_at, out, figures=figures, **how)
         elif out is not None:
-            from orchestration.results.run_directory import keep_flight
+            from orchestration.runs.run_directory import keep_flight
 
             chosen = request_from(scenario, flags, timing)
             result = keep_flight(out, lambda to: fly(chosen, recorder=to, **how), figures=figures)
@@ -219,9 +219,9 @@ def validate(
     Any FMI 2.0 co-simulation FMU will do; those that quadcosim built must keep the rules of this project too.
     All of it is done in a process of its own within limits.
     """
-    from orchestration import fmus
+    from orchestration.building import fmus
+    from orchestration.building.models import MODELS
     from orchestration.checks.validation import validate as findings_of
-    from orchestration.quadrotor.wiring import MODELS
 
     paths = fmu or [fmus.locate(name, say) for name in MODELS]
     for path in paths:
@@ -247,10 +247,10 @@ def doctor(
     limits: LimitFlags,
 ) -> Answer:
     """Say what FMUs need to load, what of it this machine has, and try; exit code 1 if anything is missing."""
-    from orchestration import fmus
+    from orchestration.building import fmus
+    from orchestration.building.models import MODELS
     from orchestration.checks.doctor.as_lines import as_text
     from orchestration.checks.doctor.report import as_tables, examine
-    from orchestration.quadrotor.wiring import MODELS
 
     report = examine(fmu or [fmus.locate(name, say) for name in MODELS], limits.limits)
     return Answer(document=as_tables(report), lines=as_text(report).splitlines(), good=report.good)
@@ -272,9 +272,9 @@ def ssp(
     flags: FlightFlags,
 ) -> Answer:
     """Write FMUs, connections and parameters as one SSP 1.0 file for other tools, and beside it its timing."""
-    from orchestration import fmus
-    from orchestration.exchange.ssp import writing
+    from orchestration.building import fmus
     from orchestration.quadrotor.scenario import Scenario
+    from orchestration.requests.ssp import writing
 
     asked = request_from(scenario, flags)
     if isinstance(asked, Scenario) or scenario is None:

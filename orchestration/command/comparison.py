@@ -4,14 +4,15 @@ import dataclasses
 from pathlib import Path
 from typing import Any, Literal
 
+from orchestration.basics.errors import UsageError
+from orchestration.basics.terminal import say
+from orchestration.command import comparison_text as terminal
 from orchestration.command.answer import Answer
 from orchestration.command.figure_flags import FigureFlags
-from orchestration.command.terminal import say
-from orchestration.errors import UsageError
-from orchestration.master.engine import Engine
-from orchestration.studies.comparison import run, terminal
-from orchestration.studies.comparison.design import Comparison
-from orchestration.studies.comparison.outcome import as_json as to_json
+from orchestration.comparison import run
+from orchestration.comparison.design import Comparison
+from orchestration.comparison.outcome import as_json as to_json
+from orchestration.engines.engine import Engine
 
 
 def all_cells(

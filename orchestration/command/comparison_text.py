@@ -3,10 +3,10 @@
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 
-from orchestration.studies.comparison.cells import PEAK, VARIATION, Median, Result
-from orchestration.studies.comparison.design import Comparison
-from orchestration.studies.comparison.limits import Limit
-from orchestration.studies.comparison.outcome import Outcome
+from orchestration.comparison.cells import PEAK, VARIATION, Median, Result
+from orchestration.comparison.design import Comparison
+from orchestration.comparison.limits import Limit
+from orchestration.comparison.outcome import Outcome
 
 
 def lines(comparison: Comparison, outcome: Outcome) -> Iterator[str]:

@@ -14,7 +14,8 @@ def among(*names: str) -> Complete:
 
 def controllers(incomplete: str) -> list[str]:
     """This project's controllers, and FMUs by their paths."""
-    from orchestration.quadrotor.wiring import DEFAULT_PLANT, MODELS
+    from orchestration.building.models import MODELS
+    from orchestration.quadrotor.wiring import DEFAULT_PLANT
 
     return starting(incomplete, [name for name in MODELS if name != DEFAULT_PLANT]) + _files(incomplete, ".fmu")
 
@@ -28,7 +29,7 @@ def plants(incomplete: str) -> list[str]:
 
 def vehicles(incomplete: str) -> list[str]:
     """Vehicles that have a name, and files of others."""
-    from orchestration.quadrotor.vehicles import ENDING, names
+    from orchestration.quadrotor.vehicle import ENDING, names
 
     return starting(incomplete, names()) + _files(incomplete, ENDING)
 

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from orchestration.drawing.names import COLUMNS, FORMATS, STYLES
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.figures.names import COLUMNS, FORMATS, STYLES
 
 if TYPE_CHECKING:
-    from orchestration.drawing.style import Style
+    from orchestration.figures.style import Style
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +58,7 @@ class FigureFlags:
         """The style with what was given beside it."""
         from dataclasses import replace
 
-        from orchestration.drawing.style import STYLES as KNOWN
+        from orchestration.figures.style import STYLES as KNOWN
 
         style = replace(KNOWN[self.style], formats=tuple(dict.fromkeys(self.format or FORMATS[:1])), **self._extent)
         return style if self.font_size is None else replace(style, font=self.font_size)

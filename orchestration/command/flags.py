@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from orchestration.basics.errors import UsageError
 from orchestration.command import completion
 from orchestration.command.shared_flags import takes
-from orchestration.errors import UsageError
 from orchestration.quadrotor.timing import TIMING_KEYS
 
 if TYPE_CHECKING:
     from orchestration.quadrotor.parameters import Parameter
     from orchestration.quadrotor.scenario import Scenario
-    from orchestration.request import Request
+    from orchestration.requests.request import Request
     from orchestration.system.model import System
 
 TIMING, EFFECTS, MODEL = "Timing", "What goes wrong", "What flies"
@@ -196,10 +196,10 @@ class FlightFlags:
 
     def applied_to(self, scenario: "Scenario") -> "Scenario":
         """`scenario` with what was given; raises `UsageError` for what cannot be."""
-        from orchestration.fmus import native_twin
+        from orchestration.building.fmus import native_twin
         from orchestration.quadrotor.presets import preset_timing
         from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice, chosen
-        from orchestration.quadrotor.vehicles import load_vehicle
+        from orchestration.quadrotor.vehicle import load_vehicle
 
         timing: dict[str, Any] = {} if self.preset is None else preset_timing(self.preset)
         timing |= {name: getattr(self, name) for name in _TIMING_FLAGS if getattr(self, name) is not None}
@@ -233,7 +233,7 @@ class FlightFlags:
 
     def applied_to_system(self, system: "System") -> "System":
         """`system` with what was given; raises `UsageError` for flags that are for the quadrotor only."""
-        from orchestration.fmus import native_twin
+        from orchestration.building.fmus import native_twin
         from orchestration.system.paths import changed
 
         of_systems = ("seed", "stop_time", "set", "native")
@@ -278,7 +278,7 @@ flies = takes("flags", FlightFlags)
 def request_from(path: Path | None, flags: FlightFlags, timing: Path | None = None) -> "Request":
     """The system or the scenario of a file, an SSP's with its timing, or the paper's, with the flags applied."""
     from orchestration.quadrotor.scenario import Scenario
-    from orchestration.request import load_request
+    from orchestration.requests.request import load_request
 
     request = Scenario() if path is None else load_request(path, timing)
     return flags.applied_to(request) if isinstance(request, Scenario) else flags.applied_to_system(request)

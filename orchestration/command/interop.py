@@ -5,14 +5,15 @@ from typing import Annotated
 
 import typer
 
-from orchestration.command import completion, registering
+from orchestration.basics.terminal import progress_bar, say
+from orchestration.command import completion
+from orchestration.command import registry as registering
 from orchestration.command.answer import Answer
 from orchestration.command.flags import FlightFlags, Timing, flies, request_from
-from orchestration.command.terminal import progress_bar, say
 
 
 def _tools(incomplete: str) -> list[str]:
-    from orchestration.exchange.interop.catalogue import TOOLS
+    from orchestration.interop.catalogue import TOOLS
 
     return completion.starting(incomplete, [name for name in TOOLS if " " not in name])
 
@@ -38,17 +39,17 @@ def interop(
 
     Exit code 1 if a tool is farther than 1e-9 in a state, its own first inputs given to this master too.
     """
-    from orchestration.exchange.interop import table
-    from orchestration.exchange.interop.catalogue import chosen
-    from orchestration.exchange.interop.compare import agreements
-    from orchestration.request import system_meant
+    from orchestration.interop import table
+    from orchestration.interop.catalogue import chosen
+    from orchestration.interop.compare import agreements
+    from orchestration.requests.request import system_meant
 
     asked = request_from(scenario, flags, timing)
     tools = chosen(tool, system_meant(asked).components)
     with progress_bar("flying in other masters") as progress:
         found = agreements(asked, tools, announce=say, progress=progress)
     if out is not None:
-        from orchestration.exchange.interop.figure import draw
+        from orchestration.interop.figure import draw
 
         say(str(draw(found, out)))
     far = [agreement.tool.name for agreement in found if not table.agrees(agreement)]

@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from orchestration.checks.confined import Limits
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.processes.confined import Limits
 
 
 @dataclass(frozen=True, kw_only=True)

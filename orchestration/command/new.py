@@ -5,11 +5,11 @@ from typing import Annotated, get_args
 
 import typer
 
-from orchestration.command import registering
+from orchestration.basics.errors import UsageError
+from orchestration.basics.terminal import say
+from orchestration.command import registry as registering
 from orchestration.command.answer import Answer, of_files
-from orchestration.command.registering import FLY
-from orchestration.command.terminal import say
-from orchestration.errors import UsageError
+from orchestration.command.registry import FLY
 from orchestration.scaffold.folder import Kind, git_author, write
 
 

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.command import registering
+from orchestration.basics.errors import UsageError, shown
+from orchestration.command import registry as registering
 from orchestration.command.answer import Answer, of_files
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.shared_flags import takes
-from orchestration.drawing.names import FLIGHT
-from orchestration.errors import UsageError, shown
+from orchestration.figures.names import FLIGHT
 
 if TYPE_CHECKING:
-    from orchestration.results.result import Result
+    from orchestration.runs.result import Result
 
 TOGETHER = "overlay"
 """Folder beside the runs for what shows several of them"""
@@ -46,10 +46,10 @@ def plot(
     look: FigureFlags,
 ) -> Answer:  # fmt: skip
     """Draw the figures of a run again, or of several runs laid over each other, for a screen, a paper or slides."""
-    from orchestration.drawing.draw import draw
-    from orchestration.drawing.style import save
-    from orchestration.results.differences import told_apart
-    from orchestration.results.run_directory import load_run
+    from orchestration.figures.style import save
+    from orchestration.runs.draw import draw
+    from orchestration.runs.run_directory import load_run
+    from orchestration.runs.run_labels import told_apart
 
     results = [load_run(one) for one in directory]
     names = told_apart(results, [str(one) for one in directory])

@@ -7,9 +7,9 @@ from typing import Any
 
 import typer
 
-from orchestration.command import terminal
+from orchestration.basics import terminal
 from orchestration.command.answer import Answer
-from orchestration.command.manners import Manners
+from orchestration.command.output_options import Manners
 from orchestration.command.shared_flags import takes
 
 FLY, STUDY, FMUS, TOOLS = "Fly", "Study", "FMUs", "Other tools"

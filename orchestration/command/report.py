@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 
-from orchestration.command import registering
+from orchestration.basics.terminal import progress_bar
+from orchestration.command import registry as registering
 from orchestration.command.answer import Answer, of_files
-from orchestration.command.terminal import progress_bar
 
 
 def report(

@@ -3,7 +3,7 @@
 import os
 import sys
 
-from orchestration.subprocesses import ROOT, misleading_variables
+from orchestration.processes.subprocesses import ROOT, misleading_variables
 
 _AGAIN = "import sys; sys.path.insert(0, sys.argv.pop(1)); from orchestration.command.start import main; main()"
 

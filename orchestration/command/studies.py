@@ -7,16 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from orchestration.command import completion, registering
+from orchestration.basics.errors import UsageError
+from orchestration.basics.terminal import say
+from orchestration.command import completion
+from orchestration.command import registry as registering
 from orchestration.command.answer import Answer, of_files
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.flags import EngineFlag, FlightFlags, Timing, flies, request_from
 from orchestration.command.shared_flags import takes
-from orchestration.command.terminal import say
-from orchestration.errors import UsageError
 
 if TYPE_CHECKING:
-    from orchestration.master.engine import Engine
+    from orchestration.engines.engine import Engine
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file.", metavar="STUDY.toml", show_default=False)]
 Out = Annotated[
@@ -62,10 +63,10 @@ def sweep(
 
 def status(study: StudyFile, out: Out = None) -> Answer:
     """Tell how far a study is, also while it runs in another process."""
-    from orchestration.studies.lanes import Agreement
     from orchestration.studies.store import open_for_reading
     from orchestration.studies.study_file import load_study
     from orchestration.studies.sweep import AGREEMENT, TOTAL, expect_current, store_path
+    from orchestration.workers.batching import Agreement
 
     chosen = load_study(study)
     path = store_path(chosen.name, out)
@@ -142,8 +143,8 @@ def tune(
     engine: BatchFlag = None,
 ) -> Answer:
     """Tune a controller on an ensemble of starts, and judge it on others; goes on where it was stopped."""
-    from orchestration.studies.tune import tune as search_all
-    from orchestration.studies.tuning_file import load_tuning
+    from orchestration.tuning.tune import tune as search_all
+    from orchestration.tuning.tuning_file import load_tuning
 
     command = f"quadcosim tune {tuning} --out {out}" + (f" --engine {engine}" if engine else "")
     found = search_all(load_tuning(tuning), out=out, workers=workers, engine=_batch_or(engine), command=command)
@@ -174,9 +175,9 @@ def compare(
     look: FigureFlags,
 ) -> Answer:
     """Fly controllers against each other from the same starts: who flies, how far, how well, at what effort."""
-    from orchestration.master.engine import engine_named
-    from orchestration.studies.comparison import command
-    from orchestration.studies.comparison.file import load_comparison
+    from orchestration.command import comparison as command
+    from orchestration.comparison.file import load_comparison
+    from orchestration.engines.engine import engine_named
 
     native = native or engine == "batch"
     chosen = dataclasses.replace(load_comparison(comparison), native=native)
@@ -237,8 +238,8 @@ def limit(
     flags: FlightFlags,
 ) -> Answer:
     """Find the largest value that is still good (a period, delay, jitter, loss, any path), and the local limit."""
-    from orchestration.master.engine import engine_named
-    from orchestration.studies import limit as limits
+    from orchestration.engines.engine import engine_named
+    from orchestration.limits import limit as limits
 
     chosen = request_from(scenario, flags, timing)
     found = limits.find(
@@ -247,7 +248,7 @@ def limit(
     )  # fmt: skip
     where = out or (None if scenario is None else scenario.parent)
     if figures and where is not None:
-        from orchestration.studies.drawing import draw_limit
+        from orchestration.limits.figure import draw_limit
 
         for written in draw_limit(chosen, found, where):
             say(str(written))
@@ -264,7 +265,7 @@ def margin(
 ) -> Answer:
     """Tell what delay the loop about hover stands: a constant one exactly, one that varies by bounds from theory."""
     from orchestration.quadrotor.scenario import Scenario
-    from orchestration.studies.margin import margin_of
+    from orchestration.stability.margin import margin_of
 
     chosen = request_from(scenario, flags)
     if not isinstance(chosen, Scenario):
@@ -278,7 +279,7 @@ def margin(
 
 
 def _batch_or(engine: str | None) -> "Engine | Literal['batch'] | None":
-    from orchestration.master.engine import engine_named
+    from orchestration.engines.engine import engine_named
 
     return "batch" if engine == "batch" else engine_named(engine, "batch")
 

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.command import registering
+from orchestration.basics.terminal import say
+from orchestration.command import registry as registering
 from orchestration.command.answer import Answer
 from orchestration.command.flags import FlightFlags, Timing, flies, request_from
-from orchestration.command.registering import FLY
-from orchestration.command.terminal import say
+from orchestration.command.registry import FLY
 
 if TYPE_CHECKING:
     from orchestration.system.model import System
@@ -31,8 +31,8 @@ def connect(
     ] = None,
 ) -> Answer:
     """Propose a system file for FMUs: outputs to inputs by name, type and unit; what is open is said in it."""
-    from orchestration import fmus
-    from orchestration.errors import UsageError
+    from orchestration.basics.errors import UsageError
+    from orchestration.building import fmus
     from orchestration.fmi.model import read_model
     from orchestration.system.proposal import propose
 
@@ -67,13 +67,13 @@ def show(
     flags: FlightFlags,
 ) -> Answer:
     """Show a system: components with their rates, connections with their delay, jitter, loss and hold, units."""
-    from orchestration.request import system_meant
+    from orchestration.requests.request import system_meant
     from orchestration.system.description import as_text
     from orchestration.system.system_file import to_tables
 
     meant = system_meant(request_from(system, flags, timing))
     if out is not None:
-        from orchestration.drawing import diagram
+        from orchestration.figures import diagram
 
         say(str(diagram.write(meant, out)))
     return Answer(document=to_tables(meant), lines=as_text(meant, _units_of(meant)).splitlines())
@@ -81,10 +81,10 @@ def show(
 
 def _units_of(system: "System") -> dict[str, str]:
     """Of its objectives; none where its FMUs are not there, or do not fit."""
-    from orchestration import fmus
-    from orchestration.errors import QuadcosimError
+    from orchestration.basics.errors import QuadcosimError
+    from orchestration.building import fmus
+    from orchestration.engines.wiring import checked
     from orchestration.fmi.model import read_model
-    from orchestration.simulation import checked
 
     try:
         models = {name: read_model(path) for name, path in fmus.of_components(system.fmus, say).items()}

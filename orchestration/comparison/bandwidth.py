@@ -5,15 +5,15 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from orchestration import fmus
+from orchestration.building import fmus
+from orchestration.comparison.design import FMU, Comparison, Controller, Craft
 from orchestration.fmi.model import read_model
 from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor import wiring
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.simulation import prepared
+from orchestration.runs.simulation import prepared
+from orchestration.stability.hover_loop import at_hover
 from orchestration.studies.axes import Value
-from orchestration.studies.comparison.design import FMU, Comparison, Controller, Craft
-from orchestration.studies.linear import at_hover
 from orchestration.system.model import System
 
 Key = tuple[str, str, Value]

@@ -5,9 +5,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from orchestration.statistics import quantile, wilson
+from orchestration.basics.statistics import quantile, wilson
+from orchestration.comparison.design import START, Comparison
 from orchestration.studies.axes import Value
-from orchestration.studies.comparison.design import START, Comparison
 from orchestration.studies.figures import flew
 
 if TYPE_CHECKING:

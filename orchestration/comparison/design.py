@@ -6,17 +6,17 @@ from functools import cached_property
 from typing import Any
 
 from fmu_kit.trajectory import Trajectory
-from orchestration import fmus
-from orchestration.constructors import strict
-from orchestration.errors import UsageError
+from orchestration.basics.constructors import strict
+from orchestration.basics.errors import UsageError
+from orchestration.building import fmus
+from orchestration.quadrotor.initial_conditions import Start, Starts
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import paths_of
-from orchestration.quadrotor.vehicles import Vehicle
+from orchestration.quadrotor.vehicle import Vehicle
 from orchestration.quadrotor.wiring import TRAJECTORY
 from orchestration.studies.axes import Axis, Value
-from orchestration.studies.starts import Start, Starts
+from orchestration.studies.linked_settings import Key, Together
 from orchestration.studies.study import Study
-from orchestration.studies.together import Key, Together
 from orchestration.system.paths import value_at
 
 VEHICLE, CONDITION, CONTROLLER, START = "vehicle", "condition", "controller", "start"

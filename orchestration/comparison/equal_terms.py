@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from orchestration.statistics import wilson
+from orchestration.basics.statistics import wilson
+from orchestration.comparison.bandwidth import Bandwidths
+from orchestration.comparison.cells import PEAK, Result
+from orchestration.comparison.design import CONDITION, CONTROLLER, VEHICLE, Comparison
 from orchestration.studies.axes import Value
-from orchestration.studies.comparison.bandwidth import Bandwidths
-from orchestration.studies.comparison.cells import PEAK, Result
-from orchestration.studies.comparison.design import CONDITION, CONTROLLER, VEHICLE, Comparison
 from orchestration.studies.figures import flew
 
 if TYPE_CHECKING:

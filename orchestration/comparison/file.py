@@ -6,16 +6,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-from orchestration.documents import read_toml
-from orchestration.errors import UsageError
+from orchestration.basics.documents import read_toml
+from orchestration.basics.errors import UsageError
+from orchestration.comparison.design import FMU, Comparison, Condition, Controller, Craft, Front
+from orchestration.quadrotor.initial_conditions import Starts
 from orchestration.quadrotor.parameters import parameters_in
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.vehicles import Vehicle, load_vehicle
+from orchestration.quadrotor.vehicle import Vehicle, load_vehicle
 from orchestration.studies.axes import Value
-from orchestration.studies.comparison.design import FMU, Comparison, Condition, Controller, Craft, Front
-from orchestration.studies.starts import Starts
+from orchestration.studies.linked_settings import Key
 from orchestration.studies.study_file import AxisTable, axis_of, load, scenario_of
-from orchestration.studies.together import Key
 
 _FORBID: dict[str, str] = {"extra": "forbid"}
 

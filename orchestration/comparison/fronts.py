@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from orchestration.comparison.cells import Median
+from orchestration.comparison.design import CONDITION, CONTROLLER, START, VEHICLE, Comparison
 from orchestration.studies.axes import Value
-from orchestration.studies.comparison.cells import Median
-from orchestration.studies.comparison.design import CONDITION, CONTROLLER, START, VEHICLE, Comparison
 from orchestration.studies.figures import flew
 
 if TYPE_CHECKING:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from itertools import takewhile
 from typing import TYPE_CHECKING, Any
 
-from orchestration.statistics import Estimate, quantile
-from orchestration.studies.comparison.bandwidth import Bandwidths
-from orchestration.studies.comparison.design import CONDITION, CONTROLLER, START, VEHICLE, Comparison
+from orchestration.basics.statistics import Estimate, quantile
+from orchestration.comparison.bandwidth import Bandwidths
+from orchestration.comparison.design import CONDITION, CONTROLLER, START, VEHICLE, Comparison
 from orchestration.studies.figures import flew
 
 if TYPE_CHECKING:

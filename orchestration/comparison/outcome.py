@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from orchestration.studies.comparison import fronts, slices
-from orchestration.studies.comparison.bandwidth import Bandwidths
-from orchestration.studies.comparison.cells import Result, judged, results
-from orchestration.studies.comparison.design import Comparison
-from orchestration.studies.comparison.limits import Limit, limits
-from orchestration.studies.comparison.pairs import Pair, pairs
-from orchestration.studies.ranges import is_in_seconds
+from orchestration.comparison import equal_terms as slices
+from orchestration.comparison import fronts
+from orchestration.comparison.bandwidth import Bandwidths
+from orchestration.comparison.cells import Result, judged, results
+from orchestration.comparison.design import Comparison
+from orchestration.comparison.limits import Limit, limits
+from orchestration.comparison.pairs import Pair, pairs
+from orchestration.requests.ranges import is_in_seconds
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -13,19 +13,19 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from orchestration.drawing import cells
-from orchestration.drawing.palette import BLUE, CYCLE, GREY, ORANGE
-from orchestration.drawing.style import SCREEN, Style
-from orchestration.results import labels
-from orchestration.simulator import Floats
+from orchestration.basics.simulator import Floats
+from orchestration.comparison.cells import Median, Result, sizes
+from orchestration.comparison.design import CONDITION, CONTROLLER, VEHICLE, Comparison
+from orchestration.comparison.fronts import Point
+from orchestration.comparison.limits import Limit
+from orchestration.comparison.outcome import Outcome
+from orchestration.figures import cells
+from orchestration.figures.palette import BLUE, CYCLE, GREY, ORANGE
+from orchestration.figures.style import SCREEN, Style
+from orchestration.requests.ranges import is_in_seconds
+from orchestration.results import display_names as labels
 from orchestration.studies.axis_labels import name_of
-from orchestration.studies.comparison.cells import Median, Result, sizes
-from orchestration.studies.comparison.design import CONDITION, CONTROLLER, VEHICLE, Comparison
-from orchestration.studies.comparison.fronts import Point
-from orchestration.studies.comparison.limits import Limit
-from orchestration.studies.comparison.outcome import Outcome
 from orchestration.studies.figures import flew, save
-from orchestration.studies.ranges import is_in_seconds
 
 if TYPE_CHECKING:
     import pandas as pd

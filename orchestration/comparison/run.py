@@ -5,30 +5,30 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from orchestration.command.terminal import say
-from orchestration.errors import UsageError
-from orchestration.extras import explained
-from orchestration.master.engine import Engine
+from orchestration.basics.errors import UsageError
+from orchestration.basics.extras import explained
+from orchestration.basics.progress import CountHeard
+from orchestration.basics.terminal import say
+from orchestration.comparison.bandwidth import Bandwidths, bandwidths
+from orchestration.comparison.cells import Result, frame_of, results
+from orchestration.comparison.design import Comparison
+from orchestration.comparison.outcome import Outcome, concluded, write
+from orchestration.engines.engine import Engine
+from orchestration.engines.wiring import checked
 from orchestration.quadrotor.translation import in_its_own_words
 from orchestration.results import html
-from orchestration.results.run_directory import keep_flight
-from orchestration.simulation import checked
-from orchestration.simulation import run as fly
-from orchestration.studies.comparison.bandwidth import Bandwidths, bandwidths
-from orchestration.studies.comparison.cells import Result, frame_of, results
-from orchestration.studies.comparison.design import Comparison
-from orchestration.studies.comparison.outcome import Outcome, concluded, write
-from orchestration.studies.engine import Pool
-from orchestration.studies.hearing import CountHeard
-from orchestration.studies.lanes import TOLERATED
+from orchestration.runs.run_directory import keep_flight
+from orchestration.runs.simulation import run as fly
 from orchestration.studies.sweep import store_path, sweep
 from orchestration.studies.swept import Swept
 from orchestration.studies.table import export, frame
+from orchestration.workers.batching import TOLERATED
+from orchestration.workers.executors import Pool
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from orchestration.drawing.style import Style
+    from orchestration.figures.style import Style
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -106,8 +106,8 @@ def compare(
     outcome = concluded(comparison, table, known)
     written = [*export(summary.path, place), *write(comparison, outcome, known, place)]
     if figures:
-        from orchestration.drawing.style import SCREEN  # with it comes matplotlib
-        from orchestration.studies.comparison import pictures
+        from orchestration.comparison import pictures
+        from orchestration.figures.style import SCREEN  # with it comes matplotlib
 
         written += pictures.draw(comparison, outcome, table, place, style or SCREEN)
     return Compared(

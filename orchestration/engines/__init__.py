@@ -1,1 +1,1 @@
-"""Steps components through the instants of a run: what happens when, and the master that obeys it."""
+"""What steps components through the instants of a run: the master, in Python and in C, and runs as lanes."""

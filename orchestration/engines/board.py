@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from orchestration.simulator import Floats
+from orchestration.basics.simulator import Floats
 from orchestration.system.model import System, component_of, variable_of
 
 

@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from orchestration.simulator import Floats, Transfer
+from orchestration.basics.simulator import Floats, Transfer
 from orchestration.system.model import Connection
 
 Indices: TypeAlias = npt.NDArray[np.intp]

@@ -11,20 +11,19 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.errors import QuadcosimError, SimulatorError
+from orchestration.basics.errors import QuadcosimError, SimulatorError
+from orchestration.basics.simulator import Floats, Integers, Simulator
+from orchestration.engines import structures as c
+from orchestration.engines.board import Board
+from orchestration.engines.condition import Step
+from orchestration.engines.loop import library
+from orchestration.engines.master import Diverged, Master
+from orchestration.engines.memory import Memory
+from orchestration.engines.sources import Values
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.fmi3 import Fmi3Instance
 from orchestration.fmi.native import NativeInstance
-from orchestration.master import structures as c
-from orchestration.master.board import Board
-from orchestration.master.condition import Step
-from orchestration.master.loop import library
-from orchestration.master.master import Diverged, Master
-from orchestration.master.memory import Memory
-from orchestration.master.recording import Integers
-from orchestration.master.schedule import Schedule
-from orchestration.master.sources import Values
-from orchestration.simulator import Floats, Simulator
+from orchestration.schedule.schedule import Schedule
 from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS
 

@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
+from orchestration.engines.board import Board
+from orchestration.engines.sources import Values
+from orchestration.engines.watch import is_wanted
 from orchestration.expressions.syntax import Name, Node, Number, Operation, names, parse
-from orchestration.master.board import Board
-from orchestration.master.sources import Values
-from orchestration.master.watch import is_wanted
 
 Step: TypeAlias = tuple[int, int, float]
 """What is done, how many operands it takes (of a signal, its place), and the number that it is"""

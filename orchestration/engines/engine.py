@@ -4,11 +4,11 @@ import logging
 from collections.abc import Mapping
 from typing import Any, Literal, cast, get_args
 
-from orchestration.errors import QuadcosimError, UsageError, expected_name
+from orchestration.basics.errors import QuadcosimError, UsageError, expected_name
+from orchestration.basics.simulator import Simulator
+from orchestration.engines.compiled import CompiledMaster, Condition, obstacle
+from orchestration.engines.master import Master
 from orchestration.fmi.native import NativeInstance
-from orchestration.master.compiled import CompiledMaster, Condition, obstacle
-from orchestration.master.master import Master
-from orchestration.simulator import Simulator
 from orchestration.system.model import System
 from orchestration.system.times import nanoseconds
 

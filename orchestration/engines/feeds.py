@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from orchestration.master.sources import Values
-from orchestration.simulator import Floats, Transfer
+from orchestration.basics.simulator import Floats, Transfer
+from orchestration.engines.sources import Values
 
 
 class Feed:

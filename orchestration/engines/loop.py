@@ -5,9 +5,9 @@ import functools
 from pathlib import Path
 from typing import Any
 
-from fmu_kit.native.compiler import OPTIONS, compiled_here
-from orchestration.errors import QuadcosimError
-from orchestration.libraries import kept
+from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
+from orchestration.basics.errors import QuadcosimError
+from orchestration.basics.libraries import kept
 
 FILES = tuple(Path(__file__).with_name(name) for name in ("loop.c", "condition.h"))
 """What it is made of"""

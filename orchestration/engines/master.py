@@ -12,18 +12,18 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from orchestration.errors import SimulatorError
-from orchestration.master.board import Board
-from orchestration.master.channel import Channel
-from orchestration.master.feeds import Feed
-from orchestration.master.plan import Plan
-from orchestration.master.position import Position
-from orchestration.master.recording import ARRIVED, EVENTS, LOST, ROWS, SAMPLED, SENT, Chunk, Events, Integers, Recorder
-from orchestration.master.schedule import Due, Message, Schedule
-from orchestration.master.sources import Values
-from orchestration.master.streams import NOISE, Streams
-from orchestration.master.timetable import Timetable
-from orchestration.simulator import Floats, Simulator, Transfer
+from orchestration.basics.errors import SimulatorError
+from orchestration.basics.simulator import Floats, Integers, Simulator, Transfer
+from orchestration.engines.board import Board
+from orchestration.engines.channel import Channel
+from orchestration.engines.feeds import Feed
+from orchestration.engines.sources import Values
+from orchestration.recording.recording import ARRIVED, EVENTS, LOST, ROWS, SAMPLED, SENT, Chunk, Events, Recorder
+from orchestration.schedule.cursor import Position
+from orchestration.schedule.plan import Plan
+from orchestration.schedule.schedule import Due, Message, Schedule
+from orchestration.schedule.streams import NOISE, Streams
+from orchestration.schedule.timetable import Timetable
 from orchestration.system.model import System, variable_of
 from orchestration.system.times import NANOSECONDS
 

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from orchestration.basics.simulator import Floats, Transfer
+from orchestration.engines import structures as c
+from orchestration.engines.channel import Channel, of_each
+from orchestration.engines.feeds import Feed
 from orchestration.fmi.native import Call, NativeInstance
-from orchestration.master import structures as c
-from orchestration.master.channel import Channel, of_each
-from orchestration.master.feeds import Feed
-from orchestration.simulator import Floats, Transfer
 from orchestration.system.model import Connection
 
 

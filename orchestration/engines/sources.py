@@ -10,10 +10,10 @@ import numpy as np
 
 from fmu_kit.scalar import ScalarOps
 from fmu_kit.trajectory import Trajectory
+from orchestration.basics.simulator import Floats
 from orchestration.signals.dryden import DRAWS, Dryden
 from orchestration.signals.motions import Motion
 from orchestration.signals.spline import Spline
-from orchestration.simulator import Floats
 from orchestration.system.times import NANOSECONDS, Grid, exact_nanoseconds
 
 

@@ -3,11 +3,11 @@
 import operator
 from collections.abc import Callable, Mapping, Sequence
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.engines.board import Board
+from orchestration.engines.sources import Values
 from orchestration.expressions.at_instant import Current, compiled
 from orchestration.expressions.syntax import Node, Operation, names, parse, text
-from orchestration.master.board import Board
-from orchestration.master.sources import Values
 
 Watch = Callable[[float], str | None]
 """At t [s], says how the values of the row have diverged, or None"""

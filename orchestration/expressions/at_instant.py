@@ -5,7 +5,7 @@ import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 from orchestration.expressions.syntax import Call, Name, Node, Number, Operation, Sampled, is_over_run
 
 Current: TypeAlias = Callable[[Sequence[float]], float]

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 from orchestration.expressions.over_span import SpanValues
 from orchestration.expressions.recorded import Recorded, Spans
 from orchestration.expressions.reductions import FOLDS

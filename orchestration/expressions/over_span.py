@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats
 from orchestration.expressions.recorded import STOP_TIME, TIME, Recorded
 from orchestration.expressions.reductions import Course, Fold
 from orchestration.expressions.syntax import Call, Name, Node, Number, Operation, Sampled, is_over_run, names
-from orchestration.simulator import Floats
 
 
 class SpanValues:

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from orchestration.simulator import Floats
+from orchestration.basics.simulator import Floats
 
 TIME, STOP_TIME = "time", "stop_time"
 Marks: TypeAlias = npt.NDArray[np.bool_]

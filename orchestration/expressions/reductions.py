@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from orchestration.basics.simulator import Floats
 from orchestration.expressions.syntax import Call
-from orchestration.simulator import Floats
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from fmu_kit.syntax_trees import parsed_expression
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 
 LONGEST, DEEPEST = 10_000, 60
 """Characters and nesting of an expression"""

@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import TypeAlias
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.basics.units import NUMBER, ONE, RADIAN, SECOND, Unit, common
 from orchestration.expressions.recorded import STOP_TIME, TIME
 from orchestration.expressions.syntax import Call, Name, Node, Number, Operation, Sampled, is_over_run, text
-from orchestration.units import NUMBER, ONE, RADIAN, SECOND, Unit, common
 
 Units: TypeAlias = Mapping[str, Unit | None]
 """By name; None: it has none, or none that is known"""

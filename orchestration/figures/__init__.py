@@ -1,0 +1,1 @@
+"""Figures of rows: style, axes, lines; without knowing what a run is."""

@@ -10,8 +10,8 @@ from matplotlib.collections import LineCollection, PatchCollection
 from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.patches import Patch, Rectangle
 
-from orchestration.drawing.palette import GREY, RED, SHADES
-from orchestration.simulator import Floats
+from orchestration.basics.simulator import Floats
+from orchestration.figures.palette import GREY, RED, SHADES
 
 LIMIT = {"colors": RED, "linewidths": 1.8}
 """How the line between what is good and what is not looks"""

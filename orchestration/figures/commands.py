@@ -7,10 +7,10 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration.drawing.lines import TIME, clip_peaks, legend_of_runs, quantity
-from orchestration.drawing.palette import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED
-from orchestration.drawing.run import Run, Window, title
-from orchestration.drawing.style import Style
+from orchestration.figures.lines import TIME, clip_peaks, legend_of_runs, quantity
+from orchestration.figures.palette import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED
+from orchestration.figures.run import Run, Window, title
+from orchestration.figures.style import Style
 from orchestration.quadrotor.measures import saturated
 from orchestration.quadrotor.wiring import COMMAND
 
@@ -24,7 +24,7 @@ AT_LIMIT = "a limit of the plant is active"
 
 def commands(runs: Sequence[Run], style: Style) -> Figure:
     """The whole run, and a window of it: the first second unless told. In a narrow figure the window alone, if any."""
-    end = max(float(run.result.rows[-1, 0]) for run in runs)
+    end = max(float(run.rows[-1, 0]) for run in runs)
     told = runs[0].window
     zoom = told or (0.0, min(1.0, end))
     spans: list[Window] = [(0.0, end), zoom] if style.is_wide else [told or (0.0, end)]
@@ -54,7 +54,7 @@ def _draw(panel: Axes, runs: Sequence[Run], name: str, span: Window, style: Styl
     """One command over one span, with the limits that are near."""
     lines = []
     for run in runs:
-        t, values = run.result.signals["time"], run.result.signals[f"plant.{name}"]
+        t, values = run.signals["time"], run.signals[f"plant.{name}"]
         color = BLUE if len(runs) == 1 else run.color
         panel.plot(t, values, drawstyle="steps-post", color=color, linestyle=run.dashes if len(runs) > 1 else "-")
         inside = (t >= span[0]) & (t <= span[1])
@@ -72,7 +72,7 @@ def _mark_limits(panel: Axes, runs: Sequence[Run], name: str) -> None:
     """A line at each limit that the command comes near, in an axis that is made to show it."""
     bottom, top = panel.get_ylim()
     for run in runs:
-        most = run.result.parameters.get("plant.thrust_max" if name == COMMAND[0] else "plant.torque_max", np.inf)
+        most = run.parameters.get("plant.thrust_max" if name == COMMAND[0] else "plant.torque_max", np.inf)
         for limit in (0.0 if name == COMMAND[0] else -most, most):
             if bottom <= limit <= top:
                 panel.axhline(limit, color=BLACK, linestyle=":", label="limit of the plant")
@@ -81,8 +81,8 @@ def _mark_limits(panel: Axes, runs: Sequence[Run], name: str) -> None:
 def _mark_saturation(panel: Axes, runs: Sequence[Run], name: str) -> None:
     """Shade the time at which a limit changes the command."""
     for run in runs:
-        t = run.result.signals["time"]
-        active = saturated(run.result.signals, run.result.parameters)[name]
+        t = run.signals["time"]
+        active = saturated(run.signals, run.parameters)[name]
         if active.any():
             panel.fill_between(
                 t, 0.0, 1.0, where=active, step="post", transform=panel.get_xaxis_transform(),

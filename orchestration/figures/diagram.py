@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
-from orchestration.drawing.names import FORMATS
-from orchestration.drawing.style import SCREEN, save
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.figures.names import FORMATS
+from orchestration.figures.style import SCREEN, save
 from orchestration.system.description import rate, timing, what
 from orchestration.system.model import System, component_of, variable_of
 

@@ -6,10 +6,10 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from orchestration.drawing.lines import TIME, legend_of_runs, logarithmic, positive, quantity, see
-from orchestration.drawing.palette import BLUE
-from orchestration.drawing.run import Run, title
-from orchestration.drawing.style import Style
+from orchestration.figures.lines import TIME, legend_of_runs, logarithmic, positive, quantity, see
+from orchestration.figures.palette import BLUE
+from orchestration.figures.run import Run, title
+from orchestration.figures.style import Style
 from orchestration.quadrotor.wiring import ENERGY
 
 COLUMN = f"controller.{ENERGY}"
@@ -26,7 +26,7 @@ def energy(runs: Sequence[Run], style: Style) -> Figure | None:
         at = _sampled(run)
         color = BLUE if len(runs) == 1 else run.color
         panel.plot(run.time[at], positive(run[COLUMN][at]), color=color, linestyle=run.dashes, label=run.name)
-    unit = with_energy[0].whole.described[COLUMN].unit
+    unit = with_energy[0].described[COLUMN].unit
     logarithmic(panel)
     panel.set(xlabel=TIME, ylabel=quantity("energy L", unit))
     see(panel, runs)

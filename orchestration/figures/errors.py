@@ -7,13 +7,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration.drawing.lines import TIME, clip_peaks, legend_of_runs, logarithmic, positive, quantity, see, wrapped
-from orchestration.drawing.palette import BLUE, GREEN, RED
-from orchestration.drawing.run import Run, title
-from orchestration.drawing.style import Style
+from orchestration.basics.simulator import Floats
+from orchestration.figures.lines import TIME, clip_peaks, legend_of_runs, logarithmic, positive, quantity, see, wrapped
+from orchestration.figures.palette import BLUE, GREEN, RED
+from orchestration.figures.run import Run, title
+from orchestration.figures.style import Style
 from orchestration.quadrotor.measures import desired
 from orchestration.quadrotor.wiring import POSITION, components
-from orchestration.simulator import Floats
 
 AXES = tuple(zip("xyz", (BLUE, RED, GREEN), ("-", "--", "-."), strict=True))
 
@@ -110,7 +110,7 @@ def _known(runs: Sequence[Run]) -> list[Error]:
 
 def _position(run: Run) -> Floats | None:
     flown = run.stacked([f"plant.{name}" for name in POSITION])
-    return flown - desired(run.result.signals)[run.seen]
+    return flown - desired(run.signals)[run.seen]
 
 
 def _told(name: str) -> Callable[[Run], Floats | None]:

@@ -3,17 +3,12 @@
 import base64
 import html
 import io
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from orchestration.drawing.draw import draw
-from orchestration.drawing.run import Window
-from orchestration.drawing.style import STYLES, Style, save
-from orchestration.errors import UsageError
-from orchestration.results.differences import told_apart
-from orchestration.results.result import Result
+from orchestration.figures.style import Style, save
 
 
 class Figures(Mapping[str, Figure]):
@@ -50,13 +45,3 @@ class Figures(Mapping[str, Figure]):
     def save(self, folder: str | Path) -> list[Path]:
         """Write them into a folder, each as NAME.png; their paths."""
         return save(self, Path(folder), self._style)
-
-
-def figures_of(
-    results: Sequence[Result], which: Collection[str] | None, *, window: Window | None, style: str
-) -> Figures:
-    """The figures of runs laid over each other; raises `UsageError` for a name of a figure or a style that is none."""
-    if style not in STYLES:
-        raise UsageError(f"style {style}: expected one of {', '.join(STYLES)}")
-    names = told_apart(results, [f"run {i + 1}" for i in range(len(results))])
-    return Figures(draw(results, which, names=names, window=window, style=STYLES[style]), STYLES[style])

@@ -9,11 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from orchestration.drawing.palette import BLACK, GREY
-from orchestration.drawing.run import Run
-from orchestration.drawing.style import Style
-from orchestration.results import labels
-from orchestration.simulator import Floats
+from orchestration.basics.simulator import Floats
+from orchestration.figures.palette import BLACK, GREY
+from orchestration.figures.run import Run
+from orchestration.figures.style import Style
+from orchestration.results import display_names as labels
 
 Lines: TypeAlias = Sequence[tuple[Floats, Floats]]
 """Times [s] and values, shape (n,) each"""

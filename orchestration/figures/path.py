@@ -7,12 +7,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from orchestration.drawing.lines import legend_of_runs
-from orchestration.drawing.palette import BLUE, ORANGE
-from orchestration.drawing.run import Run, title
-from orchestration.drawing.style import Style
+from orchestration.basics.simulator import Floats
+from orchestration.figures.lines import legend_of_runs
+from orchestration.figures.palette import BLUE, ORANGE
+from orchestration.figures.run import Run, title
+from orchestration.figures.style import Style
 from orchestration.quadrotor.wiring import POSITION, POSITION_REFERENCE
-from orchestration.simulator import Floats
 
 LEAST = 0.45
 """of the longest side: so long at least is each side of the box"""

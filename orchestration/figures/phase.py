@@ -6,12 +6,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration.drawing.lines import legend_of_runs, quantity
-from orchestration.drawing.palette import BLUE, GREY
-from orchestration.drawing.run import Run, title
-from orchestration.drawing.style import Style
+from orchestration.basics.simulator import Floats
+from orchestration.figures.lines import legend_of_runs, quantity
+from orchestration.figures.palette import BLUE, GREY
+from orchestration.figures.run import Run, title
+from orchestration.figures.style import Style
 from orchestration.quadrotor.wiring import BOUNDARY_LAYER, SURFACE_EXPONENT, SURFACE_GAIN, components
-from orchestration.simulator import Floats
 
 ERROR, RATE = (tuple(f"controller.{c}" for c in components(name)) for name in ("position_error", "velocity_error"))
 DRAWN = (*ERROR, *RATE)
@@ -58,7 +58,7 @@ def _draw_surfaces(panel: Axes, runs: Sequence[Run]) -> None:
     error = np.concatenate([-bend[::-1], bend])
     drawn: list[Floats] = []
     for run in runs:
-        rate = surface(error, run.result.parameters)
+        rate = surface(error, run.parameters)
         if rate is not None and not any(np.array_equal(rate, other) for other in drawn):
             panel.plot(
                 error, rate, color=GREY, linestyle="--", label="sliding surface s = 0" if not drawn else None, zorder=1

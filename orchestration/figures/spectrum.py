@@ -6,13 +6,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration.drawing.commands import COLUMNS
-from orchestration.drawing.lines import legend_of_runs, logarithmic, positive, wrapped
-from orchestration.drawing.palette import BLACK, BLUE, GREEN, RED
-from orchestration.drawing.run import Run, title
-from orchestration.drawing.style import Style
-from orchestration.drawing.ticks import plain
-from orchestration.simulator import Floats
+from orchestration.basics.simulator import Floats
+from orchestration.figures.commands import COLUMNS
+from orchestration.figures.lines import legend_of_runs, logarithmic, positive, wrapped
+from orchestration.figures.palette import BLACK, BLUE, GREEN, RED
+from orchestration.figures.run import Run, title
+from orchestration.figures.style import Style
+from orchestration.figures.ticks import plain
 
 SEGMENTS = 8
 """Of the run, before they overlap by half"""
@@ -82,10 +82,10 @@ def welch(values: Floats, step: float) -> tuple[Floats, Floats]:
 
 def _command(run: Run) -> tuple[float, Floats] | None:
     """The step of the plant [s] and what it was given at each, shape (n, 4), of all rows in the window."""
-    step = run.whole.system.components["plant"].step
+    step = run.system.components["plant"].step
     if step is None:
         return None
-    chunks = run.whole.recording.chunks(("time", *COLUMNS))
+    chunks = run.whole.chunks(("time", *COLUMNS))
     rows = np.concatenate([[chunk.signals[name] for name in ("time", *COLUMNS)] for chunk in chunks], axis=1).T
     start, end = run.window or (0.0, float(rows[-1, 0]))
     count = int((min(end, rows[-1, 0]) - start) / step + 1e-9)
@@ -99,7 +99,7 @@ def _command(run: Run) -> tuple[float, Floats] | None:
 def _mark_rates(panel: Axes, runs: Sequence[Run], style: Style) -> None:
     """The rate at which the controller samples, and half of it, beyond which it cannot see."""
     for run in runs:
-        sampling = run.whole.system.components["controller"].sampling
+        sampling = run.system.components["controller"].sampling
         if sampling is None:
             continue
         rate, color = 1.0 / sampling.period, BLACK if len(runs) == 1 else run.color

@@ -10,9 +10,9 @@ import matplotlib
 from cycler import cycler
 from matplotlib.figure import Figure
 
-from orchestration.drawing.names import COLUMNS, FORMATS
-from orchestration.drawing.palette import CYCLE
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.figures.names import COLUMNS, FORMATS
+from orchestration.figures.palette import CYCLE
 
 INCH = 25.4
 """[mm]"""

@@ -9,7 +9,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from orchestration.errors import QuadcosimError
+from orchestration.basics.errors import QuadcosimError
 
 DESCRIPTION = "modelDescription.xml"
 

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 from fmpy import fmi2
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 from orchestration.fmi.messages import WARNING, collecting_callbacks
 from orchestration.fmi.native import NativeInstance
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from fmpy import fmi3
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 from orchestration.fmi.messages import WARNING
 from orchestration.fmi.native import NativeInstance
 from orchestration.fmi.values import INTEGERS

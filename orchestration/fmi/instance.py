@@ -7,9 +7,9 @@ from typing import Protocol, TypeVar
 
 from fmpy.model_description import ModelDescription
 
+from orchestration.basics.simulator import Simulator
 from orchestration.fmi.model import Kind, Model, Variable
 from orchestration.fmi.values import Value
-from orchestration.simulator import Simulator
 
 T = TypeVar("T", bound="Instance")
 

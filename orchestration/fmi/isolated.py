@@ -17,12 +17,12 @@ from typing import IO, Any
 
 import numpy as np
 
-from orchestration import subprocesses
-from orchestration.errors import SimulatorError
+from orchestration.basics.errors import SimulatorError
+from orchestration.basics.simulator import Floats, Transfer
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.model import read_model
 from orchestration.fmi.values import Value
-from orchestration.simulator import Floats, Transfer
+from orchestration.processes import subprocesses
 
 Command = tuple[Any, ...]
 """`("write", index, bytes)`, `("reader" or "writer", names)`, `("read",)` or the name of a method and its arguments"""

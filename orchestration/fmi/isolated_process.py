@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from orchestration import subprocesses
+from orchestration.basics.simulator import Floats, Transfer
 from orchestration.fmi.instances import open_here
 from orchestration.fmi.isolated import Command, receive, send
 from orchestration.fmi.native import NativeInstance
-from orchestration.simulator import Floats, Transfer
+from orchestration.processes import subprocesses
 
 
 class _Served:

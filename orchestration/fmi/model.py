@@ -17,8 +17,8 @@ import fmpy
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmu_kit.packaging import read_source_hash
-from orchestration.errors import UsageError
-from orchestration.units import BASE, BaseUnits, Unit, named
+from orchestration.basics.errors import UsageError
+from orchestration.basics.units import BASE, BaseUnits, Unit, named
 
 Kind = Literal["Real", "Integer", "Boolean", "Enumeration", "String", "Binary", "Clock"]
 """Types by their FMI 2.0 names; FMI 3.0's Float64 is a Real, its Int32 an Integer"""

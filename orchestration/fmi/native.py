@@ -16,15 +16,15 @@ import numpy as np
 import numpy.typing as npt
 from fmpy.fmi1 import FMICallException
 
-from orchestration import scratch
-from orchestration.errors import QuadcosimError, RefusedValueError, SimulatorError, UsageError
+from orchestration.basics import scratch
+from orchestration.basics.errors import QuadcosimError, RefusedValueError, SimulatorError, UsageError
+from orchestration.basics.scratch import Scratch
+from orchestration.basics.simulator import Floats, Transfer
 from orchestration.fmi import pythonfmu
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.messages import WARNING, Messages, words
 from orchestration.fmi.model import Variable, read_model
 from orchestration.fmi.values import Value, number_of, same, taken
-from orchestration.scratch import Scratch
-from orchestration.simulator import Floats, Transfer
 
 DIVERGENCE_CATEGORY = b"divergence"
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import fmpy
 
 from fmu_kit import loader
-from orchestration.errors import QuadcosimError
+from orchestration.basics.errors import QuadcosimError
 
 _ENTRY = Path("resources", "slavemodule.txt")
 _BANNER = "Fatal py exception"

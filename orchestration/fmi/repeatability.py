@@ -15,10 +15,9 @@ import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from orchestration import subprocesses
-from orchestration.checks import confined
-from orchestration.checks.confined import Limits
 from orchestration.fmi.model import read_model
+from orchestration.processes import confined, subprocesses
+from orchestration.processes.confined import Limits
 
 _RULES = "1"
 """Of how it is shown; another number shows all anew"""

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.checks.confined import Limits, restrict
-from orchestration.errors import QuadcosimError
+from orchestration.basics.errors import QuadcosimError
 from orchestration.fmi.instances import open_here
 from orchestration.fmi.model import Variable
 from orchestration.fmi.native import NativeInstance
 from orchestration.fmi.repeatability import RESULT
 from orchestration.fmi.values import Value, number_of
+from orchestration.processes.confined import Limits, restrict
 
 _STEPS = 25
 _PARAMETERS = 200

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from orchestration.errors import SimulatorError
+from orchestration.basics.errors import SimulatorError
 from orchestration.fmi import repeatability
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_instance

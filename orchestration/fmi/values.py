@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from orchestration.errors import UsageError, expected_name, shown
+from orchestration.basics.errors import UsageError, expected_name, shown
 from orchestration.fmi.model import Variable
 
 Value: TypeAlias = float | bool | str

@@ -1,0 +1,1 @@
+"""The same system by other people's masters."""

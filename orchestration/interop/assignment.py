@@ -6,9 +6,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TypeAlias
 
-from orchestration.errors import UsageError
-from orchestration.exchange.ssp.carried import Carried
+from orchestration.basics.errors import UsageError
 from orchestration.fmi.model import Kind
+from orchestration.requests.ssp.carried import Carried
 from orchestration.system.model import Parameter, variable_of
 
 End: TypeAlias = tuple[str, str]

@@ -8,9 +8,9 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestration import subprocesses
-from orchestration.errors import UsageError
-from orchestration.exchange.interop.assignment import Job, Rows
+from orchestration.basics.errors import UsageError
+from orchestration.interop.assignment import Job, Rows
+from orchestration.processes import subprocesses
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,7 +21,7 @@ class Tool:
     packages: tuple[str, ...]
     """that pip installs for it"""
     call: str
-    """module:function in `orchestration.exchange.interop.tools`"""
+    """module:function in `orchestration.interop.tools`"""
     alone: str | None = None
     """the component that it flies, if it is no master"""
     converts: bool = False
@@ -50,7 +50,7 @@ class Tool:
     def command(self, job: Path, rows: Path) -> list[str]:
         """What flies a job in a process of its own and writes the rows."""
         if self.python is None:
-            return subprocesses.command("orchestration.exchange.interop.tool_process", self.name, job, rows)
+            return subprocesses.command("orchestration.interop.tool_process", self.name, job, rows)
         module, _, function = self.call.partition(":")
         script = Path(__file__).parent / "tools" / f"{module}.py"
         return [self._other_python(), "-I", str(script), function, str(job), str(rows)]
@@ -71,7 +71,7 @@ class Tool:
         """The call."""
         module, _, name = self.call.partition(":")
         function: Callable[[Job], Rows] = getattr(
-            importlib.import_module(f"orchestration.exchange.interop.tools.{module}"), name
+            importlib.import_module(f"orchestration.interop.tools.{module}"), name
         )
         return function
 

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.errors import QuadcosimError, UsageError
-from orchestration.exchange.interop.catalogue import Tool
-from orchestration.exchange.interop.flights import Flights
-from orchestration.exchange.interop.trace import Trace
+from orchestration.basics.errors import QuadcosimError, UsageError
+from orchestration.basics.simulator import Floats
+from orchestration.interop.catalogue import Tool
+from orchestration.interop.flights import Flights
+from orchestration.interop.trace import Trace
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.simulator import Floats
 from orchestration.system.model import System, component_of
 
 MISSING = 1

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from fmu_kit.loader import PLATFORM, compiler
 from fmu_kit.packaging import write_archive
-from orchestration.errors import QuadcosimError, UsageError
-from orchestration.exchange.interop.assignment import Ports
+from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.fmi.model import Kind, Model, read_model
+from orchestration.interop.assignment import Ports
 
 SOURCE = Path(__file__).with_name("recorder.c")
 _KINDS: dict[Kind, int] = {"Real": 0, "Integer": 1, "Enumeration": 1, "Boolean": 2}

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from orchestration.drawing.palette import BLUE, GREEN, GREY, ORANGE, RED
-from orchestration.drawing.style import SCREEN, save
-from orchestration.exchange.interop.compare import Agreement
-from orchestration.exchange.interop.table import AIM
+from orchestration.figures.palette import BLUE, GREEN, GREY, ORANGE, RED
+from orchestration.figures.style import SCREEN, save
+from orchestration.interop.compare import Agreement
+from orchestration.interop.table import AIM
 from orchestration.system.model import component_of
 
 SMALLEST = 1e-17

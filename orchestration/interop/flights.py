@@ -7,21 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from orchestration import subprocesses
-from orchestration.errors import QuadcosimError, UsageError
-from orchestration.exchange.interop.assignment import Job, loop_of
-from orchestration.exchange.interop.catalogue import Tool
-from orchestration.exchange.interop.copies import expect_traceable, traced_copy
-from orchestration.exchange.interop.trace import Trace, read_trace
-from orchestration.exchange.ssp import writing
-from orchestration.exchange.ssp.carried import Part, carried, has_clock, wholly_carried
+from orchestration.basics.errors import QuadcosimError, UsageError
+from orchestration.basics.simulator import Floats, Transfer
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_instance
+from orchestration.interop.assignment import Job, loop_of
+from orchestration.interop.catalogue import Tool
+from orchestration.interop.copies import expect_traceable, traced_copy
+from orchestration.interop.trace import Trace, read_trace
+from orchestration.processes import subprocesses
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import in_its_own_words, system_of
-from orchestration.simulation import prepared
-from orchestration.simulator import Floats, Transfer
+from orchestration.requests.ssp import writing
+from orchestration.requests.ssp.carried import Part, carried, has_clock, wholly_carried
+from orchestration.runs.simulation import prepared
 from orchestration.system.model import Parameter, System
 from orchestration.system.paths import changed
 from orchestration.system.times import exact_nanoseconds

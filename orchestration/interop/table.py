@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from orchestration.exchange.interop.compare import Agreement
+from orchestration.interop.compare import Agreement
 
 AIM = 1e-9
 """Largest difference of a state that counts as agreement [SI]"""

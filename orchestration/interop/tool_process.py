@@ -1,4 +1,4 @@
-"""`python -m orchestration.exchange.interop.tool_process TOOL JOB ROWS`: one flight of a tool.
+"""`python -m orchestration.interop.tool_process TOOL JOB ROWS`: one flight of a tool.
 
 Tools bring native libraries that need not get along, and log what they like.
 """
@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestration.exchange.interop.assignment import Job
-from orchestration.exchange.interop.catalogue import TOOLS
+from orchestration.interop.assignment import Job
+from orchestration.interop.catalogue import TOOLS
 
 
 def main(tool: str, job: str, rows: str) -> None:

@@ -7,11 +7,11 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from orchestration.errors import QuadcosimError
-from orchestration.exchange.interop.assignment import Loop
-from orchestration.exchange.interop.copies import log_of
+from orchestration.basics.errors import QuadcosimError
 from orchestration.fmi.model import read_model
 from orchestration.fmi.values import number_of
+from orchestration.interop.assignment import Loop
+from orchestration.interop.copies import log_of
 
 
 @dataclass(frozen=True, kw_only=True)

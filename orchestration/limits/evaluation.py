@@ -5,11 +5,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from orchestration.statistics import refutes, wilson
+from orchestration.basics.statistics import refutes, wilson
+from orchestration.requests.ranges import Range, Varied
 from orchestration.studies.criteria import judged
-from orchestration.studies.engine import Pool
-from orchestration.studies.ranges import Range, Varied
 from orchestration.system.model import System
+from orchestration.workers.executors import Pool
 
 RELIABILITY = 0.9
 """For random quantities: the share of seeds that are good, which the stated confidence is in."""

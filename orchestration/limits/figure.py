@@ -1,14 +1,25 @@
 """The figure of a limit: what was measured at each value, where it ceases to be good, and where theory says so."""
 
+import contextlib
+import re
+from pathlib import Path
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration.drawing.palette import BLUE, GREY, ORANGE, RED
-from orchestration.drawing.style import SCREEN, Style
-from orchestration.results import labels
-from orchestration.studies.limit import Limit
-from orchestration.studies.trials import RELIABILITY, Tried
+from orchestration.basics.errors import UsageError
+from orchestration.figures.palette import BLUE, GREY, ORANGE, RED
+from orchestration.figures.style import SCREEN, Style
+from orchestration.limits.evaluation import RELIABILITY, Tried
+from orchestration.limits.limit import Limit
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.requests.request import Request, system_meant
+from orchestration.results import display_names as labels
+from orchestration.stability.hover_loop import HoverLoop
+from orchestration.stability.local_limit import radius
+from orchestration.studies import figures
+from orchestration.studies.criteria import edge
 
 _PLACES = ("components", "connections", "sources")
 
@@ -137,3 +148,39 @@ def _shown(value: float, scale: float, unit: str | None) -> str:
 def _with_margin(values: list[float]) -> tuple[float, float]:
     room = 0.03 * (max(values) - min(values)) or 1.0
     return min(values) - room, max(values) + room
+
+
+def draw_limit(request: Request, found: Limit, folder: Path, style: Style = SCREEN) -> list[Path]:
+    """Draw what was measured, with both limits; of the quadrotor over period or delay the spectral radius too."""
+    system = system_meant(request)
+    bound = None if found.judged is None else edge(system, found.judged)
+    name = "limit_" + re.sub(r"[^A-Za-z0-9]+", "_", found.of).strip("_")
+    written = figures.save(lambda how: measured(found, bound, how), folder / name, style)
+    if isinstance(request, Scenario) and found.of in ("period", "delay"):
+        with contextlib.suppress(UsageError):  # where linear theory about hover does not apply
+            written += draw_spectral_radius(request, found, folder, style)
+    return written
+
+
+def draw_spectral_radius(scenario: Scenario, found: Limit, folder: Path, style: Style = SCREEN) -> list[Path]:
+    """Draw the spectral radius of the loop about hover over the period or the delay; the paths of the figure.
+
+    Raises `UsageError` where linear theory does not apply.
+    """
+    ends = [limit for limit in (found.local_limit, found.large_signal_limit) if limit is not None]
+    last = 1.3 * max(ends, default=0.1)
+    values = np.array([0.001 + i / 199.0 * (last - 0.001) for i in range(200)])
+    loop = HoverLoop.of(scenario)
+    radii = np.array([radius(loop, scenario, found.of, value) for value in values])
+    return figures.save(
+        lambda how: figures.spectral_radius(
+            found.of,
+            values,
+            radii,
+            local_limit=found.local_limit,
+            large_signal_limit=found.large_signal_limit,
+            style=how,
+        ),
+        folder / f"spectral_radius_{found.of}",
+        style,
+    )

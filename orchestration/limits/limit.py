@@ -6,30 +6,30 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from orchestration.command.terminal import say
-from orchestration.errors import UsageError
-from orchestration.extras import explained
-from orchestration.master.engine import Engine
+from orchestration.basics.bisection import Bracket, bisected, first_failure
+from orchestration.basics.errors import UsageError
+from orchestration.basics.extras import explained
+from orchestration.basics.progress import ShareHeard, of_share
+from orchestration.basics.terminal import say
+from orchestration.building.inputs import Files, files_of
+from orchestration.engines.engine import Engine
+from orchestration.engines.wiring import checked
+from orchestration.limits.evaluation import RELIABILITY, Trials, Tried, is_random, said
 from orchestration.quadrotor.measures import Outcome
 from orchestration.quadrotor.scenario import Record, Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.translation import in_its_own_words
-from orchestration.request import Request, system_meant
+from orchestration.requests.ranges import Range, Varied, range_asked_for
+from orchestration.requests.request import Request, system_meant
 from orchestration.results import html
-from orchestration.simulation import checked
+from orchestration.stability.local_limit import Local, local_limits
 from orchestration.studies.criteria import judged
-from orchestration.studies.engine import Pool
-from orchestration.studies.files import Files, files_of
-from orchestration.studies.hearing import ShareHeard, of_share
-from orchestration.studies.local import Local, local_limits
-from orchestration.studies.ranges import Range, Varied, range_asked_for
-from orchestration.studies.search import Bracket, bisected, first_failure
-from orchestration.studies.trials import RELIABILITY, Trials, Tried, is_random, said
+from orchestration.workers.executors import Pool
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from orchestration.drawing.gallery import Figures
+    from orchestration.figures.gallery import Figures
 
 GAP = 0.1
 """of the local limit: a larger difference to the large-signal one is worth saying"""
@@ -118,9 +118,9 @@ class Limit:
     @explained
     def plot(self) -> "Figures":
         """The figure of what was measured over the quantity, with both limits; a notebook shows it."""
-        from orchestration.drawing.gallery import Figures
-        from orchestration.drawing.style import SCREEN
-        from orchestration.studies import limit_figure
+        from orchestration.figures.gallery import Figures
+        from orchestration.figures.style import SCREEN
+        from orchestration.limits import figure as limit_figure
 
         with SCREEN.applied():
             return Figures({"limit": limit_figure.measured(self, None, SCREEN)}, SCREEN)

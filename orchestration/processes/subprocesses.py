@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 from typing import BinaryIO
 
-ROOT = str(Path(__file__).resolve().parent.parent)
+ROOT = str(Path(__file__).resolve().parents[2])
 """The folder in which the packages of the project lie"""
 
 _MISLEADING = ("PYTHONHOME", "PYTHONPATH")

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fmu_kit.trajectory import Trajectory
-from orchestration.constructors import strict
-from orchestration.errors import UsageError
-from orchestration.master.streams import Streams
-from orchestration.simulator import Floats
+from orchestration.basics.constructors import strict
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats
+from orchestration.schedule.streams import Streams
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,8 +6,8 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 import numpy.typing as npt
 
+from orchestration.basics.simulator import Floats
 from orchestration.quadrotor.wiring import COMMAND, POSITION, POSITION_REFERENCE
-from orchestration.simulator import Floats
 
 Marks: TypeAlias = npt.NDArray[np.bool_]
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from orchestration.errors import UsageError, shown
+from orchestration.basics.errors import UsageError, shown
 
 Parameter = float | bool | str
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from orchestration.errors import UsageError, expected_name
+from orchestration.basics.errors import UsageError, expected_name
 
 
 @dataclass(frozen=True, kw_only=True)

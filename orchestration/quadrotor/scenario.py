@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-from orchestration.constructors import strict
-from orchestration.errors import UsageError, shown
+from orchestration.basics.constructors import strict
+from orchestration.basics.errors import UsageError, shown
 from orchestration.quadrotor.parameters import Parameter
 from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.timing import Timing
-from orchestration.quadrotor.vehicles import Vehicle
+from orchestration.quadrotor.vehicle import Vehicle
 from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT, SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.system.requirements import is_finite
 

@@ -9,14 +9,14 @@ from typing import Any, ClassVar, TypeVar
 
 import pydantic
 
-from orchestration.documents import read_toml
-from orchestration.errors import UsageError, shown
+from orchestration.basics.documents import read_toml
+from orchestration.basics.errors import UsageError, shown
 from orchestration.quadrotor.parameters import parameters_in
 from orchestration.quadrotor.presets import preset_timing
 from orchestration.quadrotor.scenario import FmuChoice, Record, Scenario
 from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.timing import Timing
-from orchestration.quadrotor.vehicles import load_vehicle
+from orchestration.quadrotor.vehicle import load_vehicle
 from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
 
 Shape = TypeVar("Shape")

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from orchestration.constructors import strict
-from orchestration.errors import UsageError
+from orchestration.basics.constructors import strict
+from orchestration.basics.errors import UsageError
 from orchestration.system.requirements import is_finite, require, require_choice
 
 Between = Literal["linear", "previous"]

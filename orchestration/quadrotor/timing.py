@@ -4,8 +4,8 @@ from dataclasses import dataclass, field, fields
 from fractions import Fraction
 from typing import ClassVar
 
-from orchestration.constructors import strict
-from orchestration.errors import shown
+from orchestration.basics.constructors import strict
+from orchestration.basics.errors import shown
 from orchestration.system.model import Clock, Distribution, Hold, Order
 from orchestration.system.requirements import (
     is_finite,

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 from orchestration.quadrotor.nominal_model import mismatch
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.signals import DRAG, DisturbanceChoice, ReferenceChoice

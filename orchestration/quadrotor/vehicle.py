@@ -5,12 +5,12 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import Any
 
-from orchestration.constructors import strict
-from orchestration.documents import read_toml
-from orchestration.errors import UsageError, expected_name
+from orchestration.basics.constructors import strict
+from orchestration.basics.documents import read_toml
+from orchestration.basics.errors import UsageError, expected_name
 from orchestration.quadrotor.parameters import Parameter, parameters_in
 
-SHIPPED = Path(__file__).parents[1] / "vehicles"
+SHIPPED = Path(__file__).with_name("vehicles")
 """Where the vehicles are that go by a name"""
 ENDING = ".toml"
 

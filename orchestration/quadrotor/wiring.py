@@ -2,14 +2,6 @@
 
 from collections.abc import Iterable, Mapping
 
-MODELS = {
-    "UnifiedController": "controller_fmu.sliding_mode.slave:UnifiedController",
-    "GeometricController": "controller_fmu.geometric.slave:GeometricController",
-    "CascadedController": "controller_fmu.cascaded.slave:CascadedController",
-    "QuadrotorPlant": "plant_fmu.slave:QuadrotorPlant",
-}
-"""FMUs of this project by name, and the slave that each is built from."""
-
 DEFAULT_CONTROLLER = "UnifiedController"
 DEFAULT_PLANT = "QuadrotorPlant"
 

@@ -6,10 +6,10 @@ from typing import Any
 import pyarrow as pa
 from pyarrow import csv
 
-from orchestration.master.recording import About, Recording
-from orchestration.results import tables
-from orchestration.results.frames import units_of
-from orchestration.units import in_brackets
+from orchestration.basics.units import in_brackets
+from orchestration.recording import tables
+from orchestration.recording.frames import units_of
+from orchestration.recording.recording import About, Recording
 
 SIGNALS, EVENTS = "signals.csv", "events.csv"
 

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from orchestration.master.recording import KINDS, About, Events, Recording
+from orchestration.recording.recording import KINDS, About, Events, Recording
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -2,14 +2,12 @@
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol, TypeAlias, overload
+from typing import NamedTuple, Protocol, overload
 
 import numpy as np
 import numpy.typing as npt
 
-from orchestration.simulator import Floats
-
-Integers: TypeAlias = npt.NDArray[np.int64]
+from orchestration.basics.simulator import Floats, Integers
 
 ROWS, EVENTS = 2**15, 2**18
 """A chunk is whole as soon as it has so many rows or events, so that what is computed by chunks does not depend on

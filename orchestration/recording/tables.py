@@ -9,9 +9,9 @@ import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from orchestration.errors import UsageError
-from orchestration.master.recording import KINDS, About, Chunk, Events, Integers, Recording
-from orchestration.simulator import Floats
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats, Integers
+from orchestration.recording.recording import KINDS, About, Chunk, Events, Recording
 
 SIGNALS, EVENTS = "signals.parquet", "events.parquet"
 _EVENT = pa.schema(

@@ -3,18 +3,19 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from orchestration.batch.fly import Batches
-from orchestration.errors import QuadcosimError
-from orchestration.master.streams import Streams
+from orchestration.basics.errors import QuadcosimError
+from orchestration.basics.simulator import Floats
+from orchestration.building.inputs import Files, all_with_files
+from orchestration.engines.batch.fly import Batches
+from orchestration.engines.wiring import columns_of, source_values
 from orchestration.report.layouts import COMPACT, is_flight
 from orchestration.report.tracks import Signals
 from orchestration.results.objectives import Metrics
-from orchestration.simulation import columns_of, run, source_values
-from orchestration.simulator import Floats
-from orchestration.studies.files import Files, all_with_files
-from orchestration.studies.lanes import expect_lanes
+from orchestration.runs.simulation import run
+from orchestration.schedule.streams import Streams
 from orchestration.studies.study import Study
 from orchestration.system.model import System
+from orchestration.workers.batching import expect_lanes
 
 SOME = 64
 """Runs that are flown at once, so that of no more the whole signals are held"""

@@ -5,7 +5,7 @@ import re
 from importlib import resources
 from pathlib import Path
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 from orchestration.report.model import Report, as_json
 
 SCRIPTS = (

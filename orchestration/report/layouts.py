@@ -13,8 +13,8 @@ from orchestration.quadrotor.wiring import (
     components,
 )
 from orchestration.report.model import Layout, Line, Panel, Scene
-from orchestration.results import labels
-from orchestration.results.described import Described
+from orchestration.results import display_names as labels
+from orchestration.results.column_info import Described
 from orchestration.system.model import System, component_of
 
 POSITION_ERROR = "position error"

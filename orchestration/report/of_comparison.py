@@ -4,14 +4,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from orchestration.report.choice import evenly
+from orchestration.comparison.cells import Median, Result, results
+from orchestration.comparison.design import START, Comparison
 from orchestration.report.flights import Progress
 from orchestration.report.model import Cell, Compared, Report, Share
+from orchestration.report.number_format import number
 from orchestration.report.of_study import Stored, read, report_of, ways_of
+from orchestration.report.subset import evenly
 from orchestration.report.tables import Way
-from orchestration.report.words import number
-from orchestration.studies.comparison.cells import Median, Result, results
-from orchestration.studies.comparison.design import START, Comparison
 from orchestration.studies.table import frame
 
 SIZE = "size of the initial error"

@@ -3,15 +3,15 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from orchestration.documents import tables_in
-from orchestration.errors import UsageError
+from orchestration.basics.documents import tables_in
+from orchestration.basics.errors import UsageError
 from orchestration.report.blobs import Blobs
 from orchestration.report.model import Report, Run, Setting
+from orchestration.report.number_format import number
 from orchestration.report.tracks import Tracks
-from orchestration.report.words import number
-from orchestration.request import text_of
-from orchestration.results import labels
-from orchestration.results.result import Result
+from orchestration.requests.request import text_of
+from orchestration.results import display_names as labels
+from orchestration.runs.result import Result
 
 BYTES = 9_000_000
 """Characters that the signals of all runs may take"""

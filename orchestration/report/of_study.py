@@ -6,22 +6,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 from orchestration.expressions.syntax import names, parse
 from orchestration.report.blobs import Blobs
-from orchestration.report.choice import ALONE, MOST, chosen, points_for
 from orchestration.report.flights import Flight, Progress, fly, in_lanes
 from orchestration.report.model import Report, Run, Setting, Share
+from orchestration.report.number_format import percent
+from orchestration.report.subset import ALONE, MOST, chosen, points_for
 from orchestration.report.tables import Row, Way, share_of, shares_along, table_of
 from orchestration.report.tracks import Tracks
-from orchestration.report.words import percent
-from orchestration.results import labels
-from orchestration.results.described import described
-from orchestration.studies.lanes import Agreement
-from orchestration.studies.ranges import is_in_seconds
+from orchestration.requests.ranges import is_in_seconds
+from orchestration.results import display_names as labels
+from orchestration.results.column_info import described
 from orchestration.studies.store import TEXTS, UNITS, open_for_reading
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import AGREEMENT, expect_current
+from orchestration.workers.batching import Agreement
 
 AGREES = 1e-6
 """Relative difference of the metric that is drawn first, up to which a flight flown again is the one in the store"""

@@ -3,13 +3,13 @@
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from orchestration.documents import read_toml
-from orchestration.errors import UsageError
+from orchestration.basics.documents import read_toml
+from orchestration.basics.errors import UsageError
 from orchestration.report import of_runs
 from orchestration.report.flights import Progress
 from orchestration.report.model import Report
-from orchestration.results.result import Result
-from orchestration.results.run_directory import METRICS, load_run
+from orchestration.runs.result import Result
+from orchestration.runs.run_directory import METRICS, load_run
 
 EXPECTED = "the directory of a run, a study file or its store, or a comparison file"
 STORE = "study.sqlite"
@@ -72,8 +72,8 @@ def _of_many(
     progress: Progress | None,
 ) -> Report:
     # what reads stores comes with an extra
+    from orchestration.comparison.file import load_comparison
     from orchestration.report import of_comparison, of_study
-    from orchestration.studies.comparison.file import load_comparison
     from orchestration.studies.study_file import load_study
     from orchestration.studies.sweep import store_path
 

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from orchestration.basics.simulator import Floats
+from orchestration.basics.statistics import wilson
 from orchestration.report.blobs import Blobs
-from orchestration.report.choice import evenly
 from orchestration.report.model import Column, Share, Shares, Table
-from orchestration.report.words import number
-from orchestration.results import labels
-from orchestration.simulator import Floats
-from orchestration.statistics import wilson
+from orchestration.report.number_format import number
+from orchestration.report.subset import evenly
+from orchestration.results import display_names as labels
 
 MOST_ROWS = 50_000
 """of a table; of a larger study every n-th row is in it"""

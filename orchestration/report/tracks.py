@@ -4,12 +4,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from orchestration.basics.simulator import Floats
 from orchestration.quadrotor.measures import position_error
 from orchestration.quadrotor.wiring import POSITION_REFERENCE
 from orchestration.report.blobs import Blobs
 from orchestration.report.layouts import POSITION_ERROR, About, is_flight, layout_of
 from orchestration.report.model import Layout, Track
-from orchestration.simulator import Floats
 from orchestration.system.model import System
 
 Signals = Mapping[str, Floats]

@@ -4,12 +4,12 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
-from orchestration.errors import UsageError
-from orchestration.extras import explained
+from orchestration.basics.errors import UsageError
+from orchestration.basics.extras import explained
 from orchestration.report import html, of_runs
 from orchestration.report.flights import Progress
-from orchestration.report.what import report_of
-from orchestration.results.result import Result
+from orchestration.report.sources import report_of
+from orchestration.runs.result import Result
 
 ENDINGS = (".html", ".htm")
 

@@ -1,1 +1,1 @@
-"""Other tools: files that they read, and their masters."""
+"""What can be asked to run: a system, a scenario, an SSP."""

@@ -5,15 +5,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from orchestration.errors import UsageError, expected_name
+from orchestration.basics.errors import UsageError, expected_name
+from orchestration.basics.units import after
 from orchestration.fmi.model import Model
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.translation import in_its_own_words
-from orchestration.request import Request, system_meant
-from orchestration.studies.study import paths_in
+from orchestration.quadrotor.translation import in_its_own_words, paths_of
+from orchestration.requests.request import Request, system_meant
 from orchestration.system.model import System
 from orchestration.system.paths import TOP, changed, value_at
-from orchestration.units import after
 
 Quantity = Literal["period", "delay", "jitter", "loss"]
 """Of the quadrotor, by name; of any system a path"""
@@ -149,3 +148,11 @@ def unit_at(path: str, models: Mapping[str, Model]) -> str | None:
         if variable is not None and variable.unit:
             return variable.unit
     return None
+
+
+def paths_in(base: Request, target: str) -> tuple[str, ...]:
+    """The paths of a target in the system that `base` means; raises `UsageError` where there is no such."""
+    paths = paths_of(target) if isinstance(base, Scenario) else (target,)
+    for path in paths:
+        value_at(system_meant(base), path)
+    return paths

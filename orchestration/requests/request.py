@@ -5,8 +5,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from orchestration.documents import read_toml
-from orchestration.errors import UsageError
+from orchestration.basics.documents import read_toml
+from orchestration.basics.errors import UsageError
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.scenario_file import scenario_from_tables
 from orchestration.quadrotor.translation import in_its_own_words, system_of
@@ -49,7 +49,7 @@ def request_from_tables(tables: dict[str, Any], folder: Path) -> Request:
 
 
 def _from_ssp(path: Path, timing: dict[str, Any], folder: Path) -> System:
-    from orchestration.exchange.ssp.reading import tables_of  # with it comes XML, which no other file needs
+    from orchestration.requests.ssp.reading import tables_of  # with it comes XML, which no other file needs
 
     return system_from_tables(tables_of(path, timing), folder)
 

@@ -1,1 +1,1 @@
-"""What a run came to: objectives, tables, figures."""
+"""What rows come to: objectives, their units, the names that people read."""

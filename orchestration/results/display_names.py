@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping
 
-from orchestration.results.described import Described
+from orchestration.results.column_info import Described
 from orchestration.system.model import component_of, variable_of
 
 METRICS: Mapping[str, tuple[str, str | None]] = {

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.master.recording import About, Chunk, Recording
-from orchestration.results import mat_file
-from orchestration.results.frames import units_of
+from orchestration.recording import mat_file
+from orchestration.recording.frames import units_of
+from orchestration.recording.recording import About, Chunk, Recording
 from orchestration.results.objectives import Metrics
 
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats
 from orchestration.expressions.over_run import evaluate, expect_names
 from orchestration.expressions.recorded import Marks, Recorded, Spans, vectors
 from orchestration.expressions.syntax import names, parse
-from orchestration.master.recording import Events, Recording
-from orchestration.simulator import Floats
+from orchestration.recording.recording import Events, Recording
 from orchestration.system.model import System, expressions
 from orchestration.system.times import NANOSECONDS
 

@@ -3,12 +3,12 @@
 import functools
 from collections.abc import Mapping, Sequence
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.basics.units import METRE, SECOND, Unit
 from orchestration.expressions.syntax import names, parse
 from orchestration.expressions.units import unit_of
 from orchestration.fmi.model import Model
 from orchestration.system.model import System, component_of, variable_of
-from orchestration.units import METRE, SECOND, Unit
 
 OF_EVERY_RUN = dict.fromkeys(("horizon", "divergence_time"), str(SECOND))
 """Units of what every run comes to beside its objectives"""

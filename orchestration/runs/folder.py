@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestration import scratch
-from orchestration.errors import QuadcosimError, UsageError
-from orchestration.scratch import Scratch
+from orchestration.basics import scratch
+from orchestration.basics.errors import QuadcosimError, UsageError
+from orchestration.basics.scratch import Scratch
 
 _HIDDEN = re.compile(r"\.(?P<name>.+)\.(?P<mark>[0-9a-f]{12})\.(?P<kind>new|old)", re.DOTALL)
 """`new`: being written; `old`: on its way out, for the new one with the same mark, which is complete."""

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.errors import UsageError
-from orchestration.master.engine import Engine
-from orchestration.master.recording import InMemory, Recorder
-from orchestration.request import Request, load_request, system_meant, text_of
-from orchestration.results.result import Result
-from orchestration.results.run_directory import METRICS, SCENARIO, STATE, keep_flight
-from orchestration.results.tables import InFolder, ToFolder
-from orchestration.simulation import Announce, Progress, Simulation, prepared
+from orchestration.basics.errors import UsageError
+from orchestration.engines.engine import Engine
+from orchestration.recording.recording import InMemory, Recorder
+from orchestration.recording.tables import InFolder, ToFolder
+from orchestration.requests.request import Request, load_request, system_meant, text_of
+from orchestration.runs.result import Result
+from orchestration.runs.run_directory import METRICS, SCENARIO, STATE, keep_flight
+from orchestration.runs.simulation import Announce, Progress, Simulation, prepared
 from orchestration.system.times import nanoseconds
 
 

@@ -9,19 +9,21 @@ from typing import TYPE_CHECKING, Literal, TypedDict
 import numpy as np
 import numpy.typing as npt
 
-from orchestration.extras import explained
-from orchestration.master.recording import About, Event, Recording
+from orchestration.basics.extras import explained
+from orchestration.basics.simulator import Floats
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.results import exports, frames, html, labels
-from orchestration.results.described import Described
+from orchestration.recording import frames
+from orchestration.recording.recording import About, Event, Recording
+from orchestration.results import display_names as labels
+from orchestration.results import exports, html
+from orchestration.results.column_info import Described
 from orchestration.results.objectives import Metrics
-from orchestration.simulator import Floats
 from orchestration.system.model import System
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from orchestration.drawing.gallery import Figures
+    from orchestration.figures.gallery import Figures
 
 
 class Origin(TypedDict):
@@ -152,7 +154,7 @@ class Result:
 
         Raises `UsageError` for a figure that there is not, and for runs of different systems.
         """
-        from orchestration.drawing.gallery import figures_of  # with it comes matplotlib
+        from orchestration.runs.draw import figures_of  # with it comes matplotlib
 
         return figures_of([self, *beside], which or None, window=window, style=style)
 
@@ -166,7 +168,7 @@ class Result:
 
     def to_csv(self, folder: str | Path) -> list[Path]:
         """Write `signals.csv` and `events.csv` into a folder, with units in the heads of the columns; their paths."""
-        from orchestration.results import csv_files  # with it comes pyarrow
+        from orchestration.recording import csv_files  # with it comes pyarrow
 
         return csv_files.write(self.recording, self.about, Path(folder))
 

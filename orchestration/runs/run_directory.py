@@ -7,16 +7,17 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, cast
 
-from orchestration.documents import read_json
-from orchestration.drawing.names import FILES, FIRST
-from orchestration.errors import UsageError, shown
-from orchestration.request import load_request, system_meant, text_of
-from orchestration.results import tables
-from orchestration.results.described import Described
-from orchestration.results.folder import NewFolder, new_folder
-from orchestration.results.result import Provenance, Result
-from orchestration.results.tables import ToFolder
-from orchestration.simulation import RunInterrupted, columns_of
+from orchestration.basics.documents import read_json
+from orchestration.basics.errors import UsageError, shown
+from orchestration.engines.wiring import columns_of
+from orchestration.figures.names import FILES, FIRST
+from orchestration.recording import tables
+from orchestration.recording.tables import ToFolder
+from orchestration.requests.request import load_request, system_meant, text_of
+from orchestration.results.column_info import Described
+from orchestration.runs.folder import NewFolder, new_folder
+from orchestration.runs.result import Provenance, Result
+from orchestration.runs.simulation import RunInterrupted
 
 SIGNALS, EVENTS = tables.SIGNALS, tables.EVENTS
 METRICS, SCENARIO, PROVENANCE = "metrics.json", "scenario.toml", "provenance.json"
@@ -52,7 +53,8 @@ def _write(result: Result, folder: Path, *, figures: bool) -> None:
     (folder / SCENARIO).write_text(text_of(result.asked), encoding="utf-8")
     (folder / PROVENANCE).write_text(json.dumps(notes, indent=2) + "\n", encoding="utf-8")
     if figures:
-        from orchestration.drawing import draw, style  # with it comes matplotlib, which takes longer than a short run
+        from orchestration.figures import style
+        from orchestration.runs import draw  # with it comes matplotlib, which takes longer than a short run
 
         style.save(draw.draw(result, FIRST), folder)
 

@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
 
-from orchestration.request import text_of
-from orchestration.results import labels
-from orchestration.results.result import Result
+from orchestration.requests.request import text_of
+from orchestration.results import display_names as labels
+from orchestration.runs.result import Result
 
 if sys.version_info >= (3, 11):
     import tomllib

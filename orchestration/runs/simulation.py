@@ -5,58 +5,40 @@ import importlib.metadata
 import logging
 import platform
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from fractions import Fraction
 
 import numpy as np
 
-from fmu_kit.trajectory import Trajectory
-from orchestration import fmus
-from orchestration.errors import UsageError
+from orchestration.basics.interrupt import Interrupt, Interrupted, interrupts_held_back
+from orchestration.basics.simulator import Floats
+from orchestration.building import fmus
+from orchestration.engines import initial
+from orchestration.engines.condition import program
+from orchestration.engines.engine import Engine
+from orchestration.engines.engine import master as master_of
+from orchestration.engines.feeds import Feed
+from orchestration.engines.master import Master
+from orchestration.engines.sources import (
+    Values,
+)
+from orchestration.engines.watch import watch
+from orchestration.engines.wiring import SAMPLE_OFFSET, SAMPLE_PERIOD, _signals, checked, fixed_steps, source_values
 from orchestration.fmi.instance import Instance, Loader
 from orchestration.fmi.instances import open_instance
-from orchestration.fmi.model import NUMERIC, Model, read_model
-from orchestration.fmi.values import number_of
-from orchestration.interrupt import Interrupt, Interrupted, interrupts_held_back
-from orchestration.master import initial
-from orchestration.master.condition import program
-from orchestration.master.engine import Engine
-from orchestration.master.engine import master as master_of
-from orchestration.master.feeds import Feed
-from orchestration.master.fixed_step import FixedStep
-from orchestration.master.master import Master
-from orchestration.master.recording import InMemory, Recorder
-from orchestration.master.sources import (
-    BuiltIn,
-    Constant,
-    Held,
-    Moving,
-    Scaled,
-    Table,
-    Values,
-    WhiteNoise,
-    along,
-    by_name,
-    gusts,
-)
-from orchestration.master.streams import VALUE, Streams
-from orchestration.master.timetable import Timetable
-from orchestration.master.watch import watch
+from orchestration.fmi.model import Model, read_model
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import in_its_own_words, system_of, warnings
+from orchestration.recording.recording import InMemory, Recorder
 from orchestration.results import objectives
-from orchestration.results.described import described
-from orchestration.results.result import Provenance, Result
-from orchestration.results.units import units
-from orchestration.signals.library import made
-from orchestration.signals.table_file import read_table
-from orchestration.signals.waypoints import read_waypoints
-from orchestration.simulator import Floats
-from orchestration.system.check import check, recorded
-from orchestration.system.model import MOTION, Component, Source, System, component_of, variable_of
-from orchestration.system.times import NANOSECONDS, Grid, exact_nanoseconds
+from orchestration.results.column_info import described
+from orchestration.runs.result import Provenance, Result
+from orchestration.schedule.streams import Streams
+from orchestration.schedule.timetable import Timetable
+from orchestration.system.check import recorded
+from orchestration.system.model import Component, System, component_of, variable_of
+from orchestration.system.times import NANOSECONDS
 
 _NOTES = logging.getLogger("quadcosim")
 
@@ -64,11 +46,6 @@ Progress = Callable[[float], None]
 """Hears the share of the run that is done."""
 Announce = Callable[[str], None]
 """Hears what is done before the run begins."""
-
-SAMPLE_PERIOD, SAMPLE_OFFSET = "sample_period", "sample_offset"
-"""Parameters by which a component built on `fmu_kit` is given a clock of its own; 0: it samples at every step"""
-TRAJECTORY = ("amplitude_x", "amplitude_y", "frequency", "start_z", "rate_z")
-"""Parameters trajectory.* of a component, and the fields of `Trajectory` that they are"""
 
 
 class RunInterrupted(Interrupted):
@@ -223,38 +200,8 @@ def prepared(
         )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Checked:
-    """A system that its FMUs fit."""
-
-    system: System
-    """with the objectives that they have the variables for"""
-    parameters: dict[str, float]
-    """the numeric ones of all components, as COMPONENT.NAME"""
-    units: dict[str, str]
-    """of what it comes to, where it has one"""
-
-
-def checked(system: System, models: Mapping[str, Model]) -> Checked:
-    """A system held to what its FMUs say; raises `UsageError` for what they do not have, or cannot take."""
-    check(system, models)
-    for name, component in system.components.items():
-        _expect_clock(name, component, models[name])
-    parameters = _parameters(system, models)
-    system = objectives.known(system, _signals(system, models), set(parameters))
-    return Checked(system=system, parameters=parameters, units=units(system, models))
-
-
 def _seconds(time: int | None) -> float | None:
     return None if time is None else time / NANOSECONDS
-
-
-def columns_of(system: System) -> tuple[str, ...]:
-    """The columns that a run of `system` has whatever is recorded beside them."""
-    exchanged = [start for x in system.connections for start in x.start]
-    applied = [end for x in system.connections for end in x.end if system.components[x.receiver].sampling is None]
-    sources = [signal for name, source in system.sources.items() for signal in source.signals(name)]
-    return ("time", *dict.fromkeys((*applied, *exchanged, *sources)))
 
 
 def provenance(instances: Mapping[str, Instance]) -> Provenance:
@@ -283,21 +230,6 @@ def _set_parameters(instance: Instance, component: Component) -> None:
         instance.set(name, value)
 
 
-def _expect_clock(name: str, component: Component, model: Model) -> None:
-    """Raise `UsageError` for a clock that the FMU does not have, or that its parameters would set beside the master."""
-    sampling = component.sampling
-    if sampling is None or SAMPLE_PERIOD not in model.variables:
-        if sampling is not None and sampling.clock == "fmu":
-            raise UsageError(f"components.{name}.sampling.clock = fmu: expected an FMU with {SAMPLE_PERIOD}")
-        return
-    for parameter in (SAMPLE_PERIOD, SAMPLE_OFFSET):
-        if parameter in component.parameters:
-            raise UsageError(
-                f"components.{name}.parameters.{parameter}: expected sampling instead; the master sets it, to 0 "
-                "with clock master (the master decides when to sample) and to that of sampling with clock fmu"
-            )
-
-
 def _set_clock(instance: Instance, component: Component, model: Model) -> None:
     """A component built on `fmu_kit` samples at every step that it is given, unless it is to keep its own clock."""
     sampling = component.sampling
@@ -311,58 +243,6 @@ def _set_clock(instance: Instance, component: Component, model: Model) -> None:
         instance.set(SAMPLE_OFFSET, 0.0)
 
 
-def _parameters(system: System, models: Mapping[str, Model]) -> dict[str, float]:
-    found = {}
-    for name, model in models.items():
-        given = system.components[name].parameters
-        for variable in model.variables.values():
-            value = given.get(variable.name, variable.start)
-            if variable.causality == "parameter" and variable.kind in NUMERIC and value is not None:
-                found[f"{name}.{variable.name}"] = number_of(variable, value)
-    return found
-
-
-def _signals(system: System, models: Mapping[str, Model]) -> set[str]:
-    """Everything that is recorded, or comes from a source."""
-    found = {f"{name}.{variable}" for name, variables in recorded(system, models).items() for variable in variables}
-    return found.union(columns_of(system)) - {"time"}
-
-
-def source_values(system: System, name: str, parameters: Mapping[str, float], streams: Streams) -> Values:
-    """A source at work in a run; `parameters` are those of the component of a trajectory, as COMPONENT.NAME."""
-    source = system.sources[name]
-    if source.constant is not None:
-        return Constant([source.constant] * len(source.to))
-    if source.noise is not None and source.period is not None:
-        return WhiteNoise(source.noise, source.period, len(source.to), streams.of(f"sources.{name}", VALUE))
-    if source.trajectory is None:
-        values = _of_file_or_signal(system, name, streams)
-        return values if source.scale == 1.0 else Scaled(values, source.scale)
-    owner = f"{source.trajectory}.trajectory."
-    given = {field: parameters[owner + field] for field in TRAJECTORY if owner + field in parameters}
-    return BuiltIn(Trajectory(**given))
-
-
-def _of_file_or_signal(system: System, name: str, streams: Streams) -> Values:
-    source = system.sources[name]
-    quantities = [MOTION.index(".".join(signal.split(".")[-2:])) for signal in source.signals(name) if source.is_motion]
-    if source.signal is not None:
-        signal = made(source.signal, source.parameters)
-        if source.is_motion:
-            return Moving(by_name(signal), quantities)
-        return gusts(signal, system.stop_time, streams.of(f"sources.{name}", VALUE))
-    assert source.file is not None
-    if source.is_motion:
-        return Moving(along(read_waypoints(source.file, source.parameters)), quantities)
-    table = read_table(source.file, table_columns(source), system.stop_time)
-    return Held(*table) if source.interpolation == "previous" else Table(*table)
-
-
-def table_columns(source: Source) -> Sequence[str]:
-    """The columns of the file of a source, in the order of the inputs."""
-    return [variable_of(end) for end in source.to] if source.columns is None else source.columns
-
-
 def _feeds(system: System, sources: Mapping[str, Values], instances: Mapping[str, Instance]) -> list[Feed]:
     feeds = []
     for name, values in sources.items():
@@ -373,13 +253,3 @@ def _feeds(system: System, sources: Mapping[str, Values], instances: Mapping[str
             write = instances[component].writer([variable_of(ends[i]) for i in places], into)
             feeds.append(Feed(component, values, places, into, write, count=len(ends)))
     return feeds
-
-
-def fixed_steps(system: System, models: Mapping[str, Model]) -> dict[str, FixedStep]:
-    """Components in continuous time that take steps of one length only, by name."""
-    found = {}
-    for name, component in system.components.items():
-        if component.step is not None and not models[name].varies_step:
-            grid = Grid(Fraction(0), exact_nanoseconds(component.step))
-            found[name] = FixedStep(name=name, grid=grid, moves=component.align == "next")
-    return found

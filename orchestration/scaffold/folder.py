@@ -9,8 +9,8 @@ from pathlib import Path
 from string import Template
 from typing import Literal
 
-from orchestration.errors import UsageError
-from orchestration.quadrotor.wiring import MODELS
+from orchestration.basics.errors import UsageError
+from orchestration.building.models import MODELS
 
 Kind = Literal["controller", "plant", "filter"]
 _HERE = Path(__file__).parent

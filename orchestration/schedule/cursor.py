@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from orchestration.master.schedule import Instant, Schedule
-from orchestration.master.timetable import Timetable
+from orchestration.schedule.schedule import Instant, Schedule
+from orchestration.schedule.timetable import Timetable
 
 INSTANTS = 2**13
 """Of one schedule, about: so many are made at once"""

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orchestration.errors import UsageError
-from orchestration.master.recording import Integers
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Integers
 from orchestration.system.times import NANOSECONDS, Grid
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-from orchestration.master.order import ranked
+from orchestration.schedule.order import ranked
 from orchestration.system.model import Connection, System
 
 

@@ -6,11 +6,11 @@ from functools import partial
 
 import numpy as np
 
-from orchestration.master.chance import lateness, losses
-from orchestration.master.fixed_step import FixedStep, Refusal, seconds
-from orchestration.master.plan import Plan
-from orchestration.master.recording import Integers
-from orchestration.master.streams import DELAY_JITTER, JITTER, LOSS, Streams
+from orchestration.basics.simulator import Integers
+from orchestration.schedule.fixed_step import FixedStep, Refusal, seconds
+from orchestration.schedule.message_times import lateness, losses
+from orchestration.schedule.plan import Plan
+from orchestration.schedule.streams import DELAY_JITTER, JITTER, LOSS, Streams
 from orchestration.system.model import Connection
 from orchestration.system.times import Grid, exact_nanoseconds, nanoseconds
 

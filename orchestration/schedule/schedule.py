@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from orchestration.master.recording import Integers
+from orchestration.basics.simulator import Integers
 
 Message: TypeAlias = Sequence[int]
 """Index of its connection; k, which message of it; when it is sent [ns] or, of one that is measured for a sample, when

@@ -3,10 +3,10 @@
 from collections import OrderedDict
 from collections.abc import Hashable, Iterator, Sequence
 
-from orchestration.master.position import INSTANTS
-from orchestration.master.schedule import Schedule
-from orchestration.master.streams import Streams
-from orchestration.master.timetable import Timetable
+from orchestration.schedule.cursor import INSTANTS
+from orchestration.schedule.schedule import Schedule
+from orchestration.schedule.streams import Streams
+from orchestration.schedule.timetable import Timetable
 from orchestration.system.model import System
 
 MOST = 2**17

@@ -11,14 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orchestration.errors import UsageError
-from orchestration.master.chance import Flags
-from orchestration.master.drawn import MESSAGES, NEXT, TIME, Link, Task
-from orchestration.master.fixed_step import FixedStep, Refusal
-from orchestration.master.plan import Plan
-from orchestration.master.recording import Integers
-from orchestration.master.schedule import Schedule
-from orchestration.master.streams import Streams
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Integers
+from orchestration.schedule.fixed_step import FixedStep, Refusal
+from orchestration.schedule.message_times import Flags
+from orchestration.schedule.plan import Plan
+from orchestration.schedule.random_timing import MESSAGES, NEXT, TIME, Link, Task
+from orchestration.schedule.schedule import Schedule
+from orchestration.schedule.streams import Streams
 from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS, Grid, exact_nanoseconds, nanoseconds
 

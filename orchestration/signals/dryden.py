@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 
 FOOT = 0.3048
 """[m]"""

@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from orchestration.errors import UsageError, expected_name, shown
+from orchestration.basics.errors import UsageError, expected_name, shown
 from orchestration.signals.dryden import Dryden
 from orchestration.signals.limits import Limits
 from orchestration.signals.motions import MOTIONS

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 
 AXES = ("x", "y", "z")
 """Columns of way-points [m], inertial"""

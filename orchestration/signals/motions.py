@@ -11,7 +11,7 @@ from typing import Protocol
 from fmu_kit.algebra import Vec3
 from fmu_kit.scalar import FLOAT, Scalar, ScalarOps
 from fmu_kit.trajectory import Reference, Trajectory
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 from orchestration.signals.derivatives import (
     Derivatives,
     after,

@@ -11,7 +11,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from orchestration.simulator import Floats
+from orchestration.basics.simulator import Floats
 
 ORDERS = 5
 """the value and four derivatives"""

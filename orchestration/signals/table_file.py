@@ -11,9 +11,9 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from orchestration.documents import readable
-from orchestration.errors import UsageError, shown
-from orchestration.simulator import Floats
+from orchestration.basics.documents import readable
+from orchestration.basics.errors import UsageError, shown
+from orchestration.basics.simulator import Floats
 
 LONGEST_LINE = 2**17
 """Characters of a line, so that a file without line ends is not read whole."""

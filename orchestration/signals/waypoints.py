@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats
 from orchestration.signals.limits import AXES, Limits
 from orchestration.signals.spline import DEGREE, Spline, through
 from orchestration.signals.table_file import TIME, Rows, read_rows
-from orchestration.simulator import Floats
 
 HOLD, SPEED = "hold", "speed"
 _SAMPLES, _FINER = 32, 3

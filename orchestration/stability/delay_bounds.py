@@ -21,8 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from orchestration.simulator import Floats
-from orchestration.studies.search import bisected
+from orchestration.basics.bisection import bisected
+from orchestration.basics.simulator import Floats
 
 Complexes = npt.NDArray[np.complex128]
 

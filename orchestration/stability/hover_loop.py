@@ -16,17 +16,17 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestration import fmus
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats
+from orchestration.building import fmus
+from orchestration.building.inputs import files_of
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor import wiring
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.translation import system_of
-from orchestration.simulation import prepared
-from orchestration.simulator import Floats
-from orchestration.studies.files import files_of
+from orchestration.runs.simulation import prepared
 from orchestration.system.model import System
 
 STEP = 1e-6

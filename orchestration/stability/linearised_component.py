@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats, Transfer
 from orchestration.fmi.instance import Instance
-from orchestration.simulator import Floats, Transfer
 from orchestration.system.times import NANOSECONDS
 
 PULSE = 1e-6

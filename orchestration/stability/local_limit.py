@@ -3,16 +3,16 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from orchestration.errors import SimulatorError, UsageError
+from orchestration.basics.bisection import first_failure
+from orchestration.basics.errors import SimulatorError, UsageError
 from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.studies.at_rest import NotAtRest
-from orchestration.studies.linear import HoverLoop, NotSmooth, at_edge, at_hover
-from orchestration.studies.ranges import Range, Varied, range_of
-from orchestration.studies.sampled_loop import growth_of_loop
-from orchestration.studies.search import first_failure
-from orchestration.studies.tangent import PULSE
-from orchestration.studies.twins import growth_of
+from orchestration.requests.ranges import Range, Varied, range_of
+from orchestration.stability.hover_loop import HoverLoop, NotSmooth, at_edge, at_hover
+from orchestration.stability.linearised_component import PULSE
+from orchestration.stability.monodromy import growth_of_loop
+from orchestration.stability.operating_point import NotAtRest
+from orchestration.stability.perturbed_runs import growth_of
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 

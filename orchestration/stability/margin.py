@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.studies.delay_bounds import SampledLoop, breaking_jitter, certain_jitter
-from orchestration.studies.linear import HoverLoop
-from orchestration.studies.local import local_limit
+from orchestration.stability.delay_bounds import SampledLoop, breaking_jitter, certain_jitter
+from orchestration.stability.hover_loop import HoverLoop
+from orchestration.stability.local_limit import local_limit
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,17 +15,18 @@ from typing import Any, cast
 
 import numpy as np
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats, Transfer
+from orchestration.engines.master import Master
+from orchestration.engines.wiring import fixed_steps
 from orchestration.fmi.instance import Instance, Loader
 from orchestration.fmi.reuse import Instances
-from orchestration.master.master import Master
-from orchestration.master.recording import Chunk, InMemory
-from orchestration.master.streams import Streams
-from orchestration.master.timetable import Timetable
-from orchestration.simulation import Simulation, fixed_steps, prepared
-from orchestration.simulator import Floats, Transfer
-from orchestration.studies.at_rest import calmed, common_period, exchanged, expect_rest, latest_offset
-from orchestration.studies.tangent import PULSE, Rest, Tangent
+from orchestration.recording.recording import Chunk, InMemory
+from orchestration.runs.simulation import Simulation, prepared
+from orchestration.schedule.streams import Streams
+from orchestration.schedule.timetable import Timetable
+from orchestration.stability.linearised_component import PULSE, Rest, Tangent
+from orchestration.stability.operating_point import calmed, common_period, exchanged, expect_rest, latest_offset
 from orchestration.system.model import Component, Criterion, System, component_of, variable_of
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 

@@ -7,8 +7,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from orchestration.errors import UsageError
-from orchestration.simulator import Floats
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats
 from orchestration.system.model import Component, Criterion, System
 from orchestration.system.paths import changed
 from orchestration.system.times import exact_nanoseconds

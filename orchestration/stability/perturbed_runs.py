@@ -17,12 +17,19 @@ from typing import Any, cast
 
 import numpy as np
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats, Transfer
 from orchestration.fmi.instance import Instance, Loader
 from orchestration.fmi.reuse import Instances
-from orchestration.simulation import prepared
-from orchestration.simulator import Floats, Transfer
-from orchestration.studies.at_rest import calmed, common_period, exchanged, expect_rest, latest_offset, longest_period
+from orchestration.runs.simulation import prepared
+from orchestration.stability.operating_point import (
+    calmed,
+    common_period,
+    exchanged,
+    expect_rest,
+    latest_offset,
+    longest_period,
+)
 from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 

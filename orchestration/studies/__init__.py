@@ -1,1 +1,1 @@
-"""Studies: many runs of one scenario, over axes of timing, parameters and initial state."""
+"""Many runs of one request, over axes of timing, parameters and initial state."""

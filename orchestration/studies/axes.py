@@ -7,9 +7,9 @@ from typing import Literal, overload
 
 import numpy as np
 
-from orchestration.constructors import strict
-from orchestration.errors import UsageError
-from orchestration.simulator import Floats
+from orchestration.basics.constructors import strict
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats
 from orchestration.studies import sensitivity
 
 Value = float | int | bool | str

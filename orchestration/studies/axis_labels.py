@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from orchestration.drawing import cells
-from orchestration.results import labels
-from orchestration.simulator import Floats
+from orchestration.basics.simulator import Floats
+from orchestration.figures import cells
+from orchestration.requests.ranges import is_in_seconds
+from orchestration.results import display_names as labels
 from orchestration.studies.axes import Axis
-from orchestration.studies.ranges import is_in_seconds
 
 SCALES = {"linear": "linear", "logarithmic": "log"}
 """As matplotlib calls them"""

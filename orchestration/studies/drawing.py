@@ -1,24 +1,17 @@
 """Which figures a study gets: decides by its axes, reads the store, writes beside it."""
 
-import contextlib
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestration.drawing.style import SCREEN, Style, save
-from orchestration.errors import UsageError
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.request import Request, system_meant
-from orchestration.simulator import Floats
-from orchestration.studies import figures, limit_figure, sensitivity
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats
+from orchestration.figures.style import SCREEN, Style, save
+from orchestration.studies import figures, sensitivity
 from orchestration.studies.axes import Axis, unit_points
 from orchestration.studies.criteria import edge, judged
-from orchestration.studies.limit import Limit
-from orchestration.studies.linear import HoverLoop
-from orchestration.studies.local import radius
 from orchestration.studies.maps import heat_map
 from orchestration.studies.store import TEXTS, metrics_with
 from orchestration.studies.study import Study
@@ -78,42 +71,6 @@ def _over_axes(study: Study, table: "pd.DataFrame", metric: str, unit: str | Non
     if len(axes) == 2 and all(axis.values is not None for axis in axes):
         made[f"{metric}_map"] = heat_map(table, axes, metric, words, unit=unit, style=style)
     return made
-
-
-def draw_limit(request: Request, found: Limit, folder: Path, style: Style = SCREEN) -> list[Path]:
-    """Draw what was measured, with both limits; of the quadrotor over period or delay the spectral radius too."""
-    system = system_meant(request)
-    bound = None if found.judged is None else edge(system, found.judged)
-    name = "limit_" + re.sub(r"[^A-Za-z0-9]+", "_", found.of).strip("_")
-    written = figures.save(lambda how: limit_figure.measured(found, bound, how), folder / name, style)
-    if isinstance(request, Scenario) and found.of in ("period", "delay"):
-        with contextlib.suppress(UsageError):  # where linear theory about hover does not apply
-            written += draw_spectral_radius(request, found, folder, style)
-    return written
-
-
-def draw_spectral_radius(scenario: Scenario, found: Limit, folder: Path, style: Style = SCREEN) -> list[Path]:
-    """Draw the spectral radius of the loop about hover over the period or the delay; the paths of the figure.
-
-    Raises `UsageError` where linear theory does not apply.
-    """
-    ends = [limit for limit in (found.local_limit, found.large_signal_limit) if limit is not None]
-    last = 1.3 * max(ends, default=0.1)
-    values = np.array([0.001 + i / 199.0 * (last - 0.001) for i in range(200)])
-    loop = HoverLoop.of(scenario)
-    radii = np.array([radius(loop, scenario, found.of, value) for value in values])
-    return figures.save(
-        lambda how: figures.spectral_radius(
-            found.of,
-            values,
-            radii,
-            local_limit=found.local_limit,
-            large_signal_limit=found.large_signal_limit,
-            style=how,
-        ),
-        folder / f"spectral_radius_{found.of}",
-        style,
-    )
 
 
 def indices_of(study: Study, values: Floats, metric: str) -> list[sensitivity.Index]:

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from orchestration.errors import UsageError
-from orchestration.results.run_directory import MAT, load_run
+from orchestration.basics.errors import UsageError
+from orchestration.runs.run_directory import MAT, load_run
 from orchestration.studies.table import FORMATS, export
 
 OF_RUNS = ("csv", "mat")

@@ -9,16 +9,16 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestration.drawing.palette import BLUE, GREY, ORANGE, RED, SHADES
-from orchestration.drawing.style import SCREEN, Style
-from orchestration.drawing.style import save as write
-from orchestration.drawing.ticks import plain
-from orchestration.results import labels
-from orchestration.simulator import Floats
-from orchestration.statistics import wilson
+from orchestration.basics.simulator import Floats
+from orchestration.basics.statistics import wilson
+from orchestration.basics.units import after
+from orchestration.figures.palette import BLUE, GREY, ORANGE, RED, SHADES
+from orchestration.figures.style import SCREEN, Style
+from orchestration.figures.style import save as write
+from orchestration.figures.ticks import plain
+from orchestration.results import display_names as labels
 from orchestration.studies.axes import Axis
 from orchestration.studies.axis_labels import SCALES, drawn, label
-from orchestration.units import after
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,13 +8,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from orchestration.drawing import cells
-from orchestration.drawing.palette import DIVERGED as DARK
-from orchestration.drawing.palette import NOT_GOOD, RED, SHADES
-from orchestration.drawing.style import SCREEN, Style
-from orchestration.drawing.ticks import plain
-from orchestration.results import labels
-from orchestration.simulator import Floats
+from orchestration.basics.simulator import Floats
+from orchestration.figures import cells
+from orchestration.figures.palette import DIVERGED as DARK
+from orchestration.figures.palette import NOT_GOOD, RED, SHADES
+from orchestration.figures.style import SCREEN, Style
+from orchestration.figures.ticks import plain
+from orchestration.results import display_names as labels
 from orchestration.studies.axes import Axis
 from orchestration.studies.axis_labels import SCALES, edges, label
 from orchestration.studies.figures import DIVERGED, by_horizon, flew

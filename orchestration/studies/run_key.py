@@ -1,98 +1,18 @@
 """What a run and a store are identified by: content, sources and versions, never where a file lies or its age."""
 
-import ast
 import dataclasses
-import functools
 import hashlib
-import importlib.metadata
 import json
-import platform
 from collections.abc import Callable, Container, Iterable, Mapping
 from functools import partial
-from pathlib import Path
 from typing import Any
 
-from fmu_kit.syntax_trees import parsed
-from orchestration.batch import kernels
-from orchestration.master import loop
-from orchestration.quadrotor import translation
+from orchestration.building.inputs import Files, tables_of
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import in_words_of_a_scenario
-from orchestration.studies.files import Files, tables_of
 from orchestration.studies.study import Study
 from orchestration.system.model import Component, Source, System
-
-ROOTS = ("orchestration.simulation", "orchestration.studies.worker")
-"""Where the code that flies begins."""
-QUADROTOR = Path(translation.__file__).with_name("system.toml")
-"""What every scenario is a change of"""
-_ASIDE = (
-    "orchestration.fmus",
-    "orchestration.drawing.gallery",
-    "orchestration.results.tables",
-    "orchestration.studies.store",
-)
-"""What finds FMUs, keeps results and draws them; it is imported there and changes no bit of them."""
-_PACKAGES = ("orchestration", "fmu_kit")
-_FEATURES = ("fma", "fma4", "avx2", "avx512f")
-"""of a processor, by which the C library and numpy choose among their mathematical functions"""
-
-
-@functools.cache
-def versions() -> dict[str, str]:
-    """The software that a run's bits depend on, the sources on the flight's path by their hash."""
-    packages = {name: importlib.metadata.version(name) for name in ("quadcosim", "numpy", "fmpy")}
-    return {**packages, "sources": sources_hash(flight_sources())}
-
-
-def flight_sources() -> dict[str, Path]:
-    """The modules of this project that the code that flies imports, directly or not, by name."""
-    found: dict[str, Path] = {}
-    waiting = list(ROOTS)
-    while waiting:
-        name = waiting.pop()
-        if name in found or name in _ASIDE or (path := _source(name)) is None:
-            continue
-        found[name] = path
-        for node in ast.walk(parsed(path.read_bytes())):
-            if isinstance(node, ast.ImportFrom) and node.module:
-                waiting += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-            elif isinstance(node, ast.Import):
-                waiting += [alias.name for alias in node.names]
-    return found | {path.name: path for path in (QUADROTOR, *loop.FILES, *kernels.FILES)}
-
-
-def sources_hash(sources: Mapping[str, Path]) -> str:
-    """One hash of the content of all modules."""
-    digest = hashlib.sha256()
-    for name, path in sorted(sources.items()):
-        digest.update(f"{name}\0".encode() + hashlib.sha256(path.read_bytes()).digest())
-    return digest.hexdigest()
-
-
-def _source(name: str) -> Path | None:
-    """The file of a module of this project; None for anything else."""
-    package, *parts = name.split(".")
-    if package not in _PACKAGES or not parts:
-        return None
-    path = Path(__file__).resolve().parents[2].joinpath(package, *parts).with_suffix(".py")
-    return path if path.is_file() else None  # a name that is imported from a module has none
-
-
-@functools.cache
-def machine() -> str:
-    """The kind of this machine: flights on different kinds may differ in the last bit."""
-    libc = " ".join(platform.libc_ver()) or platform.system()
-    features = " ".join(name for name in _FEATURES if name in _processor_flags())
-    return f"Python {platform.python_version()}, {libc}, {platform.machine()} {features}".rstrip()
-
-
-def _processor_flags() -> list[str]:
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return []
-    return next((line.partition(":")[2].split() for line in lines if line.startswith(("flags", "Features"))), [])
+from orchestration.workers.provenance import machine, versions
 
 
 def run_key(system: System, files: Files) -> str:

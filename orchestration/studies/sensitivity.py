@@ -6,8 +6,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from orchestration.errors import UsageError
-from orchestration.simulator import Floats
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats
 
 SensitivityMethod = Literal["morris", "saltelli"]
 METHODS: tuple[SensitivityMethod, ...] = ("morris", "saltelli")

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from orchestration.errors import QuadcosimError, UsageError
+from orchestration.basics.errors import QuadcosimError, UsageError
+from orchestration.workers.row import Row
 
 FIXED = ("outcome", "good", "horizon", "diverged", "divergence_time", "steps")
 """Metrics of every system, beside its objectives; the wall time of a run is its duration."""
@@ -73,32 +74,6 @@ def expect_columns(objectives: Iterable[str]) -> None:
         taken.append(name)
     if len(taken) > MOST_OBJECTIVES:
         raise UsageError(f"objectives: {len(taken)} columns, expected at most {MOST_OBJECTIVES}")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Row:
-    """One run: its settings and what it came to."""
-
-    index: int
-    """place in the design"""
-    key: str
-    """hash of everything that determines the run"""
-    settings: Mapping[str, Any]
-    """the value of each axis"""
-    seed: int
-    metrics: Mapping[str, Any] | None
-    """None if the run failed"""
-    message: str | None
-    """why it failed, or what diverged"""
-    duration: float
-    """wall-clock time of the run [s]"""
-    machine: str | None = None
-    """the kind of machine that flew it"""
-
-    @property
-    def status(self) -> str:
-        """`done` or `failed`; divergence is a result."""
-        return "failed" if self.metrics is None else "done"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,16 +8,16 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from orchestration.constructors import strict
-from orchestration.errors import UsageError
-from orchestration.fmus import native_twin, native_twins
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.translation import in_its_own_words, paths_of
-from orchestration.request import Request, system_meant
+from orchestration.basics.constructors import strict
+from orchestration.basics.errors import UsageError
+from orchestration.building.fmus import native_twin, native_twins
+from orchestration.building.inputs import Files, files_of
+from orchestration.quadrotor.translation import in_its_own_words
+from orchestration.requests.ranges import paths_in
+from orchestration.requests.request import Request, system_meant
 from orchestration.studies.axes import Axis, Method, Points, Value
-from orchestration.studies.files import Files, files_of
+from orchestration.studies.linked_settings import Together
 from orchestration.studies.store import is_column
-from orchestration.studies.together import Together
 from orchestration.system.model import System
 from orchestration.system.paths import changed, names_table, value_at
 
@@ -134,14 +134,6 @@ class Study:
 
 
 _NAME = re.compile(r"[^\W_][\w .+-]{0,99}")
-
-
-def paths_in(base: Request, target: str) -> tuple[str, ...]:
-    """The paths of a target in the system that `base` means; raises `UsageError` where there is no such."""
-    paths = paths_of(target) if isinstance(base, Scenario) else (target,)
-    for path in paths:
-        value_at(system_meant(base), path)
-    return paths
 
 
 def names_fmu(path: str) -> bool:

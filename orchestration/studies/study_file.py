@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, TypeVar
 
-from orchestration.documents import read_toml
-from orchestration.errors import UsageError
+from orchestration.basics.documents import read_toml
+from orchestration.basics.errors import UsageError
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.scenario_file import parsed
-from orchestration.request import Request, load_request, request_from_tables
+from orchestration.requests.request import Request, load_request, request_from_tables
 from orchestration.studies.axes import Axis, Method, Scale, Value, span
 from orchestration.studies.study import Study, names_fmu
 from orchestration.system.paths import names_table

@@ -7,32 +7,26 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
-from orchestration.command.terminal import Count, say
-from orchestration.errors import UsageError
-from orchestration.extras import explained
-from orchestration.interrupt import Interrupted
-from orchestration.master.engine import Engine
-from orchestration.simulation import checked
+from orchestration.basics.errors import UsageError
+from orchestration.basics.extras import explained
+from orchestration.basics.interrupt import Interrupted
+from orchestration.basics.progress import CountHeard, of_runs
+from orchestration.basics.terminal import Count, say
+from orchestration.building.inputs import Files
+from orchestration.engines.engine import Engine
+from orchestration.engines.wiring import checked
+from orchestration.requests.ranges import paths_in, unit_at
 from orchestration.studies import store
 from orchestration.studies.checks import described, expect_flyable
-from orchestration.studies.crew import Package
-from orchestration.studies.engine import expect_scheduler, run_locally, run_on_dask
-from orchestration.studies.files import Files
-from orchestration.studies.hearing import CountHeard, of_runs
-from orchestration.studies.identity import (
-    design_parts,
-    difference,
-    place_parts,
-    run_key,
-    study_parts,
-    versions,
-)
-from orchestration.studies.lanes import Agreement, chunks, expect_lanes, sample
-from orchestration.studies.ranges import unit_at
-from orchestration.studies.store import Row
-from orchestration.studies.study import Study, paths_in
+from orchestration.studies.run_key import design_parts, difference, place_parts, run_key, study_parts
+from orchestration.studies.study import Study
 from orchestration.studies.swept import Swept
-from orchestration.studies.worker import Chunk, Outcome, Task
+from orchestration.workers.batching import Agreement, chunks, expect_lanes, sample
+from orchestration.workers.executors import expect_scheduler, run_locally, run_on_dask
+from orchestration.workers.pool import Package
+from orchestration.workers.provenance import versions
+from orchestration.workers.row import Row
+from orchestration.workers.task import Chunk, Outcome, Task
 
 Announce = Callable[[str], None]
 """Hears of a run that failed."""

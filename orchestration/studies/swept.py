@@ -5,18 +5,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from orchestration.extras import explained
+from orchestration.basics.extras import explained
 from orchestration.results import html
-from orchestration.studies.lanes import Agreement
 from orchestration.studies.store import open_for_reading
 from orchestration.studies.study import Study
 from orchestration.studies.table import dataset, frame, units_in
+from orchestration.workers.batching import Agreement
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from orchestration.drawing.gallery import Figures
+    from orchestration.figures.gallery import Figures
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -56,8 +56,8 @@ class Swept:
 
         Raises `UsageError` for a metric that does not exist, or axes that no figure is for.
         """
-        from orchestration.drawing.gallery import Figures
-        from orchestration.drawing.style import SCREEN
+        from orchestration.figures.gallery import Figures
+        from orchestration.figures.style import SCREEN
         from orchestration.studies.drawing import study_figures
 
         made, _ = study_figures(self.study, self.path, metric, SCREEN)

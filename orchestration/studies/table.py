@@ -10,8 +10,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from pyarrow import csv
 
-from orchestration.errors import UsageError
-from orchestration.results import mat_file
+from orchestration.basics.errors import UsageError
+from orchestration.recording import mat_file
 from orchestration.studies.store import SETTINGS, TEXTS, UNITS, Store, open_for_reading
 
 if TYPE_CHECKING:

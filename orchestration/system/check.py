@@ -3,7 +3,7 @@
 import difflib
 from collections.abc import Iterable, Mapping
 
-from orchestration.errors import UsageError, expected_name
+from orchestration.basics.errors import UsageError, expected_name
 from orchestration.expressions.syntax import Name, names, parse, parts
 from orchestration.fmi.model import NUMERIC, Model, Variable
 from orchestration.fmi.values import taken

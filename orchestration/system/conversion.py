@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
+from orchestration.basics.units import BaseUnits
 from orchestration.fmi.model import Kind, Model, Variable
-from orchestration.units import BaseUnits
 
 BECOMES: dict[Kind, tuple[Kind, ...]] = {
     "Real": ("Real",),

@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from orchestration.basics.units import in_brackets
 from orchestration.system.model import Component, Connection, Sampling, Source, System, variable_of
-from orchestration.units import in_brackets
 
 
 def as_text(system: System, units: Mapping[str, str] = {}) -> str:

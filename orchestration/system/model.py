@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from orchestration.constructors import strict
-from orchestration.errors import UsageError
+from orchestration.basics.constructors import strict
+from orchestration.basics.errors import UsageError
 from orchestration.expressions.syntax import is_number, parse
 from orchestration.signals import WINDS
 from orchestration.system.requirements import (

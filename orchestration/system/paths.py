@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 from orchestration.system.model import Component, Connection, Sampling, Source, System
 
 TOP = ("stop_time", "seed")

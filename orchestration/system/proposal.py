@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 from orchestration.fmi.model import NUMERIC, Model
 from orchestration.system.matching import Match, match
 from orchestration.system.model import component_of

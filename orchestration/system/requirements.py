@@ -3,7 +3,7 @@
 import math
 from typing import Any, TypeGuard, get_args
 
-from orchestration.errors import UsageError, shown
+from orchestration.basics.errors import UsageError, shown
 from orchestration.system.times import exact_nanoseconds
 
 

@@ -8,8 +8,8 @@ from typing import Annotated, Any, TypeVar
 
 import pydantic
 
-from orchestration.documents import read_toml
-from orchestration.errors import UsageError
+from orchestration.basics.documents import read_toml
+from orchestration.basics.errors import UsageError
 from orchestration.system.model import (
     Align,
     Clock,

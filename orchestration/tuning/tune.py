@@ -8,16 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from orchestration.command.terminal import say
-from orchestration.extras import explained
-from orchestration.master.engine import Engine
+from orchestration.basics.extras import explained
+from orchestration.basics.progress import ShareHeard, of_share
+from orchestration.basics.terminal import say
+from orchestration.building.inputs import Files
+from orchestration.engines.engine import Engine
 from orchestration.results import html
-from orchestration.studies.engine import Pool
-from orchestration.studies.files import Files
-from orchestration.studies.hearing import ShareHeard, of_share
-from orchestration.studies.identity import versions
-from orchestration.studies.tuning import Fly, Found, Tuning, best_by_period, search
-from orchestration.studies.tuning_file import gains_text
+from orchestration.tuning.tuning import Fly, Found, Tuning, best_by_period, search
+from orchestration.tuning.tuning_file import gains_text
+from orchestration.workers.executors import Pool
+from orchestration.workers.provenance import versions
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,22 +8,22 @@ from typing import Any
 import numpy as np
 
 from fmu_kit.trajectory import Trajectory
-from orchestration.constructors import strict
-from orchestration.errors import UsageError
-from orchestration.fmus import native_twins
+from orchestration.basics.constructors import strict
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats
+from orchestration.basics.statistics import wilson
+from orchestration.building.fmus import native_twins
+from orchestration.building.inputs import Files, files_of
+from orchestration.limits.evaluation import is_good
+from orchestration.quadrotor.initial_conditions import Starts
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import in_its_own_words
-from orchestration.request import system_meant
-from orchestration.simulator import Floats
-from orchestration.statistics import wilson
+from orchestration.requests.ranges import paths_in
+from orchestration.requests.request import system_meant
 from orchestration.studies.axes import Axis
-from orchestration.studies.files import Files, files_of
-from orchestration.studies.lanes import expect_lanes
-from orchestration.studies.starts import Starts
-from orchestration.studies.study import paths_in
-from orchestration.studies.trials import is_good
 from orchestration.system.model import System
 from orchestration.system.paths import changed
+from orchestration.workers.batching import expect_lanes
 
 Fly = Callable[[Sequence[System]], Sequence[dict[str, Any]]]
 """The metrics of runs, in their order"""

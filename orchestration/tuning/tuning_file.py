@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-from orchestration.errors import UsageError
-from orchestration.studies.starts import Starts
+from orchestration.basics.errors import UsageError
+from orchestration.quadrotor.initial_conditions import Starts
 from orchestration.studies.study_file import AxisTable, axis_of, load, scenario_of
-from orchestration.studies.tuning import Found, Tuning
+from orchestration.tuning.tuning import Found, Tuning
 
 _FORBID: dict[str, str] = {"extra": "forbid"}
 

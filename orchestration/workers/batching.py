@@ -8,14 +8,14 @@ from dataclasses import asdict, dataclass
 from itertools import islice
 from typing import Any
 
-from orchestration.batch.kernels import lanes_here
-from orchestration.batch.shape import Shape, outline
-from orchestration.batch.windows import timing
-from orchestration.errors import QuadcosimError
-from orchestration.simulation import checked
-from orchestration.studies.files import Files
-from orchestration.studies.worker import Chunk, Task
+from orchestration.basics.errors import QuadcosimError
+from orchestration.building.inputs import Files
+from orchestration.engines.batch.kernels import lanes_here
+from orchestration.engines.batch.shape import Shape, outline
+from orchestration.engines.wiring import checked
+from orchestration.schedule.schedule_cache import timing
 from orchestration.system.model import System
+from orchestration.workers.task import Chunk, Task
 
 SAMPLE = 8
 """Runs that are flown by FMUs too"""

@@ -12,13 +12,13 @@ from contextlib import ExitStack
 from itertools import islice
 from typing import Any
 
-from orchestration.errors import QuadcosimError, UsageError
-from orchestration.master.engine import Engine
-from orchestration.studies.crew import Crew, InterruptedWorker, Package
-from orchestration.studies.files import Files
-from orchestration.studies.lanes import chunks
-from orchestration.studies.worker import Chunk, Outcome, Task
+from orchestration.basics.errors import QuadcosimError, UsageError
+from orchestration.building.inputs import Files
+from orchestration.engines.engine import Engine
 from orchestration.system.model import System
+from orchestration.workers.batching import chunks
+from orchestration.workers.pool import Crew, InterruptedWorker, Package
+from orchestration.workers.task import Chunk, Outcome, Task
 
 Submit = Callable[[Task | Chunk], "Future[list[Outcome]]"]
 _PATIENCE = 10.0

@@ -15,11 +15,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from orchestration import scratch, subprocesses
-from orchestration.errors import QuadcosimError
-from orchestration.studies.files import Files, all_with_files, with_files
-from orchestration.studies.identity import versions
-from orchestration.studies.worker import Broken, BrokenPlaceError, Chunk, Outcome, Ready, Task, row_of
+from orchestration.basics import scratch
+from orchestration.basics.errors import QuadcosimError
+from orchestration.building.inputs import Files, all_with_files, with_files
+from orchestration.processes import subprocesses
+from orchestration.workers.provenance import versions
+from orchestration.workers.task import Broken, BrokenPlaceError, Chunk, Outcome, Ready, Task, row_of
 
 ATTEMPTS = 3
 """How often a run is flown, the later times first in a new process, before the death of its worker is its result."""
@@ -75,7 +76,8 @@ class WorkerProcess:
         )
         # A session of its own: an interrupt from the terminal is the coordinator's to handle.
         self.process = subprocess.Popen(
-            subprocesses.command("orchestration.studies.serve", folder), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            subprocesses.command("orchestration.workers.worker_process", folder),
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             env=subprocesses.environment(**dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder)), start_new_session=True,
         )  # fmt: skip
 

@@ -8,16 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from orchestration.batch.fly import Batches
-from orchestration.errors import QuadcosimError, SimulatorError, UsageError
+from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageError
+from orchestration.engines.batch.fly import Batches
+from orchestration.engines.engine import Engine
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.model import read_model
 from orchestration.fmi.reuse import Instances
-from orchestration.master.engine import Engine
-from orchestration.results.result import Result
-from orchestration.simulation import prepared
-from orchestration.studies.store import Row
+from orchestration.runs.result import Result
+from orchestration.runs.simulation import prepared
 from orchestration.system.model import System
+from orchestration.workers.row import Row
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,7 +163,7 @@ def row_of(
 
 
 def _parquet(result: Result) -> bytes:
-    from orchestration.results import tables  # pyarrow loads only where signals are kept
+    from orchestration.recording import tables  # pyarrow loads only where signals are kept
 
     buffer = io.BytesIO()
     tables.write_signals(buffer, result.recording, result.about)

@@ -11,10 +11,10 @@ import threading
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from orchestration import scratch
-from orchestration.studies.identity import machine, versions
-from orchestration.studies.worker import Broken, BrokenPlaceError, Chunk, Hangar, Outcome, Ready, Task
-from orchestration.subprocesses import private_pipes
+from orchestration.basics import scratch
+from orchestration.processes.subprocesses import private_pipes
+from orchestration.workers.provenance import machine, versions
+from orchestration.workers.task import Broken, BrokenPlaceError, Chunk, Hangar, Outcome, Ready, Task
 
 
 def main() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from docs import comparisons
-from orchestration.studies.comparison.cells import frame_of, results
+from orchestration.comparison.cells import frame_of, results
 
 PAGE = Path(comparisons.__file__).parent / "findings.md"
 FLOWN = sorted(path.stem for path in comparisons.DATA.glob("*.json"))

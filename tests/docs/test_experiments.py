@@ -11,10 +11,10 @@ import quadcosim
 from docs import experiments
 from docs.make_findings import flying_up_to, with_python_inside
 from fmu_kit.trajectory import Trajectory
-from orchestration.batch.fly import fly
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import system_of
-from orchestration.studies.lanes import Agreement
+from orchestration.runs.in_lanes import fly
+from orchestration.workers.batching import Agreement
 
 PAGE = (Path(__file__).parents[2] / "docs" / "findings.md").read_text(encoding="utf-8")
 DECIMAL = re.compile(r"-?\d+\.?\d*")

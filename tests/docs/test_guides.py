@@ -19,13 +19,13 @@ import fmpy
 import numpy as np
 import pytest
 
-from orchestration import fmus
+from orchestration.building import fmus
 from orchestration.checks.doctor.machine import this_machine
 from orchestration.checks.doctor.verdict import INSTALL_LIBPYTHON, satisfies
-from orchestration.exchange.ssp import writing
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
+from orchestration.requests.ssp import writing
 from quadcosim import run
 from tests.fmus.expected import law_command
 from tests.native import NATIVE

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.documents import read_toml
+from orchestration.basics.documents import read_toml
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.request import system_meant
+from orchestration.requests.request import system_meant
 from quadcosim import Result, run
 
 PAGE = (Path(__file__).parents[2] / "docs" / "metrics.md").read_text(encoding="utf-8")

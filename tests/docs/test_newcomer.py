@@ -15,8 +15,8 @@ from docs.newcomer.blocks import Block, blocks_of
 from docs.newcomer.following import Newcomer, NotAsSaid
 from docs.newcomer.pages import pages
 from docs.newcomer.readers import reader_of
+from orchestration.basics.documents import read_toml
 from orchestration.command.cli import app
-from orchestration.documents import read_toml
 from tests.commands import Main
 
 ROOT = Path(__file__).parents[2]

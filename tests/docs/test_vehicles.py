@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from orchestration.command.cli import main
-from orchestration.quadrotor.vehicles import Vehicle, load_vehicle, names
+from orchestration.quadrotor.vehicle import Vehicle, load_vehicle, names
 
 PAGE = (Path(__file__).parents[2] / "docs" / "vehicles.md").read_text(encoding="utf-8")
 

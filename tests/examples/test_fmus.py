@@ -2,7 +2,7 @@
 
 import pytest
 
-from orchestration import fmus
+from orchestration.building import fmus
 from orchestration.checks.validation import validate
 from tests.examples.common import EXAMPLES
 

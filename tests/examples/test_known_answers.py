@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestration.simulation import run
-from orchestration.studies import limit
+from orchestration.limits import limit
+from orchestration.runs.simulation import run
 from orchestration.system.model import System
 from tests.examples.common import example
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from fmu_kit.native.compiler import Mathematics
-from orchestration import fmus
-from orchestration.results.result import Result
-from orchestration.simulation import run
+from fmu_kit.compiler.pack.c_compiler import Mathematics
+from orchestration.building import fmus
+from orchestration.runs.result import Result
+from orchestration.runs.simulation import run
 from orchestration.system.model import System
 from tests.examples.common import EXAMPLES, NAMES, example
 from tests.native import assert_near, assert_the_same, natives

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from orchestration.quadrotor.translation import system_of
-from orchestration.results.result import Result
+from orchestration.runs.result import Result
 from orchestration.signals.waypoints import read_waypoints
 from quadcosim import DisturbanceChoice, ReferenceChoice, Scenario, load_scenario, run
 from tests.examples.common import EXAMPLES
-from tests.orchestration.batch.lanes import located
+from tests.orchestration.engines.batch.lanes import located
 from tests.orchestration.fmi.small import needs_compiler
 
 pytestmark = needs_compiler

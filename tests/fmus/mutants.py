@@ -11,8 +11,8 @@ from xml.etree.ElementTree import Element
 
 import fmpy
 
-from orchestration import fmus
-from orchestration.quadrotor.wiring import MODELS
+from orchestration.building import fmus
+from orchestration.building.models import MODELS
 from tests.fmus.damage import (
     DESCRIPTION,
     Damage,

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from subprocess import CompletedProcess
 
-from orchestration.quadrotor.wiring import MODELS
+from orchestration.building.models import MODELS
 from tests.fmus.process import ROOT, run
 
 PACKAGES = ("fmu_kit", "controller_fmu", "plant_fmu")

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from orchestration.errors import SimulatorError, UsageError
+from orchestration.basics.errors import SimulatorError, UsageError
+from orchestration.building.models import MODELS
 from orchestration.fmi.fmi2 import Fmi2Instance
-from orchestration.quadrotor.wiring import MODELS
 from tests.fmus.archive import without_loader
 from tests.fmus.instance import Instance
 from tests.fmus.making import PAIR, Making
@@ -347,7 +347,7 @@ def test_a_plant_state_that_overflows_is_divergence(start: Values, inputs: Value
 LOAD = """
 import sys
 from pathlib import Path
-from orchestration.errors import QuadcosimError
+from orchestration.basics.errors import QuadcosimError
 from orchestration.fmi.fmi2 import Fmi2Instance
 try:
     Fmi2Instance(Path(sys.argv[1]), "it").close()

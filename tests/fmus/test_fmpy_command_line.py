@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestration.quadrotor.wiring import MODELS
-from orchestration.simulator import Floats
+from orchestration.basics.simulator import Floats
+from orchestration.building.models import MODELS
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
 from tests.fmus.process import run
 

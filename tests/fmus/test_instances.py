@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.quadrotor.wiring import MODELS
+from orchestration.building.models import MODELS
 from tests.fmus.expected import law_command
 from tests.fmus.instance import Instance
 from tests.fmus.making import Making

@@ -10,8 +10,8 @@ import pytest
 from fmpy.model_description import ModelDescription
 
 from fmu_kit.model_description import PYTHON_REQUIRED
-from orchestration.documents import read_toml
-from orchestration.quadrotor.wiring import MODELS
+from orchestration.basics.documents import read_toml
+from orchestration.building.models import MODELS
 from tests.fmus.archive import files_of
 from tests.fmus.expected import MEASUREMENT
 from tests.fmus.instance import Instance

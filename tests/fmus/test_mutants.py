@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.checks.confined import Limits
+from orchestration.building.models import MODELS
 from orchestration.checks.validation import Finding, description, rules, validate
 from orchestration.checks.validation.confined_process import PLATFORM, READABLE, look
 from orchestration.checks.validation.finding import name_of
 from orchestration.checks.validation.progress import Report, Told
 from orchestration.checks.validation.validator import PROCESS
 from orchestration.command import cli
-from orchestration.quadrotor.wiring import MODELS
+from orchestration.processes.confined import Limits
 from tests.fmus.damage import Mutant
 from tests.fmus.mutants import MUTANTS
 from tests.fmus.verdicts import as_markdown, fmpy_finds, fmutool_finds, verdicts

@@ -9,9 +9,9 @@ import pytest
 from elftools.elf.elffile import ELFFile
 
 from fmu_kit.bundle import Target
-from orchestration import fmus
+from orchestration.building import fmus
+from orchestration.building.models import MODELS
 from orchestration.checks.validation import validate
-from orchestration.quadrotor.wiring import MODELS
 from tests.examples.common import EXAMPLES
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
 from tests.fmus.instance import Instance

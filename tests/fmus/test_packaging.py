@@ -13,10 +13,10 @@ import pytest
 
 from fmu_kit import bundle, packaging
 from fmu_kit.loader import BESIDE, GUID_FILE
-from orchestration import fmus
+from orchestration.basics.errors import QuadcosimError
+from orchestration.building import fmus
+from orchestration.building.models import MODELS
 from orchestration.checks.doctor import binaries
-from orchestration.errors import QuadcosimError
-from orchestration.quadrotor.wiring import MODELS
 from tests.fmus.archive import files_of
 from tests.fmus.instance import Instance
 from tests.fmus.process import run
@@ -236,7 +236,7 @@ def test_a_python_that_is_too_old_is_refused_in_a_sentence(model: str, built: di
         ("import math, numpy.linalg as la", "numpy.linalg"),
         ("from numpy import array", "numpy"),
         ("def late():\n    import numpy", "numpy"),
-        ("from orchestration.quadrotor.wiring import MODELS", "orchestration.quadrotor.wiring"),
+        ("from orchestration.building.models import MODELS", "orchestration.building.models"),
     ],
 )
 def test_a_slave_that_needs_more_than_the_standard_library_is_refused(

@@ -6,13 +6,13 @@ from typing import Any
 import pytest
 
 import quadcosim
-from orchestration import fmus
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.building import fmus
 from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.scenario_file import scenario_from_tables
-from orchestration.studies.linear import HoverLoop, at_hover
-from orchestration.studies.sampled_loop import growth_of_loop
+from orchestration.stability.hover_loop import HoverLoop, at_hover
+from orchestration.stability.monodromy import growth_of_loop
 
 MEAN = {"discretisation": "mean", "stages": 3}
 

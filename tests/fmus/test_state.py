@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from orchestration.errors import SimulatorError
+from orchestration.basics.errors import SimulatorError
 from orchestration.fmi.fmi2 import Fmi2Instance
 from tests.fmus.flights import FLIGHTS, Flight
 from tests.fmus.instance import Instance

@@ -11,21 +11,21 @@ import pytest
 from fmpy import read_model_description
 from fmpy.model_description import ValidationError
 
-from orchestration.checks import confined
-from orchestration.checks.archive import Archive
-from orchestration.checks.confined import Ending, Limits
+from orchestration.basics.errors import QuadcosimError
+from orchestration.building.models import MODELS
 from orchestration.checks.validation import Finding, confined_process, run_rules, validate
-from orchestration.checks.validation.exercise import Bench
 from orchestration.checks.validation.finding import check
 from orchestration.checks.validation.fmu import Fmu, read_co_simulation, read_fmu
 from orchestration.checks.validation.own_description import differences, elements
+from orchestration.checks.validation.probe import Bench
 from orchestration.checks.validation.progress import REPORT, Told
 from orchestration.checks.validation.structure import initial_unknowns, known_dependencies, outputs
 from orchestration.checks.validation.units import dimensions, unit_meaning
 from orchestration.checks.validation.variables import aliases, names
 from orchestration.command import cli
-from orchestration.errors import QuadcosimError
-from orchestration.quadrotor.wiring import MODELS
+from orchestration.fmi.archive import Archive
+from orchestration.processes import confined
+from orchestration.processes.confined import Ending, Limits
 from tests.fmus.archive import files_of
 from tests.fmus.damage import DESCRIPTION, Damage, description, root, source, without, write_fmu
 from tests.fmus.foreign import lag, needs_compiler

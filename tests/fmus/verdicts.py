@@ -8,8 +8,8 @@ from pathlib import Path
 
 from fmpy.validation import validate_fmu
 
-from orchestration.checks.confined import Limits
 from orchestration.checks.validation import Finding, validate
+from orchestration.processes.confined import Limits
 from tests.fmus.damage import Mutant
 
 

@@ -11,18 +11,18 @@ from fmpy.validation import validate_fmu
 
 from fmu_kit.errors import FmuError
 from fmu_kit.variables import discrete_input, fixed_parameter
-from orchestration import fmus
+from orchestration.building import fmus
 from orchestration.checks.validation.validator import validate
-from orchestration.exchange.ssp import package, writing
 from orchestration.fmi import instances
-from orchestration.request import load_request
+from orchestration.requests.request import load_request
+from orchestration.requests.ssp import package, writing
 from orchestration.studies.store import open_for_reading
 from orchestration.studies.study_file import load_study
 from orchestration.studies.sweep import store_path, sweep
 from orchestration.system.model import System
 from quadcosim import SimulatorError, UsageError, changed, load_run, load_system, run
 from tests.commands import Main
-from tests.fmu_kit.native.probes import Mode
+from tests.fmu_kit.compiler.probes import Mode
 
 SLAVE = """
 import dataclasses

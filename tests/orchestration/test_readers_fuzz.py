@@ -12,11 +12,11 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 import quadcosim
-from orchestration.exchange.ssp import writing
 from orchestration.quadrotor.presets import preset_timing
 from orchestration.quadrotor.wiring import REFERENCE
-from orchestration.request import load_request, text_of
-from orchestration.results.pause import read_state
+from orchestration.requests.request import load_request, text_of
+from orchestration.requests.ssp import writing
+from orchestration.runs.pause import read_state
 from orchestration.signals.table_file import read_table
 from orchestration.studies.study_file import load_study
 from quadcosim import Scenario, UsageError, fly_until, load_run, load_scenario, save_run

@@ -9,9 +9,9 @@ import pyarrow.parquet as pq
 import pytest
 
 import quadcosim
-from orchestration.studies.tuning_file import load_tuning
+from orchestration.tuning.tuning_file import load_tuning
 from quadcosim import Axis, QuadcosimError, Scenario, Study, Swept, UsageError
-from tests.orchestration.studies.test_tuning import FILE
+from tests.orchestration.tuning.test_tuning import FILE
 from tests.quadcosim.conftest import native
 
 PERIODS = Axis(name="timing.period", values=(0.01, 0.02))

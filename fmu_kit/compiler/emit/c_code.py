@@ -9,9 +9,9 @@ import re
 from collections.abc import Container, Iterable, Mapping
 from typing import ClassVar
 
-from fmu_kit.native.statements import Block, Call, Function, Place, Statement, ends
-from fmu_kit.native.symbols import Kind, Symbol, TraceError, closure, node, value_of
-from fmu_kit.native.tracing import Program
+from fmu_kit.compiler.trace.statements import TANGENT, Block, Call, Function, Place, Statement, ends
+from fmu_kit.compiler.trace.symbols import Kind, Symbol, TraceError, closure, node, value_of
+from fmu_kit.compiler.trace.tracing import Program
 
 _BINARY = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 _CALLED = {
@@ -26,10 +26,6 @@ _CALLED = {
 _FORMATS = {"g": "general", "e": "exponential", "f": "fixed"}
 ERRORS = ("FmuError", "DivergenceError", "ZeroDivisionError", "OverflowError", "ValueError")
 """What a function may end with; the place here, from 1 on, is what it returns."""
-
-
-TANGENT = "tangent of "
-"""Before the name of a place, in that of the place of its tangent."""
 
 
 def c_code(program: Program) -> str:

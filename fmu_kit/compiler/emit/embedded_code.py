@@ -10,9 +10,9 @@ from ctypes import c_float
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from fmu_kit.native.c_code import ERRORS, KEYWORDS, Writer
-from fmu_kit.native.statements import Block, Statement
-from fmu_kit.native.tracing import Program
+from fmu_kit.compiler.emit.c_code import ERRORS, KEYWORDS, Writer
+from fmu_kit.compiler.trace.statements import Block, Statement
+from fmu_kit.compiler.trace.tracing import Program
 from fmu_kit.variables import Variable
 
 GROUPS = {"input": "in", "output": "out", "parameter": "par", "local": "local", None: "kept"}

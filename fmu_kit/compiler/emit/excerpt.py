@@ -1,13 +1,13 @@
-"""What is used of the headers beside this file, for one lane: the definitions, each after those that it needs."""
+"""What is used of the headers, for one lane: the definitions, each after those that it needs."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
-_HERE = Path(__file__).parent
+from fmu_kit.compiler.runtime import FOLDER
+
 _DOUBLE, _SINGLE = ("lanes.h", "mathematics.h"), ("single.h",)
 _NAME = re.compile(r"\b(?:[qQ]_\w+|QUADCOSIM_LANES)\b")
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
@@ -34,7 +34,7 @@ def excerpt(text: str, *, single: bool = False) -> str:
 
     `single`: in single precision, by the functions of libm.
     """
-    parts = [part for name in (_SINGLE if single else _DOUBLE) for part in _parts((_HERE / name).read_text("utf-8"))]
+    parts = [part for name in (_SINGLE if single else _DOUBLE) for part in _parts((FOLDER / name).read_text("utf-8"))]
     wanted = set(_NAME.findall(_COMMENT.sub("", text)))
     kept: list[_Part] = []
     for part in reversed(parts):

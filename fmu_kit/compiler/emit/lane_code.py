@@ -9,10 +9,10 @@ from __future__ import annotations
 import itertools
 from typing import ClassVar
 
-from fmu_kit.native.c_code import ERRORS, Writer, c_name, place_names
-from fmu_kit.native.statements import Block, Function, Statement, ends
-from fmu_kit.native.symbols import Symbol
-from fmu_kit.native.tracing import Program
+from fmu_kit.compiler.emit.c_code import ERRORS, Writer, c_name, place_names
+from fmu_kit.compiler.trace.statements import Block, Function, Statement, ends
+from fmu_kit.compiler.trace.symbols import Symbol
+from fmu_kit.compiler.trace.tracing import Program
 
 
 def lane_code(program: Program) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 from fmu_kit import model_description
-from fmu_kit.native import description_3
+from fmu_kit.compiler.emit import description_3
 
 
 @dataclass(frozen=True, kw_only=True)

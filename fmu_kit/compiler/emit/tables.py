@@ -9,14 +9,14 @@ import inspect
 import math
 from collections.abc import Callable, Iterable
 
+from fmu_kit.compiler.emit.c_code import ERRORS, c_string, place_names
+from fmu_kit.compiler.emit.standards import Standard
+from fmu_kit.compiler.trace.memory import Memory, name_of_kept
+from fmu_kit.compiler.trace.statements import Place
+from fmu_kit.compiler.trace.symbols import TraceError
+from fmu_kit.compiler.trace.tracing import Program
+from fmu_kit.compiler.trace.tree import is_number, leaves
 from fmu_kit.errors import FmuError
-from fmu_kit.native.c_code import ERRORS, c_string, place_names
-from fmu_kit.native.memory import Memory, name_of_kept
-from fmu_kit.native.standards import Standard
-from fmu_kit.native.statements import Place
-from fmu_kit.native.structure import is_number, leaves
-from fmu_kit.native.symbols import TraceError
-from fmu_kit.native.tracing import Program
 from fmu_kit.saved_state import expect_state
 from fmu_kit.slave import Phase, Slave
 

@@ -1,6 +1,6 @@
 """Packing a slave as an .fmu without Python inside: C from its sources, and a library compiled from that.
 
-Packing imports the slave, so it runs in a process of its own: `python -m fmu_kit.native.building`.
+Packing imports the slave, so it runs in a process of its own: `python -m fmu_kit.compiler.pack.building`.
 """
 
 from __future__ import annotations
@@ -15,10 +15,11 @@ from pathlib import Path
 
 from fmu_kit import packaging
 from fmu_kit.bundle import PackagingError, Target, bundled_sources, place
-from fmu_kit.documentation import Making
-from fmu_kit.model_description import GUID_PLACEHOLDER
-from fmu_kit.native.c_code import c_code
-from fmu_kit.native.compiler import (
+from fmu_kit.compiler.emit.c_code import c_code
+from fmu_kit.compiler.emit.lane_code import lane_code
+from fmu_kit.compiler.emit.standards import STANDARDS, Standard
+from fmu_kit.compiler.emit.tables import places, tables
+from fmu_kit.compiler.pack.c_compiler import (
     Mathematics,
     compiled_for,
     compiled_here,
@@ -26,20 +27,19 @@ from fmu_kit.native.compiler import (
     library_path,
     targets_of,
 )
-from fmu_kit.native.derivatives import with_tangents
-from fmu_kit.native.freshness import source_hash
-from fmu_kit.native.lane_code import lane_code
-from fmu_kit.native.precomputing import precomputed
-from fmu_kit.native.standards import STANDARDS, Standard
-from fmu_kit.native.symbols import TraceError
-from fmu_kit.native.tables import places, tables
-from fmu_kit.native.tracing import Program, trace
+from fmu_kit.compiler.pack.freshness import source_hash
+from fmu_kit.compiler.passes.derivatives import with_tangents
+from fmu_kit.compiler.passes.precomputing import precomputed
+from fmu_kit.compiler.runtime import FOLDER
+from fmu_kit.compiler.trace.symbols import TraceError
+from fmu_kit.compiler.trace.tracing import Program, trace
+from fmu_kit.documentation import Making
+from fmu_kit.model_description import GUID_PLACEHOLDER
 from fmu_kit.packaging import SOURCE_HASH_FILE, described, licences_and_icon, put_guid, slave_class, written
 
-_HERE = Path(__file__).parent
 BESIDE = ("instance.h", "lanes.c", "lanes.h", "mathematics.h", "text.h")
 """What lies beside the file to compile, the same for every slave."""
-_NEEDS = _HERE / "needs.html"
+_NEEDS = FOLDER / "needs.html"
 _PYTHON = "python"
 """Where in the documentation the Python is from which the C was written."""
 
@@ -90,7 +90,7 @@ def build(
 
 def c_sources(program: Program, guid: str, standard: Standard) -> dict[str, bytes]:
     """The sources of an FMU, by the names of their files."""
-    fixed = {name: (_HERE / name).read_bytes() for name in (standard.main, *BESIDE)}
+    fixed = {name: (FOLDER / name).read_bytes() for name in (standard.main, *BESIDE)}
     derivatives = with_tangents(program, program.initialise)
     functions = f"{c_code(program)}\n{c_code(derivatives)}"
     made = {
@@ -114,7 +114,10 @@ def _python_sources(target: Target) -> dict[str, str]:
 
 
 def main(arguments: list[str]) -> int:
-    """`python -m fmu_kit.native.building [--fmi VERSION] [--target SYSTEM,…] FOLDER …`: as `fmu_kit.packaging`."""
+    """`python -m fmu_kit.compiler.pack.building [--fmi VERSION] [--target SYSTEM,…] FOLDER …`.
+
+    The rest as in `fmu_kit.packaging`.
+    """
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--fmi", type=int, choices=STANDARDS, default=2)
     parser.add_argument("--target")

@@ -1,6 +1,6 @@
 """A slave as two files in C for a microcontroller: Model.h and Model.c.
 
-Writing them imports the slave, so it runs in a process of its own: `python -m fmu_kit.native.embedded`.
+Writing them imports the slave, so it runs in a process of its own: `python -m fmu_kit.compiler.pack.embedded`.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from string import Template
 
 from fmu_kit import packaging
 from fmu_kit.bundle import PackagingError, Target
-from fmu_kit.native.building import modules_of
-from fmu_kit.native.c_code import c_name, c_string
-from fmu_kit.native.embedded_code import GROUPS, Words, comment, described, fields, functions, single_number
-from fmu_kit.native.excerpt import excerpt
-from fmu_kit.native.memory import name_of_kept
-from fmu_kit.native.precomputing import precomputed
-from fmu_kit.native.symbols import TraceError
-from fmu_kit.native.tables import start_of
-from fmu_kit.native.tracing import Program, trace
+from fmu_kit.compiler.emit.c_code import c_name, c_string
+from fmu_kit.compiler.emit.embedded_code import GROUPS, Words, comment, described, fields, functions, single_number
+from fmu_kit.compiler.emit.excerpt import excerpt
+from fmu_kit.compiler.emit.tables import start_of
+from fmu_kit.compiler.pack.building import modules_of
+from fmu_kit.compiler.passes.precomputing import precomputed
+from fmu_kit.compiler.runtime import FOLDER
+from fmu_kit.compiler.trace.memory import name_of_kept
+from fmu_kit.compiler.trace.symbols import TraceError
+from fmu_kit.compiler.trace.tracing import Program, trace
 from fmu_kit.packaging import slave_class
 from fmu_kit.versions import generation_tool, version_of
 
-_HERE = Path(__file__).parent
 _TITLES = {
     "in": "Inputs: set them before each step.",
     "out": "Outputs.",
@@ -104,8 +104,8 @@ def files(program: Program, *, single: bool) -> tuple[str, str]:
         "texts": "".join(f"    {c_string(text)},\n" for text in ("no error", *words.errors)),
     }
     return (
-        Template((_HERE / "embedded.h").read_text("utf-8")).substitute(known, **header),
-        Template((_HERE / "embedded.c").read_text("utf-8")).substitute(known, **source),
+        Template((FOLDER / "embedded.h").read_text("utf-8")).substitute(known, **header),
+        Template((FOLDER / "embedded.c").read_text("utf-8")).substitute(known, **source),
     )
 
 
@@ -174,7 +174,7 @@ def _changed(program: Program, *, whole: bool) -> str:
 
 
 def main(arguments: list[str]) -> int:
-    """`python -m fmu_kit.native.embedded [--single] FOLDER …`: as `fmu_kit.packaging`, two files each."""
+    """`python -m fmu_kit.compiler.pack.embedded [--single] FOLDER …`: as `fmu_kit.packaging`, two files each."""
     single = arguments[:1] == ["--single"]
     return packaging.main(arguments[single:], functools.partial(write, single=single))
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from fmu_kit import compiler
 from fmu_kit.bundle import Target
 from fmu_kit.documentation import TEMPLATE
 from fmu_kit.packaging import hash_of, licences_and_icon
 
-_HERE = Path(__file__).parent
+_COMPILER = Path(compiler.__file__).parent
 
 
 def source_hash(target: Target, version: int = 2) -> str:
@@ -16,5 +17,5 @@ def source_hash(target: Target, version: int = 2) -> str:
 
     Not of the compiler: every one makes a library that gives the same bits.
     """
-    own = sorted(path for path in _HERE.iterdir() if path.suffix in (".py", ".c", ".h", ".html"))
+    own = sorted(path for path in _COMPILER.rglob("*") if path.suffix in (".py", ".c", ".h", ".html"))
     return hash_of(target, [*own, TEMPLATE], {"version": str(version)}, licences_and_icon(target))

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fmu_kit.bundle import PackagingError
-from fmu_kit.native.compiler import FOR_THIS_PROCESSOR, Mathematics, compiled_here, compiler
+from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, Mathematics, compiled_here, compiler
 
 MAIN = "lanes.c"
 """Of the sources of an FMU, what is compiled."""

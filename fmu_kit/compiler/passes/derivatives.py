@@ -10,10 +10,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
-from fmu_kit.native.c_code import TANGENT
-from fmu_kit.native.statements import Block, Call, Function, Statement, statement
-from fmu_kit.native.symbols import Symbol, TraceError, constant, lifted, node, select
-from fmu_kit.native.tracing import Program
+from fmu_kit.compiler.trace.statements import TANGENT, Block, Call, Function, Statement, statement
+from fmu_kit.compiler.trace.symbols import Symbol, TraceError, constant, lifted, node, select
+from fmu_kit.compiler.trace.tracing import Program
 
 Rule = Callable[[Symbol, tuple[Symbol, ...], tuple[Any, ...]], Any]
 """The tangent of a value, from the value, what it is computed from, and the tangents of that; None is zero"""

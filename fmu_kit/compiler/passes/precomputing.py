@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from fmu_kit.native.statements import Block, Call, Function, Place, Statement, statement, symbols_of
-from fmu_kit.native.symbols import Symbol, closure, node
-from fmu_kit.native.tracing import Program
+from fmu_kit.compiler.trace.statements import Block, Call, Function, Place, Statement, statement, symbols_of
+from fmu_kit.compiler.trace.symbols import Symbol, closure, node
+from fmu_kit.compiler.trace.tracing import Program
 
 TAKING = "take_parameters"
 """The function in which parameters are taken over."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from fmu_kit.native.statements import Block, Place, Statement, statement
-from fmu_kit.native.structure import (
+from fmu_kit.compiler.trace.statements import Block, Place, Statement, statement
+from fmu_kit.compiler.trace.symbols import Kind, Symbol, TraceError, common_kind, lifted, node
+from fmu_kit.compiler.trace.tree import (
     Path,
     Snapshot,
     children,
@@ -16,7 +17,6 @@ from fmu_kit.native.structure import (
     mapped,
     shape,
 )
-from fmu_kit.native.symbols import Kind, Symbol, TraceError, common_kind, lifted, node
 from fmu_kit.slave import Slave
 
 _KINDS: dict[str, Kind] = {"Real": "real", "Integer": "int", "Boolean": "bool", "Enumeration": "int"}

@@ -10,11 +10,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from fmu_kit.errors import DivergenceError, FmuError
-from fmu_kit.native.memory import Memory
-from fmu_kit.native.statements import Block, Call, Function, Statement, branched, statement
-from fmu_kit.native.structure import difference, expect_no_twins, is_number, leaves, mapped, shape
-from fmu_kit.native.symbols import (
+from fmu_kit.compiler.trace.memory import Memory
+from fmu_kit.compiler.trace.statements import Block, Call, Function, Statement, branched, statement
+from fmu_kit.compiler.trace.symbols import (
     Kind,
     Piece,
     Symbol,
@@ -28,6 +26,8 @@ from fmu_kit.native.symbols import (
     token,
     truth,
 )
+from fmu_kit.compiler.trace.tree import difference, expect_no_twins, is_number, leaves, mapped, shape
+from fmu_kit.errors import DivergenceError, FmuError
 
 
 class _EndedError(BaseException):

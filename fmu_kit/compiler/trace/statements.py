@@ -9,9 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from fmu_kit.native.symbols import Kind, Symbol, both, either, negation
+from fmu_kit.compiler.trace.symbols import Kind, Symbol, both, either, negation
 
 Block = tuple["Statement", ...]
+
+TANGENT = "tangent of "
+"""Before the name of a place, in that of the place of its tangent"""
 
 
 class Statement:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from fmu_kit import scalar
-from fmu_kit.native.symbols import (
+from fmu_kit.compiler.trace.symbols import (
     PowerErrors,
     Symbol,
     TraceError,

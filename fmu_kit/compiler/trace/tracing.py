@@ -15,18 +15,17 @@ import types
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from pythonfmu.fmi2slave import Fmi2Slave
 
 from fmu_kit import scalar
+from fmu_kit.compiler.trace import symbolic_builtins as stand_ins
+from fmu_kit.compiler.trace.memory import Memory
+from fmu_kit.compiler.trace.path_exploration import Recorder
+from fmu_kit.compiler.trace.statements import Function, Place, Statement
+from fmu_kit.compiler.trace.symbols import Kind, TraceError
 from fmu_kit.failure import place_of
-from fmu_kit.native import stand_ins
-from fmu_kit.native.memory import Memory
-from fmu_kit.native.recorder import Recorder
-from fmu_kit.native.statements import Function, Place, Statement
-from fmu_kit.native.symbols import Kind, TraceError
 from fmu_kit.slave import Phase, Slave
 
 _BASE_METHODS = ("_take_parameters", "_check_parameters")
@@ -35,7 +34,6 @@ _OPEN = frozenset({"__init__", "read_parameters", "initialise", "step", "interna
 """What a slave may define of the methods that its base class has."""
 MOST_WARNINGS = 32
 """Of a slave, by their keys; each is a bit of its state."""
-_OWN = Path(__file__).parent
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ import random
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from fmu_kit.native.symbols import Symbol, TraceError
+from fmu_kit.compiler.trace.symbols import Symbol, TraceError
 
 Path = tuple[Any, ...]
 _LEAVES = (Symbol, float, int, bool, str, bytes, type(None), type, enum.Enum)

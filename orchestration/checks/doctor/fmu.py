@@ -9,9 +9,9 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from fmu_kit import loader
-from orchestration.checks.archive import DESCRIPTION, UnreadableFmuError, read_archive, read_root
 from orchestration.checks.doctor import sources
 from orchestration.checks.doctor.binaries import LINUX, MACOS, WINDOWS, Binary, UnreadableError, joined, origin_in, read
+from orchestration.fmi.archive import DESCRIPTION, UnreadableFmuError, read_archive, read_root
 
 CO_SIMULATION, MODEL_EXCHANGE = "CoSimulation", "ModelExchange"
 

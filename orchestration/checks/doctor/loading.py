@@ -13,12 +13,11 @@ from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
-from orchestration import subprocesses
-from orchestration.checks import confined
-from orchestration.checks.archive import UnreadableFmuError
-from orchestration.checks.confined import Ending, Limits, restrict
+from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.checks.doctor.fmu import CO_SIMULATION, Fmu, read_fmu
-from orchestration.errors import QuadcosimError, UsageError
+from orchestration.fmi.archive import UnreadableFmuError
+from orchestration.processes import confined, subprocesses
+from orchestration.processes.confined import Ending, Limits, restrict
 
 _READ, _LOADED = "read", "loaded"
 """Files in the folder: the FMU as it was read, or an error; whether it was loaded"""

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from orchestration.checks.confined import Limits
 from orchestration.checks.doctor.binaries import newest
 from orchestration.checks.doctor.dependencies import part_for
 from orchestration.checks.doctor.loading import attempt
 from orchestration.checks.doctor.machine import Library, Machine, this_machine
 from orchestration.checks.doctor.verdict import Verdict, judge
+from orchestration.processes.confined import Limits
 
 
 @dataclass(frozen=True, kw_only=True)

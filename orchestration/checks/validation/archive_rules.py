@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import PurePosixPath
 
-from orchestration.checks.archive import Archive
+from orchestration.fmi.archive import Archive
 
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _SYMBOLIC_LINK = 0o12

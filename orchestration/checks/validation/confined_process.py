@@ -9,17 +9,17 @@ from pathlib import Path
 
 import fmpy
 
-from orchestration.checks.archive import UnreadableFmuError, read_archive
-from orchestration.checks.confined import Limits, restrict
 from orchestration.checks.validation import rules, run_rules
 from orchestration.checks.validation.archive_rules import can_be_unpacked
 from orchestration.checks.validation.description import standard
-from orchestration.checks.validation.exercise import Bench
 from orchestration.checks.validation.fmu import Fmu, read_co_simulation, read_fmu
 from orchestration.checks.validation.instance import RefusedError
 from orchestration.checks.validation.own_description import own_description
+from orchestration.checks.validation.probe import Bench
 from orchestration.checks.validation.progress import PULSE, REPORT, Pulse, Report
+from orchestration.fmi.archive import UnreadableFmuError, read_archive
 from orchestration.fmi.pythonfmu import expect_readable_place
+from orchestration.processes.confined import Limits, restrict
 
 READABLE, PLATFORM = "readable", "platform"
 """Rules that are kept here: there is an FMI 2.0 FMU to look at, and this machine can run it"""

@@ -5,9 +5,9 @@ from collections import defaultdict, deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
-from orchestration.checks.validation.exercise import Bench, Plan
 from orchestration.checks.validation.fmu import Fmu, Unknown, Variable
 from orchestration.checks.validation.instance import Instance, RefusedError, Row, Value, Values, same
+from orchestration.checks.validation.probe import Bench, Plan
 
 MOST_SWITCHES = 16
 """Boolean parameters that are tried the other way round, each with all inputs"""

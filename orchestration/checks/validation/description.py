@@ -5,8 +5,8 @@ import re
 from collections.abc import Iterator
 
 from fmu_kit.packaging import NATIVE_TABLES
-from orchestration.checks.archive import Archive
 from orchestration.checks.validation.fmu import Fmu
+from orchestration.fmi.archive import Archive
 
 _PLATFORM_SUFFIXES = (".so", ".dll", ".dylib")
 SLAVE_MODULE = "resources/slavemodule.txt"

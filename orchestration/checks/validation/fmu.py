@@ -5,7 +5,7 @@ from typing import NoReturn
 from xml.etree.ElementTree import Element
 
 from fmu_kit.packaging import SOURCE_HASH_FILE
-from orchestration.checks.archive import DESCRIPTION, Archive, UnreadableFmuError, read_root
+from orchestration.fmi.archive import DESCRIPTION, Archive, UnreadableFmuError, read_root
 
 TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 NUMBERS = ("Real", "Integer", "Enumeration")

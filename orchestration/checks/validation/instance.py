@@ -8,8 +8,8 @@ from typing import Any, TypeAlias
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
+from orchestration.basics.errors import QuadcosimError
 from orchestration.checks.validation.fmu import Fmu, Variable
-from orchestration.errors import QuadcosimError
 from orchestration.fmi.messages import Message, collecting_callbacks, words
 from orchestration.fmi.pythonfmu import release_interpreter_state
 

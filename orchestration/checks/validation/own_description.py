@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from orchestration.checks.validation.description import SLAVE_MODULE
-from orchestration.checks.validation.exercise import Bench
+from orchestration.checks.validation.probe import Bench
 
 _DIFFERS = {"guid", "generationDateAndTime", "generationTool", "version"}
 """Attributes that packaging and the calendar decide."""

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 from fmu_kit.loader import GUID_FILE
 from fmu_kit.packaging import ICON, NATIVE_TABLES, content_guid
+from orchestration.building.models import MODELS
 from orchestration.checks.validation.fmu import Fmu, Variable
 from orchestration.checks.validation.units import base_units, dimensions
 from orchestration.quadrotor import wiring
@@ -77,7 +78,7 @@ def documentation(fmu: Fmu) -> Iterator[str]:
     files = fmu.archive.files
     if not files.get(PAGE, b"").strip():
         yield f"{PAGE}: expected a page, found {'an empty file' if PAGE in files else 'none'}"
-    if fmu.root.get("modelName") in wiring.MODELS and not files.get(ICON, b"").startswith(_PNG):
+    if fmu.root.get("modelName") in MODELS and not files.get(ICON, b"").startswith(_PNG):
         yield f"{ICON}: expected an icon in PNG, found {'another file' if ICON in files else 'none'}"
 
 

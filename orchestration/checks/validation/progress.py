@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterable
 from itertools import islice
 from pathlib import Path
 
+from orchestration.basics.errors import QuadcosimError
 from orchestration.checks.validation.finding import Finding, Note, Rule, Subject, name_of
-from orchestration.errors import QuadcosimError
 
 REPORT, PULSE = "report", "pulse"
 """Names of the files"""

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Iterator
 
-from orchestration.checks.validation.exercise import PLAIN, Bench
 from orchestration.checks.validation.fmu import Variable
 from orchestration.checks.validation.instance import RefusedError, Value
+from orchestration.checks.validation.probe import PLAIN, Bench
 from orchestration.checks.validation.variables import limits
 
 

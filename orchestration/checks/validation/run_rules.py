@@ -4,10 +4,10 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
-from orchestration.checks.validation.exercise import PLAIN, Bench, Plan
 from orchestration.checks.validation.finding import Note
 from orchestration.checks.validation.fmu import Variable
 from orchestration.checks.validation.instance import RefusedError, Row, Value, same
+from orchestration.checks.validation.probe import PLAIN, Bench, Plan
 from orchestration.fmi.messages import WARNING
 
 _DIGITS = 5e-15

@@ -3,12 +3,11 @@
 import tempfile
 from pathlib import Path
 
-from orchestration import subprocesses
-from orchestration.checks import confined
-from orchestration.checks.confined import Ending, Limits
+from orchestration.basics.errors import QuadcosimError
 from orchestration.checks.validation.finding import Finding
 from orchestration.checks.validation.progress import PULSE, REPORT, Told, since_last_beat
-from orchestration.errors import QuadcosimError
+from orchestration.processes import confined, subprocesses
+from orchestration.processes.confined import Ending, Limits
 
 PROCESS = "process"
 """Rule that is kept here: the process of the FMU lives to its end"""

@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from orchestration.batch.folds import Folds
-from orchestration.batch.writing import Leaf, Section, Writer
+from orchestration.engines.batch.folds import Folds
+from orchestration.engines.batch.writing import Leaf, Section, Writer
 from orchestration.expressions.recorded import TIME
 from orchestration.expressions.syntax import Call, Name, Node
 

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from orchestration.basics.simulator import Floats
 from orchestration.expressions.over_run import reductions
 from orchestration.expressions.over_span import SpanValues
 from orchestration.expressions.recorded import Recorded
 from orchestration.expressions.syntax import Call, Node
-from orchestration.simulator import Floats
 
 Marks = npt.NDArray[np.bool_]
 

@@ -8,19 +8,19 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from orchestration.batch import structures as c
-from orchestration.batch.shape import Ends, Shape, changes_of, ends_of
-from orchestration.batch.windows import Windows
-from orchestration.errors import QuadcosimError
+from orchestration.basics.errors import QuadcosimError
+from orchestration.basics.simulator import Floats
+from orchestration.engines.batch import structures as c
+from orchestration.engines.batch.shape import Ends, Shape, changes_of, ends_of
+from orchestration.engines.master import CONVERGED, SWEEPS
+from orchestration.engines.sources import Values
+from orchestration.engines.wiring import SAMPLE_OFFSET, SAMPLE_PERIOD, source_values
 from orchestration.expressions.recorded import STOP_TIME
 from orchestration.expressions.syntax import Call
 from orchestration.fmi.values import number_of, taken
-from orchestration.master.master import CONVERGED, SWEEPS
-from orchestration.master.schedule import Schedule
-from orchestration.master.sources import Values
-from orchestration.master.streams import NOISE, Streams
-from orchestration.simulation import SAMPLE_OFFSET, SAMPLE_PERIOD, source_values
-from orchestration.simulator import Floats
+from orchestration.schedule.schedule import Schedule
+from orchestration.schedule.schedule_cache import Windows
+from orchestration.schedule.streams import NOISE, Streams
 from orchestration.system.model import System, component_of, variable_of
 from orchestration.system.times import NANOSECONDS, nanoseconds
 
@@ -190,7 +190,7 @@ class Batch:
         )  # fmt: skip
 
     def _growth(self, call: Call, own: Call, values: Mapping[Call, Floats]) -> Floats:
-        from orchestration.batch.combining import combined
+        from orchestration.engines.batch.combining import combined
 
         folds, batch = self._written.folds, self._batch
         count = len(next(iter(values.values())))

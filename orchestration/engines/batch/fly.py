@@ -1,23 +1,22 @@
 """Flies many systems as lanes of runs, and says of each what it came to, or that it is to be flown alone."""
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from orchestration import fmus
-from orchestration.batch.combining import combined
-from orchestration.batch.flight import DIVERGED, FLYING, Batch, Landed
-from orchestration.batch.kernels import lanes_here
-from orchestration.batch.shape import Shape, outline
-from orchestration.batch.windows import Windows, timing
+from orchestration.basics.simulator import Floats
+from orchestration.engines.batch.combining import combined
+from orchestration.engines.batch.flight import DIVERGED, FLYING, Batch, Landed
+from orchestration.engines.batch.kernels import lanes_here
+from orchestration.engines.batch.shape import Shape, outline
+from orchestration.engines.watch import watch
+from orchestration.engines.wiring import checked, source_values
 from orchestration.fmi.model import read_model
-from orchestration.master.streams import Streams
-from orchestration.master.watch import watch
 from orchestration.results.objectives import Metrics, told
-from orchestration.simulation import checked, run, source_values
-from orchestration.simulator import Floats
+from orchestration.schedule.schedule_cache import Windows, timing
+from orchestration.schedule.streams import Streams
 from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS, nanoseconds
 
@@ -32,27 +31,6 @@ class Flown:
     metrics: Metrics
     message: str | None
     """what diverged"""
-
-
-def fly(systems: Sequence[System]) -> Iterator[Metrics]:
-    """The metrics of systems in their order, by native FMUs, built if need be; divergence is a result.
-
-    Raises `UsageError` for a system that cannot be flown in lanes, naming the component and what it lacks, and what
-    `run` raises for one that cannot be flown at all.
-    """
-    twins = [fmus.native_twins(system) for system in systems]
-    paths: dict[str, str] = {}
-    for system in twins:
-        if not paths.keys() >= {*system.fmus.values()}:
-            paths |= {system.fmus[name]: str(path) for name, path in fmus.of_components(system.fmus).items()}
-    located = [_with_fmus(system, paths) for system in twins]
-    for system, flown in zip(located, Batches().fly(located)):
-        yield run(system).metrics if flown is None else flown.metrics
-
-
-def _with_fmus(system: System, paths: Mapping[str, str]) -> System:
-    components = {name: replace(each, fmu=paths[each.fmu]) for name, each in system.components.items()}
-    return replace(system, components=components)
 
 
 class Batches:

@@ -10,10 +10,10 @@ from typing import TypeAlias
 
 import numpy as np
 
-from orchestration.batch.writing import Kind, Place, Section, Writer
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats
+from orchestration.engines.batch.writing import Kind, Place, Section, Writer
 from orchestration.expressions.syntax import Call, Name, Node, Sampled
-from orchestration.simulator import Floats
 
 Value: TypeAlias = Callable[[Floats, Floats], Floats]
 """From states, shape (states, lanes), and the time at the end, shape (lanes,), a number for each lane; NaN for none"""

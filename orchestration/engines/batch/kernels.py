@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fmu_kit import native
 from fmu_kit.bundle import PackagingError
-from fmu_kit.native.compiler import FOR_THIS_PROCESSOR, OPTIONS, compiled_here
-from fmu_kit.native.lanes import MAIN, Lanes, compiled_lanes
-from fmu_kit.native.lanes import lanes_here as lanes_of_fmus
-from orchestration.errors import QuadcosimError, UsageError
+from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, OPTIONS, compiled_here
+from fmu_kit.compiler.pack.lanes import MAIN, Lanes, compiled_lanes
+from fmu_kit.compiler.pack.lanes import lanes_here as lanes_of_fmus
+from fmu_kit.compiler.runtime import FOLDER
+from orchestration.basics.errors import QuadcosimError, UsageError
+from orchestration.basics.libraries import kept
 from orchestration.fmi.model import Model
-from orchestration.libraries import kept
 
 FILES = (Path(__file__).with_name("batch.c"),)
 """What it is made of, beside what is written for a system and headers of native FMUs"""
@@ -72,7 +72,7 @@ def _compiled(sources: tuple[tuple[str, bytes], ...], lanes: int) -> Kernel:
 @functools.lru_cache(maxsize=256)
 def batch(sizes: str, expressions: str, lanes: int) -> Any:
     """The functions of batch.c with the expressions of a system."""
-    headers = [Path(native.__file__).with_name(name) for name in _HEADERS]
+    headers = [FOLDER / name for name in _HEADERS]
     sources = {path.name: path.read_bytes() for path in (*FILES, *headers)}
     sources |= {"sizes.h": sizes.encode(), "expressions.h": expressions.encode()}
     options = (*FOR_THIS_PROCESSOR, f"-DQUADCOSIM_LANES={lanes}", "-Wno-psabi")

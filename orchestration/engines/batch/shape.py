@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from orchestration.batch.code import Written, written
-from orchestration.batch.kernels import Kernel, batch, component
-from orchestration.batch.writing import Kind, Leaf, scalars
+from orchestration.engines import initial
+from orchestration.engines.batch.code import Written, written
+from orchestration.engines.batch.kernels import Kernel, batch, component
+from orchestration.engines.batch.writing import Kind, Leaf, scalars
+from orchestration.engines.board import Board
+from orchestration.engines.channel import of_each
 from orchestration.expressions.over_run import inlined, reductions
 from orchestration.expressions.recorded import STOP_TIME, TIME, vectors
 from orchestration.expressions.syntax import Call, Node, names, parse
 from orchestration.fmi.model import Model, Variable
-from orchestration.master import initial
-from orchestration.master.board import Board
-from orchestration.master.channel import of_each
-from orchestration.master.plan import Plan, is_plain
 from orchestration.results.objectives import GOOD
+from orchestration.schedule.plan import Plan, is_plain
 from orchestration.system.check import recorded
 from orchestration.system.model import Connection, Source, System, component_of, variable_of
 

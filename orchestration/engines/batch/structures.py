@@ -3,7 +3,7 @@
 from ctypes import POINTER, Structure, c_int32, c_int64, c_uint64, c_void_p
 from typing import Any, ClassVar
 
-from orchestration.master.structures import SCHEDULE, List, address
+from orchestration.engines.structures import SCHEDULE, List, address
 
 __all__ = ["SCHEDULE", "Component", "Fed", "Kept", "List", "Schedule", "address", "batch_of", "channel_of", "track_of"]
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 from orchestration.expressions.syntax import Call, Name, Node, Number, Operation, Sampled, is_over_run
 
 Place: TypeAlias = Literal["row", "end", "middle"]

@@ -5,7 +5,7 @@ from libcosimpy.CosimExecution import CosimExecution
 from libcosimpy.CosimObserver import CosimObserver
 from libcosimpy.CosimSlave import CosimLocalSlave
 
-from orchestration.exchange.interop.assignment import Job, Rows
+from orchestration.interop.assignment import Job, Rows
 from orchestration.system.times import NANOSECONDS
 
 SPARE = 2

@@ -4,13 +4,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from orchestration import fmus
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.building import fmus
 from orchestration.fmi.model import Model, Variable, read_model
-from orchestration.master.plan import Plan
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import in_its_own_words, in_words_of_a_scenario, system_of
 from orchestration.quadrotor.wiring import SAMPLE_OFFSET, SAMPLE_PERIOD
+from orchestration.schedule.plan import Plan
 from orchestration.system.check import check
 from orchestration.system.model import Component, Connection, Parameter, Sampling, System, component_of, variable_of
 

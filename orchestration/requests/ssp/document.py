@@ -7,8 +7,8 @@ from xml.etree.ElementTree import Element, indent, register_namespace, tostring
 from fmpy.ssp import ssd
 from lxml import etree
 
-from orchestration.documents import readable
-from orchestration.errors import UsageError
+from orchestration.basics.documents import readable
+from orchestration.basics.errors import UsageError
 
 NAMESPACES = {
     "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",

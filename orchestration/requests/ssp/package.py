@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from orchestration.documents import readable
-from orchestration.errors import UsageError
+from orchestration.basics.documents import readable
+from orchestration.basics.errors import UsageError
 
 STRUCTURE = "SystemStructure.ssd"
 LARGEST = 2**32

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from orchestration.errors import UsageError
-from orchestration.exchange.ssp.document import Read, all_of, read
-from orchestration.exchange.ssp.package import Package
+from orchestration.basics.errors import UsageError
+from orchestration.basics.units import BASE, BaseUnits
+from orchestration.requests.ssp.document import Read, all_of, read
+from orchestration.requests.ssp.package import Package
 from orchestration.system.conversion import Conversion
 from orchestration.system.model import Parameter
-from orchestration.units import BASE, BaseUnits
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,17 +6,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from orchestration.errors import UsageError
-from orchestration.exchange.ssp.document import read
-from orchestration.exchange.ssp.package import opened
-from orchestration.exchange.ssp.parameters import Value
-from orchestration.exchange.ssp.structure import Node, Path_, Structure, Wire, said, structure_of
-from orchestration.exchange.ssp.timing import expect_tables
+from orchestration.basics.errors import UsageError
+from orchestration.basics.units import BaseUnits
 from orchestration.fmi.model import Model, read_model
 from orchestration.quadrotor.wiring import SAMPLE_OFFSET, SAMPLE_PERIOD
+from orchestration.requests.ssp.document import read
+from orchestration.requests.ssp.package import opened
+from orchestration.requests.ssp.parameters import Value
+from orchestration.requests.ssp.structure import Node, Path_, Structure, Wire, said, structure_of
+from orchestration.requests.ssp.timing import expect_tables
 from orchestration.system.conversion import Conversion, OtherQuantity, between
 from orchestration.system.model import Parameter, component_of
-from orchestration.units import BaseUnits
 
 TAKEN = frozenset(("rows", "time", "stop_time", "sampled"))
 """Names that no component can have"""

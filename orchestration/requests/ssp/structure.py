@@ -4,12 +4,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from orchestration.errors import UsageError
-from orchestration.exchange.ssp.document import Read, all_of
-from orchestration.exchange.ssp.package import Package
-from orchestration.exchange.ssp.parameters import Value, definitions_in, transformation, values_of
+from orchestration.basics.errors import UsageError
+from orchestration.basics.units import BaseUnits
+from orchestration.requests.ssp.document import Read, all_of
+from orchestration.requests.ssp.package import Package
+from orchestration.requests.ssp.parameters import Value, definitions_in, transformation, values_of
 from orchestration.system.conversion import Conversion
-from orchestration.units import BaseUnits
 
 Path_ = tuple[str, ...]
 """Names from the system at the top, which is (), to an element"""

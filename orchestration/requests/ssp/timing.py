@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from orchestration.errors import UsageError, shown
+from orchestration.basics.errors import UsageError, shown
 from orchestration.system.model import System
 from orchestration.system.system_file import to_tables
 

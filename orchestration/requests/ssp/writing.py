@@ -14,15 +14,15 @@ from xml.etree.ElementTree import Element
 from fmu_kit.model_description import generation_date
 from fmu_kit.packaging import write_archive
 from fmu_kit.versions import generation_tool
-from orchestration.errors import UsageError
-from orchestration.exchange.ssp import timing
-from orchestration.exchange.ssp.carried import Carried, Part, carried
-from orchestration.exchange.ssp.document import add, document, element
+from orchestration.basics.errors import UsageError
+from orchestration.basics.units import BASE
 from orchestration.fmi.model import Kind, Variable
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import system_of
+from orchestration.requests.ssp import timing
+from orchestration.requests.ssp.carried import Carried, Part, carried
+from orchestration.requests.ssp.document import add, document, element
 from orchestration.system.model import System, variable_of
-from orchestration.units import BASE
 
 NAME = "QuadrotorLoop"
 """Of the quadrotor's system; any other is called after its file"""

@@ -6,10 +6,10 @@ import pytest
 
 import quadcosim
 from fmu_kit.bundle import Target
+from orchestration.building.models import MODELS
 from orchestration.fmi.reuse import Instances
-from orchestration.quadrotor.wiring import MODELS
-from orchestration.studies.linear import HoverLoop, at_hover
-from orchestration.studies.sampled_loop import growth_of_loop
+from orchestration.stability.hover_loop import HoverLoop, at_hover
+from orchestration.stability.monodromy import growth_of_loop
 from orchestration.system.model import System
 from quadcosim import Result, Scenario, Timing, UsageError
 from tests.native import assert_the_same, natives

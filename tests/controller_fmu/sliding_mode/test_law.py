@@ -28,7 +28,7 @@ from fmu_kit.integrator import rk4_step
 from fmu_kit.rigid_body import Body, RigidState, Wrench, derivative
 from fmu_kit.scalar import FLOAT, ScalarOps
 from fmu_kit.trajectory import Reference, Trajectory
-from orchestration.master.sources import NUMPY
+from orchestration.engines.sources import NUMPY
 from tests.controller_fmu.closed_loop import assert_is_the_rate, between, inertias, quaternions, trajectories, triple
 from tests.reference.tables import LAWS, law_at
 from tests.scalars import PRECISE

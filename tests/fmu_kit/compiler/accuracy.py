@@ -8,7 +8,7 @@ import mpmath
 import numpy as np
 from mpmath import mp, mpf
 
-from tests.fmu_kit.native.compiled import Floats, results
+from tests.fmu_kit.compiler.compiled import Floats, results
 
 Arguments = tuple[Floats, ...]
 MANTISSA, LEAST = 53, -1074  # bits of a double; the exponent of the smallest one

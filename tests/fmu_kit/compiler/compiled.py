@@ -1,4 +1,4 @@
-"""The C sources beside this file, compiled with the headers of `fmu_kit/native`."""
+"""The C sources beside this file, compiled with the headers of `fmu_kit/compiler`."""
 
 import ctypes
 import shutil
@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from fmu_kit.compiler import runtime
+
 HERE = Path(__file__).parent
-HEADERS = HERE.parents[2] / "fmu_kit" / "native"
+HEADERS = runtime.FOLDER
 COMPILER = shutil.which("gcc") or shutil.which("cc")
 WARNINGS = ("-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
 Floats = NDArray[np.float64]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.fmu_kit.native.compiled import HERE, compiler
+from tests.fmu_kit.compiler.compiled import HERE, compiler
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wdouble-promotion", "-O2", "-fno-math-errno")
 ARM, QEMU = "arm-none-eabi-gcc", "qemu-system-arm"

@@ -10,9 +10,9 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
-from fmu_kit.native.c_code import ERRORS
-from fmu_kit.native.lanes import Lanes
-from tests.fmu_kit.native.twins import GUID
+from fmu_kit.compiler.emit.c_code import ERRORS
+from fmu_kit.compiler.pack.lanes import Lanes
+from tests.fmu_kit.compiler.twins import GUID
 
 _BEFORE_THE_MEMORY = 136
 """Bytes of an instance's state that say whose it is."""

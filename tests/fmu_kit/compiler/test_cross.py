@@ -11,8 +11,8 @@ import pefile
 import pytest
 
 from fmu_kit.bundle import PackagingError
-from fmu_kit.native.compiler import targets_of, universal
-from orchestration import fmus
+from fmu_kit.compiler.pack.c_compiler import targets_of, universal
+from orchestration.building import fmus
 
 needs_zig = pytest.mark.skipif(
     importlib.util.find_spec("ziglang") is None, reason="no zig: pip install 'quadcosim[cross]'"

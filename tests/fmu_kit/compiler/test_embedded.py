@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from fmu_kit.bundle import Target
-from fmu_kit.native.embedded import write
-from fmu_kit.native.embedded_code import single_number
-from orchestration import fmus
-from orchestration.quadrotor.wiring import MODELS
+from fmu_kit.compiler.emit.embedded_code import single_number
+from fmu_kit.compiler.pack.embedded import write
+from orchestration.building import fmus
+from orchestration.building.models import MODELS
 from tests.commands import Main
-from tests.fmu_kit.native.embedded import (
+from tests.fmu_kit.compiler.embedded import (
     ARM,
     M4F,
     M7,
@@ -207,6 +207,6 @@ def test_the_program_of_the_page_is_good_c(exported: dict[str, Path], tmp_path: 
 
 @pytest.mark.parametrize("name", ["Branches", "Words"])
 def test_a_slave_with_much_to_say_is_written_without_a_warning_of_the_compiler(name: str, tmp_path: Path) -> None:
-    target = Target.parse(f"tests.fmu_kit.native.probes:{name}", Path().resolve())
+    target = Target.parse(f"tests.fmu_kit.compiler.probes:{name}", Path().resolve())
     for single, flags in ((False, ()), (True, ("-O1",))):
         assert made(write(target, tmp_path, single=single), "cc", *flags).is_file()

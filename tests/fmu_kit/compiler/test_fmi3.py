@@ -14,11 +14,11 @@ from fmpy.model_description import ModelDescription
 from fmpy.validation import validate_fmu
 
 import quadcosim
-from fmu_kit.native import c_code
-from orchestration import fmus
+from fmu_kit.compiler.emit import c_code
+from orchestration.building import fmus
 from orchestration.quadrotor.scenario import Scenario
 from tests.commands import Main
-from tests.fmu_kit.native.compiled import compiled
+from tests.fmu_kit.compiler.compiled import compiled
 from tests.fmus.expected import MEASUREMENT
 from tests.fmus.making import PAIR
 from tests.fmus.process import run, run_script

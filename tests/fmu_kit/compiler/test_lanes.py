@@ -9,20 +9,20 @@ import pytest
 from numpy.typing import NDArray
 
 from fmu_kit.bundle import PackagingError, Target
-from fmu_kit.native.building import c_sources, modules_of
-from fmu_kit.native.c_code import ERRORS
-from fmu_kit.native.compiler import compiled_here
-from fmu_kit.native.lanes import compiled_lanes, lanes_here
-from fmu_kit.native.precomputing import precomputed
-from fmu_kit.native.standards import STANDARDS
-from fmu_kit.native.tracing import trace
+from fmu_kit.compiler.emit.c_code import ERRORS
+from fmu_kit.compiler.emit.standards import STANDARDS
+from fmu_kit.compiler.pack.building import c_sources, modules_of
+from fmu_kit.compiler.pack.c_compiler import compiled_here
+from fmu_kit.compiler.pack.lanes import compiled_lanes, lanes_here
+from fmu_kit.compiler.passes.precomputing import precomputed
+from fmu_kit.compiler.trace.tracing import trace
 from fmu_kit.packaging import slave_class
 from fmu_kit.variables import Variable
-from orchestration import fmus
-from orchestration.quadrotor.wiring import MODELS
-from tests.fmu_kit.native.compiled import compiler
-from tests.fmu_kit.native.in_lanes import Alone, Together, Values, bits
-from tests.fmu_kit.native.twins import GUID
+from orchestration.building import fmus
+from orchestration.building.models import MODELS
+from tests.fmu_kit.compiler.compiled import compiler
+from tests.fmu_kit.compiler.in_lanes import Alone, Together, Values, bits
+from tests.fmu_kit.compiler.twins import GUID
 
 PROBES = {"Arithmetic": 4, "Branches": 8, "Kept": 4, "Loops": 4, "Memory": 1}
 """Slaves that do what slaves may do, and in how many lanes"""
@@ -67,7 +67,7 @@ def test_in_a_lane_are_the_bits_of_the_fmu(model: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", PROBES)
 def test_whatever_a_slave_does_it_does_in_lanes(name: str, tmp_path: Path) -> None:
     compiler("cc")
-    target = Target.parse(f"tests.fmu_kit.native.probes:{name}")
+    target = Target.parse(f"tests.fmu_kit.compiler.probes:{name}")
     sources = c_sources(precomputed(trace(slave_class(target), modules_of(target))), GUID, STANDARDS[2])
     (tmp_path / "alone.so").write_bytes(compiled_here(sources, STANDARDS[2].main))
     (tmp_path / "lanes.so").write_bytes(compiled_lanes(sources, PROBES[name]))

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from elftools.elf.elffile import ELFFile
 
-from tests.fmu_kit.native.accuracy import STATED, Samples, arguments, largest_error
-from tests.fmu_kit.native.compiled import Floats, compiled, library, processor, results
+from tests.fmu_kit.compiler.accuracy import STATED, Samples, arguments, largest_error
+from tests.fmu_kit.compiler.compiled import Floats, compiled, library, processor, results
 
 SAMPLES = 700  # of each set of arguments
 HASH = "e55b276ac5433a03"  # of all results of hash.c

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from fmu_kit.bundle import PackagingError, Target
-from fmu_kit.native.building import build
+from fmu_kit.compiler.pack.building import build
 
 SLAVE = """\
 import math

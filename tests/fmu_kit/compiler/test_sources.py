@@ -9,7 +9,7 @@ import fmpy
 import pytest
 from elftools.elf.elffile import ELFFile
 
-from orchestration import fmus
+from orchestration.building import fmus
 from tests.fmus.process import run
 
 MODEL = "QuadrotorPlant"

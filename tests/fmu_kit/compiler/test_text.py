@@ -2,12 +2,12 @@
 
 import ctypes
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.fmu_kit.native.compiled import Floats, library
+from fmu_kit.compiler import runtime
+from tests.fmu_kit.compiler.compiled import Floats, library
 
 MILLION = 10**6
 SIZE = 400  # characters of the longest number, and more
@@ -93,6 +93,6 @@ def test_a_text_that_does_not_fit_ends_with_its_last_whole_character(texts: ctyp
 
 def test_the_locale_changes_nothing(texts: ctypes.CDLL) -> None:
     """No function that knows of it is called."""
-    source = (Path(__file__).parents[3] / "fmu_kit" / "native" / "text.h").read_text(encoding="utf-8")
+    source = (runtime.FOLDER / "text.h").read_text(encoding="utf-8")
     included = [line.split()[1] for line in source.splitlines() if line.startswith("#include")]
     assert included == ["<stddef.h>", "<stdint.h>", "<string.h>"]

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from fmu_kit.bundle import Target
 from fmu_kit.packaging import slave_class
-from tests.fmu_kit.native.compiled import compiler
-from tests.fmu_kit.native.twins import InC, InPython, Values, answers, library
+from tests.fmu_kit.compiler.compiled import compiler
+from tests.fmu_kit.compiler.twins import InC, InPython, Values, answers, library
 
 PROBES = ("Branches", "Arithmetic", "Choices", "Memory", "Kept", "Below", "Loops", "Words")
 NUMBERS = st.sampled_from([0.0, -0.0, 0.5, 1.0, -1.0, 2.0, 3.0, 7.25, 100.0, 1e3, 1e200, -1e308]) | st.floats(-8.0, 8.0)
@@ -27,7 +27,7 @@ FIXED = st.fixed_dictionaries(
 def probe(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Target, Path]:
     """Each slave in turn, and the library that it is compiled to."""
     compiler("cc")
-    target = Target.parse(f"tests.fmu_kit.native.probes:{request.param}")
+    target = Target.parse(f"tests.fmu_kit.compiler.probes:{request.param}")
     return target, library(target, tmp_path_factory.mktemp("probe"))
 
 

@@ -10,11 +10,11 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
 from fmu_kit.bundle import Target
-from fmu_kit.native.building import c_sources, modules_of
-from fmu_kit.native.compiler import compiled_here
-from fmu_kit.native.precomputing import precomputed
-from fmu_kit.native.standards import STANDARDS
-from fmu_kit.native.tracing import trace
+from fmu_kit.compiler.emit.standards import STANDARDS
+from fmu_kit.compiler.pack.building import c_sources, modules_of
+from fmu_kit.compiler.pack.c_compiler import compiled_here
+from fmu_kit.compiler.passes.precomputing import precomputed
+from fmu_kit.compiler.trace.tracing import trace
 from fmu_kit.packaging import slave_class
 from fmu_kit.slave import Slave
 from fmu_kit.variables import Variable

@@ -7,8 +7,8 @@ import functools
 import sys
 from typing import cast
 
-from fmu_kit.native.building import build
-from fmu_kit.native.compiler import Mathematics
+from fmu_kit.compiler.pack.building import build
+from fmu_kit.compiler.pack.c_compiler import Mathematics
 from fmu_kit.packaging import main
 
 if __name__ == "__main__":

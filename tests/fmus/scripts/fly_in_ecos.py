@@ -3,7 +3,7 @@
 import json
 import sys
 
-import orchestration.exchange.interop.tools.ecos  # noqa: F401  # oneTBB, which ecospy does not find by itself
+import orchestration.interop.tools.ecos  # noqa: F401  # oneTBB, which ecospy does not find by itself
 
 # isort: split
 from ecospy import EcosSimulation, EcosSimulationStructure

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestration import scratch
+from orchestration.basics import scratch
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="folders have no locks there")
 

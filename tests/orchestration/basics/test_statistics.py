@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom
 
-from orchestration.statistics import quantile, refutes, wilson
+from orchestration.basics.statistics import quantile, refutes, wilson
 from quadcosim import UsageError
 
 

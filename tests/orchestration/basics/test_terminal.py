@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import pytest
 
-from orchestration.command import terminal
-from orchestration.command.terminal import SPARSE, progress_bar, runs_bar
+from orchestration.basics import terminal
+from orchestration.basics.terminal import SPARSE, progress_bar, runs_bar
 
 
 class Terminal(io.StringIO):

@@ -7,10 +7,11 @@ from pathlib import Path
 import platformdirs
 import pytest
 
-from orchestration import fmus, subprocesses
+from orchestration.building import fmus
+from orchestration.building.models import MODELS
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.model import read_model
-from orchestration.quadrotor.wiring import MODELS
+from orchestration.processes import subprocesses
 from quadcosim import QuadcosimError, UsageError
 
 
@@ -18,8 +19,8 @@ from quadcosim import QuadcosimError, UsageError
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder that the package takes for the one that it lies in; its cache is beside it."""
     root = tmp_path / "project"
-    (root / "orchestration").mkdir(parents=True)
-    monkeypatch.setattr(fmus, "__file__", str(root / "orchestration" / "fmus.py"))
+    (root / "orchestration" / "building").mkdir(parents=True)
+    monkeypatch.setattr(fmus, "__file__", str(root / "orchestration" / "building" / "fmus.py"))
     monkeypatch.setattr(platformdirs, "user_cache_dir", lambda name: str(tmp_path / "cache" / name))
     return root
 

@@ -12,9 +12,9 @@ from typing import Any
 
 import pytest
 
-from orchestration import fmus
-from orchestration.drawing.names import FLIGHT
-from orchestration.quadrotor.wiring import MODELS
+from orchestration.building import fmus
+from orchestration.building.models import MODELS
+from orchestration.figures.names import FLIGHT
 from quadcosim import Scenario, Timing, load_run, run, save_run
 from tests.commands import Done, Main
 
@@ -252,7 +252,7 @@ def test_plot_zooms_on_a_window(main: Main, here: Path) -> None:
 @pytest.mark.parametrize("out", [[], ["--out", "stopped", "--no-figures"]], ids=["nothing kept", "kept"])
 def test_ctrl_c_ends_a_flight_with_one_line_and_130(here: Path, out: list[str]) -> None:
     code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n" + (
-        "from orchestration.command import terminal; terminal.SPARSE = 0.0\n"  # says when it flies
+        "from orchestration.basics import terminal; terminal.SPARSE = 0.0\n"  # says when it flies
         "from orchestration.command.cli import main; main()"
     )
     with subprocess.Popen(

@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 import typer.main
 
+from orchestration.basics.terminal import listen
 from orchestration.command.answer import Answer
 from orchestration.command.cli import app
-from orchestration.command.terminal import listen
 from tests.commands import Main
 
 GROUP: Any = typer.main.get_command(app)

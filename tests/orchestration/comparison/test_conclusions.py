@@ -7,15 +7,16 @@ import pandas as pd
 import pytest
 from scipy.stats import binomtest
 
+from orchestration.comparison import equal_terms as slices
+from orchestration.comparison import fronts
+from orchestration.comparison.bandwidth import Bandwidths
+from orchestration.comparison.cells import frame_of, results
+from orchestration.comparison.design import Comparison, Condition, Controller, Craft
+from orchestration.comparison.limits import first_ends, limits
+from orchestration.comparison.outcome import as_json, concluded
+from orchestration.comparison.pairs import pairs
+from orchestration.quadrotor.initial_conditions import Starts
 from orchestration.studies.axes import Axis
-from orchestration.studies.comparison import fronts, slices
-from orchestration.studies.comparison.bandwidth import Bandwidths
-from orchestration.studies.comparison.cells import frame_of, results
-from orchestration.studies.comparison.design import Comparison, Condition, Controller, Craft
-from orchestration.studies.comparison.limits import first_ends, limits
-from orchestration.studies.comparison.outcome import as_json, concluded
-from orchestration.studies.comparison.pairs import pairs
-from orchestration.studies.starts import Starts
 from quadcosim import Scenario
 
 PERIODS = (0.01, 0.02, 0.03, 0.04)

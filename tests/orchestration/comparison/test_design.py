@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.studies.comparison.design import Comparison
-from orchestration.studies.comparison.file import load_comparison
+from orchestration.comparison.design import Comparison
+from orchestration.comparison.file import load_comparison
 from orchestration.system.model import System
 from orchestration.system.paths import value_at
 from quadcosim import UsageError
@@ -184,7 +184,7 @@ def test_a_cell_that_there_is_not_is_refused(comparison: Comparison) -> None:
 
 # -- files of the repository ------------------------------------------------------------------------------------------
 
-REPOSITORY = Path(__file__).parents[4]
+REPOSITORY = Path(__file__).parents[3]
 
 
 @pytest.mark.parametrize("path", sorted((REPOSITORY / "studies" / "comparisons").glob("*.toml")), ids=lambda p: p.stem)

@@ -1,4 +1,4 @@
-/* The FMU of moving.c in lanes, as fmu_kit/native/lanes.c has them: one after the other, in the same words. */
+/* The FMU of moving.c in lanes, as fmu_kit/compiler/runtime/lanes.c has them: one after the other, in the same words. */
 #include <math.h>
 #include <stdint.h>
 #include <string.h>

@@ -17,24 +17,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orchestration import simulation
-from orchestration.errors import QuadcosimError, SimulatorError
+from orchestration.basics.errors import QuadcosimError, SimulatorError
+from orchestration.engines import loop
+from orchestration.engines.compiled import CompiledMaster
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_here
 from orchestration.fmi.native import NativeInstance
-from orchestration.master import loop, position
-from orchestration.master.compiled import CompiledMaster
-from orchestration.master.recording import InMemory
-from orchestration.results.pause import fly_until, resume
-from orchestration.results.result import Result
-from orchestration.simulation import RunInterrupted, prepared
+from orchestration.recording.recording import InMemory
+from orchestration.runs import simulation
+from orchestration.runs.pause import fly_until, resume
+from orchestration.runs.result import Result
+from orchestration.runs.simulation import RunInterrupted, prepared
+from orchestration.schedule import cursor as position
 from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
 from orchestration.system.system_file import load_system
 from tests.native import assert_the_same
+from tests.orchestration.engines.moving import moving
+from tests.orchestration.engines.random_systems import systems, systems_of_fixed_steps
 from tests.orchestration.fmi.small import needs_compiler, small
-from tests.orchestration.master.moving import moving
-from tests.orchestration.master.random_systems import systems, systems_of_fixed_steps
 from tests.orchestration.quadrotor.signals_table import flights, scenario_of
 
 pytestmark = needs_compiler
@@ -263,7 +264,7 @@ def test_a_run_may_be_stopped_and_go_on_in_the_same_process(fmu: Path) -> None:
 def test_chunks_are_whole_at_the_same_rows_and_events(fmu: Path, kept: Kept, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, most in (("ROWS", 16), ("EVENTS", 30)):
         with monkeypatch.context() as patch:
-            patch.setattr(f"orchestration.master.master.{name}", most)
+            patch.setattr(f"orchestration.engines.master.{name}", most)
             sizes = []
             for engine in ("python", "compiled"):
                 recorder = InMemory()

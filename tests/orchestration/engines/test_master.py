@@ -4,12 +4,12 @@ import math
 
 import pytest
 
-from orchestration.errors import SimulatorError
-from orchestration.master.master import Master
-from orchestration.master.recording import InMemory
-from orchestration.master.streams import Streams
-from orchestration.master.timetable import Timetable
-from tests.orchestration.master.stubs import Stub, clock, column, continuous, events, near, sampled, system, wire
+from orchestration.basics.errors import SimulatorError
+from orchestration.engines.master import Master
+from orchestration.recording.recording import InMemory
+from orchestration.schedule.streams import Streams
+from orchestration.schedule.timetable import Timetable
+from tests.orchestration.engines.stubs import Stub, clock, column, continuous, events, near, sampled, system, wire
 
 
 def run(what, stubs, **keys):

@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from orchestration.master.sources import WhiteNoise
+from orchestration.engines.sources import WhiteNoise
 from orchestration.system.times import Grid, exact_nanoseconds
 
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 from orchestration.expressions.over_run import evaluate
 from orchestration.expressions.recorded import Recorded
 from orchestration.expressions.syntax import parse

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 from orchestration.expressions.syntax import Call, Name, Number, Operation, Sampled, names, parse, text
 
 

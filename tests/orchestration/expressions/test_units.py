@@ -4,10 +4,10 @@ from fractions import Fraction
 
 import pytest
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.basics.units import BASE, BaseUnits, Unit, named
 from orchestration.expressions.syntax import parse
 from orchestration.expressions.units import unit_of
-from orchestration.units import BASE, BaseUnits, Unit, named
 
 
 def defined(name: str, factor: float = 1.0, offset: float = 0.0, **exponents: int) -> Unit:

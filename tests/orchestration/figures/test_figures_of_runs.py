@@ -12,14 +12,14 @@ from matplotlib.collections import FillBetweenPolyCollection
 from matplotlib.figure import Figure
 
 import quadcosim
-from orchestration.drawing import commands
-from orchestration.drawing.draw import draw
-from orchestration.drawing.lines import clip_peaks
-from orchestration.drawing.names import COLUMNS, FLIGHT
-from orchestration.drawing.phase import surface
-from orchestration.drawing.spectrum import welch
-from orchestration.drawing.style import SCREEN, STYLES, Style, save
-from orchestration.results.differences import told_apart
+from orchestration.figures import commands
+from orchestration.figures.lines import clip_peaks
+from orchestration.figures.names import COLUMNS, FLIGHT
+from orchestration.figures.phase import surface
+from orchestration.figures.spectrum import welch
+from orchestration.figures.style import SCREEN, STYLES, Style, save
+from orchestration.runs.draw import draw
+from orchestration.runs.run_labels import told_apart
 from quadcosim import Result, Scenario, UsageError
 
 TANK = Path(__file__).parents[3] / "examples" / "water_tank" / "system.toml"

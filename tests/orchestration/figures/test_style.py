@@ -9,8 +9,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from orchestration.command.figure_flags import FigureFlags
-from orchestration.drawing.names import FORMATS
-from orchestration.drawing.style import STYLES, Style, save
+from orchestration.figures.names import FORMATS
+from orchestration.figures.style import STYLES, Style, save
 from quadcosim import UsageError
 
 

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestration import subprocesses
-from orchestration.errors import SimulatorError, UsageError
+from orchestration.basics.errors import SimulatorError, UsageError
 from orchestration.fmi import instances
 from orchestration.fmi.isolated import IsolatedInstance
 from orchestration.fmi.native import NativeInstance
-from orchestration.results.result import Result
-from orchestration.simulation import prepared
+from orchestration.processes import subprocesses
+from orchestration.runs.result import Result
+from orchestration.runs.simulation import prepared
 from orchestration.system.model import Component, Connection, Sampling, Source, System
 from tests.orchestration.fmi.small import BINARY, CLOCK, SIZE, needs_compiler, small
 
@@ -329,7 +329,7 @@ def test_what_an_fmu_prints_is_not_among_what_the_command_prints(load: str, tmp_
         from orchestration.fmi.banners import banners_to_stderr
         from orchestration.fmi.instances import open_here
         from orchestration.fmi.isolated import IsolatedInstance
-        from orchestration.simulation import prepared
+        from orchestration.runs.simulation import prepared
         from orchestration.system.model import Component, System
 
         system = System(stop_time=0.1, components={{"it": Component(fmu=sys.argv[1], step=0.01)}})

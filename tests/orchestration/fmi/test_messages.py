@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.errors import SimulatorError
+from orchestration.basics.errors import SimulatorError
 from orchestration.fmi.fmi2 import Fmi2Instance
 from tests.fmus.foreign import lag, needs_compiler
 

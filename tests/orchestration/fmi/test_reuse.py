@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.checks import confined
-from orchestration.checks.confined import Ending
 from orchestration.fmi import repeatability
 from orchestration.fmi.isolated import IsolatedInstance
 from orchestration.fmi.native import NativeInstance
 from orchestration.fmi.repeatability import Repeatability
 from orchestration.fmi.reuse import Instances
-from orchestration.simulation import prepared
+from orchestration.processes import confined
+from orchestration.processes.confined import Ending
+from orchestration.runs.simulation import prepared
 from orchestration.system.model import Parameter
 from tests.orchestration.fmi.small import needs_compiler, small
 from tests.orchestration.fmi.test_foreign_fmus import alone, ran

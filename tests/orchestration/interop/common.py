@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from orchestration.exchange.interop.assignment import Loop, Ports
-from orchestration.exchange.interop.catalogue import TOOLS, Tool
-from orchestration.exchange.interop.compare import Agreement
-from orchestration.exchange.interop.trace import Trace
+from orchestration.basics.simulator import Floats
+from orchestration.interop.assignment import Loop, Ports
+from orchestration.interop.catalogue import TOOLS, Tool
+from orchestration.interop.compare import Agreement
+from orchestration.interop.trace import Trace
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
-from orchestration.simulator import Floats
 from quadcosim import Scenario, run
 
 PORTS = {

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestration.exchange.interop.table import AIM
+from orchestration.basics.simulator import Floats
 from orchestration.fmi.fmi2 import Fmi2Instance
+from orchestration.interop.table import AIM
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
-from orchestration.simulator import Floats
 from orchestration.system.times import NANOSECONDS
 from quadcosim import Scenario, run
 

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestration.exchange.interop import tools
-from orchestration.exchange.interop.assignment import Job
-from orchestration.exchange.interop.catalogue import TOOLS
-from orchestration.exchange.interop.flights import parameters_for
-from orchestration.exchange.ssp.carried import Part, carried
+from orchestration.interop import tools
+from orchestration.interop.assignment import Job
+from orchestration.interop.catalogue import TOOLS
+from orchestration.interop.flights import parameters_for
+from orchestration.requests.ssp.carried import Part, carried
 from quadcosim import Scenario, UsageError
-from tests.orchestration.exchange.interop.common import LOOP
+from tests.orchestration.interop.common import LOOP
 
 COORDINATOR = """
 import json

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.exchange.interop import copies
-from orchestration.exchange.interop.catalogue import chosen
-from orchestration.exchange.interop.compare import agreements
-from orchestration.exchange.interop.table import AIM
+from orchestration.interop import copies
+from orchestration.interop.catalogue import chosen
+from orchestration.interop.compare import agreements
+from orchestration.interop.table import AIM
 from orchestration.system.model import System
 from orchestration.system.system_file import load_system
 from quadcosim import UsageError

@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from orchestration.exchange.interop import table
-from orchestration.exchange.interop.catalogue import TOOLS, chosen
-from orchestration.exchange.interop.compare import Agreement, agreements
-from orchestration.exchange.interop.table import AIM, agrees
+from orchestration.interop import table
+from orchestration.interop.catalogue import TOOLS, chosen
+from orchestration.interop.compare import Agreement, agreements
+from orchestration.interop.table import AIM, agrees
 from quadcosim import QuadcosimError, Scenario, UsageError
 from tests.native import NATIVE
-from tests.orchestration.exchange.interop.common import LOOP, components_of, farthest
+from tests.orchestration.interop.common import LOOP, components_of, farthest
 from tests.orchestration.studies.common import one_line
 
 
@@ -84,7 +84,7 @@ def test_the_table_has_every_tool_in_order(flown: Flown) -> None:
 
 def test_the_page_has_the_table_that_was_found(flown: Flown) -> None:
     scenario, found = flown
-    page = (Path(__file__).parents[4] / "docs" / "interop.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "interop.md").read_text(encoding="utf-8")
     block = page.partition(f"<!-- step {scenario.timing.plant_interval} -->")[2].partition("<!-- end -->")[0]
     columns = slice(1, 4)  # tool, order, first inputs: no rounding moves them, nor does the length of the flight
 

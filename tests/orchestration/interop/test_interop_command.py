@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from orchestration import fmus
-from orchestration.exchange.interop.catalogue import COFMUPY, TOOLS, chosen
-from orchestration.exchange.ssp import writing
-from orchestration.quadrotor.wiring import MODELS
+from orchestration.building import fmus
+from orchestration.building.models import MODELS
+from orchestration.interop.catalogue import COFMUPY, TOOLS, chosen
+from orchestration.requests.ssp import writing
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 from tests.commands import Main
-from tests.orchestration.exchange.interop.common import LOOP
+from tests.orchestration.interop.common import LOOP
 from tests.orchestration.studies.common import error_line, quadcosim
 
 SHORT = ("--plant-interval", "0.01", "--stop-time", "0.1")

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from orchestration.exchange.interop.catalogue import TOOLS, chosen
-from orchestration.exchange.interop.compare import agreements
-from orchestration.exchange.interop.flights import Flights
-from orchestration.exchange.interop.table import AIM
-from orchestration.simulation import run
+from orchestration.interop.catalogue import TOOLS, chosen
+from orchestration.interop.compare import agreements
+from orchestration.interop.flights import Flights
+from orchestration.interop.table import AIM
+from orchestration.runs.simulation import run
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 from quadcosim import UsageError

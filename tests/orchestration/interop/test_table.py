@@ -9,10 +9,10 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from orchestration.exchange.interop import figure, table
-from orchestration.exchange.interop.catalogue import TOOLS
-from orchestration.exchange.interop.compare import Agreement
-from tests.orchestration.exchange.interop.common import agreement
+from orchestration.interop import figure, table
+from orchestration.interop.catalogue import TOOLS
+from orchestration.interop.compare import Agreement
+from tests.orchestration.interop.common import agreement
 
 SEVERAL = [
     agreement("fmpy, plant alone"),

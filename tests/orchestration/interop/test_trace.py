@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestration.exchange.interop.copies import log_of, traced_copy
-from orchestration.exchange.interop.trace import Trace, read_trace
+from orchestration.interop.copies import log_of, traced_copy
+from orchestration.interop.trace import Trace, read_trace
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
 from quadcosim import QuadcosimError, Result, Scenario, load_run, run
-from tests.orchestration.exchange.interop.common import LOOP
+from tests.orchestration.interop.common import LOOP
 from tests.orchestration.studies.common import quadcosim
 
 Values = list[float]

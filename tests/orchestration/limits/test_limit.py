@@ -15,21 +15,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import quadcosim
+from orchestration.basics.bisection import first_failure
+from orchestration.basics.simulator import Floats
+from orchestration.basics.statistics import wilson
 from orchestration.fmi.reuse import Instances
+from orchestration.limits import limit as limits
+from orchestration.limits.evaluation import is_good
+from orchestration.limits.limit import Continuous, find
 from orchestration.quadrotor.scenario import FmuChoice, Record
 from orchestration.quadrotor.translation import system_of
 from orchestration.quadrotor.wiring import COMMAND
-from orchestration.simulation import prepared
-from orchestration.simulator import Floats
-from orchestration.statistics import wilson
-from orchestration.studies import limit as limits
-from orchestration.studies import local
-from orchestration.studies.limit import Continuous, find
-from orchestration.studies.linear import COORDINATES, HoverLoop, hover_of
-from orchestration.studies.local import Local, local_limit, local_limits
-from orchestration.studies.ranges import Range, Varied, range_of
-from orchestration.studies.search import first_failure
-from orchestration.studies.trials import is_good
+from orchestration.requests.ranges import Range, Varied, range_of
+from orchestration.runs.simulation import prepared
+from orchestration.stability import local_limit as local
+from orchestration.stability.hover_loop import COORDINATES, HoverLoop, hover_of
+from orchestration.stability.local_limit import Local, local_limit, local_limits
 from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS
 from quadcosim import Result, Scenario, Timing, UsageError

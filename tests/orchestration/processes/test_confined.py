@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.checks import confined
-from orchestration.checks.confined import Ending, Limits
+from orchestration.processes import confined
+from orchestration.processes.confined import Ending, Limits
 
 linux_only = pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="no /proc")
 
@@ -87,7 +87,7 @@ def test_the_memory_of_what_a_process_has_started_counts(tmp_path: Path) -> None
 
 
 def test_no_file_may_grow_beyond_its_limit(tmp_path: Path) -> None:
-    program = "import sys; from orchestration.checks.confined import restrict; restrict(1.0)\n" + (
+    program = "import sys; from orchestration.processes.confined import restrict; restrict(1.0)\n" + (
         "with open(sys.argv[1], 'wb') as file: file.write(bytes(2_000_000))"
     )
     assert "File too large" in python(program, tmp_path / "file").said

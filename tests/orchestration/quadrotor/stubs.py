@@ -8,19 +8,19 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from orchestration.errors import SimulatorError
-from orchestration.master.master import Master
-from orchestration.master.position import Position
-from orchestration.master.recording import Chunk, Event, InMemory
-from orchestration.master.sources import Constant, Values
-from orchestration.master.streams import Streams
-from orchestration.master.timetable import Timetable
-from orchestration.master.watch import watch
+from orchestration.basics.errors import SimulatorError
+from orchestration.basics.simulator import Floats, Simulator, Transfer
+from orchestration.engines.master import Master
+from orchestration.engines.sources import Constant, Values
+from orchestration.engines.watch import watch
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.translation import system_of
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE
-from orchestration.simulator import Floats, Simulator, Transfer
+from orchestration.recording.recording import Chunk, Event, InMemory
+from orchestration.schedule.cursor import Position
+from orchestration.schedule.streams import Streams
+from orchestration.schedule.timetable import Timetable
 
 Call = tuple[Any, ...]
 

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.scenario_file import load_scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.results.run_directory import run_folder
+from orchestration.runs.run_directory import run_folder
 from tests.orchestration.quadrotor.stubs import Counting, Flown, Plant, Straying, instants_of, position_of
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fmu_kit.trajectory import Trajectory
-from orchestration.errors import UsageError
-from orchestration.studies.starts import Starts
+from orchestration.basics.errors import UsageError
+from orchestration.quadrotor.initial_conditions import Starts
 
 TRAJECTORY = Trajectory()
 STARTS = Starts(count=64, position=4.0, velocity=2.0, angle=2.0, rate=3.0)

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestration.errors import SimulatorError
-from orchestration.master.sources import Constant
+from orchestration.basics.errors import SimulatorError
+from orchestration.engines.sources import Constant
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.wiring import MEASUREMENT
 from orchestration.system.model import Hold

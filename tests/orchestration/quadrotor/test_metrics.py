@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from orchestration.master.recording import Chunk, Event, Events, InMemory
 from orchestration.quadrotor import wiring
 from orchestration.quadrotor.translation import quadrotor
 from orchestration.quadrotor.wiring import COMMAND, POSITION
+from orchestration.recording.recording import Chunk, Event, Events, InMemory
 from orchestration.results import objectives
 from orchestration.results.objectives import Metrics
 from orchestration.system.model import Hold

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import quadcosim
-from orchestration.documents import read_toml
+from orchestration.basics.documents import read_toml
 from orchestration.quadrotor.timing import TIMING_KEYS
 from quadcosim import FmuChoice, Record, ReferenceChoice, Scenario, Timing, UsageError, load_scenario
 from tests.orchestration.quadrotor.strategies import timings

@@ -10,17 +10,17 @@ import pytest
 import quadcosim
 from orchestration.quadrotor.signals import DRAG, chosen
 from orchestration.quadrotor.translation import paths_of, system_of
-from orchestration.results.result import Result
+from orchestration.runs.result import Result
 from orchestration.signals.dryden import DRAWS, Dryden
 from orchestration.signals.library import made
 from orchestration.signals.waypoints import read_waypoints
-from orchestration.studies.linear import hover_of
+from orchestration.stability.hover_loop import hover_of
 from orchestration.system.paths import changed
 from orchestration.system.system_file import system_from_tables, to_tables
 from quadcosim import DisturbanceChoice, ReferenceChoice, Scenario, UsageError, load_scenario
 from tests.commands import Main
-from tests.orchestration.batch.lanes import assert_the_same_signals, landed, located, shape_of
-from tests.orchestration.batch.test_signals import plain
+from tests.orchestration.engines.batch.lanes import assert_the_same_signals, landed, located, shape_of
+from tests.orchestration.engines.batch.test_signals import plain
 from tests.orchestration.fmi.small import needs_compiler
 
 POINTS = "x,y,z,hold,speed\n0,0,0,0.2,0\n1,0,-1,0,2\n1,1,-1,0.3,2\n"
@@ -95,7 +95,7 @@ def test_gusts_are_those_of_the_seed_at_their_steps() -> None:
     name = "disturbance.external_force.y"
     assert one.rows.tobytes() == same.rows.tobytes()
     assert not (one.signals[name] == other.signals[name]).any()
-    from orchestration.master.streams import VALUE, Streams
+    from orchestration.schedule.streams import VALUE, Streams
 
     stream = Streams(3).of("sources.disturbance", VALUE)
     wind = Dryden(wind_speed=8.0, step=0.02).velocities(stream.standard_normal((30, DRAWS)).tolist())

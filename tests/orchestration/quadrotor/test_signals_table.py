@@ -9,7 +9,7 @@ import pytest
 
 import quadcosim
 from fmu_kit.bundle import Target
-from orchestration.quadrotor.wiring import MODELS
+from orchestration.building.models import MODELS
 from quadcosim import Result
 from tests.fmus.making import PAIR
 from tests.native import assert_near, assert_the_same, natives

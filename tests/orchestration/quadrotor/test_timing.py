@@ -12,14 +12,14 @@ import typer.main
 from hypothesis import given
 from hypothesis import strategies as st
 
+from orchestration.basics.errors import UsageError
 from orchestration.command import cli
 from orchestration.command.flags import FlightFlags
-from orchestration.errors import UsageError
-from orchestration.master import position
-from orchestration.master.position import INSTANTS, Position
-from orchestration.master.streams import Streams
 from orchestration.quadrotor.timing import TIMING_KEYS, Timing
 from orchestration.quadrotor.translation import quadrotor
+from orchestration.schedule import cursor as position
+from orchestration.schedule.cursor import INSTANTS, Position
+from orchestration.schedule.streams import Streams
 from orchestration.system.times import Grid, nanoseconds
 from quadcosim import Scenario
 from tests.orchestration.quadrotor import stubs

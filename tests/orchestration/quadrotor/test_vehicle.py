@@ -11,7 +11,7 @@ import quadcosim
 from orchestration.command.cli import main
 from orchestration.command.flags import FlightFlags, request_from
 from orchestration.quadrotor.translation import warnings
-from orchestration.quadrotor.vehicles import Vehicle, load_vehicle, names
+from orchestration.quadrotor.vehicle import Vehicle, load_vehicle, names
 from orchestration.quadrotor.wiring import RIGID_BODY
 from quadcosim import Scenario, Timing, UsageError, load_scenario
 

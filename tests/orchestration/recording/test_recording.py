@@ -7,12 +7,12 @@ import pyarrow.parquet as pq
 import pytest
 
 import quadcosim
-from orchestration.drawing import run as drawn
-from orchestration.drawing.draw import draw
-from orchestration.drawing.names import FLIGHT
-from orchestration.master.recording import InMemory, thinned
-from orchestration.results.pause import fly_until, resume
-from orchestration.results.run_directory import keep_flight
+from orchestration.figures.names import FLIGHT
+from orchestration.recording.recording import InMemory, thinned
+from orchestration.runs import draw as drawn
+from orchestration.runs.draw import draw
+from orchestration.runs.pause import fly_until, resume
+from orchestration.runs.run_directory import keep_flight
 from quadcosim import Result, Scenario, Timing, load_run
 
 JACOBI = Timing(order="jacobi", delay=0.003, jitter=0.004, command_loss=0.3, hold="first")
@@ -27,7 +27,7 @@ def whole() -> Result:
 @pytest.fixture(autouse=True)
 def _few_rows(whole: Result, monkeypatch: pytest.MonkeyPatch) -> None:
     """In each chunk, once the flight to compare with is over."""
-    monkeypatch.setattr("orchestration.master.master.ROWS", 64)
+    monkeypatch.setattr("orchestration.engines.master.ROWS", 64)
 
 
 def expect_equal(found: Result, whole: Result) -> None:
@@ -52,8 +52,8 @@ def test_what_is_on_disk_is_what_was_flown_chunk_by_chunk(whole: Result, tmp_pat
 
 
 def test_many_events_make_a_chunk_whole_too(whole: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("orchestration.master.master.ROWS", 10**6)
-    monkeypatch.setattr("orchestration.master.master.EVENTS", 20)
+    monkeypatch.setattr("orchestration.engines.master.ROWS", 10**6)
+    monkeypatch.setattr("orchestration.engines.master.EVENTS", 20)
     keep_flight(tmp_path / "run", lambda to: quadcosim.run(SCENARIO, recorder=to), figures=False)
     found = load_run(tmp_path / "run")
     sizes = [len(chunk.events) for chunk in found.recording.chunks()]
@@ -86,7 +86,7 @@ def test_a_pause_between_chunks_changes_nothing(at: float, whole: Result, tmp_pa
 def test_a_diverged_run_is_the_same_in_chunks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scenario = Scenario(stop_time=3.0, timing=Timing(period=0.3, order="jacobi"))
     chunks = quadcosim.run(scenario)
-    monkeypatch.setattr("orchestration.master.master.ROWS", 10**6)
+    monkeypatch.setattr("orchestration.engines.master.ROWS", 10**6)
     expect_equal(chunks, quadcosim.run(scenario))
 
 

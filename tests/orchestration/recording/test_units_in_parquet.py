@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import quadcosim
-from orchestration.results.run_directory import keep_flight
+from orchestration.runs.run_directory import keep_flight
 from quadcosim import Result, save_run
 from tests.native import NATIVE
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from orchestration.report.writing import report
-from orchestration.simulation import run
+from orchestration.runs.simulation import run
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import sweep
 from quadcosim import Scenario, Timing

@@ -5,10 +5,10 @@ from typing import Any
 
 import pytest
 
+from orchestration.basics.statistics import wilson
 from orchestration.report.blobs import Blobs
-from orchestration.report.choice import LEAST_POINTS, MOST_POINTS, chosen, evenly, points_for
+from orchestration.report.subset import LEAST_POINTS, MOST_POINTS, chosen, evenly, points_for
 from orchestration.report.tables import Way, share_of, shares_along, table_of
-from orchestration.statistics import wilson
 from tests.orchestration.report.test_blobs import read
 
 

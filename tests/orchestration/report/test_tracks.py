@@ -2,14 +2,14 @@
 
 import numpy as np
 
+from orchestration.basics.simulator import Floats
 from orchestration.quadrotor.translation import quadrotor
 from orchestration.quadrotor.wiring import POSITION_REFERENCE
 from orchestration.report.blobs import Blobs
 from orchestration.report.layouts import COMPACT, POSITION_ERROR
 from orchestration.report.model import Track
 from orchestration.report.tracks import Signals, Tracks
-from orchestration.results.described import Described
-from orchestration.simulator import Floats
+from orchestration.results.column_info import Described
 from tests.orchestration.report.test_blobs import read
 
 ABOUT = {"tank.level": Described(unit="m", text="of the water")}

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 import quadcosim
-from orchestration.results import labels
-from orchestration.results.described import Described
+from orchestration.results import display_names as labels
+from orchestration.results.column_info import Described
 from quadcosim import Scenario
 
 METRICS_PAGE = Path(__file__).parents[3] / "docs" / "metrics.md"

@@ -12,8 +12,8 @@ import pytest
 
 import quadcosim
 from orchestration.quadrotor.wiring import REFERENCE
-from orchestration.results.pause import fly_until, resume
-from orchestration.results.result import Result
+from orchestration.runs.pause import fly_until, resume
+from orchestration.runs.result import Result
 from quadcosim import ReferenceChoice, Scenario, Timing, UsageError
 
 EVERYTHING = Timing(

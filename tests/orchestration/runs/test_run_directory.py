@@ -17,11 +17,11 @@ import pyarrow.parquet as pq
 import pytest
 
 import quadcosim
-from orchestration.drawing import draw as drawing
-from orchestration.drawing.names import FIRST, FLIGHT
-from orchestration.drawing.style import save
-from orchestration.master.recording import Chunk, Events, InMemory, Recorder
-from orchestration.results.run_directory import keep_flight
+from orchestration.figures.names import FIRST, FLIGHT
+from orchestration.figures.style import save
+from orchestration.recording.recording import Chunk, Events, InMemory, Recorder
+from orchestration.runs import draw as drawing
+from orchestration.runs.run_directory import keep_flight
 from quadcosim import (  # fmt: skip
     QuadcosimError,
     Result,
@@ -241,7 +241,7 @@ def test_a_failure_while_writing_leaves_the_earlier_run(
 WRITER = """
 import sys, time
 import quadcosim
-from orchestration.drawing import draw
+from orchestration.runs import draw
 
 def wait(*_):
     print("writing", flush=True)

@@ -8,11 +8,11 @@ from xml.etree.ElementTree import fromstring
 
 import pytest
 
-from orchestration import fmus
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.building import fmus
+from orchestration.limits import limit
+from orchestration.runs.simulation import run
 from orchestration.scaffold.folder import Kind, class_name, module_name, write
-from orchestration.simulation import run
-from orchestration.studies import limit
 from orchestration.system.system_file import load_system
 from tests.commands import Main
 

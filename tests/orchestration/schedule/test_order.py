@@ -2,9 +2,9 @@
 
 import sys
 
-from orchestration.master.initial import groups, is_loop
-from orchestration.master.order import ranked
-from tests.orchestration.master.stubs import wire
+from orchestration.engines.initial import groups, is_loop
+from orchestration.schedule.order import ranked
+from tests.orchestration.engines.stubs import wire
 
 
 def test_the_order_of_the_file_holds_where_nothing_feeds_anything():

@@ -13,23 +13,23 @@ import pytest
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
-from orchestration.errors import UsageError
-from orchestration.master import position
-from orchestration.master.fixed_step import FixedStep
-from orchestration.master.master import Master
-from orchestration.master.recording import InMemory
-from orchestration.master.streams import Streams
-from orchestration.master.timetable import Timetable
+from orchestration.basics.errors import UsageError
+from orchestration.engines.master import Master
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.translation import quadrotor, system_of
 from orchestration.quadrotor.wiring import MEASUREMENT
+from orchestration.recording.recording import InMemory
+from orchestration.schedule import cursor as position
+from orchestration.schedule.fixed_step import FixedStep
+from orchestration.schedule.streams import Streams
+from orchestration.schedule.timetable import Timetable
 from orchestration.system.model import System, variable_of
 from orchestration.system.times import Grid, exact_nanoseconds
-from tests.orchestration.master import second_clock
-from tests.orchestration.master.random_systems import systems, systems_of_fixed_steps
-from tests.orchestration.master.stubs import Stub, continuous, events, sampled, system, wire
+from tests.orchestration.engines.random_systems import systems, systems_of_fixed_steps
+from tests.orchestration.engines.stubs import Stub, continuous, events, sampled, system, wire
 from tests.orchestration.quadrotor.strategies import Case, cases
+from tests.orchestration.schedule import second_clock
 
 PAGE = Path(__file__).parents[3] / "docs" / "timing.md"
 

@@ -5,13 +5,13 @@ import hashlib
 import numpy as np
 from hypothesis import given, settings
 
-from orchestration.master.master import Master
-from orchestration.master.position import Position
-from orchestration.master.recording import InMemory
-from orchestration.master.streams import Streams
-from orchestration.master.timetable import Timetable
-from tests.orchestration.master.random_systems import systems_with_more
-from tests.orchestration.master.stubs import Stub
+from orchestration.engines.master import Master
+from orchestration.recording.recording import InMemory
+from orchestration.schedule.cursor import Position
+from orchestration.schedule.streams import Streams
+from orchestration.schedule.timetable import Timetable
+from tests.orchestration.engines.random_systems import systems_with_more
+from tests.orchestration.engines.stubs import Stub
 
 
 def test_a_stream_is_made_as_the_documents_say():

@@ -4,14 +4,14 @@ from fractions import Fraction
 
 import pytest
 
-from orchestration.errors import UsageError
-from orchestration.master import position
-from orchestration.master.fixed_step import FixedStep
-from orchestration.master.position import Position
-from orchestration.master.streams import Streams
-from orchestration.master.timetable import LONGEST, Timetable
+from orchestration.basics.errors import UsageError
+from orchestration.schedule import cursor as position
+from orchestration.schedule.cursor import Position
+from orchestration.schedule.fixed_step import FixedStep
+from orchestration.schedule.streams import Streams
+from orchestration.schedule.timetable import LONGEST, Timetable
 from orchestration.system.times import Grid, exact_nanoseconds
-from tests.orchestration.master.stubs import continuous, sampled, system, wire
+from tests.orchestration.engines.stubs import continuous, sampled, system, wire
 
 MS = 1_000_000
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from orchestration.master.sources import gusts
+from orchestration.engines.sources import gusts
 from orchestration.signals.dryden import DRAWS, FOOT, Dryden
 
 STEP = 0.05

@@ -8,7 +8,7 @@ import pytest
 import sympy
 
 from fmu_kit.trajectory import Reference, Trajectory
-from orchestration.master.sources import EXACT, by_name
+from orchestration.engines.sources import EXACT, by_name
 from orchestration.signals.library import KINDS, SIGNALS, made
 from orchestration.signals.motions import MOTIONS, Circle, Helix, Lemniscate, Motion, Paper, Step
 from orchestration.system.model import MOTION

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fmu_kit.trajectory import Trajectory
-from orchestration.master.sources import BuiltIn, Table
+from orchestration.engines.sources import BuiltIn, Table
 from orchestration.quadrotor.wiring import REFERENCE
 from orchestration.signals.table_file import read_table
 from quadcosim import UsageError

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestration.simulator import Floats, Transfer
-from orchestration.studies.tangent import Rest, Tangent
+from orchestration.basics.simulator import Floats, Transfer
+from orchestration.stability.linearised_component import Rest, Tangent
 from quadcosim import UsageError
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from orchestration.command.cli import main
-from orchestration.studies import delay_bounds
-from orchestration.studies.delay_bounds import SampledLoop, breaking_jitter, certain_jitter
+from orchestration.stability import delay_bounds
+from orchestration.stability.delay_bounds import SampledLoop, breaking_jitter, certain_jitter
 from tests.orchestration.studies.common import one_line
 
 DOUBLE: dict[str, Any] = {

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestration import fmus
+from orchestration.building import fmus
 from orchestration.fmi.reuse import Instances
-from orchestration.studies import local
-from orchestration.studies.linear import HoverLoop, at_hover
-from orchestration.studies.local import LOOP, TWINS, local_limits
-from orchestration.studies.ranges import Range, Varied
-from orchestration.studies.sampled_loop import growth_of_loop
-from orchestration.studies.twins import Growth, growth_of
+from orchestration.requests.ranges import Range, Varied
+from orchestration.stability import local_limit as local
+from orchestration.stability.hover_loop import HoverLoop, at_hover
+from orchestration.stability.local_limit import LOOP, TWINS, local_limits
+from orchestration.stability.monodromy import growth_of_loop
+from orchestration.stability.perturbed_runs import Growth, growth_of
 from orchestration.system.model import Component, Connection, Sampling, System
 from orchestration.system.paths import changed
 from quadcosim import Scenario, Timing, UsageError

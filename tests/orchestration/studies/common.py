@@ -13,14 +13,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from orchestration.building.inputs import Files, files_of
 from orchestration.quadrotor.translation import paths_of, quadrotor, system_of
 from orchestration.studies.axes import Axis
-from orchestration.studies.files import Files, files_of
-from orchestration.studies.store import Row, metrics_with, open_for_reading
+from orchestration.studies.store import metrics_with, open_for_reading
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import store_path, sweep
 from orchestration.system.model import System
 from orchestration.system.paths import value_at
+from orchestration.workers.row import Row
 from quadcosim import QuadcosimError, Scenario, Timing
 from tests.commands import Done
 from tests.native import NATIVE
@@ -200,7 +201,7 @@ def workers_of(parent: int) -> list[int]:
     for folder in Path("/proc").iterdir():
         try:
             is_child = folder.name.isdigit() and parent_of(folder) == parent
-            if is_child and b"orchestration.studies.serve" in (folder / "cmdline").read_bytes():
+            if is_child and b"orchestration.workers.worker_process" in (folder / "cmdline").read_bytes():
                 found.append(int(folder.name))
         except OSError:  # has ended meanwhile
             continue

@@ -12,18 +12,20 @@ import pytest
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
-from orchestration.drawing import cells
-from orchestration.statistics import wilson
-from orchestration.studies import figures, limit_figure
+from orchestration.basics.statistics import wilson
+from orchestration.figures import cells
+from orchestration.limits import figure as limit_figure
+from orchestration.limits.evaluation import Tried
+from orchestration.limits.figure import draw_limit
+from orchestration.limits.limit import Limit
+from orchestration.studies import figures
 from orchestration.studies.axes import Axis
-from orchestration.studies.drawing import draw_limit, draw_study
-from orchestration.studies.limit import Limit
+from orchestration.studies.drawing import draw_study
 from orchestration.studies.maps import heat_map
 from orchestration.studies.sensitivity import Index
 from orchestration.studies.store import open_for_writing
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import store_path
-from orchestration.studies.trials import Tried
 from quadcosim import UsageError
 from tests.orchestration.studies.common import OBJECTIVES, axis, row, short, study
 

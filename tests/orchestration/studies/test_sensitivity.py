@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestration.simulator import Floats
+from orchestration.basics.simulator import Floats
 from orchestration.studies import sensitivity
 from orchestration.studies.axes import Axis
 from orchestration.studies.drawing import draw_study, indices_of, numbers

@@ -18,15 +18,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestration import fmus
+from orchestration.building import fmus
+from orchestration.building.inputs import Files
 from orchestration.quadrotor.scenario import FmuChoice
 from orchestration.quadrotor.signals import ReferenceChoice
 from orchestration.quadrotor.translation import system_of
 from orchestration.quadrotor.wiring import DEFAULT_PLANT
 from orchestration.studies import store as stores
-from orchestration.studies.files import Files
-from orchestration.studies.identity import flight_sources, run_key, sources_hash, versions
-from orchestration.studies.store import TEXTS, Place, Row, open_for_reading, open_for_writing
+from orchestration.studies.run_key import run_key
+from orchestration.studies.store import TEXTS, Place, open_for_reading, open_for_writing
+from orchestration.workers.provenance import flight_sources, sources_hash, versions
+from orchestration.workers.row import Row
 from quadcosim import QuadcosimError, Scenario, UsageError
 from tests.orchestration.studies.common import METRICS, OBJECTIVES, files_in, one_line, row
 
@@ -415,7 +417,7 @@ def test_the_key_differs_with_everything_that_determines_a_run(tmp_path: Path) -
 
 def test_the_key_differs_with_the_versions_of_the_software(monkeypatch: pytest.MonkeyPatch) -> None:
     before = key_of(BASE)
-    monkeypatch.setattr("orchestration.studies.identity.versions", lambda: {"numpy": "0.1"})
+    monkeypatch.setattr("orchestration.workers.provenance.versions", lambda: {"numpy": "0.1"})
     assert key_of(BASE) != before
 
 
@@ -449,8 +451,8 @@ def test_a_parameter_given_as_its_fmu_has_it_is_the_same_run() -> None:
 
 
 @pytest.mark.parametrize(
-    "module", ["orchestration.master.master", "orchestration.master.timetable", "orchestration.results.objectives",
-               "fmu_kit.trajectory", "orchestration.fmi.native", "orchestration.studies.worker",
+    "module", ["orchestration.engines.master", "orchestration.schedule.timetable", "orchestration.results.objectives",
+               "fmu_kit.trajectory", "orchestration.fmi.native", "orchestration.workers.task",
                "orchestration.quadrotor.wiring"],
 )  # fmt: skip
 def test_an_edited_source_on_the_path_of_the_flight_is_other_software(module: str, tmp_path: Path) -> None:
@@ -462,7 +464,7 @@ def test_an_edited_source_on_the_path_of_the_flight_is_other_software(module: st
 
 def test_sources_that_only_show_or_keep_results_are_not_on_the_path_of_the_flight() -> None:
     aside = (
-        "orchestration.drawing.style",
+        "orchestration.figures.style",
         "orchestration.command.cli",
         "orchestration.studies.sweep",
         "orchestration.studies.store",

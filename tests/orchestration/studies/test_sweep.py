@@ -12,17 +12,17 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from orchestration.building.inputs import Files, files_of, with_files
 from orchestration.quadrotor.scenario import Record
 from orchestration.quadrotor.translation import system_of
-from orchestration.studies import engine
 from orchestration.studies.axes import Axis
-from orchestration.studies.files import Files, files_of, with_files
-from orchestration.studies.identity import machine, versions
 from orchestration.studies.store import open_for_reading
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
 from orchestration.studies.sweep import store_path, sweep
-from orchestration.studies.worker import Hangar, Task
+from orchestration.workers import executors as engine
+from orchestration.workers.provenance import machine, versions
+from orchestration.workers.task import Hangar, Task
 from quadcosim import QuadcosimError, UsageError, run
 from tests.native import NATIVE
 from tests.orchestration.studies.common import (
@@ -141,9 +141,9 @@ def test_other_fmus_machines_and_sources_are_a_changed_study(
     if place == "hashes":
         monkeypatch.setattr(Study, "files", other)
     elif place == "machine":
-        monkeypatch.setattr("orchestration.studies.identity.machine", lambda: "a Z80")
+        monkeypatch.setattr("orchestration.workers.provenance.machine", lambda: "a Z80")
     else:
-        monkeypatch.setattr("orchestration.studies.identity.versions", lambda: edited)
+        monkeypatch.setattr("orchestration.workers.provenance.versions", lambda: edited)
     with pytest.raises(UsageError, match=said):
         sweep(study(PERIODS), folder=finished)
 

@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 
 from orchestration.fmi.reuse import Instances
+from orchestration.limits.limit import find
 from orchestration.quadrotor.translation import system_of
-from orchestration.request import load_request
+from orchestration.requests.request import load_request
+from orchestration.stability.hover_loop import HoverLoop
+from orchestration.stability.perturbed_runs import growth_of
 from orchestration.studies.axes import Axis
 from orchestration.studies.drawing import draw_study
-from orchestration.studies.limit import find
-from orchestration.studies.linear import HoverLoop
 from orchestration.studies.store import expect_columns, is_column, open_for_reading
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
 from orchestration.studies.sweep import store_path, sweep
 from orchestration.studies.table import frame
-from orchestration.studies.twins import growth_of
 from orchestration.system.model import Criterion, System
 from orchestration.system.paths import changed
 from quadcosim import Scenario, Timing, UsageError, run

@@ -12,11 +12,12 @@ import pytest
 import quadcosim
 from orchestration.quadrotor.translation import system_of
 from orchestration.studies.axes import Axis
-from orchestration.studies.identity import versions
-from orchestration.studies.store import Row, open_for_reading, open_for_writing
+from orchestration.studies.store import open_for_reading, open_for_writing
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
 from orchestration.studies.table import dataset, export, frame
+from orchestration.workers.provenance import versions
+from orchestration.workers.row import Row
 from quadcosim import Scenario, UsageError
 from tests.orchestration.studies.common import GRID, METRICS, OBJECTIVES, axis, files_in, row, starts, study, swept
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 from orchestration.fmi.model import read_model
 from orchestration.results import objectives
 from orchestration.system.check import check, recorded

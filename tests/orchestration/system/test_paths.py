@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
 from orchestration.quadrotor.translation import quadrotor
 from orchestration.system.paths import changed, value_at
 

@@ -7,7 +7,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from orchestration.drawing import diagram
+from orchestration.figures import diagram
 from orchestration.system.description import as_text, seconds
 from orchestration.system.system_file import load_system
 from tests.commands import Main

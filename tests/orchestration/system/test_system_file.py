@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.errors import UsageError
-from orchestration.master.position import Position
-from orchestration.master.streams import Streams
-from orchestration.master.timetable import Timetable
+from orchestration.basics.errors import UsageError
 from orchestration.quadrotor import translation
 from orchestration.quadrotor.translation import quadrotor
-from orchestration.request import load_request
+from orchestration.requests.request import load_request
+from orchestration.schedule.cursor import Position
+from orchestration.schedule.streams import Streams
+from orchestration.schedule.timetable import Timetable
 from orchestration.system.system_file import load_system, schema, to_toml
 
 SHIPPED = Path(translation.__file__).with_name("system.toml")
@@ -186,7 +186,7 @@ def test_what_happens_when_needs_no_fmu(tmp_path: Path) -> None:
 
 def test_the_schema_holds_for_the_files_that_are_read_and_for_no_unknown_key(tmp_path: Path) -> None:
     jsonschema = pytest.importorskip("jsonschema")
-    from orchestration.documents import read_toml
+    from orchestration.basics.documents import read_toml
 
     check = jsonschema.Draft202012Validator(schema())
     check.check_schema(schema())

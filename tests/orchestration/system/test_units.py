@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from orchestration import fmus
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.building import fmus
+from orchestration.engines.wiring import checked
 from orchestration.fmi.model import read_model
 from orchestration.quadrotor.translation import quadrotor
-from orchestration.simulation import checked
 from orchestration.system.system_file import load_system
 from tests.commands import Main
 from tests.orchestration.system.described import described

@@ -5,13 +5,13 @@ from typing import Any
 
 import pytest
 
-from orchestration.documents import read_toml
-from orchestration.errors import UsageError
-from orchestration.studies.starts import Starts
-from orchestration.studies.tune import searched, write
-from orchestration.studies.tuning import Tuning, best_by_period, search
-from orchestration.studies.tuning_file import load_tuning
+from orchestration.basics.documents import read_toml
+from orchestration.basics.errors import UsageError
+from orchestration.quadrotor.initial_conditions import Starts
 from orchestration.system.paths import value_at
+from orchestration.tuning.tune import searched, write
+from orchestration.tuning.tuning import Tuning, best_by_period, search
+from orchestration.tuning.tuning_file import load_tuning
 
 FILE = """
 [base]

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from orchestration import fmus
+from orchestration.building import fmus
 from orchestration.quadrotor.wiring import DEFAULT_PLANT
 from tests.fmus.archive import files_of
 from tests.fmus.damage import with_its_guid, write_fmu

@@ -7,14 +7,14 @@ from typing import Any
 
 import pytest
 
-from orchestration.errors import QuadcosimError, UsageError
-from orchestration.studies.crew import Died, Package, Pilot
-from orchestration.studies.lanes import SAMPLE, Agreement, chunks, sample
+from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.studies.store import open_for_reading
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
 from orchestration.studies.sweep import AGREEMENT, sweep
-from orchestration.studies.worker import Chunk, Task
+from orchestration.workers.batching import SAMPLE, Agreement, chunks, sample
+from orchestration.workers.pool import Died, Package, Pilot
+from orchestration.workers.task import Chunk, Task
 from tests.orchestration.fmi.small import needs_compiler, small
 from tests.orchestration.studies.common import NOISY, RUNS, axis, bits, quadcosim, short, study, swept
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from orchestration import fmus
+from orchestration.building import fmus
 from orchestration.quadrotor.scenario import FmuChoice
-from orchestration.studies.crew import Crew
-from orchestration.studies.identity import versions
 from orchestration.studies.store import open_for_reading
 from orchestration.studies.sweep import store_path, sweep
+from orchestration.workers.pool import Crew
+from orchestration.workers.provenance import versions
 from quadcosim import QuadcosimError
 from tests.orchestration.studies.common import (
     NOISY,
@@ -36,7 +36,7 @@ from tests.orchestration.studies.common import (
     workers_of,
 )
 from tests.orchestration.studies.kills import disturbed
-from tests.orchestration.studies.sick import ABORTS, KILLED, SPENT, sick_plant
+from tests.orchestration.workers.sick import ABORTS, KILLED, SPENT, sick_plant
 
 # -- killed -----------------------------------------------------------------------------------------------
 
@@ -177,7 +177,7 @@ def test_a_place_where_nothing_can_be_flown_stops_the_sweep_without_a_row(
 
 def test_other_software_where_it_is_flown_stops_the_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     other = {**versions(), "sources": "other"}
-    monkeypatch.setattr("orchestration.studies.crew.versions", lambda: other)
+    monkeypatch.setattr("orchestration.workers.pool.versions", lambda: other)
     with pytest.raises(QuadcosimError, match="has another version of sources than the coordinator; expected the same"):
         sweep(study(PERIODS), folder=tmp_path)
     assert rows_in(store_path("study", tmp_path)) == 0

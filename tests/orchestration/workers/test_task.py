@@ -5,11 +5,11 @@ from typing import Any
 
 import pytest
 
+from orchestration.building.inputs import with_files
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.translation import system_of
-from orchestration.studies.files import with_files
-from orchestration.studies.worker import BrokenPlaceError, Hangar, Outcome, Task
+from orchestration.workers.task import BrokenPlaceError, Hangar, Outcome, Task
 from quadcosim import QuadcosimError
 from tests.orchestration.studies.common import FAILS, files_in, short
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from orchestration.checks.confined import Limits
+from orchestration.building.models import MODELS
 from orchestration.checks.doctor import loading
 from orchestration.checks.doctor.as_lines import as_text
 from orchestration.checks.doctor.report import as_tables, examine
-from orchestration.quadrotor.wiring import MODELS
+from orchestration.processes.confined import Limits
 from tests.commands import Main
 from tests.fmus.foreign import lag, needs_compiler
 from tests.fmus.process import ROOT, run

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.checks.archive import UnreadableFmuError
 from orchestration.checks.doctor.fmu import read_fmu
+from orchestration.fmi.archive import UnreadableFmuError
 from tests.orchestration.checks.doctor.common import (
     AARCH64,
     LINUX64,

@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from orchestration import fmus
-from orchestration.batch.flight import FLYING, Batch, Landed
-from orchestration.batch.kernels import lanes_here
-from orchestration.batch.shape import Shape, outline
-from orchestration.batch.windows import Windows, timing
+from orchestration.building import fmus
+from orchestration.engines.batch.flight import FLYING, Batch, Landed
+from orchestration.engines.batch.kernels import lanes_here
+from orchestration.engines.batch.shape import Shape, outline
+from orchestration.engines.wiring import checked
 from orchestration.fmi.model import read_model
-from orchestration.results.result import Result
-from orchestration.simulation import checked
+from orchestration.runs.result import Result
+from orchestration.schedule.schedule_cache import Windows, timing
 from orchestration.system.model import System
 
 

@@ -7,18 +7,19 @@ from typing import Any
 
 import pytest
 
-from orchestration import fmus
-from orchestration.batch.fly import Batches, fly
-from orchestration.errors import UsageError
+from orchestration.basics.errors import UsageError
+from orchestration.building import fmus
+from orchestration.engines.batch.fly import Batches
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.translation import system_of
+from orchestration.runs.in_lanes import fly
 from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
 from orchestration.system.paths import changed
-from tests.orchestration.batch.lanes import landed, located, shape_of
+from tests.orchestration.engines.batch.lanes import landed, located, shape_of
+from tests.orchestration.engines.moving import moving
+from tests.orchestration.engines.test_compiled import Kept, of, ran
 from tests.orchestration.fmi.small import needs_compiler, small
-from tests.orchestration.master.moving import moving
-from tests.orchestration.master.test_compiled import Kept, of, ran
 
 pytestmark = needs_compiler
 SUMS = ("rmse", "iae", "itae", "effort", "variation", "mean", "rms", "integral", "saturation_share", "share_", "near")

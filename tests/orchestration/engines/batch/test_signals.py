@@ -11,16 +11,16 @@ from hypothesis import strategies as st
 from orchestration.quadrotor.translation import system_of
 from orchestration.system.model import System
 from orchestration.system.system_file import load_system
-from tests.orchestration.batch.lanes import assert_the_same_signals, landed, located, shape_of
+from tests.orchestration.engines.batch.lanes import assert_the_same_signals, landed, located, shape_of
+from tests.orchestration.engines.moving import moving
+from tests.orchestration.engines.random_systems import TIMES, systems
+from tests.orchestration.engines.test_compiled import Kept, of, ran
 from tests.orchestration.fmi.small import needs_compiler
-from tests.orchestration.master.moving import moving
-from tests.orchestration.master.random_systems import TIMES, systems
-from tests.orchestration.master.test_compiled import Kept, of, ran
 from tests.orchestration.quadrotor.signals_table import flights, scenario_of
 
 pytestmark = needs_compiler
 FLIGHTS = dict(flights())
-EXAMPLES = sorted(Path(__file__).parents[3].glob("examples/*/system.toml"))
+EXAMPLES = sorted(Path(__file__).parents[4].glob("examples/*/system.toml"))
 
 
 @pytest.fixture(scope="module")

@@ -8,12 +8,12 @@ from typing import Any
 import pytest
 from fmpy.ssp.ssd import read_ssd
 
-from orchestration import fmus
-from orchestration.exchange.ssp import writing
+from orchestration.building import fmus
+from orchestration.requests.ssp import writing
 from quadcosim import Scenario, Timing, UsageError
 from tests.commands import Main
 from tests.fmus.making import PAIR
-from tests.orchestration.exchange.interop.common import OTHER
+from tests.orchestration.interop.common import OTHER
 from tests.orchestration.studies.common import error_line, one_line, quadcosim
 
 

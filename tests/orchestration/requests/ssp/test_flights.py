@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestration.exchange.interop.catalogue import Tool, chosen
-from orchestration.exchange.interop.compare import Agreement, agreements
-from orchestration.exchange.interop.table import AIM, agrees
-from orchestration.exchange.ssp import writing
+from orchestration.interop.catalogue import Tool, chosen
+from orchestration.interop.compare import Agreement, agreements
+from orchestration.interop.table import AIM, agrees
+from orchestration.requests.ssp import writing
 from orchestration.system.model import System
 from quadcosim import Scenario, load_scenario
-from tests.orchestration.exchange.interop.common import LOOP, farthest, states_of_master, with_other_parameters
+from tests.orchestration.interop.common import LOOP, farthest, states_of_master, with_other_parameters
 
 FROM_SSP = ("libcosim, SSP", "ecos, SSP", "fmpy, SSP")
 

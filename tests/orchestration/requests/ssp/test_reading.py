@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from fmu_kit.packaging import write_archive
-from orchestration.exchange.ssp import package, writing
 from orchestration.quadrotor.translation import system_of
-from orchestration.request import load_request
+from orchestration.requests.request import load_request
+from orchestration.requests.ssp import package, writing
 from orchestration.system.model import Sampling, System
 from quadcosim import Scenario, UsageError
 from tests.commands import Main

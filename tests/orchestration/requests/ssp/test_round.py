@@ -5,15 +5,15 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.exchange.ssp import package, writing
 from orchestration.quadrotor.translation import system_of
-from orchestration.request import load_request
-from orchestration.results.result import Result
-from orchestration.simulation import run
+from orchestration.requests.request import load_request
+from orchestration.requests.ssp import package, writing
+from orchestration.runs.result import Result
+from orchestration.runs.simulation import run
 from orchestration.system.model import Criterion, Source, System
 from quadcosim import Scenario, UsageError
 from tests.commands import Main
-from tests.orchestration.exchange.interop.test_systems import CARRIED, carried
+from tests.orchestration.interop.test_systems import CARRIED, carried
 from tests.orchestration.studies.common import error_line, one_line
 
 EXAMPLES = Path(__file__).parents[4] / "examples"

@@ -13,12 +13,12 @@ import pytest
 from fmpy.ssp.ssd import read_ssd, read_ssv
 
 from fmu_kit.packaging import write_archive
-from orchestration.exchange.ssp import writing
 from orchestration.quadrotor.translation import system_of
+from orchestration.requests.ssp import writing
 from orchestration.system.paths import changed
 from quadcosim import FmuChoice, Scenario, Timing, UsageError
 from tests.fmus.interface_table import TABLES
-from tests.orchestration.exchange.interop.common import with_other_parameters
+from tests.orchestration.interop.common import with_other_parameters
 
 NAMES = {
     "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",

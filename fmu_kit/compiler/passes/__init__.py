@@ -1,0 +1,1 @@
+"""From statements to statements: derivatives, and what follows from parameters alone."""

@@ -1,0 +1,1 @@
+"""Where FMUs are, and the building of those that are old."""

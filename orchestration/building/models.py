@@ -1,0 +1,9 @@
+"""The FMUs of this project."""
+
+MODELS = {
+    "UnifiedController": "controller_fmu.sliding_mode.slave:UnifiedController",
+    "GeometricController": "controller_fmu.geometric.slave:GeometricController",
+    "CascadedController": "controller_fmu.cascaded.slave:CascadedController",
+    "QuadrotorPlant": "plant_fmu.slave:QuadrotorPlant",
+}
+"""FMUs of this project by name, and the slave that each is built from."""

@@ -1,0 +1,147 @@
+"""A system made ready for any engine: held to its FMUs, its sources at work, its columns."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from fmu_kit.trajectory import Trajectory
+from orchestration.basics.errors import UsageError
+from orchestration.engines.sources import (
+    BuiltIn,
+    Constant,
+    Held,
+    Moving,
+    Scaled,
+    Table,
+    Values,
+    WhiteNoise,
+    along,
+    by_name,
+    gusts,
+)
+from orchestration.fmi.model import NUMERIC, Model
+from orchestration.fmi.values import number_of
+from orchestration.results import objectives
+from orchestration.results.units import units
+from orchestration.schedule.fixed_step import FixedStep
+from orchestration.schedule.streams import VALUE, Streams
+from orchestration.signals.library import made
+from orchestration.signals.table_file import read_table
+from orchestration.signals.waypoints import read_waypoints
+from orchestration.system.check import check, recorded
+from orchestration.system.model import MOTION, Component, Source, System, variable_of
+from orchestration.system.times import Grid, exact_nanoseconds
+
+SAMPLE_PERIOD, SAMPLE_OFFSET = "sample_period", "sample_offset"
+"""Parameters by which a component built on `fmu_kit` is given a clock of its own; 0: it samples at every step"""
+
+
+TRAJECTORY = ("amplitude_x", "amplitude_y", "frequency", "start_z", "rate_z")
+"""Parameters trajectory.* of a component, and the fields of `Trajectory` that they are"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Checked:
+    """A system that its FMUs fit."""
+
+    system: System
+    """with the objectives that they have the variables for"""
+    parameters: dict[str, float]
+    """the numeric ones of all components, as COMPONENT.NAME"""
+    units: dict[str, str]
+    """of what it comes to, where it has one"""
+
+
+def checked(system: System, models: Mapping[str, Model]) -> Checked:
+    """A system held to what its FMUs say; raises `UsageError` for what they do not have, or cannot take."""
+    check(system, models)
+    for name, component in system.components.items():
+        _expect_clock(name, component, models[name])
+    parameters = _parameters(system, models)
+    system = objectives.known(system, _signals(system, models), set(parameters))
+    return Checked(system=system, parameters=parameters, units=units(system, models))
+
+
+def columns_of(system: System) -> tuple[str, ...]:
+    """The columns that a run of `system` has whatever is recorded beside them."""
+    exchanged = [start for x in system.connections for start in x.start]
+    applied = [end for x in system.connections for end in x.end if system.components[x.receiver].sampling is None]
+    sources = [signal for name, source in system.sources.items() for signal in source.signals(name)]
+    return ("time", *dict.fromkeys((*applied, *exchanged, *sources)))
+
+
+def _expect_clock(name: str, component: Component, model: Model) -> None:
+    """Raise `UsageError` for a clock that the FMU does not have, or that its parameters would set beside the master."""
+    sampling = component.sampling
+    if sampling is None or SAMPLE_PERIOD not in model.variables:
+        if sampling is not None and sampling.clock == "fmu":
+            raise UsageError(f"components.{name}.sampling.clock = fmu: expected an FMU with {SAMPLE_PERIOD}")
+        return
+    for parameter in (SAMPLE_PERIOD, SAMPLE_OFFSET):
+        if parameter in component.parameters:
+            raise UsageError(
+                f"components.{name}.parameters.{parameter}: expected sampling instead; the master sets it, to 0 "
+                "with clock master (the master decides when to sample) and to that of sampling with clock fmu"
+            )
+
+
+def _parameters(system: System, models: Mapping[str, Model]) -> dict[str, float]:
+    found = {}
+    for name, model in models.items():
+        given = system.components[name].parameters
+        for variable in model.variables.values():
+            value = given.get(variable.name, variable.start)
+            if variable.causality == "parameter" and variable.kind in NUMERIC and value is not None:
+                found[f"{name}.{variable.name}"] = number_of(variable, value)
+    return found
+
+
+def _signals(system: System, models: Mapping[str, Model]) -> set[str]:
+    """Everything that is recorded, or comes from a source."""
+    found = {f"{name}.{variable}" for name, variables in recorded(system, models).items() for variable in variables}
+    return found.union(columns_of(system)) - {"time"}
+
+
+def source_values(system: System, name: str, parameters: Mapping[str, float], streams: Streams) -> Values:
+    """A source at work in a run; `parameters` are those of the component of a trajectory, as COMPONENT.NAME."""
+    source = system.sources[name]
+    if source.constant is not None:
+        return Constant([source.constant] * len(source.to))
+    if source.noise is not None and source.period is not None:
+        return WhiteNoise(source.noise, source.period, len(source.to), streams.of(f"sources.{name}", VALUE))
+    if source.trajectory is None:
+        values = _of_file_or_signal(system, name, streams)
+        return values if source.scale == 1.0 else Scaled(values, source.scale)
+    owner = f"{source.trajectory}.trajectory."
+    given = {field: parameters[owner + field] for field in TRAJECTORY if owner + field in parameters}
+    return BuiltIn(Trajectory(**given))
+
+
+def _of_file_or_signal(system: System, name: str, streams: Streams) -> Values:
+    source = system.sources[name]
+    quantities = [MOTION.index(".".join(signal.split(".")[-2:])) for signal in source.signals(name) if source.is_motion]
+    if source.signal is not None:
+        signal = made(source.signal, source.parameters)
+        if source.is_motion:
+            return Moving(by_name(signal), quantities)
+        return gusts(signal, system.stop_time, streams.of(f"sources.{name}", VALUE))
+    assert source.file is not None
+    if source.is_motion:
+        return Moving(along(read_waypoints(source.file, source.parameters)), quantities)
+    table = read_table(source.file, table_columns(source), system.stop_time)
+    return Held(*table) if source.interpolation == "previous" else Table(*table)
+
+
+def table_columns(source: Source) -> Sequence[str]:
+    """The columns of the file of a source, in the order of the inputs."""
+    return [variable_of(end) for end in source.to] if source.columns is None else source.columns
+
+
+def fixed_steps(system: System, models: Mapping[str, Model]) -> dict[str, FixedStep]:
+    """Components in continuous time that take steps of one length only, by name."""
+    found = {}
+    for name, component in system.components.items():
+        if component.step is not None and not models[name].varies_step:
+            grid = Grid(Fraction(0), exact_nanoseconds(component.step))
+            found[name] = FixedStep(name=name, grid=grid, moves=component.align == "next")
+    return found

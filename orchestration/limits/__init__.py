@@ -1,0 +1,1 @@
+"""The largest value of a quantity that is still good."""

@@ -1,0 +1,1 @@
+"""Rows and events of a run, in memory and in files."""

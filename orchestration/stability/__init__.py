@@ -1,0 +1,1 @@
+"""Loops linearised about rest: local limits, margins."""

@@ -1,0 +1,1 @@
+"""Searches for the parameters of a controller that cost least."""

@@ -1,0 +1,1 @@
+"""Processes that fly runs: a pool here, dask elsewhere, and what they are told."""

@@ -1,0 +1,31 @@
+"""What a worker says of a run."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One run: its settings and what it came to."""
+
+    index: int
+    """place in the design"""
+    key: str
+    """hash of everything that determines the run"""
+    settings: Mapping[str, Any]
+    """the value of each axis"""
+    seed: int
+    metrics: Mapping[str, Any] | None
+    """None if the run failed"""
+    message: str | None
+    """why it failed, or what diverged"""
+    duration: float
+    """wall-clock time of the run [s]"""
+    machine: str | None = None
+    """the kind of machine that flew it"""
+
+    @property
+    def status(self) -> str:
+        """`done` or `failed`; divergence is a result."""
+        return "failed" if self.metrics is None else "done"
