@@ -26,7 +26,6 @@ from orchestration.engines.wiring import checked
 from orchestration.fmi.model import read_model
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.quadrotor.translation import system_of
 from orchestration.runs.simulation import prepared
 from orchestration.schedule.schedule_cache import Windows, timing
 from orchestration.studies.axes import Axis
@@ -45,7 +44,7 @@ X = "components.plant.parameters.initial.position.x"
 
 def systems(period: float, stop_time: float) -> tuple[Shape, list[System]]:
     """The paper's flight from as many places as there are lanes."""
-    one = fmus.native_twins(system_of(Scenario(timing=Timing(period=period), stop_time=stop_time)))
+    one = fmus.native_twins(Scenario(timing=Timing(period=period), stop_time=stop_time).as_system())
     models = {name: read_model(path) for name, path in fmus.of_components(one.fmus).items()}
     one = checked(one, models).system
     places = np.linspace(0.0, 1.0, lanes_here()).tolist()

@@ -24,7 +24,6 @@ from orchestration.fmi.model import read_model
 from orchestration.quadrotor import wiring
 from orchestration.quadrotor.scenario import FmuChoice, Scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.quadrotor.translation import system_of
 from orchestration.runs.simulation import prepared
 from orchestration.schedule.cursor import Position
 from orchestration.schedule.streams import Streams
@@ -93,7 +92,7 @@ def loop(scenario: Scenario) -> float:
 
 def bare(scenario: Scenario) -> float:
     """The same FMI calls as the master makes in a step, and nothing else."""
-    system = system_of(scenario)
+    system = scenario.as_system()
     paths = {name: Path(component.fmu) for name, component in system.components.items()}
     board = Board(system, recorded(system, {name: read_model(path) for name, path in paths.items()}))
     with (
@@ -130,7 +129,7 @@ def outputs(board: Board, component: str) -> Floats:
 def clock(timing: Timing) -> float:
     """One instant of the timing alone, no FMU."""
 
-    system = system_of(Scenario(timing=timing, stop_time=STEPS * MILLISECOND))
+    system = Scenario(timing=timing, stop_time=STEPS * MILLISECOND).as_system()
 
     def work() -> int:
         return sum(1 for _ in Position(Timetable(system, Streams(0, system.streams))).instants())

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from orchestration.building.inputs import files_of, with_files
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.translation import system_of
 from orchestration.studies.axes import Axis
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import sweep
@@ -32,7 +31,7 @@ def runs_per_second(workers: int) -> float:
 
 def many_short_runs() -> tuple[float, float]:
     """Median time of a run of one plant step [ms], FMUs loaded, and growth of memory over the last half [KiB]."""
-    system = system_of(Scenario(stop_time=0.001))
+    system = Scenario(stop_time=0.001).as_system()
     system = with_files(system, files_of(system).fmus)
     task = Task(index=0, key="", settings={}, system=system, keep_signals=False)
     durations, memory, hangar = [], [], Hangar()

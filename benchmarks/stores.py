@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import TypeVar
 
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.translation import system_of
 from orchestration.studies.axes import Axis
 from orchestration.studies.drawing import draw_study
 from orchestration.studies.store import Store, open_for_reading, open_for_writing
@@ -27,7 +26,7 @@ from orchestration.workers.row import Row
 ROWS = 1_000_000
 TOGETHER = 1000
 """rows that are written in one transaction"""
-OBJECTIVES = tuple(system_of(Scenario()).objectives)
+OBJECTIVES = tuple(Scenario().as_system().objectives)
 AXES = tuple(
     Axis(name=name, targets=(name,), low=0.0, high=1.0) for name in ("timing.delay", "timing.jitter", "timing.loss")
 )

@@ -28,6 +28,7 @@ from orchestration.engines.batch import fly
 from orchestration.fmi.model import read_model
 from orchestration.runs.simulation import run
 from orchestration.system.model import System
+from orchestration.system.request import Start
 
 ROOT = Path(__file__).parent.parent
 FILES = ROOT / "studies" / "comparisons"
@@ -99,10 +100,14 @@ def systems_of(comparison: Comparison, index: int, paths: dict[str, str]) -> lis
         replace(
             first,
             seed=comparison.base.seed + comparison.starts.first + i,
-            components={**components, "plant": replace(plant, parameters={**plant.parameters, **start.parameters})},
+            components={**components, "plant": replace(plant, parameters={**plant.parameters, **_of_plant(start)})},
         )
         for i, start in enumerate(comparison.drawn)
     ]
+
+
+def _of_plant(start: Start) -> dict[str, Any]:
+    return {target.removeprefix("plant."): value for target, value in start.values.items()}
 
 
 @cache

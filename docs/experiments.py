@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from fmu_kit.trajectory import Trajectory
-from orchestration.quadrotor.parameters import Parameter
 from orchestration.quadrotor.scenario import FmuChoice, Scenario
+from orchestration.system.model import Parameter
 
 Array = Any
 

@@ -11,7 +11,6 @@ from orchestration.figures.palette import BLUE, GREEN, GREY, RED
 from orchestration.figures.style import DOCS, save
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.quadrotor.translation import system_of
 from orchestration.runs.draw import draw
 from orchestration.schedule.cursor import Position
 from orchestration.schedule.streams import Streams
@@ -66,7 +65,7 @@ def timing_diagram() -> Figure:
 
 
 def _draw_case(axes: Axes, timing: Timing) -> None:
-    system, sampled = system_of(Scenario(timing=timing, stop_time=0.065, seed=3)), {}
+    system, sampled = Scenario(timing=timing, stop_time=0.065, seed=3).as_system(), {}
     for instant in Position(Timetable(system, Streams(system.seed, system.streams))).instants():
         now, arrivals = instant.time * MILLISECONDS, [k for _, k, _, _ in instant.arrivals]
         axes.plot(now, 0.0, "|", color=GREY, markersize=4, label="plant point")

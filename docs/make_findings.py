@@ -25,19 +25,18 @@ from docs.experiments import PAPER
 from orchestration.basics.statistics import quantile, wilson
 from orchestration.building.inputs import files_of
 from orchestration.figures.style import DOCS, save
+from orchestration.flight.hover_loop import HoverLoop
+from orchestration.flight.local_limit import about_hover
+from orchestration.flight.margin import margin_of
 from orchestration.limits import figure, limit
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.translation import system_of
 from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
-from orchestration.stability.hover_loop import HoverLoop
-from orchestration.stability.local_limit import about_hover
-from orchestration.stability.margin import margin_of
 from orchestration.studies import drawing, figures
 from orchestration.studies.sensitivity import Index
-from orchestration.studies.store import open_for_reading
+from orchestration.studies.store import open_for_reading, store_path
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
-from orchestration.studies.sweep import AGREEMENT, store_path, sweep
+from orchestration.studies.sweep import AGREEMENT, sweep
 from orchestration.studies.table import frame
 from orchestration.workers.batching import Agreement
 from orchestration.workers.executors import Pool
@@ -381,7 +380,7 @@ def kept(name: str, compute: Callable[[], Any], *given: Any) -> Any:
 def _stamp(given: Any) -> str:
     """A hash of what flights come from: FMUs, what flies them, what is asked here and beside theory."""
     own = [(ROOT / "docs" / f"{name}.py").read_text(encoding="utf-8") for name in ("experiments", "theory")]
-    known = [files_of(system_of(PAPER)).hashes, versions(), own, given]
+    known = [files_of(PAPER.as_system()).hashes, versions(), own, given]
     return hashlib.sha256(repr(known).encode()).hexdigest()
 
 
@@ -405,7 +404,7 @@ def _in_processes(function: Callable[[Any], Any], arguments: Any) -> list[Any]:
 
 
 def _flown(scenarios: list[Scenario], *, in_lanes: bool) -> list[Any]:
-    systems = [system_of(scenario) for scenario in scenarios]
+    systems = [scenario.as_system() for scenario in scenarios]
     with Pool(files_of(systems[0]), WORKERS) as pool:
         return pool.fly_all(systems, in_lanes=in_lanes)
 

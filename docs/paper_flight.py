@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from orchestration.basics.simulator import Floats
-from orchestration.figures.errors import ERRORS, Error, draw_components
 from orchestration.figures.lines import TIME
-from orchestration.figures.path import draw_in_space
 from orchestration.figures.run import Run
 from orchestration.figures.style import Style
+from orchestration.flight.errors import ERRORS, Error, draw_components
+from orchestration.flight.path import draw_in_space
 from orchestration.quadrotor.measures import position_error
 from orchestration.runs.draw import runs_of
 from orchestration.runs.result import Result

@@ -7,10 +7,10 @@ import numpy as np
 
 import quadcosim
 from docs.experiments import random_starts
+from orchestration.flight.hover_loop import HoverLoop
+from orchestration.flight.local_limit import local_limit
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.stability.hover_loop import HoverLoop
-from orchestration.stability.local_limit import local_limit
 
 Array = Any
 

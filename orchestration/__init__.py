@@ -3,6 +3,8 @@
 from importlib import import_module
 from typing import Any
 
+import orchestration.flight  # noqa: F401 - what is drawn and judged of a flight enters the tables of the rooms below
+
 
 def __getattr__(name: str) -> Any:
     """What the API has under this name, for programs written when this package was the API."""

@@ -1,7 +1,8 @@
-"""Looking for the first value that fails, by a scan upward and bisection."""
+"""Looking for the first value that fails: where, by a scan upward, and bisection."""
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -17,6 +18,24 @@ class Bracket(NamedTuple):
     """does not fail; None: the first value of the scan fails"""
     bad: float
     """fails"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Range:
+    """How a quantity is scanned: `before`, then from `first` in steps to `last`; then bisected to `tolerance`."""
+
+    before: tuple[float, ...] = ()
+    first: float
+    step: float
+    last: float
+    tolerance: float
+    unit: str = " s"
+
+    def values(self) -> list[float]:
+        """The scan, upward."""
+        count = math.floor((self.last - self.first) / self.step + 1e-9)
+        steps = (float(f"{self.first + i * self.step:.12g}") for i in range(count + 1))
+        return [*(value for value in self.before if value < self.first), *steps]
 
 
 def first_failure(

@@ -62,6 +62,16 @@ def strict(place: str = "") -> Callable[[Class], Class]:
     return decorated
 
 
+def called(words: str) -> Callable[[Class], Class]:
+    """What an error says is expected where a value of a class, mostly a protocol, is not given."""
+
+    def decorated(cls: Class) -> Class:
+        _WORDS[cls] = words
+        return cls
+
+    return decorated
+
+
 def _short(self: Any) -> str:
     """The class with the fields that differ from their defaults, long ones cut."""
     given = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
@@ -108,7 +118,7 @@ def _check_of(hint: Any) -> Check:
     return lambda place, value: value  # one of some words: that is checked with what the field means
 
 
-_WORDS = {int: "a valid integer", str: "a valid string", bool: "a valid boolean"}
+_WORDS: dict[type, str] = {int: "a valid integer", str: "a valid string", bool: "a valid boolean"}
 
 
 def _kind(kinds: tuple[type, ...], expected: str) -> Check:

@@ -273,12 +273,11 @@ def ssp(
 ) -> Answer:
     """Write FMUs, connections and parameters as one SSP 1.0 file for other tools, and beside it its timing."""
     from orchestration.building import fmus
-    from orchestration.quadrotor.scenario import Scenario
     from orchestration.requests.ssp import writing
 
     asked = request_from(scenario, flags)
-    if isinstance(asked, Scenario) or scenario is None:
-        usual = fmus.default_folder() / f"{writing.NAME}.ssp"
+    if asked.title is not None or scenario is None:
+        usual = fmus.default_folder() / f"{asked.title}.ssp"
     else:
         usual = Path(f"{scenario.stem}.ssp")
     written, timing = writing.write_with_timing(asked, out or usual, say, warn)

@@ -13,10 +13,9 @@ from orchestration.command.shared_flags import takes
 from orchestration.quadrotor.timing import TIMING_KEYS
 
 if TYPE_CHECKING:
-    from orchestration.quadrotor.parameters import Parameter
     from orchestration.quadrotor.scenario import Scenario
-    from orchestration.requests.request import Request
-    from orchestration.system.model import System
+    from orchestration.system.model import Parameter, System
+    from orchestration.system.request import Request
 
 TIMING, EFFECTS, MODEL = "Timing", "What goes wrong", "What flies"
 

@@ -42,7 +42,7 @@ def interop(
     from orchestration.interop import table
     from orchestration.interop.catalogue import chosen
     from orchestration.interop.compare import agreements
-    from orchestration.requests.request import system_meant
+    from orchestration.system.request import system_meant
 
     asked = request_from(scenario, flags, timing)
     tools = chosen(tool, system_meant(asked).components)

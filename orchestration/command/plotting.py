@@ -13,7 +13,7 @@ from orchestration.command import registry as registering
 from orchestration.command.answer import Answer, of_files
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.shared_flags import takes
-from orchestration.figures.names import FLIGHT
+from orchestration.flight.names import FIGURES
 
 if TYPE_CHECKING:
     from orchestration.runs.result import Result
@@ -32,7 +32,7 @@ def plot(
     figure: Annotated[
         list[str] | None,
         typer.Option(
-            "--figure", help=f"One of {', '.join(FLIGHT)}; all unless told.", metavar="NAME", show_default=False
+            "--figure", help=f"One of {', '.join(FIGURES)}; all unless told.", metavar="NAME", show_default=False
         ),
     ] = None,
     out: Annotated[

@@ -63,9 +63,9 @@ def sweep(
 
 def status(study: StudyFile, out: Out = None) -> Answer:
     """Tell how far a study is, also while it runs in another process."""
-    from orchestration.studies.store import open_for_reading
+    from orchestration.studies.store import open_for_reading, store_path
     from orchestration.studies.study_file import load_study
-    from orchestration.studies.sweep import AGREEMENT, TOTAL, expect_current, store_path
+    from orchestration.studies.sweep import AGREEMENT, TOTAL, expect_current
     from orchestration.workers.batching import Agreement
 
     chosen = load_study(study)
@@ -106,7 +106,7 @@ def export(
 ) -> Answer:  # fmt: skip
     """Write the rows of a study, or the signals and events of a run, as CSV, MAT or Parquet, with their units."""
     from orchestration.studies import exporting
-    from orchestration.studies.sweep import store_path
+    from orchestration.studies.store import store_path
 
     if what.is_dir() and not store_path("", what).is_file():
         return of_files(exporting.of_run(what, out or what, formats or ()))
@@ -264,8 +264,8 @@ def margin(
     flags: FlightFlags,
 ) -> Answer:
     """Tell what delay the loop about hover stands: a constant one exactly, one that varies by bounds from theory."""
+    from orchestration.flight.margin import margin_of
     from orchestration.quadrotor.scenario import Scenario
-    from orchestration.stability.margin import margin_of
 
     chosen = request_from(scenario, flags)
     if not isinstance(chosen, Scenario):
@@ -286,9 +286,9 @@ def _batch_or(engine: str | None) -> "Engine | Literal['batch'] | None":
 
 def _current_store(study: Path, out: Path | None) -> Path:
     """The store of a study file that has not changed since it was flown."""
-    from orchestration.studies.store import open_for_reading
+    from orchestration.studies.store import open_for_reading, store_path
     from orchestration.studies.study_file import load_study
-    from orchestration.studies.sweep import expect_current, store_path
+    from orchestration.studies.sweep import expect_current
 
     chosen = load_study(study)
     path = store_path(chosen.name, out)

@@ -67,16 +67,16 @@ def show(
     flags: FlightFlags,
 ) -> Answer:
     """Show a system: components with their rates, connections with their delay, jitter, loss and hold, units."""
-    from orchestration.requests.request import system_meant
     from orchestration.system.description import as_text
-    from orchestration.system.system_file import to_tables
+    from orchestration.system.request import system_meant
+    from orchestration.system.written import tables_of
 
     meant = system_meant(request_from(system, flags, timing))
     if out is not None:
         from orchestration.figures import diagram
 
         say(str(diagram.write(meant, out)))
-    return Answer(document=to_tables(meant), lines=as_text(meant, _units_of(meant)).splitlines())
+    return Answer(document=tables_of(meant), lines=as_text(meant, _units_of(meant)).splitlines())
 
 
 def _units_of(system: "System") -> dict[str, str]:

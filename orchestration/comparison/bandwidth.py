@@ -1,43 +1,25 @@
-"""The bandwidth of a controller's attitude loop, by which controllers of any structure are put side by side."""
+"""The bandwidth of each controller's loop, by which controllers of any structure are put side by side."""
 
-import math
 from collections.abc import Mapping
 
-import numpy as np
-
 from orchestration.building import fmus
+from orchestration.comparison.crossovers import CROSSOVERS
 from orchestration.comparison.design import FMU, Comparison, Controller, Craft
 from orchestration.fmi.model import read_model
-from orchestration.fmi.reuse import Instances
-from orchestration.quadrotor import wiring
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.runs.simulation import prepared
-from orchestration.stability.hover_loop import at_hover
 from orchestration.studies.axes import Value
-from orchestration.system.model import System
+from orchestration.system.request import ControlLoop
 
 Key = tuple[str, str, Value]
 """Controller, vehicle, value of the axis"""
 Bandwidths = Mapping[Key, float]
-PERIOD = 1e-3
-"""[s] between samples while it is asked; a redesign for longer ones has other gains by design"""
-RANGE, FIRST = (0.1, 1000.0), 20.0
-"""[rad/s] in which it is looked for, and where first"""
-ACCURACY = 1e-3
-"""of the gain"""
-AMPLITUDE = 1e-4
-"""of roll [rad]"""
-CYCLES = 6
-"""of the oscillation; the second half of them counts"""
 _OF_THE_PERIOD = ("hold_period", "prediction")
-_ROLL, _SCALAR, _RATE = (
-    wiring.MEASUREMENT.index(name) for name in ("quaternion.x", "quaternion.w", "angular_velocity.x")
-)
-_TORQUE = wiring.COMMAND.index("torque.x")
 
 
 def bandwidths(comparison: Comparison) -> dict[Key, float]:
     """Of every controller on every vehicle [rad/s], at each value of the axis; only tuned ones differ there."""
+    crossover = CROSSOVERS.of(comparison.base.kind)
+    if crossover is None:
+        return {}
     found: dict[Key, float] = {}
     for controller in comparison.controllers:
         for vehicle in comparison.vehicles:
@@ -45,72 +27,19 @@ def bandwidths(comparison: Comparison) -> dict[Key, float]:
             for value in comparison.values:
                 tuned = tuple(sorted(controller.tuned.get((vehicle.name, value), {}).items()))
                 if tuned not in known:
-                    known[tuned] = controller.bandwidth or crossover(_scenario(comparison, controller, vehicle, tuned))
+                    known[tuned] = controller.bandwidth or crossover(_loop(comparison, controller, vehicle, tuned))
                 found[controller.name, vehicle.name, value] = known[tuned]
     return found
 
 
-def crossover(scenario: Scenario) -> float:
-    """Where the open attitude loop, from roll through the controller and 1/(J s²) back, has the gain one [rad/s].
-
-    The controller is shown a small oscillation of roll about hover, all else at rest, and its torque about x is what
-    follows it: so it is that of the FMU, whatever its law and its memory. J is the plant's. `math.inf` or 0 where the
-    gain does not pass one within `RANGE`.
-    """
-    inertia, fleet = _inertia(scenario), Instances()
-    hover = at_hover(scenario.with_changes(timing={"period": PERIOD, "plant_interval": PERIOD}))
-    frequency, (low, high) = FIRST, RANGE
-    while low < frequency < high:
-        gain = response(hover, frequency, fleet) / (inertia * frequency**2)
-        if abs(gain - 1.0) < ACCURACY:
-            return frequency
-        frequency *= gain ** (1.0 / 1.5)  # it falls with the first to the second power of the frequency
-    return 0.0 if frequency <= low else math.inf
-
-
-def response(hover: System, frequency: float, fleet: Instances) -> float:
-    """By how much the torque about x answers to an oscillation of roll at hover [N.m/rad]; `frequency` in rad/s."""
-    count = max(40, math.ceil(2.0 * math.pi * CYCLES / frequency / PERIOD))
-    times = PERIOD * np.arange(count)
-    torque, command = np.empty(count), np.zeros(len(wiring.COMMAND))
-    measured = np.zeros(len(wiring.MEASUREMENT))
-    with prepared(hover, load=fleet.load) as flight:
-        controller = flight.instances["controller"]
-        write, read = controller.writer(wiring.MEASUREMENT, measured), controller.reader(wiring.COMMAND, command)
-        measured[_SCALAR] = 1.0
-        controller.enter_initialization(0.0, float(times[-1]) + 1.0)
-        write()
-        controller.exit_initialization()
-        for k, t in enumerate(times):
-            half = 0.5 * AMPLITUDE * math.sin(frequency * t)
-            measured[_ROLL], measured[_SCALAR] = math.sin(half), math.cos(half)
-            measured[_RATE] = AMPLITUDE * frequency * math.cos(frequency * t)
-            write()
-            controller.step(float(t), PERIOD)
-            read()
-            torque[k] = command[_TORQUE]
-    late = times >= times[-1] / 2.0  # what began with the oscillation has died out
-    phase = frequency * times[late]
-    shapes = np.column_stack([np.sin(phase), np.cos(phase), np.ones(len(phase)), times[late]])
-    (a, b, *_), *_ = np.linalg.lstsq(shapes, torque[late], rcond=None)
-    return math.hypot(a, b) / AMPLITUDE
-
-
-def _scenario(
+def _loop(
     comparison: Comparison, controller: Controller, vehicle: Craft, tuned: tuple[tuple[str, Value], ...]
-) -> Scenario:
+) -> ControlLoop:
     fmu = comparison.fmu_of(controller)
     sets = {**comparison.told(vehicle, controller), **controller.sets, **dict(tuned)}
-    parameters = {target: value for target, value in sets.items() if target != FMU}
     known = read_model(fmus.locate(fmu)).variables
-    parameters |= {f"controller.{name}": 0.0 for name in _OF_THE_PERIOD if name in known}
-    plant = comparison.base.plant.fmu
-    base = comparison.base.with_fmus(plant=fmus.native_twin(plant) if comparison.native else plant, controller=fmu)
-    return base.with_changes(parameters=parameters)
-
-
-def _inertia(scenario: Scenario) -> float:
-    name = "inertia.xx"
-    if name in scenario.plant.parameters:
-        return float(scenario.plant.parameters[name])
-    return float(read_model(fmus.locate(scenario.plant.fmu)).variables[name].start or 1.0)
+    sets |= {f"controller.{name}": 0.0 for name in _OF_THE_PERIOD if name in known}
+    plant = comparison.base.as_system().fmus["plant"]
+    return comparison.base.with_values(
+        {**sets, FMU: fmu, "plant.fmu": fmus.native_twin(plant) if comparison.native else plant}
+    )

@@ -3,26 +3,19 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
-from fmu_kit.trajectory import Trajectory
 from orchestration.basics.constructors import strict
 from orchestration.basics.errors import UsageError
 from orchestration.building import fmus
-from orchestration.quadrotor.initial_conditions import Start, Starts
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.translation import paths_of
-from orchestration.quadrotor.vehicle import Vehicle
-from orchestration.quadrotor.wiring import TRAJECTORY
 from orchestration.studies.axes import Axis, Value
 from orchestration.studies.linked_settings import Key, Together
 from orchestration.studies.study import Study
 from orchestration.system.paths import value_at
+from orchestration.system.request import ControlLoop, Ensemble, Start, Values
+from orchestration.system.request import Craft as Vehicle
 
 VEHICLE, CONDITION, CONTROLLER, START = "vehicle", "condition", "controller", "start"
 FMU = "controller.fmu"
-Changes = Mapping[str, Value]
-"""Values by target, as axes of studies name them"""
 
 
 @strict()
@@ -31,8 +24,8 @@ class Controller:
     """One that is compared: an FMU with parameters."""
 
     name: str
-    sets: Changes = field(default_factory=dict)
-    tuned: Mapping[Key, Changes] = field(default_factory=dict)
+    sets: Values = field(default_factory=dict)
+    tuned: Mapping[Key, Values] = field(default_factory=dict)
     """what it is set to beside, by vehicle and value of the axis"""
     bandwidth: float | None = None
     """of its attitude loop [rad/s]; None: that of the FMU about hover"""
@@ -44,7 +37,8 @@ class Craft:
     """A vehicle that they fly."""
 
     name: str
-    vehicle: Vehicle = field(default_factory=lambda: Vehicle(name="base"))
+    vehicle: Vehicle | None = None
+    """what it is; None: the plant of the base"""
 
 
 @strict()
@@ -53,7 +47,7 @@ class Condition:
     """What differs from what a controller believes, or goes wrong: mass, lag, wind, losses."""
 
     name: str
-    sets: Changes = field(default_factory=dict)
+    sets: Values = field(default_factory=dict)
     multiplies: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -86,7 +80,7 @@ class Comparison:
 
     name: str
     """The name of the comparison, and of the folder of its store in `results`."""
-    base: Scenario
+    base: ControlLoop
     """The scenario that all flights begin from."""
     controllers: tuple[Controller, ...]
     """Who is compared."""
@@ -96,7 +90,7 @@ class Comparison:
     """What differs from what a controller believes, or goes wrong."""
     axis: Axis
     """What is varied, over growing values."""
-    starts: Starts
+    starts: Ensemble
     """The initial states, the same for all."""
     front: Front = field(default_factory=Front)
     """The two objectives that are weighed against each other."""
@@ -127,9 +121,7 @@ class Comparison:
     @cached_property
     def drawn(self) -> tuple[Start, ...]:
         """The starts, around the beginning of the base's trajectory."""
-        given = self.base.controller.parameters
-        fields: dict[str, Any] = {field: given[name] for name, field in TRAJECTORY.items() if name in given}
-        return self.starts.drawn(Trajectory(**fields))
+        return tuple(self.starts.starts_of(self.base))
 
     @cached_property
     def study(self) -> Study:
@@ -160,23 +152,21 @@ class Comparison:
 
     def fmu_of(self, controller: Controller) -> str:
         """The FMU of a controller, by name or path."""
-        fmu = str(controller.sets.get(FMU, self.base.controller.fmu))
+        fmu = str(controller.sets.get(FMU, self.base.as_system().fmus["controller"]))
         return fmus.native_twin(fmu) if self.native else fmu
 
     def told(self, craft: Craft, controller: Controller) -> dict[str, Value]:
         """What the plant is made of on a vehicle, and what this controller is told of it."""
-        sides = {"plant": craft.vehicle.plant, "controller": craft.vehicle.for_controller(self.fmu_of(controller))}
-        return {f"{side}.{name}": value for side, table in sides.items() for name, value in table.items()}
+        return {} if craft.vehicle is None else dict(craft.vehicle.told(self.fmu_of(controller)))
 
-    def _told(self) -> dict[Key, Changes]:
+    def _told(self) -> dict[Key, Values]:
         return {(v.name, one.name): self.told(v, one) for v in self.vehicles for one in self.controllers}
 
-    def _tuned(self) -> dict[Key, Changes]:
+    def _tuned(self) -> dict[Key, Values]:
         return {(one.name, *key): changes for one in self.controllers for key, changes in one.tuned.items()}
 
     def _begun(self, index: int, start: Start) -> dict[str, Value]:
-        seed = self.base.seed + self.starts.first + index
-        return {**{f"plant.{name}": value for name, value in start.parameters.items()}, "seed": seed}
+        return {**start.values, "seed": self.base.seed + self.starts.first + index}
 
     def cells(self) -> Iterator[Cell]:
         """All, in the order of their indices."""
@@ -207,32 +197,13 @@ class Comparison:
         """The indices of its runs in the study."""
         return range(cell.index * len(self.drawn), (cell.index + 1) * len(self.drawn))
 
-    def scenario(self, index: int, starts: Mapping[str, float]) -> Scenario:
-        """A run of the study as the scenario that it is; `starts` are the FMUs' own parameters, as COMPONENT.NAME."""
+    def request(self, index: int, starts: Mapping[str, float]) -> ControlLoop:
+        """A run of the study by itself, as the base is written; `starts` are the FMUs' own parameters."""
         system = self.study.system(index, starts)
         targets = [*self.axis.targets, *(target for each in self.study.together for target in each.targets)]
-        values = {target: value_at(system, path) for target in targets for path in paths_of(target)[:1]}
-        timing, parameters, fields = _by_table({target: v for target, v in values.items() if v is not None}, self.base)
-        return self.base.with_changes(timing=timing, parameters=parameters, **fields).with_fmus(**system.fmus)
-
-
-def _by_table(values: Mapping[str, Any], base: Scenario) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
-    """Timing keys, parameters and the fields of a scenario, from values by target."""
-    timing: dict[str, Any] = {}
-    parameters: dict[str, Any] = {}
-    fields: dict[str, Any] = {}
-    for target, value in values.items():
-        table, _, key = target.partition(".")
-        if table == "timing":
-            kind, _, name = key.partition(".")
-            alike = ("measurement_loss", "command_loss") if key == "loss" else (kind,)
-            given = {**getattr(base.timing, kind), **timing.get(kind, {}), name: value} if name else value
-            timing |= dict.fromkeys(alike, given)
-        elif key and target != FMU:
-            parameters[target] = value
-        elif not key:
-            fields[target] = value
-    return timing, parameters, fields
+        values = {target: value_at(system, path) for target in targets for path in self.base.paths_of(target)[:1]}
+        fmus = {f"{name}.fmu": fmu for name, fmu in system.fmus.items()}
+        return self.base.with_values({**{target: v for target, v in values.items() if v is not None}, **fmus})
 
 
 def _named(name: str, ones: Sequence[Controller] | Sequence[Craft] | Sequence[Condition]) -> Axis:

@@ -9,13 +9,11 @@ from typing import Any, ClassVar
 from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError
 from orchestration.comparison.design import FMU, Comparison, Condition, Controller, Craft, Front
-from orchestration.quadrotor.initial_conditions import Starts
-from orchestration.quadrotor.parameters import parameters_in
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.vehicle import Vehicle, load_vehicle
 from orchestration.studies.axes import Value
 from orchestration.studies.linked_settings import Key
-from orchestration.studies.study_file import AxisTable, axis_of, load, scenario_of
+from orchestration.studies.study_file import AxisTable, axis_of, load, loop_of
+from orchestration.system.parameters import parameters_in
+from orchestration.system.request import ControlLoop
 
 _FORBID: dict[str, str] = {"extra": "forbid"}
 
@@ -76,13 +74,6 @@ class FrontTable(Front):
 
 
 @dataclass(frozen=True, kw_only=True)
-class StartsTable(Starts):
-    """`[starts]`: the ensemble."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
-
-
-@dataclass(frozen=True, kw_only=True)
 class ComparisonFile:
     """The file: a scenario, or the path of one, and what is compared on it."""
 
@@ -96,7 +87,7 @@ class ComparisonFile:
     """The vehicles; without any, that of the base."""
     conditions: list[ConditionTable] = field(default_factory=lambda: [ConditionTable(name="nominal")])
     """What else each is flown under; without any, nothing but the base."""
-    starts: StartsTable = field(default_factory=StartsTable)
+    starts: dict[str, Any] = field(default_factory=dict)
     """The initial states that every controller is flown from."""
     front: FrontTable = field(default_factory=FrontTable)
     """The two objectives that are weighed against each other."""
@@ -119,25 +110,25 @@ def load_comparison(path: str | Path) -> Comparison:
 
 def _comparison(file: ComparisonFile, path: Path) -> Comparison:
     folder = path.parent
-    base = scenario_of(file, folder)
+    base = loop_of(file, folder)
     axis = axis_of(file.axis, folder)
     crafts = _crafts(file.vehicles, base, folder)
     keys = [(craft.name, value) for craft in crafts for value in axis.values or ()]
     return Comparison(
         name=file.name or path.stem,
-        base=dataclasses.replace(base, vehicle=None),
+        base=base.without_vehicle(),
         controllers=tuple(_controller(table, keys, folder) for table in file.controllers),
         vehicles=crafts,
         conditions=tuple(_condition(table) for table in file.conditions),
         axis=axis,
-        starts=Starts(**_fields(file.starts, Starts)),
+        starts=base.ensemble(file.starts),
         front=Front(**_fields(file.front, Front)),
     )
 
 
-def _crafts(tables: list[VehicleTable], base: Scenario, folder: Path) -> tuple[Craft, ...]:
+def _crafts(tables: list[VehicleTable], base: ControlLoop, folder: Path) -> tuple[Craft, ...]:
     if base.vehicle is None:
-        return tuple(_craft(table, folder) for table in tables or [VehicleTable(name="base")])
+        return tuple(_craft(table, base, folder) for table in tables or [VehicleTable(name="base")])
     if tables:
         raise UsageError("base.vehicle and vehicles: expected one of them")
     return (Craft(name=base.vehicle.name, vehicle=base.vehicle),)
@@ -176,18 +167,10 @@ def _filled(name: str, vehicle: str, value: Value) -> str:
         ) from None
 
 
-def _craft(table: VehicleTable, folder: Path) -> Craft:
-    given = Vehicle(name=table.name) if table.vehicle is None else load_vehicle(table.vehicle, folder)
+def _craft(table: VehicleTable, base: ControlLoop, folder: Path) -> Craft:
     place = f"vehicles.{table.name}"
     plant, own = parameters_in(table.plant, f"{place}.plant"), parameters_in(table.controller, f"{place}.controller")
-    controllers = {fmu: {**parameters, **own} for fmu, parameters in given.controllers.items()}
-    vehicle = Vehicle(
-        name=given.name,
-        plant={**given.plant, **plant},
-        controller={**given.controller, **own},
-        controllers=controllers,
-    )
-    return Craft(name=table.name, vehicle=vehicle)
+    return Craft(name=table.name, vehicle=base.craft(table.vehicle, folder, plant=plant, controller=own))
 
 
 def _condition(table: ConditionTable) -> Condition:

@@ -15,13 +15,14 @@ from orchestration.comparison.design import Comparison
 from orchestration.comparison.outcome import Outcome, concluded, write
 from orchestration.engines.engine import Engine
 from orchestration.engines.wiring import checked
-from orchestration.quadrotor.translation import in_its_own_words
 from orchestration.results import html
 from orchestration.runs.run_directory import keep_flight
 from orchestration.runs.simulation import run as fly
-from orchestration.studies.sweep import store_path, sweep
+from orchestration.studies.store import store_path
+from orchestration.studies.sweep import sweep
 from orchestration.studies.swept import Swept
 from orchestration.studies.table import export, frame
+from orchestration.system.request import in_its_own_words
 from orchestration.workers.batching import TOLERATED
 from orchestration.workers.executors import Pool
 
@@ -151,5 +152,5 @@ def flight(comparison: Comparison, index: int, start: int, out: Path, *, engine:
     if not 0 <= start < len(runs):
         raise UsageError(f"--start {start}: expected a number from 0 to {len(runs) - 1}")
     study = comparison.study
-    scenario = comparison.scenario(runs[start], study.files().starts_of(study.origin))
-    keep_flight(out, lambda to: fly(scenario, recorder=to, engine=engine))
+    request = comparison.request(runs[start], study.files().starts_of(study.origin))
+    keep_flight(out, lambda to: fly(request, recorder=to, engine=engine))

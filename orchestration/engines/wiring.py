@@ -19,6 +19,7 @@ from orchestration.engines.sources import (
     by_name,
     gusts,
 )
+from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD, TRAJECTORY
 from orchestration.fmi.model import NUMERIC, Model
 from orchestration.fmi.values import number_of
 from orchestration.results import objectives
@@ -31,13 +32,6 @@ from orchestration.signals.waypoints import read_waypoints
 from orchestration.system.check import check, recorded
 from orchestration.system.model import MOTION, Component, Source, System, variable_of
 from orchestration.system.times import Grid, exact_nanoseconds
-
-SAMPLE_PERIOD, SAMPLE_OFFSET = "sample_period", "sample_offset"
-"""Parameters by which a component built on `fmu_kit` is given a clock of its own; 0: it samples at every step"""
-
-
-TRAJECTORY = ("amplitude_x", "amplitude_y", "frequency", "start_z", "rate_z")
-"""Parameters trajectory.* of a component, and the fields of `Trajectory` that they are"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +52,7 @@ def checked(system: System, models: Mapping[str, Model]) -> Checked:
     for name, component in system.components.items():
         _expect_clock(name, component, models[name])
     parameters = _parameters(system, models)
-    system = objectives.known(system, _signals(system, models), set(parameters))
+    system = objectives.known(system, signals_of(system, models), set(parameters))
     return Checked(system=system, parameters=parameters, units=units(system, models))
 
 
@@ -96,7 +90,7 @@ def _parameters(system: System, models: Mapping[str, Model]) -> dict[str, float]
     return found
 
 
-def _signals(system: System, models: Mapping[str, Model]) -> set[str]:
+def signals_of(system: System, models: Mapping[str, Model]) -> set[str]:
     """Everything that is recorded, or comes from a source."""
     found = {f"{name}.{variable}" for name, variables in recorded(system, models).items() for variable in variables}
     return found.union(columns_of(system)) - {"time"}
@@ -112,8 +106,8 @@ def source_values(system: System, name: str, parameters: Mapping[str, float], st
     if source.trajectory is None:
         values = _of_file_or_signal(system, name, streams)
         return values if source.scale == 1.0 else Scaled(values, source.scale)
-    owner = f"{source.trajectory}.trajectory."
-    given = {field: parameters[owner + field] for field in TRAJECTORY if owner + field in parameters}
+    own = {f"{source.trajectory}.{name}": field for name, field in TRAJECTORY.items()}
+    given = {field: parameters[name] for name, field in own.items() if name in parameters}
     return BuiltIn(Trajectory(**given))
 
 

@@ -16,8 +16,8 @@ from orchestration.basics.simulator import Floats
 from orchestration.interop.catalogue import Tool
 from orchestration.interop.flights import Flights
 from orchestration.interop.trace import Trace
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.system.model import System, component_of
+from orchestration.system.model import component_of
+from orchestration.system.request import Request
 
 MISSING = 1
 """Steps before the end that a tool may leave out: some stop where the next step would end beyond it."""
@@ -49,7 +49,7 @@ class Agreement:
 
 
 def agreements(
-    asked: Scenario | System,
+    asked: Request,
     tools: Sequence[Tool],
     *,
     announce: Callable[[str], None] | None = None,

@@ -17,13 +17,12 @@ from orchestration.interop.catalogue import Tool
 from orchestration.interop.copies import expect_traceable, traced_copy
 from orchestration.interop.trace import Trace, read_trace
 from orchestration.processes import subprocesses
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.translation import in_its_own_words, system_of
 from orchestration.requests.ssp import writing
 from orchestration.requests.ssp.carried import Part, carried, has_clock, wholly_carried
 from orchestration.runs.simulation import prepared
 from orchestration.system.model import Parameter, System
 from orchestration.system.paths import changed
+from orchestration.system.request import Request, in_its_own_words
 from orchestration.system.times import exact_nanoseconds
 
 _TEMPORARY = ("TMPDIR", "TEMP", "TMP")
@@ -36,10 +35,10 @@ Start = dict[str, tuple[tuple[float, ...], tuple[float, ...]]]
 class Flights:
     """One system, flown by whom it is asked of; raises as `compare.agreements` does."""
 
-    def __init__(self, asked: Scenario | System, folder: Path, announce: Callable[[str], None] | None) -> None:
+    def __init__(self, asked: Request, folder: Path, announce: Callable[[str], None] | None) -> None:
         self._folder = folder
         with in_its_own_words(asked):
-            system = _in_order(system_of(asked) if isinstance(asked, Scenario) else asked, "gauss-seidel")
+            system = _in_order(asked.as_system(), "gauss-seidel")
             given = wholly_carried(system, announce)
             self._fmus = {part.name: part.fmu.absolute() for part in given.parts}
             self._system = _with_fmus(system, self._fmus)

@@ -5,8 +5,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
+from orchestration.basics.bisection import Range
 from orchestration.basics.statistics import refutes, wilson
-from orchestration.requests.ranges import Range, Varied
+from orchestration.requests.ranges import Varied
 from orchestration.studies.criteria import judged
 from orchestration.system.model import System
 from orchestration.workers.executors import Pool

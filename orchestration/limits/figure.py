@@ -12,19 +12,17 @@ from orchestration.basics.errors import UsageError
 from orchestration.figures.palette import BLUE, GREY, ORANGE, RED
 from orchestration.figures.style import SCREEN, Style
 from orchestration.limits.evaluation import RELIABILITY, Tried
-from orchestration.limits.limit import Limit
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.requests.request import Request, system_meant
+from orchestration.limits.found import Found
 from orchestration.results import display_names as labels
-from orchestration.stability.hover_loop import HoverLoop
-from orchestration.stability.local_limit import radius
+from orchestration.stability.known_loops import LOOPS
 from orchestration.studies import figures
 from orchestration.studies.criteria import edge
+from orchestration.system.request import Request, system_meant
 
 _PLACES = ("components", "connections", "sources")
 
 
-def measured(found: Limit, edge: float | None, style: Style = SCREEN) -> Figure:
+def measured(found: Found, edge: float | None, style: Style = SCREEN) -> Figure:
     """What the criterion is about over the quantity, or the share of good seeds, with the limits.
 
     `edge` is where the criterion draws the line; None where it is no plain bound.
@@ -54,7 +52,7 @@ def in_words(path: str) -> str:
     return labels.setting(path if "." in path else f"timing.{path}")
 
 
-def _values(axes: Axes, found: Limit, scale: float, edge: float | None) -> None:
+def _values(axes: Axes, found: Found, scale: float, edge: float | None) -> None:
     """One run a value: what the criterion is about, or good and not good where that has no value."""
     known = [one for one in found.tried if one.measured is not None]
     if not known:
@@ -83,7 +81,7 @@ def _values(axes: Axes, found: Limit, scale: float, edge: float | None) -> None:
     axes.set_ylabel(labels.with_unit(labels.metric(found.judged or ""), found.judged_unit))
 
 
-def _shares(axes: Axes, found: Limit, scale: float) -> None:
+def _shares(axes: Axes, found: Found, scale: float) -> None:
     """Many runs a value: the share of seeds that are good, with its interval where all were run."""
     shares = [one.flew / one.runs for one in found.tried]
     _drawn(axes, found.tried, shares, scale)
@@ -112,7 +110,7 @@ def is_good(tried: Tried) -> bool:
     return tried.flew == tried.runs
 
 
-def _limits(axes: Axes, found: Limit, scale: float, unit: str | None) -> None:
+def _limits(axes: Axes, found: Found, scale: float, unit: str | None) -> None:
     """The limits as lines, and what lies beyond the measured one shaded."""
     named = (
         (found.large_signal_limit, RED, "-", "measured limit"),
@@ -127,7 +125,7 @@ def _limits(axes: Axes, found: Limit, scale: float, unit: str | None) -> None:
         axes.axvspan(found.large_signal_limit * scale, right, color=RED, alpha=0.06, linewidth=0.0)
 
 
-def _title(found: Limit, scale: float, unit: str | None) -> str:
+def _title(found: Found, scale: float, unit: str | None) -> str:
     what, until = in_words(found.of), f", in runs of {found.horizon:g} s"
     if found.large_signal_limit is not None:
         return f"Good up to {_shown(found.large_signal_limit, scale, unit)}: {what}{until}"
@@ -135,7 +133,7 @@ def _title(found: Limit, scale: float, unit: str | None) -> str:
     return f"{what}: {'good throughout' if is_good(first) else 'never good'}{until}"
 
 
-def _scale(found: Limit) -> tuple[float, str | None]:
+def _scale(found: Found) -> tuple[float, str | None]:
     """What to multiply values with to be read, and their unit then: times below two seconds are in milliseconds."""
     largest = max((one.value for one in found.tried), default=0.0)
     return (1e3, "ms") if found.unit == "s" and largest < 2.0 else (1.0, found.unit)
@@ -150,28 +148,30 @@ def _with_margin(values: list[float]) -> tuple[float, float]:
     return min(values) - room, max(values) + room
 
 
-def draw_limit(request: Request, found: Limit, folder: Path, style: Style = SCREEN) -> list[Path]:
-    """Draw what was measured, with both limits; of the quadrotor over period or delay the spectral radius too."""
+def draw_limit(request: Request, found: Found, folder: Path, style: Style = SCREEN) -> list[Path]:
+    """Draw what was measured, with both limits, and the spectral radius where a loop is known over the quantity."""
     system = system_meant(request)
     bound = None if found.judged is None else edge(system, found.judged)
     name = "limit_" + re.sub(r"[^A-Za-z0-9]+", "_", found.of).strip("_")
     written = figures.save(lambda how: measured(found, bound, how), folder / name, style)
-    if isinstance(request, Scenario) and found.of in ("period", "delay"):
-        with contextlib.suppress(UsageError):  # where linear theory about hover does not apply
-            written += draw_spectral_radius(request, found, folder, style)
+    with contextlib.suppress(UsageError):  # where linear theory does not apply
+        written += draw_spectral_radius(request, found, folder, style)
     return written
 
 
-def draw_spectral_radius(scenario: Scenario, found: Limit, folder: Path, style: Style = SCREEN) -> list[Path]:
-    """Draw the spectral radius of the loop about hover over the period or the delay; the paths of the figure.
+def draw_spectral_radius(request: Request, found: Found, folder: Path, style: Style = SCREEN) -> list[Path]:
+    """Draw the spectral radius of the loop over the quantity; the paths of the figure, none where no loop is known.
 
     Raises `UsageError` where linear theory does not apply.
     """
+    known = LOOPS.of(request.kind)
+    radius = None if known is None else known.radius_over(request, found.of)
+    if radius is None:
+        return []
     ends = [limit for limit in (found.local_limit, found.large_signal_limit) if limit is not None]
     last = 1.3 * max(ends, default=0.1)
     values = np.array([0.001 + i / 199.0 * (last - 0.001) for i in range(200)])
-    loop = HoverLoop.of(scenario)
-    radii = np.array([radius(loop, scenario, found.of, value) for value in values])
+    radii = np.array([radius(value) for value in values])
     return figures.save(
         lambda how: figures.spectral_radius(
             found.of,

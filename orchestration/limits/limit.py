@@ -1,12 +1,11 @@
 """The largest value of a quantity that is still good: measured, and beside it the local limit."""
 
-import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from orchestration.basics.bisection import Bracket, bisected, first_failure
+from orchestration.basics.bisection import Bracket, Range, bisected, first_failure
 from orchestration.basics.errors import UsageError
 from orchestration.basics.extras import explained
 from orchestration.basics.progress import ShareHeard, of_share
@@ -14,16 +13,14 @@ from orchestration.basics.terminal import say
 from orchestration.building.inputs import Files, files_of
 from orchestration.engines.engine import Engine
 from orchestration.engines.wiring import checked
-from orchestration.limits.evaluation import RELIABILITY, Trials, Tried, is_random, said
-from orchestration.quadrotor.measures import Outcome
-from orchestration.quadrotor.scenario import Record, Scenario
-from orchestration.quadrotor.timing import Timing
-from orchestration.quadrotor.translation import in_its_own_words
-from orchestration.requests.ranges import Range, Varied, range_asked_for
-from orchestration.requests.request import Request, system_meant
+from orchestration.limits.evaluation import RELIABILITY, Trials, is_random, said
+from orchestration.limits.found import Continuous, Found
+from orchestration.requests.ranges import Varied, range_asked_for
 from orchestration.results import html
-from orchestration.stability.local_limit import Local, local_limits
+from orchestration.stability.known_loops import Local
+from orchestration.stability.local_limit import local_limits
 from orchestration.studies.criteria import judged
+from orchestration.system.request import Request, in_its_own_words, system_meant
 from orchestration.workers.executors import Pool
 
 if TYPE_CHECKING:
@@ -41,64 +38,9 @@ CONTINUOUS = 1e-4
 """[s], the period of the flight that stands for continuous time"""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Continuous:
-    """The same flight near continuous time, everything digital taken away: what it does is not due to sampling."""
-
-    period: float
-    """[s]"""
-    outcome: Outcome
-    settling_time: float | None
-    """[s]"""
-
-
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Limit:
+class Limit(Found):
     """The last value that is good (of the quadrotor: flies) and what it rests on; in the quantity's unit."""
-
-    of: str
-    """The quantity: a name, or a path."""
-    unit: str | None = None
-    """The unit of the quantity; None: it has none."""
-    judged: str | None = None
-    """The objective that the criterion is about; None: it is about none."""
-    judged_unit: str | None = None
-    """The unit of that objective; None: it has none."""
-    local_limit: float | None
-    """Where what is small about the operating point (hover) first ceases to decay, in the quantity's unit; None: it is
-    not defined, or not reached."""
-    local_method: str | None = None
-    """How that was found; None: it was not."""
-    local_accuracy: float | None = None
-    """How accurate it is, in its unit, as far as the method knows."""
-    local_limit_outside: float | None
-    """Of the quadrotor likewise, with the gain that the law has just outside its boundary layer; None also without such
-    a layer."""
-    large_signal_limit: float | None
-    """The last value that is good from the scenario's own initial state, in the quantity's unit; None: nothing in the
-    range failed, or the first value did."""
-    refuted_limit: float | None
-    """For random quantities the lowest value found at which so many seeds do not fly that `RELIABILITY` is refuted at
-    the confidence; None: nothing is random, or none in the range."""
-    horizon: float
-    """The stop time [s]: what does not settle by it does not fly."""
-    tolerance: float
-    """The width of the last bracket, in the quantity's unit."""
-    scan: float
-    """The step of the scan, in the quantity's unit; what flies or fails between two of its values is not seen."""
-    confidence: float | None
-    """The confidence that at least `RELIABILITY` of all seeds fly, of each value, not of the search; None: nothing is
-    random."""
-    seeds: int
-    """How many runs each value takes, all of which must fly."""
-    flies_above: tuple[float, ...]
-    """Values tried above the limit that fly again."""
-    continuous: Continuous | None
-    """The same flight near continuous time; None: it was not asked for."""
-    tried: tuple[Tried, ...]
-    """All values that were flown, upward."""
-    note: str
-    """What the figures mean together, in a sentence."""
 
     def __repr__(self) -> str:
         return f"<Limit of {self.of}: {self.note}>"
@@ -158,7 +100,10 @@ def find(
 
     Raises `UsageError` for a quantity, range, tolerance, step or confidence that cannot be.
     """
-    varied, files = _checked(request, of, confidence, continuous)
+    varied, files = _checked(request, of, confidence)
+    near = request.near_continuous(CONTINUOUS) if continuous else None
+    if continuous and near is None:
+        raise UsageError("--continuous: for the quadrotor only")
     models = files.models_of(varied.system)
     span = range_asked_for(varied, models, first=first, last=last, tolerance=tolerance, scan=scan)
     with in_its_own_words(request):
@@ -181,7 +126,7 @@ def find(
             for i, value in enumerate(beyond, start=1):
                 trials.expect(len(beyond) - i)
                 trials.fails(value)
-        ideal = _near_continuous(request, pool) if continuous and isinstance(request, Scenario) else None
+        ideal = _flown(near, pool) if near is not None else None
         hear(1.0)
     tried = tuple(trials.tried[value] for value in sorted(trials.tried))
     return Limit(
@@ -197,11 +142,9 @@ def find(
     )  # fmt: skip
 
 
-def _checked(request: Request, of: str, confidence: float, continuous: bool) -> tuple[Varied, Files]:
+def _checked(request: Request, of: str, confidence: float) -> tuple[Varied, Files]:
     if not 0.0 < confidence < 1.0:
         raise UsageError(f"--confidence {confidence}: expected a number between 0 and 1")
-    if continuous and not isinstance(request, Scenario):
-        raise UsageError("--continuous: for the quadrotor only")
     varied = Varied(request=request, of=of)
     if varied.system.criterion.good is None:
         raise UsageError("criterion.good: expected in the system file, for it says what the limit is of")
@@ -235,14 +178,9 @@ def _refuted(trials: Trials, bracket: Bracket | None, above: list[float]) -> flo
     return None
 
 
-def _near_continuous(scenario: Scenario, pool: Pool) -> Continuous:
-    """`scenario` with a period of `CONTINUOUS` and nothing late, lost or noisy."""
-    ideal = dataclasses.replace(
-        scenario,
-        timing=Timing(period=CONTINUOUS, plant_interval=scenario.timing.plant_interval),
-        record=Record(plant=(), controller=()),
-    )
-    (metrics,) = pool.fly([system_meant(ideal)], stop=lambda metrics: False)
+def _flown(near: Request, pool: Pool) -> Continuous:
+    """What comes of a run near continuous time."""
+    (metrics,) = pool.fly([system_meant(near)], stop=lambda metrics: False)
     return Continuous(period=CONTINUOUS, outcome=metrics["outcome"], settling_time=metrics["settling_time"])
 
 

@@ -1,8 +1,10 @@
 """An ensemble of initial states of the quadrotor: errors of evenly spread size around the start of its reference."""
 
+import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -10,17 +12,9 @@ from fmu_kit.trajectory import Trajectory
 from orchestration.basics.constructors import strict
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
+from orchestration.fmi.kit import TRAJECTORY
 from orchestration.schedule.streams import Streams
-
-
-@dataclass(frozen=True, kw_only=True)
-class Start:
-    """One initial state."""
-
-    size: float
-    """of the initial error, in (0, 1], as a share of the largest of each kind"""
-    parameters: Mapping[str, float]
-    """of the plant, `initial.…`"""
+from orchestration.system.request import Start
 
 
 @strict("starts.")
@@ -58,8 +52,14 @@ class Starts:
             if not (math.isfinite(value) and 0.0 <= value <= highest):
                 raise UsageError(f"starts.{name} = {value}: expected a number from 0{_to(highest)}")
 
-    def drawn(self, trajectory: Trajectory) -> tuple[Start, ...]:
-        """The starts around the beginning of a trajectory, in the order of their indices."""
+    def some(self, first: int, count: int) -> "Starts":
+        """Others of the same kind: so many, from this index on."""
+        return dataclasses.replace(self, first=first, count=count)
+
+    def starts_of(self, request: Any) -> tuple[Start, ...]:
+        """The starts around the beginning of the trajectory of a `Scenario`, in the order of their indices."""
+        given = request.controller.parameters
+        trajectory = Trajectory(**{field: given[name] for name, field in TRAJECTORY.items() if name in given})
         return tuple(self._start(i, trajectory) for i in range(self.first, self.first + self.count))
 
     def _start(self, index: int, trajectory: Trajectory) -> Start:
@@ -68,15 +68,22 @@ class Starts:
         place, motion, axis, spin = (_direction(generator) for _ in range(4))
         half = 0.5 * size * self.angle
         found = {
-            "initial.position": np.array([*reference.position]) + size * self.position * place,
-            "initial.velocity": np.array([*reference.velocity]) + size * self.velocity * motion,
-            "initial.quaternion": np.array([*(math.sin(half) * axis), math.cos(half)]),
-            "initial.angular_velocity": size * self.rate * spin,
+            "plant.initial.position": np.array([*reference.position]) + size * self.position * place,
+            "plant.initial.velocity": np.array([*reference.velocity]) + size * self.velocity * motion,
+            "plant.initial.quaternion": np.array([*(math.sin(half) * axis), math.cos(half)]),
+            "plant.initial.angular_velocity": size * self.rate * spin,
         }
-        parameters = {
-            f"{name}.{letter}": float(x) for name, values in found.items() for letter, x in zip("xyzw", values)
-        }
-        return Start(size=size, parameters=parameters)
+        values = {f"{name}.{letter}": float(x) for name, vector in found.items() for letter, x in zip("xyzw", vector)}
+        return Start(size=size, values=values)
+
+
+def starts_in(table: Mapping[str, Any], beside: Sequence[str] = ()) -> Starts:
+    """The ensemble that a table of a file says; keys `beside` are known too. Raises `UsageError`."""
+    names = [field.name for field in dataclasses.fields(Starts)]
+    for key in table:
+        if key not in names:
+            raise UsageError(f"starts.{key}: no such key; expected one of {', '.join([*names, *beside])}")
+    return Starts(**table)
 
 
 def _to(highest: float) -> str:

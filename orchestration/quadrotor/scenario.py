@@ -1,18 +1,38 @@
 """What a run is, as one frozen value."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
+from orchestration.basics.bisection import Range
 from orchestration.basics.constructors import strict
 from orchestration.basics.errors import UsageError, shown
-from orchestration.quadrotor.parameters import Parameter
+from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
+from orchestration.quadrotor.initial_conditions import Starts, starts_in
+from orchestration.quadrotor.nominal_model import mismatch
+from orchestration.quadrotor.quantities import range_of
 from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.timing import Timing
-from orchestration.quadrotor.vehicle import Vehicle
-from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT, SAMPLE_OFFSET, SAMPLE_PERIOD
+from orchestration.quadrotor.translation import (
+    BY_MEASUREMENT,
+    TIMING,
+    disturbed,
+    in_words_of_a_scenario,
+    paths_of,
+    quadrotor,
+    reference_source,
+)
+from orchestration.quadrotor.vehicle import Vehicle, load_vehicle
+from orchestration.quadrotor.wiring import (
+    DEFAULT_CONTROLLER,
+    DEFAULT_PLANT,
+    RIGID_BODY,
+    USE_REFERENCE_INPUTS,
+)
+from orchestration.system.model import Parameter, System
+from orchestration.system.paths import changed
 from orchestration.system.requirements import is_finite
 
 
@@ -133,6 +153,107 @@ class Scenario:
             for side, choice in (("plant", self.plant), ("controller", self.controller))
         }
         return dataclasses.replace(self, vehicle=None, **sides)
+
+    # What is asked of any request, and of those whose controllers are compared (`system/request.py`).
+
+    kind: ClassVar[str] = "flight"
+    title: ClassVar[str | None] = "QuadrotorLoop"
+    description: ClassVar[str] = "Quadrotor and its controller in closed loop"
+
+    def as_system(self) -> System:
+        """The system that it means: the quadrotor with its values; raises `UsageError` in the words of the system."""
+        this = self.resolved()
+        sides = {"plant": this.plant, "controller": this.controller}
+        changes: dict[str, Any] = {"stop_time": this.stop_time, "seed": this.seed}
+        for key, paths in TIMING.items():
+            changes |= {path: getattr(this.timing, key) for path in paths}
+        for kind in BY_MEASUREMENT:
+            changes |= {f"connections.measurement.{kind}.{name}": v for name, v in getattr(this.timing, kind).items()}
+        for side, choice in sides.items():
+            changes[f"components.{side}.fmu"] = choice.fmu
+            changes |= {f"components.{side}.parameters.{name}": value for name, value in choice.parameters.items()}
+            changes[f"components.{side}.record"] = getattr(this.record, side)
+        if this.reference.name is not None or this.reference.file is not None:
+            changes |= {f"sources.reference.{key}": value for key, value in reference_source(this.reference).items()}
+            changes[f"components.controller.parameters.{USE_REFERENCE_INPUTS}"] = True
+        elif this.controller.parameters.get(USE_REFERENCE_INPUTS) is True:
+            raise UsageError(f"controller.{USE_REFERENCE_INPUTS}: expected [reference] name or file = … to feed them")
+        return disturbed(changed(quadrotor(), changes), this.disturbance)
+
+    def in_words(self, text: str) -> str:
+        """`text` with the paths of its system as scenarios call them."""
+        return in_words_of_a_scenario(text)
+
+    def paths_of(self, target: str) -> tuple[str, ...]:
+        """The paths of `timing.KEY`, `controller.NAME`, `plant.NAME` and so on; raises `UsageError` for no such."""
+        return paths_of(target)
+
+    def range_of(self, quantity: str) -> Range | None:
+        """The range in which `period`, `delay`, `jitter` or `loss` is looked for; None for another name."""
+        return range_of(self.timing, quantity)
+
+    def near_continuous(self, period: float) -> "Scenario":
+        """The same with a `period` [s] near continuous time, nothing late, lost or noisy, and nothing more recorded."""
+        timing = Timing(period=period, plant_interval=self.timing.plant_interval)
+        return dataclasses.replace(self, timing=timing, record=Record(plant=(), controller=()))
+
+    def warnings(self, parameters: Mapping[str, float]) -> tuple[str, ...]:
+        """What may not be meant: a nominal model that is not the plant's, a run too short for its timing."""
+        found = []
+        if not self.model_mismatch:
+            sides = [
+                {name: parameters[f"{side}.{name}"] for name in RIGID_BODY if f"{side}.{name}" in parameters}
+                for side in ("plant", "controller")
+            ]
+            different = mismatch(*sides)
+            found += [] if different is None else [different]
+        return (*found, *self.timing.warnings(self.stop_time))
+
+    def headline(self) -> str:
+        """The controller and its timing."""
+        timing = self.timing
+        parts = [f"{self.controller.fmu}, period {timing.period * 1e3:g} ms"]
+        if timing.delay:
+            parts.append(f"delay {timing.delay * 1e3:g} ms")
+        if timing.order != "gauss-seidel":
+            parts.append("Jacobi")
+        return ", ".join(parts)
+
+    def with_values(self, values: Mapping[str, Any]) -> "Scenario":
+        """The same with values by target, as axes of studies name them; raises `UsageError` for no such target."""
+        timing: dict[str, Any] = {}
+        parameters: dict[str, Any] = {}
+        fields: dict[str, Any] = {}
+        fmus = {"plant": self.plant.fmu, "controller": self.controller.fmu}
+        for target, value in values.items():
+            table, _, key = target.partition(".")
+            if table == "timing":
+                kind, _, name = key.partition(".")
+                alike = ("measurement_loss", "command_loss") if key == "loss" else (kind,)
+                given = {**getattr(self.timing, kind), **timing.get(kind, {}), name: value} if name else value
+                timing |= dict.fromkeys(alike, given)
+            elif table in fmus and key == "fmu":
+                fmus[table] = value
+            elif key:
+                parameters[target] = value
+            else:
+                fields[target] = value
+        return self.with_changes(timing=timing, parameters=parameters, **fields).with_fmus(**fmus)
+
+    def without_vehicle(self) -> "Scenario":
+        """The same without a vehicle, where what it flies is said elsewhere."""
+        return dataclasses.replace(self, vehicle=None)
+
+    def craft(
+        self, given: str | None, folder: Path, *, plant: Mapping[str, Parameter], controller: Mapping[str, Parameter]
+    ) -> Vehicle:
+        """A vehicle by name, or by a path that starts at `folder`, with these parameters on top; None: those alone."""
+        found = Vehicle(name="base") if given is None else load_vehicle(given, folder)
+        return found.with_parameters(plant=plant, controller=controller)
+
+    def ensemble(self, table: Mapping[str, Any], beside: Sequence[str] = ()) -> Starts:
+        """The starts that a table of a file says, which may have keys `beside`; raises `UsageError`."""
+        return starts_in(table, beside)
 
     def to_toml(self) -> str:
         """The scenario file that loads as this scenario, with the parameters of its vehicle written out."""

@@ -1,25 +1,20 @@
 """Reads scenario files: keys and types are checked here, values where they mean something."""
 
 import dataclasses
-import json
-import typing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
-import pydantic
-
 from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError, shown
-from orchestration.quadrotor.parameters import parameters_in
+from orchestration.basics.typed_tables import parsed
 from orchestration.quadrotor.presets import preset_timing
 from orchestration.quadrotor.scenario import FmuChoice, Record, Scenario
 from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.vehicle import load_vehicle
 from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
-
-Shape = TypeVar("Shape")
+from orchestration.system.parameters import parameters_in
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,16 +76,12 @@ def scenario_from_tables(tables: dict[str, Any], folder: Path) -> Scenario:
     )
 
 
-SHORTHANDS = ("loss", "preset")
-"""Keys of `[timing]` that stand for others."""
-
-
 def _expanded(tables: dict[str, Any]) -> dict[str, Any]:
     """The tables with `timing.preset` and `timing.loss` written out, below what the file says itself."""
     timing = tables.get("timing")
     if not isinstance(timing, dict):
         return tables
-    written = {key: value for key, value in timing.items() if key not in SHORTHANDS}
+    written = {key: value for key, value in timing.items() if key not in Timing.SHORTHANDS}
     if "loss" in timing:
         written = {"measurement_loss": timing["loss"], "command_loss": timing["loss"], **written}
     if "preset" in timing:
@@ -127,31 +118,3 @@ def _signal(place: str, table: dict[str, Any], kind: type[Signal], folder: Path)
     if "file" in given:
         given["file"] = folder / given["file"]
     return kind(**given, parameters=parameters)
-
-
-def parsed(tables: dict[str, Any], shape: type[Shape]) -> Shape:
-    """The typed form of a TOML document; raises `UsageError` in one line for the first thing wrong."""
-    try:
-        return pydantic.TypeAdapter(shape).validate_json(json.dumps(tables, default=str), strict=True)
-    except pydantic.ValidationError as error:
-        raise UsageError(_first_problem(error, shape)) from error
-
-
-def _first_problem(error: pydantic.ValidationError, file: type) -> str:
-    """The first thing wrong with a document of the shape `file`, in one line that says what is valid."""
-    problem = error.errors()[0]
-    place = ".".join(str(part) for part in problem["loc"])
-    if problem["type"] == "unexpected_keyword_argument":
-        table: Any = file
-        for part in problem["loc"][:-1]:
-            if isinstance(part, str):
-                hint = next(f.type for f in dataclasses.fields(table) if f.name == part)
-                table = typing.get_args(hint)[0] if typing.get_origin(hint) is list else hint
-        names = [f.name for f in dataclasses.fields(table)] + list(SHORTHANDS if table is Timing else ())
-        keys = ", ".join(names)
-        return f"{place}: no such key; expected one of {keys}"
-    if problem["type"] in ("missing", "missing_argument", "missing_keyword_only_argument"):
-        return f"{place}: expected a value"
-    value = problem["input"]
-    message = problem["msg"].replace("Input should be", "expected")
-    return f"{place} = {shown(value if isinstance(value, float) else repr(value))}: {message[:1].lower()}{message[1:]}"

@@ -32,6 +32,8 @@ class Timing:
     """
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+    SHORTHANDS: ClassVar[tuple[str, ...]] = ("loss", "preset")
+    """Keys of `[timing]` in a file that stand for others"""
 
     period: float = 0.01
     """The sampling period T of the controller [s], in its own time: sample k is at offset + kT."""

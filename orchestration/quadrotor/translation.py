@@ -1,40 +1,28 @@
-"""A scenario of the quadrotor as the system that it means."""
+"""What a scenario of the quadrotor calls the parts of its system, and what its reference and disturbance are there."""
 
 import functools
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from orchestration.basics.errors import UsageError
-from orchestration.quadrotor.nominal_model import mismatch
-from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.signals import DRAG, DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.timing import TIMING_KEYS
-from orchestration.quadrotor.wiring import EXTERNAL_FORCE, REFERENCE, RIGID_BODY, USE_REFERENCE_INPUTS
+from orchestration.quadrotor.wiring import EXTERNAL_FORCE, REFERENCE
 from orchestration.signals.limits import AXES
 from orchestration.signals.table_file import header_of
 from orchestration.system.model import Source, System
-from orchestration.system.paths import TOP, changed
+from orchestration.system.paths import TOP
 from orchestration.system.system_file import load_system
+
+SYSTEM = Path(__file__).with_name("system.toml")
+"""The paper's flight, of which every scenario is a change"""
 
 
 @functools.cache
 def quadrotor() -> System:
     """The system that is shipped: the paper's flight."""
-    return load_system(Path(__file__).with_name("system.toml"))
-
-
-@contextmanager
-def in_its_own_words(asked: object) -> Iterator[None]:
-    """What is wrong with the system of a scenario is said of the scenario, which is what somebody wrote."""
-    try:
-        yield
-    except UsageError as error:
-        if not isinstance(asked, Scenario):
-            raise
-        raise type(error)(in_words_of_a_scenario(str(error))) from error
+    return load_system(SYSTEM)
 
 
 def in_words_of_a_scenario(text: str) -> str:
@@ -44,41 +32,7 @@ def in_words_of_a_scenario(text: str) -> str:
     return text
 
 
-def warnings(scenario: Scenario, parameters: Mapping[str, float]) -> tuple[str, ...]:
-    """What may not be meant: a nominal model that is not the plant's, a run too short for its timing."""
-    found = []
-    if not scenario.model_mismatch:
-        sides = [
-            {name: parameters[f"{side}.{name}"] for name in RIGID_BODY if f"{side}.{name}" in parameters}
-            for side in ("plant", "controller")
-        ]
-        different = mismatch(*sides)
-        found += [] if different is None else [different]
-    return (*found, *scenario.timing.warnings(scenario.stop_time))
-
-
-def system_of(scenario: Scenario) -> System:
-    """The system that a scenario means: the quadrotor with the scenario's values."""
-    scenario = scenario.resolved()
-    timing, sides = scenario.timing, {"plant": scenario.plant, "controller": scenario.controller}
-    changes: dict[str, Any] = {"stop_time": scenario.stop_time, "seed": scenario.seed}
-    for key, paths in TIMING.items():
-        changes |= {path: getattr(timing, key) for path in paths}
-    for kind in BY_MEASUREMENT:
-        changes |= {f"connections.measurement.{kind}.{name}": v for name, v in getattr(timing, kind).items()}
-    for side, choice in sides.items():
-        changes[f"components.{side}.fmu"] = choice.fmu
-        changes |= {f"components.{side}.parameters.{name}": value for name, value in choice.parameters.items()}
-        changes[f"components.{side}.record"] = getattr(scenario.record, side)
-    if scenario.reference.name is not None or scenario.reference.file is not None:
-        changes |= {f"sources.reference.{key}": value for key, value in _reference(scenario.reference).items()}
-        changes[f"components.controller.parameters.{USE_REFERENCE_INPUTS}"] = True
-    elif scenario.controller.parameters.get(USE_REFERENCE_INPUTS) is True:
-        raise UsageError(f"controller.{USE_REFERENCE_INPUTS}: expected [reference] name or file = … to feed them")
-    return _disturbed(changed(quadrotor(), changes), scenario.disturbance)
-
-
-def _reference(choice: ReferenceChoice) -> dict[str, Any]:
+def reference_source(choice: ReferenceChoice) -> dict[str, Any]:
     """The source that feeds the reference inputs of the controller."""
     keys: dict[str, Any] = {
         "trajectory": None,
@@ -92,7 +46,7 @@ def _reference(choice: ReferenceChoice) -> dict[str, Any]:
     return {**keys, "file": choice.file, "interpolation": "linear" if is_table else "spline"}
 
 
-def _disturbed(system: System, choice: DisturbanceChoice) -> System:
+def disturbed(system: System, choice: DisturbanceChoice) -> System:
     """`system` with what pushes the plant."""
     if choice.name is None and choice.file is None:
         return system

@@ -8,7 +8,8 @@ from typing import Any
 from orchestration.basics.constructors import strict
 from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError, expected_name
-from orchestration.quadrotor.parameters import Parameter, parameters_in
+from orchestration.system.model import Parameter
+from orchestration.system.parameters import parameters_in
 
 SHIPPED = Path(__file__).with_name("vehicles")
 """Where the vehicles are that go by a name"""
@@ -28,6 +29,20 @@ class Vehicle:
     """What every controller is told of it, likewise."""
     controllers: Mapping[str, Mapping[str, Parameter]] = field(default_factory=dict)
     """What single controllers are told beside, by the names of their FMUs."""
+
+    def with_parameters(self, *, plant: Mapping[str, Parameter], controller: Mapping[str, Parameter]) -> "Vehicle":
+        """The same with other values of the plant, and of what every controller is told."""
+        return Vehicle(
+            name=self.name,
+            plant={**self.plant, **plant},
+            controller={**self.controller, **controller},
+            controllers={fmu: {**parameters, **controller} for fmu, parameters in self.controllers.items()},
+        )
+
+    def told(self, controller: str) -> dict[str, Parameter]:
+        """What the plant is made of, and what a controller whose FMU has this name or path is told of it, by target."""
+        sides = {"plant": self.plant, "controller": self.for_controller(controller)}
+        return {f"{side}.{name}": value for side, table in sides.items() for name, value in table.items()}
 
     def for_controller(self, fmu: str) -> dict[str, Parameter]:
         """The parameters of a controller whose FMU has this name or path."""

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable, Mapping
 
+from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD, TRAJECTORY
+
 DEFAULT_CONTROLLER = "UnifiedController"
 DEFAULT_PLANT = "QuadrotorPlant"
 
@@ -28,11 +30,6 @@ REFERENCE = tuple(name for derivative in _REFERENCE_UNITS for name in components
 """Inputs of the controller that a reference from a file feeds."""
 
 USE_REFERENCE_INPUTS = "use_reference_inputs"
-SAMPLE_PERIOD = "sample_period"
-SAMPLE_OFFSET = "sample_offset"
-
-TRAJECTORY = {f"trajectory.{name}": name for name in ("amplitude_x", "amplitude_y", "frequency", "start_z", "rate_z")}
-"""Parameters of the controller's built-in trajectory, and the fields of `Trajectory` they are."""
 
 POSITION_REFERENCE = components("reference.position")
 """P_d as it is recorded beside the signals."""

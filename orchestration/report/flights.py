@@ -8,7 +8,7 @@ from orchestration.basics.simulator import Floats
 from orchestration.building.inputs import Files, all_with_files
 from orchestration.engines.batch.fly import Batches
 from orchestration.engines.wiring import columns_of, source_values
-from orchestration.report.layouts import COMPACT, is_flight
+from orchestration.report.known_layouts import layout_for
 from orchestration.report.tracks import Signals
 from orchestration.results.objectives import Metrics
 from orchestration.runs.simulation import run
@@ -93,11 +93,12 @@ def _alone(system: System) -> Found | None:
 
 
 def _columns(system: System) -> list[str]:
-    """What of a run is kept: of a flight the plant and what it is to follow, else what is exchanged."""
+    """What of a run is kept: what its known layout needs and its sources, else what is exchanged."""
     there = columns_of(system)[1:]
-    if is_flight(there):
+    known = layout_for(there)
+    if known is not None:
         sources = [name for name in there if name.partition(".")[0] in system.sources]
-        return [name for name in (*COMPACT, *sources) if name in there]
+        return [name for name in (*known.compact, *sources) if name in there]
     return [*there[:MOST_COLUMNS]]
 
 

@@ -9,7 +9,6 @@ from orchestration.report.blobs import Blobs
 from orchestration.report.model import Report, Run, Setting
 from orchestration.report.number_format import number
 from orchestration.report.tracks import Tracks
-from orchestration.requests.request import text_of
 from orchestration.results import display_names as labels
 from orchestration.runs.result import Result
 
@@ -70,7 +69,7 @@ def _run(name: str, result: Result, tracks: Tracks, rows: int) -> Run:
 def _settings(result: Result) -> dict[str, Setting]:
     """What its file says, in words."""
     found: dict[str, Setting] = {}
-    waiting: list[tuple[str, Any]] = [("", tables_in(text_of(result.asked)))]
+    waiting: list[tuple[str, Any]] = [("", tables_in(result.asked.to_toml()))]
     while waiting:
         place, value = waiting.pop(0)
         if isinstance(value, Mapping):

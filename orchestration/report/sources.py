@@ -74,8 +74,8 @@ def _of_many(
     # what reads stores comes with an extra
     from orchestration.comparison.file import load_comparison
     from orchestration.report import of_comparison, of_study
+    from orchestration.studies.store import store_path
     from orchestration.studies.study_file import load_study
-    from orchestration.studies.sweep import store_path
 
     if kind == "store":
         if store is not None:

@@ -5,10 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from orchestration.basics.simulator import Floats
-from orchestration.quadrotor.measures import position_error
-from orchestration.quadrotor.wiring import POSITION_REFERENCE
 from orchestration.report.blobs import Blobs
-from orchestration.report.layouts import POSITION_ERROR, About, is_flight, layout_of
+from orchestration.report.known_layouts import layout_for
+from orchestration.report.layouts import About, layout_of
 from orchestration.report.model import Layout, Track
 from orchestration.system.model import System
 
@@ -25,24 +24,26 @@ class Tracks:
 
     def whole(self, system: System | None, signals: Signals, about: About, rows: int) -> Track:
         """Every n-th row, so that they are about `rows`, and with them those at which a signal is at an end."""
-        signals = _with_error(signals)
+        signals = _with_computed(signals)
         kept = _rows(signals, rows)
         columns = {name: self._blobs.exact(values[kept]) for name, values in signals.items() if name != "time"}
         return self._track(system, columns, about, self._blobs.exact(signals["time"][kept]))
 
     def compact(self, system: System, signals: Signals, about: About, points: int) -> Track:
         """Values at some times, more where more happens: on the line between rows, of what is held the row before's."""
-        signals = _with_error(signals)
+        signals = _with_computed(signals)
         time = signals["time"]
         at = _instants(signals, points)
         before = np.clip(np.searchsorted(time, at, side="right") - 1, 0, None)
         layout = layout_of(system, [name for name in signals if name != "time"], about)
+        known = layout_for(signals)
+        logarithmic = () if known is None else known.logarithmic
         held = {line.column for panel in layout.panels for line in panel.lines if line.held}
         columns = {}
         for name, values in signals.items():
             if name != "time":
                 found = values[before] if name in held else np.interp(at, time, values)
-                columns[name] = self._blobs.compact(found, logarithmic=name == POSITION_ERROR)
+                columns[name] = self._blobs.compact(found, logarithmic=name in logarithmic)
         return self._track(system, columns, about, self._blobs.exact(at))
 
     def _track(self, system: System | None, columns: Mapping[str, int], about: About, time: int) -> Track:
@@ -52,11 +53,10 @@ class Tracks:
         return Track(layout=self.layouts.index(layout), time=time, columns=tuple(columns.values()))
 
 
-def _with_error(signals: Signals) -> Signals:
-    """With the position error of a flight, where it has a reference."""
-    if not is_flight(signals) or not all(name in signals for name in POSITION_REFERENCE):
-        return signals
-    return {**signals, POSITION_ERROR: position_error(signals)}
+def _with_computed(signals: Signals) -> Signals:
+    """With what is computed of signals by whoever knows them, as the position error of a flight."""
+    known = layout_for(signals)
+    return signals if known is None else {**signals, **known.computed(signals)}
 
 
 def _instants(signals: Signals, most: int) -> Floats:

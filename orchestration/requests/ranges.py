@@ -3,44 +3,24 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal, get_args
 
+from orchestration.basics.bisection import Range
 from orchestration.basics.errors import UsageError, expected_name
 from orchestration.basics.units import after
 from orchestration.fmi.model import Model
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.translation import in_its_own_words, paths_of
-from orchestration.requests.request import Request, system_meant
 from orchestration.system.model import System
 from orchestration.system.paths import TOP, changed, value_at
+from orchestration.system.request import Request, in_its_own_words, system_meant
 
-Quantity = Literal["period", "delay", "jitter", "loss"]
-"""Of the quadrotor, by name; of any system a path"""
+QUANTITIES = ("period", "delay", "jitter", "loss")
+"""Names by which a request may know quantities; any other is a path"""
 STEPS, PARTS = 20, 50
 """of a range that is given: values of the scan, and parts of its step to which the last bracket is brought together"""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Range:
-    """How a quantity is scanned: `before`, then from `first` in steps to `last`; then bisected to `tolerance`."""
-
-    before: tuple[float, ...] = ()
-    first: float
-    step: float
-    last: float
-    tolerance: float
-    unit: str = " s"
-
-    def values(self) -> list[float]:
-        """The scan, upward."""
-        count = math.floor((self.last - self.first) / self.step + 1e-9)
-        steps = (float(f"{self.first + i * self.step:.12g}") for i in range(count + 1))
-        return [*(value for value in self.before if value < self.first), *steps]
-
-
-@dataclass(frozen=True, kw_only=True)
 class Varied:
-    """A system, or a scenario of the quadrotor, in one quantity, all else as it is."""
+    """A request in one quantity, all else as it is."""
 
     request: Request
     of: str
@@ -60,13 +40,13 @@ class Varied:
     @property
     def paths(self) -> tuple[str, ...]:
         """What is changed; raises `UsageError` for what is not there."""
-        named, quadrotor = self.of in get_args(Quantity), isinstance(self.request, Scenario)
-        if named and quadrotor:
+        known = [name for name in QUANTITIES if self.request.range_of(name) is not None]
+        if self.of in known:
             return paths_in(self.request, f"timing.{self.of}")
-        if named:
+        if self.of in QUANTITIES:
             raise UsageError(f"--of {self.of}: for the quadrotor only; expected a path, as connections.NAME.delay")
         if "." not in self.of and self.of not in TOP:
-            words = f"{expected_name(self.of, get_args(Quantity))}, or" if quadrotor else "expected"
+            words = f"{expected_name(self.of, known)}, or" if known else "expected"
             raise UsageError(f"--of {self.of}: {words} a path, as connections.NAME.delay")
         return paths_in(self.request, self.of)
 
@@ -89,7 +69,7 @@ def range_asked_for(
     for flag, value in (("tolerance", tolerance), ("scan", scan)):
         if value is not None and not (value > 0.0 and math.isfinite(value)):
             raise UsageError(f"--{flag} {value}: expected a positive number")
-    known = _usual(varied)
+    known = varied.request.range_of(varied.of)
     if known is None and (first is None or last is None):
         raise UsageError(f"--of {varied.of}: expected --from and --to, between which it is looked for")
     low = first if first is not None else known.first if known is not None else 0.0
@@ -105,29 +85,6 @@ def range_asked_for(
         tolerance=tolerance if tolerance is not None else known.tolerance if known is not None else step / PARTS,
         unit=known.unit if known is not None else after(unit_at(varied.paths[0], models)),
     )
-
-
-def _usual(varied: Varied) -> Range | None:
-    """The range of a quantity of the quadrotor; None for a path."""
-    if not isinstance(varied.request, Scenario) or varied.of not in get_args(Quantity):
-        return None
-    return range_of(varied.request, varied.of)
-
-
-def range_of(scenario: Scenario, of: str) -> Range:
-    """The range in which a quantity of this scenario is looked for."""
-    period = scenario.timing.period
-    if of == "period":
-        shortest = scenario.timing.jitter * scenario.timing.clock_ratio
-        before = tuple(value for value in (0.001, 0.002, 0.003, 0.004) if value > shortest)
-        first = 0.005 * (math.floor(shortest / 0.005) + 1)
-        return Range(before=before, first=first, step=0.005, last=0.5, tolerance=0.0005)
-    if of == "delay":
-        return Range(first=0.0, step=0.005, last=0.5, tolerance=0.0005)
-    if of == "jitter":
-        return Range(first=0.0, step=period / 10.0, last=0.999 * period, tolerance=period / 100.0)
-    length = scenario.timing.burst_length
-    return Range(first=0.0, step=0.05, last=1.0 if length is None else length / (length + 1.0), tolerance=0.01, unit="")
 
 
 def is_in_seconds(path: str) -> bool:
@@ -152,7 +109,7 @@ def unit_at(path: str, models: Mapping[str, Model]) -> str | None:
 
 def paths_in(base: Request, target: str) -> tuple[str, ...]:
     """The paths of a target in the system that `base` means; raises `UsageError` where there is no such."""
-    paths = paths_of(target) if isinstance(base, Scenario) else (target,)
+    paths = base.paths_of(target)
     for path in paths:
         value_at(system_meant(base), path)
     return paths

@@ -3,25 +3,29 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError
+from orchestration.quadrotor import translation
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.scenario_file import scenario_from_tables
-from orchestration.quadrotor.translation import in_its_own_words, system_of
 from orchestration.system.model import System
-from orchestration.system.system_file import is_system, system_from_tables, to_toml
+from orchestration.system.system_file import is_system, system_from_tables
 
-Request: TypeAlias = Scenario | System
-
-
+FILES = (translation.SYSTEM,)
+"""What requests are changes of, beside the code"""
 SSP_ENDINGS = (".ssp", ".ssd")
 SSP = "ssp"
 """Key of a file with timing: the SSP that it is for"""
 
 
-def load_request(path: str | Path, timing: str | Path | None = None) -> Request:
+def usual() -> Scenario:
+    """What runs where nobody says what: the paper's flight."""
+    return Scenario()
+
+
+def load_request(path: str | Path, timing: str | Path | None = None) -> Scenario | System:
     """Read a system file, a scenario file, or an SSP with a file of its `timing`; paths are relative to their file.
 
     A file with timing that names its SSP is as good as both. Raises `UsageError` for a file that cannot be read, a
@@ -43,7 +47,7 @@ def load_request(path: str | Path, timing: str | Path | None = None) -> Request:
         return request_from_tables(tables, path.parent)
 
 
-def request_from_tables(tables: dict[str, Any], folder: Path) -> Request:
+def request_from_tables(tables: dict[str, Any], folder: Path) -> Scenario | System:
     """The system or the scenario of a TOML document whose relative paths start at `folder`; raises `UsageError`."""
     return (system_from_tables if is_system(tables) else scenario_from_tables)(tables, folder)
 
@@ -62,14 +66,3 @@ def _said_of(path: Path) -> Iterator[None]:
         if str(error).startswith(f"{path}: "):
             raise
         raise UsageError(f"{path}: {error}") from error
-
-
-def system_meant(request: Request) -> System:
-    """The system that a request means; raises `UsageError` in the request's own words."""
-    with in_its_own_words(request):
-        return system_of(request) if isinstance(request, Scenario) else request
-
-
-def text_of(request: Request) -> str:
-    """The file that loads as this request."""
-    return request.to_toml() if isinstance(request, Scenario) else to_toml(request)

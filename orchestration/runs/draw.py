@@ -1,46 +1,24 @@
 """The figures of runs by name: of one, or of several laid over each other."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 
 from matplotlib.figure import Figure
 
 from orchestration.basics.errors import UsageError
-from orchestration.figures import phase as phases
-from orchestration.figures.commands import COLUMNS, commands
-from orchestration.figures.energy import COLUMN, energy
-from orchestration.figures.errors import DRAWN, components_of_errors, errors
 from orchestration.figures.gallery import Figures
-from orchestration.figures.names import FLIGHT, SYSTEM
-from orchestration.figures.path import path
-from orchestration.figures.phase import phase
 from orchestration.figures.run import Run, Window
-from orchestration.figures.signals import signals
-from orchestration.figures.spectrum import spectrum
 from orchestration.figures.style import SCREEN, STYLES, Style
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.wiring import POSITION, POSITION_REFERENCE
+from orchestration.figures.views import VIEWS, view_of
 from orchestration.recording.recording import thinned
-from orchestration.runs.result import Result
+from orchestration.runs.ran import Ran
 from orchestration.runs.run_labels import told_apart
-
-Maker = Callable[[Sequence[Run], Style], Figure | None]
-_MAKERS: Mapping[str, Maker] = dict(
-    zip(
-        (*FLIGHT, *SYSTEM),
-        (path, errors, components_of_errors, commands, energy, phase, spectrum, signals),
-        strict=True,
-    )
-)
-_DRAWN = {
-    "time", *POSITION_REFERENCE, *(f"plant.{name}" for name in POSITION), *COLUMNS, COLUMN, *DRAWN, *phases.DRAWN,
-}  # fmt: skip
 
 MOST = 2**16
 """Rows that are drawn of the whole of a longer run, beside all in the window"""
 
 
 def draw(
-    results: Result | Sequence[Result],
+    results: Ran | Sequence[Ran],
     which: Collection[str] | None = None,
     *,
     names: Sequence[str] | None = None,
@@ -54,26 +32,24 @@ def draw(
 
     Raises `UsageError` for a name of a figure that there is not, and for runs of different systems.
     """
-    listed = [results] if isinstance(results, Result) else list(results)
-    kinds = {isinstance(result.asked, Scenario) for result in listed}
+    listed = list(results) if isinstance(results, Sequence) else [results]
+    kinds = {result.asked.kind for result in listed}
     components = {frozenset(result.system.components) for result in listed}
     if len(kinds) != 1 or len(components) != 1:
         raise UsageError("expected runs of one system to lay over each other")
-    known = FLIGHT if kinds == {True} else SYSTEM
+    view = view_of(kinds.pop())
     for name in which or ():
-        if name not in (*FLIGHT, *SYSTEM):
-            raise UsageError(f"--figure {name}: expected one of {', '.join(known)}")
-    columns = _DRAWN if known is FLIGHT else None
+        if not any(name in each.names for each in VIEWS.values()):
+            raise UsageError(f"--figure {name}: expected one of {', '.join(view.names)}")
+    drawing = view.load()
     told = names or told_apart(listed, [f"run {i + 1}" for i in range(len(listed))])
-    runs = runs_of(listed, told, columns, window)
+    runs = runs_of(listed, told, drawing.columns, window)
     with style.applied():
-        made = {name: _MAKERS[name](runs, style) for name in known if which is None or name in which}
+        made = {name: drawing.makers[name](runs, style) for name in view.names if which is None or name in which}
     return {name: figure for name, figure in made.items() if figure is not None}
 
 
-def figures_of(
-    results: Sequence[Result], which: Collection[str] | None, *, window: Window | None, style: str
-) -> Figures:
+def figures_of(results: Sequence[Ran], which: Collection[str] | None, *, window: Window | None, style: str) -> Figures:
     """The figures of runs laid over each other; raises `UsageError` for a name of a figure or a style that is none."""
     if style not in STYLES:
         raise UsageError(f"style {style}: expected one of {', '.join(STYLES)}")
@@ -82,7 +58,7 @@ def figures_of(
 
 
 def runs_of(
-    results: Sequence[Result], names: Sequence[str], columns: Collection[str] | None, window: Window | None
+    results: Sequence[Ran], names: Sequence[str], columns: Collection[str] | None, window: Window | None
 ) -> list[Run]:
     """Runs ready to be drawn; of a run of more than `MOST` rows every n-th, all in the window; of some columns."""
     return [
@@ -92,7 +68,10 @@ def runs_of(
             title=_title(result),
             system=result.system,
             recording=thinned(
-                result.recording, set(result.columns if columns is None else columns), window or (0.0, 1.0), MOST
+                result.recording,
+                set(result.recording.columns if columns is None else columns),
+                window or (0.0, 1.0),
+                MOST,
             ),
             whole=result.recording,
             described=result.described,
@@ -103,15 +82,8 @@ def runs_of(
     ]
 
 
-def _title(result: Result) -> str:
-    parts = []
-    if isinstance(result.asked, Scenario):
-        timing = result.asked.timing
-        parts.append(f"{result.asked.controller.fmu}, period {timing.period * 1e3:g} ms")
-        if timing.delay:
-            parts.append(f"delay {timing.delay * 1e3:g} ms")
-        if timing.order != "gauss-seidel":
-            parts.append("Jacobi")
+def _title(result: Ran) -> str:
+    parts = [headline] if (headline := result.asked.headline()) else []
     if result.divergence is not None:
         parts.append(f"diverged at {result.metrics['divergence_time']:g} s")
     if result.interrupted_at is not None:

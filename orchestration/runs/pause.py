@@ -11,10 +11,11 @@ from orchestration.basics.errors import UsageError
 from orchestration.engines.engine import Engine
 from orchestration.recording.recording import InMemory, Recorder
 from orchestration.recording.tables import InFolder, ToFolder
-from orchestration.requests.request import Request, load_request, system_meant, text_of
+from orchestration.requests.request import load_request
 from orchestration.runs.result import Result
 from orchestration.runs.run_directory import METRICS, SCENARIO, STATE, keep_flight
 from orchestration.runs.simulation import Announce, Progress, Simulation, prepared
+from orchestration.system.request import Request, system_meant
 from orchestration.system.times import nanoseconds
 
 
@@ -108,7 +109,7 @@ def _write(flight: Simulation, folder: Path) -> None:
     state, parts = flight.master.state(), flight.master.saved()
     text = json.dumps({**state, "of": _hashes(flight)})
     arrays = {name: np.frombuffer(part, dtype=np.uint8) for name, part in parts.items()}
-    (folder / SCENARIO).write_text(text_of(flight.asked), encoding="utf-8")
+    (folder / SCENARIO).write_text(flight.asked.to_toml(), encoding="utf-8")
     strings = {"json": np.array(text), "digest": np.array(_digest(text, parts))}
     np.savez(folder / STATE, allow_pickle=False, **strings, **arrays)
 
@@ -125,7 +126,7 @@ def _hashes(flight: Simulation) -> dict[str, str]:
     """Of everything that a run goes on from beside its state."""
     files = {name: source.file for name, source in flight.system.sources.items() if source.file is not None}
     return {
-        SCENARIO: hashlib.sha256(text_of(flight.asked).encode()).hexdigest(),
+        SCENARIO: hashlib.sha256(flight.asked.to_toml().encode()).hexdigest(),
         **{f"the file of {name}": _hash(path) for name, path in files.items()},
         **{f"the FMU of {name}": _hash(instance.path) for name, instance in flight.instances.items()},
     }

@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from orchestration.basics.extras import explained
 from orchestration.basics.simulator import Floats
-from orchestration.quadrotor.scenario import Scenario
 from orchestration.recording import frames
 from orchestration.recording.recording import About, Event, Recording
 from orchestration.results import display_names as labels
@@ -19,6 +18,7 @@ from orchestration.results import exports, html
 from orchestration.results.column_info import Described
 from orchestration.results.objectives import Metrics
 from orchestration.system.model import System
+from orchestration.system.request import Request
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -60,8 +60,8 @@ class Result:
     notebook a result shows its metrics.
     """
 
-    asked: Scenario | System
-    """What was run, as the user wrote it."""
+    asked: Request
+    """What was run, as the user wrote it: a `Scenario` or a `System`."""
     system: System
     """The system that it means; of a system that was run, the same with the objectives that its FMUs allow."""
     recording: Recording
@@ -93,7 +93,7 @@ class Result:
         good = self.metrics["good"]
         named = [name for name in self.metrics if name not in ("outcome", "good")]
         return html.card(
-            "A flight" if isinstance(self.asked, Scenario) else "A run",
+            f"A {self.asked.kind}",
             str(self.metrics["outcome"] or "") or None,
             good if isinstance(good, bool) else None,
             f"{self.end:g} s in {len(self.recording)} rows of {len(self.columns)} columns"

@@ -10,14 +10,15 @@ from typing import Any, cast
 from orchestration.basics.documents import read_json
 from orchestration.basics.errors import UsageError, shown
 from orchestration.engines.wiring import columns_of
-from orchestration.figures.names import FILES, FIRST
+from orchestration.figures.views import files, view_of
 from orchestration.recording import tables
 from orchestration.recording.tables import ToFolder
-from orchestration.requests.request import load_request, system_meant, text_of
+from orchestration.requests.request import load_request
 from orchestration.results.column_info import Described
 from orchestration.runs.folder import NewFolder, new_folder
 from orchestration.runs.result import Provenance, Result
 from orchestration.runs.simulation import RunInterrupted
+from orchestration.system.request import system_meant
 
 SIGNALS, EVENTS = tables.SIGNALS, tables.EVENTS
 METRICS, SCENARIO, PROVENANCE = "metrics.json", "scenario.toml", "provenance.json"
@@ -50,13 +51,13 @@ def _write(result: Result, folder: Path, *, figures: bool) -> None:
         "warnings": list(result.warnings),
     }
     (folder / METRICS).write_text(json.dumps(result.metrics, indent=2) + "\n", encoding="utf-8")
-    (folder / SCENARIO).write_text(text_of(result.asked), encoding="utf-8")
+    (folder / SCENARIO).write_text(result.asked.to_toml(), encoding="utf-8")
     (folder / PROVENANCE).write_text(json.dumps(notes, indent=2) + "\n", encoding="utf-8")
     if figures:
         from orchestration.figures import style
         from orchestration.runs import draw  # with it comes matplotlib, which takes longer than a short run
 
-        style.save(draw.draw(result, FIRST), folder)
+        style.save(draw.draw(result, view_of(result.asked.kind).first), folder)
 
 
 def load_run(folder: str | Path) -> Result:
@@ -147,7 +148,7 @@ def run_folder(folder: Path, replaces: Container[str] = ()) -> AbstractContextMa
 
     def replaceable(place: Path) -> bool:
         names = {path.name for path in place.iterdir() if path.is_file()}
-        others = {path.name for path in place.iterdir()} - _KNOWN
+        others = {path.name for path in place.iterdir()} - _KNOWN - files()
         return not others and any(name in names and name in replaces for name in kinds)
 
     return new_folder(folder, replaceable, expected)
@@ -163,5 +164,4 @@ _KNOWN = {
     MAT,
     "signals.csv",
     "events.csv",
-    *FILES,
 }

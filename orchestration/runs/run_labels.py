@@ -5,9 +5,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
 
-from orchestration.requests.request import text_of
 from orchestration.results import display_names as labels
-from orchestration.runs.result import Result
+from orchestration.runs.ran import Ran
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -19,7 +18,7 @@ MOST = 3
 _ABSENT = object()
 
 
-def told_apart(results: Sequence[Result], otherwise: Sequence[str]) -> list[str]:
+def told_apart(results: Sequence[Ran], otherwise: Sequence[str]) -> list[str]:
     """A name for each run, as in "period 10 ms, κ 0"; the names `otherwise` where settings do not tell them apart."""
     settings = [_settings(result) for result in results]
     paths = [path for path in dict.fromkeys(path for one in settings for path in one) if _differs(path, settings)]
@@ -29,9 +28,9 @@ def told_apart(results: Sequence[Result], otherwise: Sequence[str]) -> list[str]
     return list(otherwise)
 
 
-def _settings(result: Result) -> dict[str, Any]:
+def _settings(result: Ran) -> dict[str, Any]:
     """Of its scenario or system file by path, and the parameters that it was flown with."""
-    written = dict(_flat(tomllib.loads(text_of(result.asked))))
+    written = dict(_flat(tomllib.loads(result.asked.to_toml())))
     return {**result.parameters, **written}
 
 

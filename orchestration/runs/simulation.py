@@ -24,13 +24,13 @@ from orchestration.engines.sources import (
     Values,
 )
 from orchestration.engines.watch import watch
-from orchestration.engines.wiring import SAMPLE_OFFSET, SAMPLE_PERIOD, _signals, checked, fixed_steps, source_values
+from orchestration.engines.wiring import checked, fixed_steps, signals_of, source_values
 from orchestration.fmi.instance import Instance, Loader
 from orchestration.fmi.instances import open_instance
+from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.fmi.model import Model, read_model
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.translation import in_its_own_words, system_of, warnings
 from orchestration.recording.recording import InMemory, Recorder
+from orchestration.requests.request import usual
 from orchestration.results import objectives
 from orchestration.results.column_info import described
 from orchestration.runs.result import Provenance, Result
@@ -38,6 +38,7 @@ from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
 from orchestration.system.check import recorded
 from orchestration.system.model import Component, System, component_of, variable_of
+from orchestration.system.request import Request, in_its_own_words
 from orchestration.system.times import NANOSECONDS
 
 _NOTES = logging.getLogger("quadcosim")
@@ -60,7 +61,7 @@ class RunInterrupted(Interrupted):
 class Simulation:
     """A master over instances that have their parameters, ready to initialise or to restore."""
 
-    asked: Scenario | System
+    asked: Request
     """as the user wrote it"""
     system: System
     """what it means"""
@@ -102,7 +103,7 @@ class Simulation:
                 "wall_time": time.perf_counter() - self.started,
             },
             warnings=(
-                *(warnings(self.asked, self.parameters) if isinstance(self.asked, Scenario) else ()),
+                *self.asked.warnings(self.parameters),
                 *(warning for instance in self.instances.values() for warning in instance.warnings),
             ),
         )
@@ -116,7 +117,7 @@ class Simulation:
 
 
 def run(
-    asked: Scenario | System | None = None,
+    asked: Request | None = None,
     *,
     recorder: Recorder | None = None,
     progress: Progress | None = None,
@@ -131,7 +132,7 @@ def run(
     Raises `UsageError` for an FMU, variable or value that does not exist, `SimulatorError` if an FMU
     refuses a call for another reason than divergence, `RunInterrupted` after Ctrl-C.
     """
-    with prepared(asked or Scenario(), announce, recorder=recorder, engine=engine) as simulation:
+    with prepared(asked or usual(), announce, recorder=recorder, engine=engine) as simulation:
         simulation.master.initialise()
         simulation.master.run(progress=progress)
         return simulation.result()
@@ -139,7 +140,7 @@ def run(
 
 @contextmanager
 def prepared(
-    asked: Scenario | System,
+    asked: Request,
     announce: Announce | None = None,
     *,
     load: Loader = open_instance,
@@ -154,7 +155,7 @@ def prepared(
     started = time.perf_counter()
     recorder = InMemory() if recorder is None else recorder
     with in_its_own_words(asked):
-        system = system_of(asked) if isinstance(asked, Scenario) else asked
+        system = asked.as_system()
         paths = fmus.of_components(system.fmus, announce)
         models = {name: read_model(path) for name, path in paths.items()}
         found = checked(system, models)
@@ -166,7 +167,7 @@ def prepared(
             for name, component in system.components.items():
                 _set_parameters(instances[name], component)
                 _set_clock(instances[name], component, models[name])
-            said = described(system, models, ("time", *_signals(system, models)))
+            said = described(system, models, ("time", *signals_of(system, models)))
             recorder.describe({name: one.as_words() for name, one in said.items()})
             sources = {name: source_values(system, name, parameters, streams) for name in system.sources}
             signals = {name: system.sources[name].signals(name) for name in sources}

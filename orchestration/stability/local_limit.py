@@ -1,24 +1,19 @@
 """Local limits: where what is small about an operating point ceases to decay."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-from orchestration.basics.bisection import first_failure
+from orchestration.basics.bisection import Range, first_failure
 from orchestration.basics.errors import SimulatorError, UsageError
 from orchestration.fmi.reuse import Instances
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.requests.ranges import Range, Varied, range_of
-from orchestration.stability.hover_loop import HoverLoop, NotSmooth, at_edge, at_hover
+from orchestration.requests.ranges import Varied
+from orchestration.stability.known_loops import LOOPS, Local
 from orchestration.stability.linearised_component import PULSE
 from orchestration.stability.monodromy import growth_of_loop
 from orchestration.stability.operating_point import NotAtRest
 from orchestration.stability.perturbed_runs import growth_of
 from orchestration.system.model import System
-from orchestration.system.paths import changed
 
-HOVER = "spectral radius of the sampled loop about hover, by differences through saved states"
-HOVER_ACCURACY = 1e-3
-"""of the limit, relative: what the differences leave"""
 LOOP = "spectral radius of the sampled loop about the operating point, by differences through saved states"
 LOOP_FINER, TWINS_FINER = 0.01, 0.2
 """of the tolerance of the measured limit"""
@@ -30,84 +25,17 @@ Growth = Callable[[float], float]
 """Of what is small, by the value of the quantity [1/s]"""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Local:
-    """A local limit, None where there is none, and why."""
-
-    limit: float | None = None
-    outside: float | None = None
-    """of the quadrotor: with the gain just outside of its boundary layer"""
-    method: str | None = None
-    accuracy: float | None = None
-    reason: str
-
-
-def local_limit(loop: HoverLoop, scenario: Scenario, of: str) -> float | None:
-    """Where the spectral radius first crosses one from below, in period or delay [s]; None: nowhere in the range."""
-    span = range_of(scenario, of)
-    low = min((*span.before, span.first))
-    fine = [low + 0.001 * i for i in range(int((span.last - low) / 0.001))]
-    bracket = first_failure(lambda value: radius(loop, scenario, of, value) >= 1.0, fine, 1e-6)
-    return bracket.good if bracket is not None else None
-
-
-def radius(loop: HoverLoop, scenario: Scenario, of: str, value: float) -> float:
-    """The spectral radius of `scenario` about hover with another period or delay [s]."""
-    timing = scenario.timing
-    period = (value if of == "period" else timing.period) / timing.clock_ratio
-    delay = (value if of == "delay" else timing.delay) + (period if timing.order == "jacobi" else 0.0)
-    return loop.spectral_radius(period, delay)
-
-
 def local_limits(varied: Varied, span: Range) -> Local:
-    """The local limit of a quantity, through saved states where the FMUs have them, else by perturbed twin runs."""
-    scenario = varied.request
-    if not isinstance(scenario, Scenario):
-        if not varied.system.operating_point:
-            return Local(reason="no local limit: the system file names no operating_point")
-        return about_rest(varied.at, span)
-    if varied.of in ("jitter", "loss"):
-        return Local(reason=f"linear theory has no local limit of {varied.of}")
-    why = "the loop about hover is for period and delay only"
-    try:
-        if varied.of in ("period", "delay"):
-            return about_hover(scenario, varied.of)
-    except NotSmooth as error:
-        return Local(reason=f"no local limit: {error}")
-    except UsageError as error:
-        why = str(error)
-    return _without_hover_loop(scenario, varied, span, why)
+    """The local limit of a quantity, through saved states where the FMUs have them, else by perturbed twin runs.
 
-
-def about_hover(scenario: Scenario, of: str) -> Local:
-    """The local limits of the quadrotor in period or delay, inside its boundary layer and just outside of it.
-
-    Raises `UsageError` for a scenario whose loop about hover cannot be had.
+    Better, where more is known of the loop.
     """
-    if scenario.timing.hold != "zero":
-        raise UsageError("the loop about hover is for zero-order hold only")
-    loop = HoverLoop.of(scenario)
-    edge = at_edge(scenario)
-    limit = local_limit(loop, scenario, of)
-    return Local(
-        limit=limit,
-        outside=None if edge is None else local_limit(loop.with_law(edge), edge, of),
-        method=HOVER,
-        accuracy=None if limit is None else HOVER_ACCURACY * limit,
-        reason="the spectral radius about hover stays below one in the range, or above",
-    )
-
-
-def _without_hover_loop(scenario: Scenario, varied: Varied, span: Range, why: str) -> Local:
-    """The quadrotor as any other system, and why."""
-    try:
-        hover = at_hover(scenario)
-    except UsageError as error:
-        return Local(reason=f"no local limit: {error}")
-    found = about_rest(lambda value: changed(hover, dict.fromkeys(varied.paths, value)), span)
-    if found.method is None:
-        return replace(found, reason=f"{found.reason} ({why})")
-    return replace(found, method=f"{found.method} ({why})")
+    known = LOOPS.of(varied.request.kind)
+    if known is not None:
+        return known.local_limits(varied, span)
+    if not varied.system.operating_point:
+        return Local(reason="no local limit: the system file names no operating_point")
+    return about_rest(varied.at, span)
 
 
 def about_rest(at: Callable[[float], System], span: Range) -> Local:

@@ -7,13 +7,13 @@ from orchestration.basics.errors import UsageError
 from orchestration.building.inputs import Files
 from orchestration.engines.batch.shape import outline
 from orchestration.engines.wiring import checked, table_columns
-from orchestration.quadrotor.translation import in_its_own_words
 from orchestration.signals.table_file import read_table
 from orchestration.signals.waypoints import read_waypoints
 from orchestration.studies.store import expect_columns
 from orchestration.studies.study import Study
 from orchestration.system.check import check_parameter
 from orchestration.system.model import System
+from orchestration.system.request import in_its_own_words
 
 
 def expect_flyable(study: Study, files: Files) -> None:

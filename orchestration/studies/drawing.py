@@ -13,9 +13,8 @@ from orchestration.studies import figures, sensitivity
 from orchestration.studies.axes import Axis, unit_points
 from orchestration.studies.criteria import edge, judged
 from orchestration.studies.maps import heat_map
-from orchestration.studies.store import TEXTS, metrics_with
+from orchestration.studies.store import TEXTS, metrics_with, store_path
 from orchestration.studies.study import Study
-from orchestration.studies.sweep import store_path
 from orchestration.studies.table import frame, units_in
 
 if TYPE_CHECKING:

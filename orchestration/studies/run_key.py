@@ -8,8 +8,6 @@ from functools import partial
 from typing import Any
 
 from orchestration.building.inputs import Files, tables_of
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.translation import in_words_of_a_scenario
 from orchestration.studies.study import Study
 from orchestration.system.model import Component, Source, System
 from orchestration.workers.provenance import machine, versions
@@ -94,10 +92,9 @@ def study_parts(study: Study) -> dict[str, str]:
         parts |= {f"sources.{name}.{key}": value for key, value in _source_of(source, tables).items()}
     parts |= {f"objectives.{name}": text for name, text in system.objectives.items()}
     parts |= _parts("criterion", system.criterion)
-    words = in_words_of_a_scenario if isinstance(study.base, Scenario) else str
     said: dict[str, str] = {}
     for path, value in parts.items():
-        name = words(path)
+        name = study.base.in_words(path)
         said[path if name in said else name] = json.dumps(value, sort_keys=True)
     return said
 

@@ -38,6 +38,11 @@ UNITS = "units"
 _ABOUT = "CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL, checksum TEXT NOT NULL)"
 
 
+def store_path(study: str, folder: str | Path | None = None) -> Path:
+    """Where the rows of a study are: `results/NAME/study.sqlite` unless a folder is given."""
+    return Path(folder or Path("results") / study) / "study.sqlite"
+
+
 def _tables(metrics: Iterable[str]) -> dict[str, str]:
     typed = ", ".join(f"{_quoted(name)} {'TEXT' if name in TEXTS else 'REAL'}" for name in metrics)
     return {

@@ -12,14 +12,13 @@ from orchestration.basics.constructors import strict
 from orchestration.basics.errors import UsageError
 from orchestration.building.fmus import native_twin, native_twins
 from orchestration.building.inputs import Files, files_of
-from orchestration.quadrotor.translation import in_its_own_words
 from orchestration.requests.ranges import paths_in
-from orchestration.requests.request import Request, system_meant
 from orchestration.studies.axes import Axis, Method, Points, Value
 from orchestration.studies.linked_settings import Together
 from orchestration.studies.store import is_column
 from orchestration.system.model import System
 from orchestration.system.paths import changed, names_table, value_at
+from orchestration.system.request import Request, in_its_own_words, system_meant
 
 
 @strict()
@@ -68,8 +67,7 @@ class Study:
     @cached_property
     def origin(self) -> System:
         """The system that the base means."""
-        with in_its_own_words(self.base):
-            system = system_meant(self.base)
+        system = system_meant(self.base)
         return native_twins(system) if self.native else system
 
     @cached_property

@@ -7,12 +7,12 @@ from typing import Any, ClassVar, Protocol, TypeVar
 
 from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.scenario_file import parsed
-from orchestration.requests.request import Request, load_request, request_from_tables
+from orchestration.basics.typed_tables import parsed
+from orchestration.requests.request import load_request, request_from_tables
 from orchestration.studies.axes import Axis, Method, Scale, Value, span
 from orchestration.studies.study import Study, names_fmu
 from orchestration.system.paths import names_table
+from orchestration.system.request import ControlLoop, Request
 
 _FORBID: dict[str, str] = {"extra": "forbid"}
 
@@ -118,10 +118,10 @@ def base_of(file: Based, folder: Path) -> Request:
     return load_request(folder / file.scenario) if file.scenario else request_from_tables(file.base, folder)
 
 
-def scenario_of(file: Based, folder: Path) -> Scenario:
-    """Likewise, where the starts of the quadrotor are needed; raises `UsageError` for any other system."""
+def loop_of(file: Based, folder: Path) -> ControlLoop:
+    """Likewise, where starts of its plant are needed; raises `UsageError` for a system of which none are known."""
     base = base_of(file, folder)
-    if not isinstance(base, Scenario):
+    if not isinstance(base, ControlLoop):
         raise UsageError("base: expected a scenario of the quadrotor, whose starts are known")
     return base
 

@@ -40,11 +40,6 @@ _TOLD = 3
 """failed runs that are announced one by one"""
 
 
-def store_path(study: str, folder: str | Path | None = None) -> Path:
-    """Where the rows of a study are: `results/NAME/study.sqlite` unless a folder is given."""
-    return Path(folder or Path("results") / study) / "study.sqlite"
-
-
 @explained
 def sweep(
     study: Study,
@@ -72,7 +67,7 @@ def sweep(
     _expect_workers(workers, dask)
     in_lanes = engine == "batch"
     study = replace(study, native=True) if in_lanes else study
-    path = store_path(study.name, folder)
+    path = store.store_path(study.name, folder)
     files = study.files()
     expect_flyable(study, files)
     if in_lanes:

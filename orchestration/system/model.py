@@ -4,7 +4,7 @@ import functools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from orchestration.basics.constructors import strict
 from orchestration.basics.errors import UsageError
@@ -21,6 +21,7 @@ from orchestration.system.requirements import (
     require_share,
 )
 from orchestration.system.times import exact_nanoseconds
+from orchestration.system.written import tables_of
 
 Order = Literal["gauss-seidel", "jacobi"]
 Hold = Literal["zero", "first"]
@@ -338,6 +339,44 @@ class System:
     def fmus(self) -> dict[str, str]:
         """The FMU of each component, by its name."""
         return {name: component.fmu for name, component in self.components.items()}
+
+    def to_toml(self) -> str:
+        """The system file that loads as this system, wherever it lies."""
+        import tomli_w
+
+        return tomli_w.dumps({key: value for key, value in tables_of(self).items() if value not in ({}, [])})
+
+    # What is asked of any request (`request.Request`): a system is what it means, and has no words of its own.
+
+    kind: ClassVar[str] = "run"
+    title: ClassVar[str | None] = None
+    description: ClassVar[str] = ""
+
+    def as_system(self) -> "System":
+        """Itself."""
+        return self
+
+    def in_words(self, text: str) -> str:
+        """`text` as it is."""
+        return text
+
+    def paths_of(self, target: str) -> tuple[str, ...]:
+        """`target` is a path."""
+        return (target,)
+
+    def range_of(self, quantity: str) -> None:
+        """No quantity has a name."""
+
+    def near_continuous(self, period: float) -> None:
+        """What of it is digital, and where, it does not say."""
+
+    def warnings(self, parameters: Mapping[str, float]) -> tuple[str, ...]:
+        """None."""
+        return ()
+
+    def headline(self) -> str:
+        """None."""
+        return ""
 
     def __post_init__(self) -> None:
         require_positive(self, "stop_time")

@@ -1,6 +1,5 @@
 """Reads and writes system files (TOML), and gives the JSON schema that editors complete them from."""
 
-import dataclasses
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -304,51 +303,3 @@ def _keys_at(place: tuple[Any, ...]) -> list[str]:
     if len(place) > 2 and place[2] == "sampling":
         table = SamplingTable
     return [info.alias or name for name, info in table.model_fields.items()]
-
-
-def to_toml(system: System) -> str:
-    """The system file that loads as this system, wherever it lies."""
-    import tomli_w
-
-    return tomli_w.dumps({key: value for key, value in to_tables(system).items() if value not in ({}, [])})
-
-
-def to_tables(system: System) -> dict[str, Any]:
-    """The tables of `to_toml`, without what is what it is anyway."""
-    tables: dict[str, Any] = {"stop_time": system.stop_time, "seed": system.seed, "optional": list(system.optional)}
-    tables["components"] = {
-        name: _without_defaults(component, keep=("fmu",)) for name, component in system.components.items()
-    }
-    for table in tables["components"].values():
-        if table["fmu"].endswith(".fmu"):
-            table["fmu"] = str(Path(table["fmu"]).absolute())
-    tables["connections"] = [_connection_table(x) for x in system.connections]
-    tables["sources"] = {name: _without_defaults(source) for name, source in system.sources.items()}
-    for table in tables["sources"].values():
-        if "file" in table:
-            table["file"] = str(Path(table["file"]).absolute())
-    for key in ("objectives", "streams", "operating_point"):
-        tables[key] = dict(getattr(system, key))
-    tables["criterion"] = _without_defaults(system.criterion)
-    return tables
-
-
-def _connection_table(x: Connection) -> dict[str, Any]:
-    keys = _without_defaults(x, keep=("name",))
-    return {"name": keys.pop("name"), "from": keys.pop("start"), "to": keys.pop("end"), **keys}
-
-
-def _without_defaults(of: Any, keep: tuple[str, ...] = ()) -> dict[str, Any]:
-    result = {}
-    for field in dataclasses.fields(of):
-        value = getattr(of, field.name)
-        if field.name in keep or (value is not None and value != field.default and value != {}):
-            is_table = dataclasses.is_dataclass(value)
-            result[field.name] = _without_defaults(value) if is_table else _plain(value)
-    return result
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, tuple):
-        return list(value)
-    return dict(value) if isinstance(value, Mapping) else value

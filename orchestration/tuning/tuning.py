@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from fmu_kit.trajectory import Trajectory
 from orchestration.basics.constructors import strict
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
@@ -15,14 +14,11 @@ from orchestration.basics.statistics import wilson
 from orchestration.building.fmus import native_twins
 from orchestration.building.inputs import Files, files_of
 from orchestration.limits.evaluation import is_good
-from orchestration.quadrotor.initial_conditions import Starts
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.translation import in_its_own_words
 from orchestration.requests.ranges import paths_in
-from orchestration.requests.request import system_meant
 from orchestration.studies.axes import Axis
 from orchestration.system.model import System
 from orchestration.system.paths import changed
+from orchestration.system.request import ControlLoop, Ensemble, in_its_own_words, system_meant
 from orchestration.workers.batching import expect_lanes
 
 Fly = Callable[[Sequence[System]], Sequence[dict[str, Any]]]
@@ -41,7 +37,7 @@ class Tuning:
 
     name: str
     """The name of the tuning, with which its files begin."""
-    base: Scenario
+    base: ControlLoop
     """The scenario whose controller is tuned."""
     parameters: tuple[Axis, ...]
     """What is tuned, each between its `low` and its `high`."""
@@ -49,7 +45,7 @@ class Tuning:
     """The cost of a flight that flies: an expression over the objectives of the base."""
     bad: float
     """The cost of a flight that does not fly."""
-    starts: Starts
+    starts: Ensemble
     """The starts that it is tuned on; those that it is judged on come after them."""
     judged: int
     """How many starts it is judged on."""
@@ -99,7 +95,7 @@ class Tuning:
         found = files_of(self.origin)
         if self.native:
             middle = self.values([0.5] * len(self.parameters))
-            expect_lanes(self.systems(self.periods[0], middle, replace(self.starts, count=1))[0], found)
+            expect_lanes(self.systems(self.periods[0], middle, self.starts.some(self.starts.first, 1))[0], found)
         return found
 
     def values(self, shares: Sequence[float]) -> dict[str, float]:
@@ -108,21 +104,20 @@ class Tuning:
             target: axis.at(float(share)) for axis, share in zip(self.parameters, shares) for target in axis.targets
         }
 
-    def systems(self, period: float, values: Mapping[str, float], starts: Starts) -> list[System]:
+    def systems(self, period: float, values: Mapping[str, float], starts: Ensemble) -> list[System]:
         """The flights from an ensemble of starts; raises `UsageError` for a value that cannot be."""
         given = {**values, _PERIOD: period}
         with in_its_own_words(self.base):
             system = changed(self.origin, {path: given[target] for target in given for path in self._paths[target]})
             system = replace(system, objectives={**system.objectives, COST: self.cost})
-            plant = "components.plant.parameters."
             return [
-                changed(system, {f"{plant}{name}": value for name, value in start.parameters.items()})
-                for start in starts.drawn(Trajectory())
+                changed(system, {path: v for target, v in start.values.items() for path in self.base.paths_of(target)})
+                for start in starts.starts_of(self.base)
             ]
 
-    def judging(self) -> Starts:
+    def judging(self) -> Ensemble:
         """The starts that the outcome is judged on."""
-        return replace(self.starts, first=self.starts.first + self.starts.count, count=self.judged)
+        return self.starts.some(self.starts.first + self.starts.count, self.judged)
 
     def mean_cost(self, flights: Sequence[dict[str, Any]]) -> float:
         """Of flights by their metrics."""

@@ -1,14 +1,12 @@
 """Reads files that say what is tuned, and writes what was found."""
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
 from orchestration.basics.errors import UsageError
-from orchestration.quadrotor.initial_conditions import Starts
-from orchestration.studies.study_file import AxisTable, axis_of, load, scenario_of
+from orchestration.studies.study_file import AxisTable, axis_of, load, loop_of
 from orchestration.tuning.tuning import Found, Tuning
 
 _FORBID: dict[str, str] = {"extra": "forbid"}
@@ -26,14 +24,10 @@ class CostTable:
     """The cost of one that does not; no flight costs more."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class StartsTable(Starts):
-    """`[starts]`: those that are tuned on, and how many come after them to judge by."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
-
-    judged: int = 200
-    """How many more starts, after these, the result is judged on."""
+JUDGED = "judged"
+"""Key of `[starts]`: how many more starts, after those that are tuned on, the result is judged on"""
+USUALLY_JUDGED = 200
+"""of them, unless told"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +56,7 @@ class TuningFile:
     """How long is searched."""
     parameters: list[AxisTable]
     """What is tuned, each in a range: two at least."""
-    starts: StartsTable = field(default_factory=StartsTable)
+    starts: dict[str, Any] = field(default_factory=dict)
     """The initial states that are flown from."""
     name: str | None = None
     """What the files of the result are called by; without it, the name of the file."""
@@ -82,20 +76,23 @@ def load_tuning(path: str | Path) -> Tuning:
 
 
 def _tuning(file: TuningFile, path: Path) -> Tuning:
-    base = scenario_of(file, path.parent)
+    base = loop_of(file, path.parent)
     parameters = tuple(axis_of(table, path.parent) for table in file.parameters)
     for axis in parameters:
         if axis.values is not None or axis.multiplies:
             raise UsageError(f"parameters {axis.name}: expected start and stop, and what it sets")
-    given = {f.name: getattr(file.starts, f.name) for f in dataclasses.fields(Starts)}
+    starts = dict(file.starts)
+    judged = starts.pop(JUDGED, USUALLY_JUDGED)
+    if isinstance(judged, bool) or not isinstance(judged, int):
+        raise UsageError(f"starts.{JUDGED} = {judged!r}: expected a valid integer")
     return Tuning(
         name=file.name or path.stem,
         base=base,
         parameters=parameters,
         cost=file.cost.of,
         bad=file.cost.bad,
-        starts=Starts(**given),
-        judged=file.starts.judged,
+        starts=base.ensemble(starts, beside=(JUDGED,)),
+        judged=judged,
         periods=tuple(file.search.periods),
         evaluations=file.search.evaluations,
         seeds=tuple(file.search.seeds),

@@ -11,12 +11,10 @@ from pathlib import Path
 from fmu_kit.syntax_trees import parsed
 from orchestration.engines import loop
 from orchestration.engines.batch import kernels
-from orchestration.quadrotor import translation
+from orchestration.requests import request
 
 ROOTS = ("orchestration.runs.simulation", "orchestration.workers.task")
 """Where the code that flies begins."""
-QUADROTOR = Path(translation.__file__).with_name("system.toml")
-"""What every scenario is a change of"""
 _ASIDE = (
     "orchestration.building.fmus",
     "orchestration.figures.gallery",
@@ -51,7 +49,7 @@ def flight_sources() -> dict[str, Path]:
                 waiting += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
             elif isinstance(node, ast.Import):
                 waiting += [alias.name for alias in node.names]
-    return found | {path.name: path for path in (QUADROTOR, *loop.FILES, *kernels.FILES)}
+    return found | {path.name: path for path in (*request.FILES, *loop.FILES, *kernels.FILES)}
 
 
 def sources_hash(sources: Mapping[str, Path]) -> str:

@@ -12,7 +12,6 @@ from docs import experiments
 from docs.make_findings import flying_up_to, with_python_inside
 from fmu_kit.trajectory import Trajectory
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.translation import system_of
 from orchestration.runs.in_lanes import fly
 from orchestration.workers.batching import Agreement
 
@@ -21,7 +20,7 @@ DECIMAL = re.compile(r"-?\d+\.?\d*")
 
 
 def flown(scenarios: list[Scenario]) -> list[str]:
-    return [str(metrics["outcome"]) for metrics in fly([system_of(scenario) for scenario in scenarios])]
+    return [str(metrics["outcome"]) for metrics in fly([scenario.as_system() for scenario in scenarios])]
 
 
 def rows(section: str) -> dict[str, list[str]]:
@@ -33,7 +32,7 @@ def rows(section: str) -> dict[str, list[str]]:
 
 def test_flights_in_lanes_are_those_of_the_fmus_with_python_inside() -> None:
     chosen = [scenario.with_changes(stop_time=1.0) for scenario in experiments.some_flights(3)]
-    lanes = fly([system_of(scenario) for scenario in chosen])
+    lanes = fly([scenario.as_system() for scenario in chosen])
     alone = [quadcosim.run(with_python_inside(scenario)).metrics for scenario in chosen]
     found = Agreement.of((i, *pair) for i, pair in enumerate(zip(lanes, alone, strict=True)))
     assert found.runs == 3

@@ -7,7 +7,7 @@ import pytest
 
 from orchestration.basics.documents import read_toml
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.requests.request import system_meant
+from orchestration.system.request import system_meant
 from quadcosim import Result, run
 
 PAGE = (Path(__file__).parents[2] / "docs" / "metrics.md").read_text(encoding="utf-8")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from docs import theory
-from orchestration.stability.hover_loop import HoverLoop
+from orchestration.flight.hover_loop import HoverLoop
 
 
 @pytest.mark.parametrize("exponent", [1.0, 0.9, 0.5])

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestration.quadrotor.translation import system_of
 from orchestration.runs.result import Result
 from orchestration.signals.waypoints import read_waypoints
 from quadcosim import DisturbanceChoice, ReferenceChoice, Scenario, load_scenario, run
@@ -18,7 +17,7 @@ FOLDER = EXAMPLES / "references"
 
 
 def flown(scenario: Scenario) -> Result:
-    return run(located(system_of(scenario)))
+    return run(located(scenario.as_system()))
 
 
 @pytest.mark.parametrize("name", ["lemniscate", "waypoints"])

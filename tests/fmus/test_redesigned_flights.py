@@ -8,10 +8,10 @@ import pytest
 import quadcosim
 from orchestration.basics.errors import UsageError
 from orchestration.building import fmus
+from orchestration.flight.hover_loop import HoverLoop, at_hover
 from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.scenario_file import scenario_from_tables
-from orchestration.stability.hover_loop import HoverLoop, at_hover
 from orchestration.stability.monodromy import growth_of_loop
 
 MEAN = {"discretisation": "mean", "stages": 3}

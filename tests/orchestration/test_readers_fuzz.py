@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import quadcosim
 from orchestration.quadrotor.presets import preset_timing
 from orchestration.quadrotor.wiring import REFERENCE
-from orchestration.requests.request import load_request, text_of
+from orchestration.requests.request import load_request
 from orchestration.requests.ssp import writing
 from orchestration.runs.pause import read_state
 from orchestration.signals.table_file import read_table
@@ -238,7 +238,7 @@ def test_a_study(tmp_path: Path, content: bytes) -> None:
 def test_a_system(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "system.toml"
     path.write_bytes(content)
-    is_read_or_refused(lambda: text_of(load_request(path)))
+    is_read_or_refused(lambda: load_request(path).to_toml())
 
 
 @pytest.fixture(scope="module")
@@ -258,7 +258,7 @@ def ssp(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_timing_of_an_ssp(tmp_path: Path, ssp: Path, content: bytes) -> None:
     path = tmp_path / "timing.toml"
     path.write_bytes(content)
-    is_read_or_refused(lambda: text_of(load_request(ssp, path)))
+    is_read_or_refused(lambda: load_request(ssp, path).to_toml())
 
 
 @fuzz

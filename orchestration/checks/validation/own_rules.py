@@ -7,8 +7,8 @@ from fmu_kit.loader import GUID_FILE
 from fmu_kit.packaging import ICON, NATIVE_TABLES, content_guid
 from orchestration.building.models import MODELS
 from orchestration.checks.validation.fmu import Fmu, Variable
+from orchestration.checks.validation.roles import ROLES
 from orchestration.checks.validation.units import base_units, dimensions
-from orchestration.quadrotor import wiring
 
 PAGE = "documentation/index.html"
 _PNG = b"\x89PNG\r\n\x1a\n"
@@ -84,26 +84,14 @@ def documentation(fmu: Fmu) -> Iterator[str]:
 
 def ports(fmu: Fmu) -> Iterator[str]:
     """A controller, and a plant, has all that is wired to it, under the names and with the units of the wiring."""
-    outputs = {v.name for v in fmu.of_causality("output")}
-    if outputs.intersection(wiring.COMMAND):
-        yield from _missing(fmu, "output", wiring.COMMAND)
-        yield from _missing(fmu, "input", (*wiring.MEASUREMENT, *wiring.REFERENCE))
-        yield from _missing(fmu, "parameter", (wiring.SAMPLE_PERIOD, wiring.SAMPLE_OFFSET, *wiring.TRAJECTORY))
-        yield from _missing(fmu, "parameter", (wiring.USE_REFERENCE_INPUTS,), "Boolean")
-    elif outputs.intersection(wiring.MEASUREMENT):
-        yield from _missing(fmu, "output", wiring.MEASUREMENT)
-        yield from _missing(fmu, "input", (*wiring.COMMAND, *wiring.EXTERNAL_FORCE))
-
-
-def _missing(fmu: Fmu, causality: str, names: tuple[str, ...], kind: str = "Real") -> Iterator[str]:
-    by_name = {v.name: v for v in fmu.variables}
-    for name in names:
-        unit = wiring.UNITS.get(name)
-        expected = _described(kind, causality, unit)
-        if name not in by_name:
-            yield f"{name}: expected {expected}, found none"
-        elif (found := _as_port(by_name[name])) != expected:
-            yield f"{name}: expected {expected}, found {found}"
+    outputs, by_name = {v.name for v in fmu.of_causality("output")}, {v.name: v for v in fmu.variables}
+    role = next((role for role in ROLES if outputs.intersection(role.told_by)), None)
+    for port in () if role is None else role.ports:
+        expected = _described(port.kind, port.causality, port.unit)
+        if port.name not in by_name:
+            yield f"{port.name}: expected {expected}, found none"
+        elif (found := _as_port(by_name[port.name])) != expected:
+            yield f"{port.name}: expected {expected}, found {found}"
 
 
 def _as_port(v: Variable) -> str:

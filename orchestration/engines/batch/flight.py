@@ -14,9 +14,10 @@ from orchestration.engines.batch import structures as c
 from orchestration.engines.batch.shape import Ends, Shape, changes_of, ends_of
 from orchestration.engines.master import CONVERGED, SWEEPS
 from orchestration.engines.sources import Values
-from orchestration.engines.wiring import SAMPLE_OFFSET, SAMPLE_PERIOD, source_values
+from orchestration.engines.wiring import source_values
 from orchestration.expressions.recorded import STOP_TIME
 from orchestration.expressions.syntax import Call
+from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.fmi.values import number_of, taken
 from orchestration.schedule.schedule import Schedule
 from orchestration.schedule.schedule_cache import Windows

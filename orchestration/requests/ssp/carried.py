@@ -6,13 +6,12 @@ from pathlib import Path
 
 from orchestration.basics.errors import UsageError
 from orchestration.building import fmus
+from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.fmi.model import Model, Variable, read_model
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.translation import in_its_own_words, in_words_of_a_scenario, system_of
-from orchestration.quadrotor.wiring import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.schedule.plan import Plan
 from orchestration.system.check import check
 from orchestration.system.model import Component, Connection, Parameter, Sampling, System, component_of, variable_of
+from orchestration.system.request import Request, in_its_own_words
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,14 +46,14 @@ class Carried:
     """what other masters are not told, a line each that names its place"""
 
 
-def carried(asked: Scenario | System, announce: Callable[[str], None] | None = None) -> Carried:
+def carried(asked: Request, announce: Callable[[str], None] | None = None) -> Carried:
     """What other masters are given of a system, and what they cannot be told.
 
     That is: anything late, lost or noisy, a source that is no constant, and components at steps of their own. A
     sampled component needs the common step for its period, or an FMU with a clock of its own by `sample_period`.
     """
     with in_its_own_words(asked):
-        system = system_of(asked) if isinstance(asked, Scenario) else asked
+        system = asked.as_system()
         located = fmus.of_components(system.fmus, announce)
         models = {name: read_model(path) for name, path in located.items()}
         check(system, models)
@@ -65,11 +64,11 @@ def carried(asked: Scenario | System, announce: Callable[[str], None] | None = N
             system=system,
             parts=tuple(_part(system, name, located[name], models[name]) for name in plan.sampled + plan.continuous),
             step=step,
-            unsaid=tuple(map(in_words_of_a_scenario, unsaid)) if isinstance(asked, Scenario) else unsaid,
+            unsaid=tuple(map(asked.in_words, unsaid)),
         )
 
 
-def wholly_carried(asked: Scenario | System, announce: Callable[[str], None] | None = None) -> Carried:
+def wholly_carried(asked: Request, announce: Callable[[str], None] | None = None) -> Carried:
     """As `carried`; raises `UsageError` for the first that other masters cannot be told."""
     given = carried(asked, announce)
     if given.unsaid:

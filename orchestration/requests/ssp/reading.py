@@ -8,8 +8,8 @@ from typing import Any
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.units import BaseUnits
+from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.fmi.model import Model, read_model
-from orchestration.quadrotor.wiring import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.requests.ssp.document import read
 from orchestration.requests.ssp.package import opened
 from orchestration.requests.ssp.parameters import Value

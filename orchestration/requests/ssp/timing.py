@@ -6,7 +6,7 @@ from typing import Any
 
 from orchestration.basics.errors import UsageError, shown
 from orchestration.system.model import System
-from orchestration.system.system_file import to_tables
+from orchestration.system.written import tables_of
 
 ENDING = ".timing.toml"
 
@@ -22,7 +22,7 @@ def written(system: System, ssp: Path) -> Path:
 
 def _left_to_say(system: System) -> dict[str, Any]:
     """The tables of a system without its FMUs, their parameters and the conversions of connections."""
-    tables = to_tables(system)
+    tables = tables_of(system)
     carried = {"components": ("fmu", "parameters"), "connections": ("scale", "offset")}
     for name, members in (("components", tables["components"].values()), ("connections", tables["connections"])):
         for table in members:

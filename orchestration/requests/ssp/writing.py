@@ -17,15 +17,12 @@ from fmu_kit.versions import generation_tool
 from orchestration.basics.errors import UsageError
 from orchestration.basics.units import BASE
 from orchestration.fmi.model import Kind, Variable
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.translation import system_of
 from orchestration.requests.ssp import timing
 from orchestration.requests.ssp.carried import Carried, Part, carried
 from orchestration.requests.ssp.document import add, document, element
 from orchestration.system.model import System, variable_of
+from orchestration.system.request import Request
 
-NAME = "QuadrotorLoop"
-"""Of the quadrotor's system; any other is called after its file"""
 PARAMETER_SET = "scenario"
 """Name of each parameter set."""
 SYSTEM_PARAMETERS = "resources/scenario.ssv"
@@ -35,7 +32,7 @@ TYPED: tuple[Kind, ...] = ("Real", "Integer", "Boolean", "String")
 
 
 def write(
-    asked: Scenario | System,
+    asked: Request,
     path: Path,
     announce: Callable[[str], None] | None = None,
     warn: Callable[[str], None] | None = None,
@@ -53,23 +50,22 @@ def write(
     for part in given.parts:
         files[_parameter_file(part)] = document(_parameter_set({"": part}))
     files[SYSTEM_PARAMETERS] = document(_parameter_set({f"{part.name}.": part for part in given.parts}))
-    is_quadrotor = isinstance(asked, Scenario)
-    about = {"description": "Quadrotor and its controller in closed loop"} if is_quadrotor else {}
-    files["SystemStructure.ssd"] = document(_structure(given, NAME if is_quadrotor else path.stem, about))
+    about = {"description": asked.description} if asked.description else {}
+    files["SystemStructure.ssd"] = document(_structure(given, asked.title or path.stem, about))
     path.parent.mkdir(parents=True, exist_ok=True)
     write_archive(path, files, first="SystemStructure.ssd")
     return path
 
 
 def write_with_timing(
-    asked: Scenario | System,
+    asked: Request,
     path: Path,
     announce: Callable[[str], None] | None = None,
     warn: Callable[[str], None] | None = None,
 ) -> tuple[Path, Path]:
     """As `write`, and beside it the file that makes the system of it again."""
     write(asked, path, announce, warn)
-    return path, timing.written(system_of(asked) if isinstance(asked, Scenario) else asked, path)
+    return path, timing.written(asked.as_system(), path)
 
 
 def _sources(parts: Iterable[Part]) -> dict[str, Path]:

@@ -7,8 +7,8 @@ import pytest
 import quadcosim
 from fmu_kit.bundle import Target
 from orchestration.building.models import MODELS
+from orchestration.flight.hover_loop import HoverLoop, at_hover
 from orchestration.fmi.reuse import Instances
-from orchestration.stability.hover_loop import HoverLoop, at_hover
 from orchestration.stability.monodromy import growth_of_loop
 from orchestration.system.model import System
 from quadcosim import Result, Scenario, Timing, UsageError

@@ -14,7 +14,7 @@ import pytest
 
 from orchestration.building import fmus
 from orchestration.building.models import MODELS
-from orchestration.figures.names import FLIGHT
+from orchestration.flight.names import FIGURES as FLIGHT
 from quadcosim import Scenario, Timing, load_run, run, save_run
 from tests.commands import Done, Main
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from orchestration.studies.sweep import store_path
+from orchestration.studies.store import store_path
 from tests.commands import Done, Main
 from tests.orchestration.studies.common import (
     GRID,

@@ -7,11 +7,11 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from orchestration.comparison.bandwidth import crossover
 from orchestration.comparison.cells import Median, Result
 from orchestration.comparison.run import agree
+from orchestration.flight.bandwidth import crossover
+from orchestration.flight.hover_loop import COORDINATES, _controller_at_hover, _located, hover_of
 from orchestration.fmi.reuse import Instances
-from orchestration.stability.hover_loop import COORDINATES, _controller_at_hover, _located, hover_of
 from quadcosim import FmuChoice, Scenario
 from tests.commands import Main
 

@@ -138,10 +138,9 @@ def test_gains_may_lie_in_a_file_for_each_vehicle_and_value_with_parameters_on_t
 
 
 def test_a_run_is_the_scenario_that_means_it(comparison: Comparison) -> None:
-    from orchestration.quadrotor.translation import system_of
 
     for index in (0, 37, len(comparison.study.points) - 1):
-        assert system_of(comparison.scenario(index, {})) == comparison.study.system(index, {})
+        assert comparison.request(index, {}).as_system() == comparison.study.system(index, {})
 
 
 def test_the_native_twins_are_taken_of_all_fmus(comparison: Comparison) -> None:

@@ -12,12 +12,13 @@ from matplotlib.collections import FillBetweenPolyCollection
 from matplotlib.figure import Figure
 
 import quadcosim
-from orchestration.figures import commands
 from orchestration.figures.lines import clip_peaks
-from orchestration.figures.names import COLUMNS, FLIGHT
-from orchestration.figures.phase import surface
-from orchestration.figures.spectrum import welch
+from orchestration.figures.names import COLUMNS
 from orchestration.figures.style import SCREEN, STYLES, Style, save
+from orchestration.flight import commands
+from orchestration.flight.names import FIGURES as FLIGHT
+from orchestration.flight.phase import surface
+from orchestration.flight.spectrum import welch
 from orchestration.runs.draw import draw
 from orchestration.runs.run_labels import told_apart
 from quadcosim import Result, Scenario, UsageError
@@ -35,7 +36,7 @@ def flight() -> Result:
 
 @pytest.fixture(scope="module")
 def slow(flight: Result) -> Result:
-    return quadcosim.run(flight.asked.with_changes(timing={"period": 0.03}))  # type: ignore[union-attr]
+    return quadcosim.run(flight.asked.with_changes(timing={"period": 0.03}))  # type: ignore[attr-defined]
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +86,7 @@ def test_signals_of_any_fmus_have_their_descriptions_and_units(tank: Result) -> 
 
 
 def test_a_legend_tells_what_differs_between_runs(flight: Result, slow: Result) -> None:
-    heavy = replace(flight, asked=flight.asked.with_changes(parameters={"plant.mass": 1.2}))  # type: ignore[union-attr]
+    heavy = replace(flight, asked=flight.asked.with_changes(parameters={"plant.mass": 1.2}))  # type: ignore[attr-defined]
     assert told_apart([flight, slow], ["a", "b"]) == ["period 10 ms", "period 30 ms"]
     assert told_apart([flight, heavy], ["a", "b"]) == ["mass 1 kg", "mass 1.2 kg"]
     assert told_apart([flight, flight], ["a", "b"]) == ["a", "b"]

@@ -15,21 +15,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import quadcosim
-from orchestration.basics.bisection import first_failure
+from orchestration.basics.bisection import Range, first_failure
 from orchestration.basics.simulator import Floats
 from orchestration.basics.statistics import wilson
+from orchestration.flight.hover_loop import COORDINATES, HoverLoop, hover_of
+from orchestration.flight.local_limit import local_limit
 from orchestration.fmi.reuse import Instances
 from orchestration.limits import limit as limits
 from orchestration.limits.evaluation import is_good
-from orchestration.limits.limit import Continuous, find
+from orchestration.limits.found import Continuous
+from orchestration.limits.limit import find
 from orchestration.quadrotor.scenario import FmuChoice, Record
-from orchestration.quadrotor.translation import system_of
 from orchestration.quadrotor.wiring import COMMAND
-from orchestration.requests.ranges import Range, Varied, range_of
+from orchestration.requests.ranges import Varied
 from orchestration.runs.simulation import prepared
 from orchestration.stability import local_limit as local
-from orchestration.stability.hover_loop import COORDINATES, HoverLoop, hover_of
-from orchestration.stability.local_limit import Local, local_limit, local_limits
+from orchestration.stability.known_loops import Local
+from orchestration.stability.local_limit import local_limits
 from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS
 from quadcosim import Result, Scenario, Timing, UsageError
@@ -291,9 +293,15 @@ def test_motors_are_in_the_loop_as_lags_of_their_own() -> None:
     assert by_motors == pytest.approx(by_box, rel=1e-6, abs=1e-6)
 
 
+def range_of(scenario: Scenario) -> Range:
+    found = scenario.range_of("period")
+    assert found is not None
+    return found
+
+
 def test_motors_that_rise_otherwise_than_they_fall_have_no_local_limit() -> None:
     scenario = with_motors(0.1)
-    found = local_limits(Varied(request=scenario, of="period"), range_of(scenario, "period"))
+    found = local_limits(Varied(request=scenario, of="period"), range_of(scenario))
     assert (found.limit, found.method) == (None, None)
     assert found.reason == (
         "no local limit: the plant answers to a rise otherwise than to a fall, so hover has no linear loop"
@@ -317,7 +325,7 @@ def test_the_lag_that_an_fmu_has_by_itself_is_in_the_loop(tmp_path: Path) -> Non
 @pytest.mark.parametrize(("exponent", "limit"), [(0.5, 0.0085), (0.99, 0.0801)])
 def test_at_the_edge_of_the_boundary_layer_the_exponent_matters(exponent: float, limit: float) -> None:
     scenario = scenario_of().with_changes(parameters={"controller.surface_exponent": exponent})
-    found = known_local_limits(Varied(request=scenario, of="period"), range_of(scenario, "period"))
+    found = known_local_limits(Varied(request=scenario, of="period"), range_of(scenario))
     assert found.limit == theory()
     assert found.outside == pytest.approx(limit, abs=1e-4)
 
@@ -444,7 +452,7 @@ def test_what_varies_is_the_quantity_alone(stubbed: type[StubPool]) -> None:
     found = find(base, "delay")
     assert found.large_signal_limit == pytest.approx(0.0123, abs=0.0005)
     assert all(
-        flown == system_of(base.with_changes(timing={"delay": at(flown, "timing.delay")})) for flown in stubbed.flown
+        flown == base.with_changes(timing={"delay": at(flown, "timing.delay")}).as_system() for flown in stubbed.flown
     )
 
 
@@ -566,7 +574,7 @@ def test_near_continuous_time_nothing_digital_is_left(stubbed: type[StubPool]) -
     clear = dataclasses.replace(
         base, timing=Timing(period=1e-4, plant_interval=0.02), record=Record(plant=(), controller=())
     )
-    assert ideal == system_of(clear)
+    assert ideal == clear.as_system()
     assert found.continuous == Continuous(period=1e-4, outcome="settled", settling_time=1.5)
     assert find(base, "delay").continuous is None
 

@@ -15,7 +15,6 @@ from orchestration.engines.sources import Constant, Values
 from orchestration.engines.watch import watch
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.quadrotor.translation import system_of
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE
 from orchestration.recording.recording import Chunk, Event, InMemory
 from orchestration.schedule.cursor import Position
@@ -191,7 +190,7 @@ class Instant(NamedTuple):
 
 def position_of(timing: Timing, stop_time: float, seed: int = 0) -> Position:
     """At the start of a flight with this timing."""
-    system = system_of(Scenario(timing=timing, stop_time=stop_time))
+    system = Scenario(timing=timing, stop_time=stop_time).as_system()
     return Position(Timetable(system, Streams(seed, system.streams)))
 
 
@@ -225,7 +224,7 @@ class Flown:
         self.plant = plant or Plant({"position.x": 1.0})
         self.controller: Any = controller or Counting()
         self.recorder = InMemory()
-        system = system_of(Scenario(timing=timing, stop_time=stop_time))
+        system = Scenario(timing=timing, stop_time=stop_time).as_system()
         streams = Streams(seed, system.streams)
         named, signals = {"reference": reference}, {"reference": POSITION_REFERENCE}
         self.master = Master(

@@ -6,23 +6,25 @@ import pytest
 from fmu_kit.trajectory import Trajectory
 from orchestration.basics.errors import UsageError
 from orchestration.quadrotor.initial_conditions import Starts
+from orchestration.quadrotor.scenario import Scenario
 
 TRAJECTORY = Trajectory()
+PAPER = Scenario()
 STARTS = Starts(count=64, position=4.0, velocity=2.0, angle=2.0, rate=3.0)
 
 
 def vector(start, name, axes="xyz"):
-    return np.array([start.parameters[f"initial.{name}.{axis}"] for axis in axes])
+    return np.array([start.values[f"plant.initial.{name}.{axis}"] for axis in axes])
 
 
 def test_sizes_are_spread_evenly():
-    sizes = sorted(start.size for start in STARTS.drawn(TRAJECTORY))
+    sizes = sorted(start.size for start in STARTS.starts_of(PAPER))
     assert sizes == pytest.approx([(i + 1) / 64 for i in range(64)])
 
 
 def test_every_error_is_its_share_of_the_largest():
     reference = TRAJECTORY.at(0.0)
-    for start in STARTS.drawn(TRAJECTORY):
+    for start in STARTS.starts_of(PAPER):
         assert np.linalg.norm(vector(start, "position") - [*reference.position]) == pytest.approx(4.0 * start.size)
         assert np.linalg.norm(vector(start, "velocity") - [*reference.velocity]) == pytest.approx(2.0 * start.size)
         assert np.linalg.norm(vector(start, "angular_velocity")) == pytest.approx(3.0 * start.size)
@@ -33,21 +35,21 @@ def test_every_error_is_its_share_of_the_largest():
 
 def test_directions_are_those_of_a_sphere():
     directions = np.array(
-        [vector(s, "angular_velocity") / (3.0 * s.size) for s in Starts(count=2000, rate=3.0).drawn(TRAJECTORY)]
+        [vector(s, "angular_velocity") / (3.0 * s.size) for s in Starts(count=2000, rate=3.0).starts_of(PAPER)]
     )
     assert np.abs(directions.mean(axis=0)).max() < 0.05
     assert np.abs(directions.T @ directions / 2000 - np.eye(3) / 3).max() < 0.03
 
 
 def test_more_starts_leave_the_first_ones_as_they_are():
-    assert Starts(count=100).drawn(TRAJECTORY)[:10] == Starts(count=10).drawn(TRAJECTORY)
-    assert Starts(count=100).drawn(TRAJECTORY)[50:60] == Starts(count=10, first=50).drawn(TRAJECTORY)
+    assert Starts(count=100).starts_of(PAPER)[:10] == Starts(count=10).starts_of(PAPER)
+    assert Starts(count=100).starts_of(PAPER)[50:60] == Starts(count=10, first=50).starts_of(PAPER)
 
 
 def test_another_seed_gives_other_directions():
-    one, other = (Starts(count=1, seed=seed).drawn(TRAJECTORY)[0] for seed in (0, 1))
+    one, other = (Starts(count=1, seed=seed).starts_of(PAPER)[0] for seed in (0, 1))
     assert one.size == other.size
-    assert one.parameters != other.parameters
+    assert one.values != other.values
 
 
 @pytest.mark.parametrize(

@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 import quadcosim
+from orchestration.flight.hover_loop import hover_of
 from orchestration.quadrotor.signals import DRAG, chosen
-from orchestration.quadrotor.translation import paths_of, system_of
+from orchestration.quadrotor.translation import paths_of
 from orchestration.runs.result import Result
 from orchestration.signals.dryden import DRAWS, Dryden
 from orchestration.signals.library import made
 from orchestration.signals.waypoints import read_waypoints
-from orchestration.stability.hover_loop import hover_of
 from orchestration.system.paths import changed
-from orchestration.system.system_file import system_from_tables, to_tables
+from orchestration.system.system_file import system_from_tables
+from orchestration.system.written import tables_of
 from quadcosim import DisturbanceChoice, ReferenceChoice, Scenario, UsageError, load_scenario
 from tests.commands import Main
 from tests.orchestration.engines.batch.lanes import assert_the_same_signals, landed, located, shape_of
@@ -40,7 +41,7 @@ def written(path: Path, text: str) -> Path:
 
 def flown(**fields: object) -> Result:
     scenario = dataclasses.replace(Scenario(stop_time=0.6, seed=3), **fields)  # type: ignore[arg-type]
-    return quadcosim.run(located(system_of(scenario)))
+    return quadcosim.run(located(scenario.as_system()))
 
 
 # -- what is flown --------------------------------------------------------------------------------------------
@@ -108,7 +109,7 @@ def test_engines_have_the_same_rows_to_the_byte(name: str, points: Path) -> None
     reference = ReferenceChoice(file=points) if name == "points" else ReferenceChoice(name=name)
     gusts = DisturbanceChoice(name="dryden", parameters={"wind_speed": 6.0})
     scenario = Scenario(stop_time=0.25, seed=5, reference=reference, disturbance=gusts)
-    system = plain(located(system_of(scenario)))
+    system = plain(located(scenario.as_system()))
     python, compiled = quadcosim.run(system, engine="python"), quadcosim.run(system, engine="compiled")
     assert python.rows.tobytes() == compiled.rows.tobytes()
     shape, others = shape_of(system), [system, changed(system, {"seed": 6})]
@@ -145,12 +146,14 @@ def test_a_scenario_file_says_it_and_comes_back(tmp_path: Path, points: Path) ->
 
 def test_the_system_of_a_scenario_comes_back_from_its_file(points: Path) -> None:
     for reference in (ReferenceChoice(name="step", parameters={"dx": 2.0}), ReferenceChoice(file=points)):
-        system = system_of(Scenario(reference=reference, disturbance=DisturbanceChoice(name="dryden", drag=0.2)))
-        assert system_from_tables(to_tables(system), Path()) == system
+        system = Scenario(reference=reference, disturbance=DisturbanceChoice(name="dryden", drag=0.2)).as_system()
+        assert system_from_tables(tables_of(system), Path()) == system
 
 
 def test_axes_and_flags_reach_the_parameters(main: Main) -> None:
-    system = system_of(Scenario(reference=ReferenceChoice(name="circle"), disturbance=DisturbanceChoice(name="dryden")))
+    system = Scenario(
+        reference=ReferenceChoice(name="circle"), disturbance=DisturbanceChoice(name="dryden")
+    ).as_system()
     for target, value in (("reference.radius", 3.0), ("disturbance.wind_speed", 9.0), ("disturbance.drag", 0.7)):
         (path,) = paths_of(target)
         assert quadcosim.changed(system, {path: value}) != system
@@ -199,12 +202,12 @@ def test_constructors_refuse_what_files_do() -> None:
 def test_a_drag_beside_forces_is_refused(tmp_path: Path) -> None:
     force = written(tmp_path / "force.csv", FORCE)
     with pytest.raises(UsageError, match=r"disturbance\.drag: expected columns wind\.x, wind\.y, wind\.z in"):
-        system_of(Scenario(disturbance=DisturbanceChoice(file=force, drag=1.0)))
+        Scenario(disturbance=DisturbanceChoice(file=force, drag=1.0)).as_system()
 
 
 @needs_compiler
 def test_payloads_are_let_go_at_their_times_in_every_lane() -> None:
-    base = plain(located(system_of(Scenario(stop_time=0.12))))
+    base = plain(located(Scenario(stop_time=0.12).as_system()))
     loads = [(0.0, 0.0), (0.4, 0.0503), (0.2, 0.0997), (0.3, 0.0)]
     path = "components.plant.parameters.payload"
     systems = [changed(base, {f"{path}.mass": mass, f"{path}.drop_time": time}) for mass, time in loads]

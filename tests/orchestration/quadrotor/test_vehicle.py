@@ -10,7 +10,6 @@ import pytest
 import quadcosim
 from orchestration.command.cli import main
 from orchestration.command.flags import FlightFlags, request_from
-from orchestration.quadrotor.translation import warnings
 from orchestration.quadrotor.vehicle import Vehicle, load_vehicle, names
 from orchestration.quadrotor.wiring import RIGID_BODY
 from quadcosim import Scenario, Timing, UsageError, load_scenario
@@ -85,7 +84,7 @@ def test_a_controller_is_told_the_body_that_its_plant_is(name: str) -> None:
         if key in values
     }
     assert len(told) == 8
-    assert warnings(Scenario(), told) == ()
+    assert Scenario().warnings(told) == ()
 
 
 def ideal(vehicle: Vehicle) -> Vehicle:

@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import quadcosim
-from orchestration.figures.names import FLIGHT
+from orchestration.flight.names import FIGURES as FLIGHT
 from orchestration.recording.recording import InMemory, thinned
 from orchestration.runs import draw as drawn
 from orchestration.runs.draw import draw

@@ -3,10 +3,10 @@
 import numpy as np
 
 from orchestration.basics.simulator import Floats
+from orchestration.flight.layout import POSITION_ERROR, FlightLayout
 from orchestration.quadrotor.translation import quadrotor
 from orchestration.quadrotor.wiring import POSITION_REFERENCE
 from orchestration.report.blobs import Blobs
-from orchestration.report.layouts import COMPACT, POSITION_ERROR
 from orchestration.report.model import Track
 from orchestration.report.tracks import Signals, Tracks
 from orchestration.results.column_info import Described
@@ -18,7 +18,7 @@ ABOUT = {"tank.level": Described(unit="m", text="of the water")}
 def flight(count: int = 5001) -> dict[str, Floats]:
     """A quadrotor that stands still but for a short peak of its thrust."""
     time = np.linspace(0.0, 10.0, count)
-    found = {"time": time, **{name: np.zeros(count) for name in (*COMPACT, *POSITION_REFERENCE)}}
+    found = {"time": time, **{name: np.zeros(count) for name in (*FlightLayout.compact, *POSITION_REFERENCE)}}
     found["plant.quaternion.w"] = np.ones(count)
     found["plant.position.x"] = np.sin(time)
     found["plant.thrust"] = np.where((time > 3.0) & (time < 3.02), 50.0, 9.81)

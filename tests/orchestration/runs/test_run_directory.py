@@ -17,8 +17,9 @@ import pyarrow.parquet as pq
 import pytest
 
 import quadcosim
-from orchestration.figures.names import FIRST, FLIGHT
 from orchestration.figures.style import save
+from orchestration.figures.views import VIEWS
+from orchestration.flight.names import FIGURES as FLIGHT
 from orchestration.recording.recording import Chunk, Events, InMemory, Recorder
 from orchestration.runs import draw as drawing
 from orchestration.runs.run_directory import keep_flight
@@ -34,7 +35,8 @@ from quadcosim import (  # fmt: skip
 )
 
 FILES = {"signals.parquet", "events.parquet", "metrics.json", "scenario.toml"}
-FIGURES = {f"{name}.png" for name in FIRST if name in FLIGHT}
+FIRST = VIEWS["flight"].first
+FIGURES = {f"{name}.png" for name in FIRST}
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.engines.master import Master
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.quadrotor.translation import quadrotor, system_of
+from orchestration.quadrotor.translation import quadrotor
 from orchestration.quadrotor.wiring import MEASUREMENT
 from orchestration.recording.recording import InMemory
 from orchestration.schedule import cursor as position
@@ -99,7 +99,7 @@ def same(what: System, fixed: Iterable[str] = (), size: int = position.INSTANTS)
 
 def flight(case: Case) -> System:
     """A timing of the quadrotor as the system that it means."""
-    return system_of(Scenario(timing=case.timing, stop_time=case.stop_time, seed=case.seed))
+    return Scenario(timing=case.timing, stop_time=case.stop_time, seed=case.seed).as_system()
 
 
 SIZES = st.sampled_from((1, 7, position.INSTANTS))

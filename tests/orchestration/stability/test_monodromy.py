@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from orchestration.basics.bisection import Range
 from orchestration.building import fmus
+from orchestration.flight.hover_loop import HoverLoop, at_hover
 from orchestration.fmi.reuse import Instances
-from orchestration.requests.ranges import Range, Varied
+from orchestration.requests.ranges import Varied
 from orchestration.stability import local_limit as local
-from orchestration.stability.hover_loop import HoverLoop, at_hover
 from orchestration.stability.local_limit import LOOP, TWINS, local_limits
 from orchestration.stability.monodromy import growth_of_loop
 from orchestration.stability.perturbed_runs import Growth, growth_of

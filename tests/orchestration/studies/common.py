@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.building.inputs import Files, files_of
-from orchestration.quadrotor.translation import paths_of, quadrotor, system_of
+from orchestration.quadrotor.translation import paths_of, quadrotor
 from orchestration.studies.axes import Axis
-from orchestration.studies.store import metrics_with, open_for_reading
+from orchestration.studies.store import metrics_with, open_for_reading, store_path
 from orchestration.studies.study import Study
-from orchestration.studies.sweep import store_path, sweep
+from orchestration.studies.sweep import sweep
 from orchestration.system.model import System
 from orchestration.system.paths import value_at
 from orchestration.workers.row import Row
@@ -96,12 +96,12 @@ def swept(chosen: Study, folder: Path, **options: Any) -> Path:
 
 
 def starts() -> dict[str, float]:
-    return files_in().starts_of(system_of(short()))
+    return files_in().starts_of(short().as_system())
 
 
 def files_in(scenario: Scenario | None = None) -> Files:
     """The files that a flight needs, the paper's unless told."""
-    return files_of(system_of(scenario or short()))
+    return files_of((scenario or short()).as_system())
 
 
 def at(system: System, target: str) -> Any:

@@ -23,9 +23,8 @@ from orchestration.studies.axes import Axis
 from orchestration.studies.drawing import draw_study
 from orchestration.studies.maps import heat_map
 from orchestration.studies.sensitivity import Index
-from orchestration.studies.store import open_for_writing
+from orchestration.studies.store import open_for_writing, store_path
 from orchestration.studies.study import Study
-from orchestration.studies.sweep import store_path
 from quadcosim import UsageError
 from tests.orchestration.studies.common import OBJECTIVES, axis, row, short, study
 

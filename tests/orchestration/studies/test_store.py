@@ -22,7 +22,6 @@ from orchestration.building import fmus
 from orchestration.building.inputs import Files
 from orchestration.quadrotor.scenario import FmuChoice
 from orchestration.quadrotor.signals import ReferenceChoice
-from orchestration.quadrotor.translation import system_of
 from orchestration.quadrotor.wiring import DEFAULT_PLANT
 from orchestration.studies import store as stores
 from orchestration.studies.run_key import run_key
@@ -381,7 +380,7 @@ for changed, (name, content) in zip(OTHER_FMUS, FILES.contents.items(), strict=T
 
 
 def key_of(scenario: Scenario, files: Files | None = None) -> str:
-    return run_key(system_of(scenario), files or files_in(scenario))
+    return run_key(scenario.as_system(), files or files_in(scenario))
 
 
 def different_keys(tmp_path: Path) -> Iterator[str]:

@@ -14,12 +14,11 @@ import pytest
 
 from orchestration.building.inputs import Files, files_of, with_files
 from orchestration.quadrotor.scenario import Record
-from orchestration.quadrotor.translation import system_of
 from orchestration.studies.axes import Axis
-from orchestration.studies.store import open_for_reading
+from orchestration.studies.store import open_for_reading, store_path
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
-from orchestration.studies.sweep import store_path, sweep
+from orchestration.studies.sweep import sweep
 from orchestration.workers import executors as engine
 from orchestration.workers.provenance import machine, versions
 from orchestration.workers.task import Hangar, Task
@@ -315,7 +314,7 @@ def test_workers_leave_no_files_behind(tmp_path: Path, monkeypatch: pytest.Monke
 
 def test_a_pool_flies_in_order_up_to_the_first_that_stops_it() -> None:
     periods = (0.01, 0.02, 0.03)
-    scenarios = [system_of(short(period=period)) for period in periods]
+    scenarios = [short(period=period).as_system() for period in periods]
     with engine.Pool(files_in(), 1) as pool:
         everything = pool.fly(scenarios, stop=lambda metrics: False)
         first = pool.fly(scenarios, stop=lambda metrics: True)
@@ -326,7 +325,7 @@ def test_a_pool_flies_in_order_up_to_the_first_that_stops_it() -> None:
 
 
 def test_a_pool_of_two_workers_has_the_same_results_in_some_order() -> None:
-    scenarios = [system_of(short(period=period)) for period in (0.01, 0.02, 0.03)]
+    scenarios = [short(period=period).as_system() for period in (0.01, 0.02, 0.03)]
     found = []
     for workers in (1, 2):
         with engine.Pool(files_in(), workers) as pool:
@@ -335,7 +334,7 @@ def test_a_pool_of_two_workers_has_the_same_results_in_some_order() -> None:
 
 
 def test_a_pool_raises_what_a_run_failed_with() -> None:
-    bad = system_of(short().with_changes(parameters={"plant.mass": -1.0}))
+    bad = short().with_changes(parameters={"plant.mass": -1.0}).as_system()
     with engine.Pool(files_in(), 1) as pool, pytest.raises(QuadcosimError, match=r"mass = -1.0: expected"):
         pool.fly([bad], stop=lambda metrics: False)
 
@@ -349,7 +348,7 @@ def test_without_a_worker_nothing_is_flown(tmp_path: Path) -> None:
 
 
 def test_the_store_says_what_it_is_about(finished: Path) -> None:
-    models = files_in().models_of(system_of(short()))
+    models = files_in().models_of(short().as_system())
     with open_for_reading(store_path("study", finished)) as store:
         about = store.about()
     assert about["total"] == "2"

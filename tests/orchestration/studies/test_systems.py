@@ -10,18 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from orchestration.flight.hover_loop import HoverLoop
 from orchestration.fmi.reuse import Instances
 from orchestration.limits.limit import find
-from orchestration.quadrotor.translation import system_of
 from orchestration.requests.request import load_request
-from orchestration.stability.hover_loop import HoverLoop
 from orchestration.stability.perturbed_runs import growth_of
 from orchestration.studies.axes import Axis
 from orchestration.studies.drawing import draw_study
-from orchestration.studies.store import expect_columns, is_column, open_for_reading
+from orchestration.studies.store import expect_columns, is_column, open_for_reading, store_path
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
-from orchestration.studies.sweep import store_path, sweep
+from orchestration.studies.sweep import sweep
 from orchestration.studies.table import frame
 from orchestration.system.model import Criterion, System
 from orchestration.system.paths import changed
@@ -207,7 +206,7 @@ def test_the_twins_part_as_the_loop_that_is_linearised_through_saved_states(inst
     period = 0.081
     scenario = Scenario(stop_time=8.0, timing=Timing(period=period, plant_interval=0.02))
     expected = math.log(HoverLoop.of(scenario).spectral_radius(period, 0.0)) / period
-    assert growth_of(system_of(scenario), instances).rate == pytest.approx(expected, abs=1e-6)
+    assert growth_of(scenario.as_system(), instances).rate == pytest.approx(expected, abs=1e-6)
 
 
 def test_noise_loss_and_jitter_do_not_change_the_growth(system: System, instances: Instances) -> None:

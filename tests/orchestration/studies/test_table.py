@@ -10,7 +10,6 @@ import pyarrow.parquet as pq
 import pytest
 
 import quadcosim
-from orchestration.quadrotor.translation import system_of
 from orchestration.studies.axes import Axis
 from orchestration.studies.store import open_for_reading, open_for_writing
 from orchestration.studies.study import Study
@@ -59,7 +58,7 @@ def test_a_frame_has_settings_metrics_seeds_guids_and_versions(grid: tuple[Study
         "duration",
         "machine",
     }
-    models = files_in(Scenario()).models_of(system_of(Scenario()))
+    models = files_in(Scenario()).models_of(Scenario().as_system())
     guids, software = {name: model.description.guid for name, model in models.items()}, versions()
     origin = {f"guid.{side}" for side in guids} | {f"version.{name}" for name in software}
     assert set(table.columns) == expected | set(METRICS) | origin

@@ -11,7 +11,7 @@ from orchestration.requests.request import load_request
 from orchestration.schedule.cursor import Position
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
-from orchestration.system.system_file import load_system, schema, to_toml
+from orchestration.system.system_file import load_system, schema
 
 SHIPPED = Path(translation.__file__).with_name("system.toml")
 
@@ -160,8 +160,8 @@ def test_one_error_is_one_line_that_names_its_place(right: str, wrong: str, line
 def test_a_system_comes_back_from_the_file_that_it_writes(tmp_path: Path) -> None:
     first = loaded(tmp_path, TANK)
     (tmp_path / "elsewhere").mkdir()
-    assert loaded(tmp_path / "elsewhere", to_toml(first)) == first
-    assert loaded(tmp_path, to_toml(quadrotor())) == quadrotor()
+    assert loaded(tmp_path / "elsewhere", first.to_toml()) == first
+    assert loaded(tmp_path, quadrotor().to_toml()) == quadrotor()
 
 
 def test_the_order_at_the_top_is_that_of_connections_that_say_none(tmp_path: Path) -> None:

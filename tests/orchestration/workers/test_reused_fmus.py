@@ -6,7 +6,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from orchestration.studies.sweep import store_path
+from orchestration.studies.store import store_path
 from orchestration.studies.table import frame
 from tests.orchestration.fmi.small import needs_compiler, small
 from tests.orchestration.studies.common import quadcosim

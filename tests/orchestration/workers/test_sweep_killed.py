@@ -11,8 +11,8 @@ import pytest
 
 from orchestration.building import fmus
 from orchestration.quadrotor.scenario import FmuChoice
-from orchestration.studies.store import open_for_reading
-from orchestration.studies.sweep import store_path, sweep
+from orchestration.studies.store import open_for_reading, store_path
+from orchestration.studies.sweep import sweep
 from orchestration.workers.pool import Crew
 from orchestration.workers.provenance import versions
 from quadcosim import QuadcosimError

@@ -8,14 +8,13 @@ import pytest
 from orchestration.building.inputs import with_files
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.translation import system_of
 from orchestration.workers.task import BrokenPlaceError, Hangar, Outcome, Task
 from quadcosim import QuadcosimError
 from tests.orchestration.studies.common import FAILS, files_in, short
 
 
 def task(scenario: Scenario, index: int = 0) -> Task:
-    system = with_files(system_of(scenario), files_in(scenario).fmus)
+    system = with_files(scenario.as_system(), files_in(scenario).fmus)
     return Task(index=index, key="", settings={}, system=system, keep_signals=False)
 
 

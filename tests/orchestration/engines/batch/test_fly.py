@@ -12,7 +12,6 @@ from orchestration.building import fmus
 from orchestration.engines.batch.fly import Batches
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.quadrotor.translation import system_of
 from orchestration.runs.in_lanes import fly
 from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
 from orchestration.system.paths import changed
@@ -153,7 +152,7 @@ def test_more_runs_than_lanes_of_many_timings_come_back_in_their_order() -> None
     periods = [0.01, 0.02, 0.01, 0.015] * 4 + [0.05]
     systems = [
         changed(
-            system_of(Scenario(timing=Timing(period=period), stop_time=0.5)),
+            Scenario(timing=Timing(period=period), stop_time=0.5).as_system(),
             {"components.plant.parameters.mass": 1.0 + i / 50},
         )
         for i, period in enumerate(periods)

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orchestration.quadrotor.translation import system_of
 from orchestration.system.model import System
 from orchestration.system.system_file import load_system
 from tests.orchestration.engines.batch.lanes import assert_the_same_signals, landed, located, shape_of
@@ -75,7 +74,7 @@ def test_random_systems_have_the_same_signals_beside_any_others(fmu: Path, kept:
 
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_flights_of_the_quadrotor_are_the_same(name: str) -> None:
-    system = plain(located(system_of(scenario_of(FLIGHTS[name]["scenario"]))))
+    system = plain(located(scenario_of(FLIGHTS[name]["scenario"]).as_system()))
     shape = shape_of(system)
     found = landed(shape, [system])
     assert_the_same_signals(shape, found, 0, ran(system, "compiled"))

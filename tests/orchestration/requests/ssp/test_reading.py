@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from fmu_kit.packaging import write_archive
-from orchestration.quadrotor.translation import system_of
 from orchestration.requests.request import load_request
 from orchestration.requests.ssp import package, writing
 from orchestration.system.model import Sampling, System
@@ -366,7 +365,7 @@ def test_the_quadrotor_s_ssp_is_the_quadrotor_with_its_timing_on_top(
     )
     read = load_request(path, timing)
     assert isinstance(read, System)
-    expected = system_of(scenario)
+    expected = scenario.as_system()
     assert {(s, e) for x in read.connections for s, e in zip(x.start, x.end)} == {
         (s, e) for x in expected.connections for s, e in zip(x.start, x.end)
     }

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.quadrotor.translation import system_of
 from orchestration.requests.request import load_request
 from orchestration.requests.ssp import package, writing
 from orchestration.runs.result import Result
@@ -80,14 +79,12 @@ def test_the_quadrotor_is_flown_back_to_the_bit(tmp_path: Path) -> None:
     assert isinstance(read, System)
     flown = run(scenario)
     assert bits(run(read)) == bits(flown)
-    assert read.criterion == system_of(scenario).criterion
+    assert read.criterion == scenario.as_system().criterion
 
 
 def test_the_command_writes_both_and_run_flies_them(tmp_path: Path, main: Main) -> None:
     system = dataclasses.replace(carried("water_tank"), stop_time=1.0)
-    from orchestration.system.system_file import to_toml
-
-    (tmp_path / "tank.toml").write_text(to_toml(system))
+    (tmp_path / "tank.toml").write_text(system.to_toml())
     done = main("ssp", tmp_path / "tank.toml", "--out", tmp_path / "tank.ssp")
     assert done.stdout == f"{tmp_path / 'tank.ssp'}\n"
     assert done.stderr == f"{tmp_path / 'tank.timing.toml'} has its timing, for quadcosim run\n"

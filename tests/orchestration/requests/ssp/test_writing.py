@@ -13,7 +13,6 @@ import pytest
 from fmpy.ssp.ssd import read_ssd, read_ssv
 
 from fmu_kit.packaging import write_archive
-from orchestration.quadrotor.translation import system_of
 from orchestration.requests.ssp import writing
 from orchestration.system.paths import changed
 from quadcosim import FmuChoice, Scenario, Timing, UsageError
@@ -115,7 +114,7 @@ def test_every_set_is_bound_where_it_belongs(written: Path) -> None:
 
 def test_a_boolean_is_written_if_it_is_not_what_it_is_anyway(short: Scenario, tmp_path: Path) -> None:
     for given, expected in ((True, ("Boolean", "true", None)), (False, None)):
-        chosen = changed(system_of(short), {"components.controller.parameters.use_reference_inputs": given})
+        chosen = changed(short.as_system(), {"components.controller.parameters.use_reference_inputs": given})
         path = writing.write(chosen, tmp_path / "loop.ssp")
         assert values_in(path, "resources/controller.ssv").get("use_reference_inputs") == expected
         assert read_ssv(str(path), "resources/controller.ssv", validate=True)

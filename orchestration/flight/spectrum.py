@@ -7,12 +7,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from orchestration.basics.simulator import Floats
-from orchestration.figures.commands import COLUMNS
 from orchestration.figures.lines import legend_of_runs, logarithmic, positive, wrapped
 from orchestration.figures.palette import BLACK, BLUE, GREEN, RED
 from orchestration.figures.run import Run, title
 from orchestration.figures.style import Style
 from orchestration.figures.ticks import plain
+from orchestration.flight.commands import COLUMNS
 
 SEGMENTS = 8
 """Of the run, before they overlap by half"""

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 from orchestration.basics.errors import UsageError
+from orchestration.flight.hover_loop import HoverLoop
+from orchestration.flight.local_limit import local_limit
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.stability.delay_bounds import SampledLoop, breaking_jitter, certain_jitter
-from orchestration.stability.hover_loop import HoverLoop
-from orchestration.stability.local_limit import local_limit
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,8 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from orchestration.basics.errors import UsageError, shown
-
-Parameter = float | bool | str
+from orchestration.system.model import Parameter
 
 
 def parameters_in(table: Mapping[str, Any], place: str) -> dict[str, Parameter]:

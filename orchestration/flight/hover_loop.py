@@ -21,11 +21,11 @@ from orchestration.basics.simulator import Floats
 from orchestration.building import fmus
 from orchestration.building.inputs import files_of
 from orchestration.fmi.instance import Instance
+from orchestration.fmi.kit import TRAJECTORY
 from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor import wiring
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
-from orchestration.quadrotor.translation import system_of
 from orchestration.runs.simulation import prepared
 from orchestration.system.model import System
 
@@ -51,7 +51,7 @@ def hover_of(scenario: Scenario) -> Scenario:
     """`scenario` with the vehicle at rest at the origin, where its reference rests too, and no wind and no payload."""
     scenario = scenario.resolved()
     controller = {k: v for k, v in scenario.controller.parameters.items() if k != wiring.USE_REFERENCE_INPUTS}
-    controller |= dict.fromkeys(wiring.TRAJECTORY, 0.0)
+    controller |= dict.fromkeys(TRAJECTORY, 0.0)
     plant = dict(scenario.plant.parameters) | dict.fromkeys(wiring.DISTURBANCE, 0.0)
     plant |= {wiring.PAYLOAD: 0.0} if wiring.PAYLOAD in plant else {}
     plant |= {f"initial.{name}": 0.0 for name in wiring.MEASUREMENT} | {f"initial.{SCALAR_PART}": 1.0}
@@ -67,7 +67,7 @@ def hover_of(scenario: Scenario) -> Scenario:
 def at_hover(scenario: Scenario) -> System:
     """The system that hovers as `scenario` would, by values for what its FMUs have."""
     scenario = scenario.resolved()
-    system = system_of(hover_of(scenario))
+    system = hover_of(scenario).as_system()
     given = {"plant": scenario.plant.parameters, "controller": scenario.controller.parameters}
     models = files_of(system).models_of(system)
     components = {
@@ -90,7 +90,7 @@ def at_edge(scenario: Scenario) -> Scenario | None:
     That is the slope of k_s |e|^β_t sgn(e) at |e| = ε. None for a controller without parameters of these names.
     """
     scenario = scenario.resolved()
-    system = system_of(scenario)
+    system = scenario.as_system()
     known = files_of(system).starts_of(system)
     own = {f"controller.{name}": value for name, value in scenario.controller.parameters.items()}
     names = [f"controller.{name}" for name in (wiring.SURFACE_GAIN, wiring.SURFACE_EXPONENT, wiring.BOUNDARY_LAYER)]

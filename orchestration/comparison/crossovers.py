@@ -1,0 +1,17 @@
+"""How the bandwidth of a controller is measured, by the kind of its request."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from orchestration.basics.by_kind import ByKind
+
+if TYPE_CHECKING:
+    from orchestration.system.request import ControlLoop
+
+    Crossover = Callable[[ControlLoop], float]
+    """Of the loop in which controllers are put side by side [rad/s]; `math.inf` or 0 outside of its range"""
+
+CROSSOVERS: ByKind[Crossover] = ByKind()
+"""Rooms above enter theirs"""

@@ -1,0 +1,60 @@
+"""Which figures runs of a kind get: names for whoever has to know them without drawing, and what draws them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from orchestration.figures.names import FORMATS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from orchestration.figures.run import Run
+    from orchestration.figures.style import Style
+
+    Maker = Callable[[Sequence[Run], Style], Figure | None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drawing:
+    """What draws the figures of a kind."""
+
+    makers: Mapping[str, Maker]
+    """by their names; one that cannot be made of a run gives None"""
+    columns: Collection[str] | None
+    """that they read; None: all"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """The figures of one kind of runs."""
+
+    names: tuple[str, ...]
+    """in the order in which they are drawn"""
+    first: tuple[str, ...]
+    """those that a run draws at once; all others when they are asked for"""
+    load: Callable[[], Drawing]
+    """with it comes matplotlib"""
+
+
+def _of_any_system() -> Drawing:
+    from orchestration.figures.signals import signals
+
+    return Drawing(makers={"signals": signals}, columns=None)
+
+
+ANY = "run"
+VIEWS = {ANY: View(names=("signals",), first=("signals",), load=_of_any_system)}
+"""By kind of request; rooms above enter theirs"""
+
+
+def view_of(kind: str) -> View:
+    """The figures of a kind of runs: those of any system, unless it has its own."""
+    return VIEWS.get(kind, VIEWS[ANY])
+
+
+def files() -> frozenset[str]:
+    """What of figures may be in the directory of a run."""
+    return frozenset(f"{name}.{ending}" for view in VIEWS.values() for name in view.names for ending in FORMATS)

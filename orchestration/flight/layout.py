@@ -1,0 +1,95 @@
+"""The panels of a flight on the page of a report, and how the vehicle moves in space."""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+
+from orchestration.basics.simulator import Floats
+from orchestration.quadrotor.measures import position_error
+from orchestration.quadrotor.wiring import (
+    ANGULAR_VELOCITY,
+    COMMAND,
+    ENERGY,
+    POSITION,
+    POSITION_REFERENCE,
+    QUATERNION,
+    VELOCITY,
+    components,
+)
+from orchestration.report.model import Line, Panel, Scene
+
+POSITION_ERROR = "position error"
+"""A column that is computed: ‖P - P_d‖ [m]"""
+ANGLES = ("roll", "pitch", "yaw")
+"""Columns that the page computes from the quaternion [deg]"""
+OF_REFERENCE = ("x of the reference", "y of the reference", "z of the reference")
+
+
+def _of_plant(names: Sequence[str]) -> tuple[str, ...]:
+    return tuple(f"plant.{name}" for name in names)
+
+
+PLACE, ATTITUDE = _of_plant(POSITION), _of_plant(QUATERNION)
+
+
+class FlightLayout:
+    """Of runs with the columns of a quadrotor."""
+
+    compact = _of_plant((*POSITION, *QUATERNION, *ANGULAR_VELOCITY, *COMMAND))
+    logarithmic = (POSITION_ERROR,)
+
+    def fits(self, columns: Collection[str]) -> bool:
+        """Whether a vehicle moves and turns."""
+        return {*PLACE, *ATTITUDE} <= {*columns}
+
+    def computed(self, signals: Mapping[str, Floats]) -> dict[str, Floats]:
+        """The position error, where there is a reference."""
+        return {POSITION_ERROR: position_error(signals)} if _aims(signals) else {}
+
+    def panels(self, columns: Collection[str]) -> tuple[Panel, ...]:
+        """Errors, position, attitude, commands and rates; velocity and energy for whoever opens them."""
+        aims = _aims(columns)
+        panels = [
+            Panel(
+                title="position error",
+                unit="m",
+                lines=(Line(column=POSITION_ERROR, label="‖P − P_d‖"),),
+                logarithmic=True,
+            ),
+            Panel(
+                title="position (x north, y east, z down)",
+                unit="m",
+                lines=(
+                    *_vector(PLACE, "xyz"),
+                    *(_vector(POSITION_REFERENCE, OF_REFERENCE, reference=True) if aims else ()),
+                ),
+            ),
+            Panel(title="attitude", unit="°", lines=(*_vector(ANGLES, ANGLES),)),
+            Panel(title="thrust", unit="N", lines=(Line(column="plant.thrust", label="thrust", held=True),)),
+            Panel(title="torque", unit="N·m", lines=(*_vector(_of_plant(components("torque")), "xyz", held=True),)),
+            Panel(title="angular velocity", unit="rad/s", lines=(*_vector(_of_plant(ANGULAR_VELOCITY), "xyz"),)),
+            Panel(title="velocity", unit="m/s", lines=(*_vector(_of_plant(VELOCITY), "xyz"),), shown=False),
+            Panel(
+                title="energy", unit="J", lines=(Line(column=f"controller.{ENERGY}", label="L", held=True),),
+                logarithmic=True, shown=False,
+            ),
+        ]  # fmt: skip
+        known = {*columns, *ANGLES, *([POSITION_ERROR] if aims else [])}
+        return tuple(panel for panel in panels if all(line.column in known for line in panel.lines))
+
+    def scene(self, columns: Collection[str]) -> Scene:
+        """The vehicle, and what it follows."""
+        return Scene(
+            position=(PLACE[0], PLACE[1], PLACE[2]),
+            quaternion=(ATTITUDE[0], ATTITUDE[1], ATTITUDE[2], ATTITUDE[3]),
+            reference=(POSITION_REFERENCE[0], POSITION_REFERENCE[1], POSITION_REFERENCE[2]) if _aims(columns) else None,
+        )
+
+
+def _aims(columns: Collection[str]) -> bool:
+    return all(name in columns for name in POSITION_REFERENCE)
+
+
+def _vector(
+    columns: Sequence[str], labels: Sequence[str], *, held: bool = False, reference: bool = False
+) -> Iterator[Line]:
+    for column, label in zip(columns, labels, strict=True):
+        yield Line(column=column, label=label, held=held, reference=reference)

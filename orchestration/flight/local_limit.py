@@ -1,0 +1,98 @@
+"""The local limits of the quadrotor in period and delay, about hover; in any other quantity those of any system."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import cast
+
+from orchestration.basics.bisection import Range, first_failure
+from orchestration.basics.errors import UsageError
+from orchestration.flight.hover_loop import HoverLoop, NotSmooth, at_edge, at_hover
+from orchestration.quadrotor.quantities import range_of
+from orchestration.quadrotor.scenario import Scenario
+from orchestration.requests.ranges import Varied
+from orchestration.stability.known_loops import Local
+from orchestration.stability.local_limit import about_rest
+from orchestration.system.paths import changed
+from orchestration.system.request import Request
+
+HOVER = "spectral radius of the sampled loop about hover, by differences through saved states"
+HOVER_ACCURACY = 1e-3
+"""of the limit, relative: what the differences leave"""
+KNOWN = ("period", "delay")
+"""Quantities that the loop about hover is for"""
+
+
+class AboutHover:
+    """The loop of a `Scenario` about hover."""
+
+    def local_limits(self, varied: Varied, span: Range) -> Local:
+        """The local limit of a quantity: of the loop about hover where that is for it, else as of any system."""
+        scenario = cast(Scenario, varied.request)
+        if varied.of in ("jitter", "loss"):
+            return Local(reason=f"linear theory has no local limit of {varied.of}")
+        why = "the loop about hover is for period and delay only"
+        try:
+            if varied.of in KNOWN:
+                return about_hover(scenario, varied.of)
+        except NotSmooth as error:
+            return Local(reason=f"no local limit: {error}")
+        except UsageError as error:
+            why = str(error)
+        return _without_hover_loop(scenario, varied, span, why)
+
+    def radius_over(self, request: Request, of: str) -> Callable[[float], float] | None:
+        """The spectral radius over a period or delay [s]; raises `UsageError` where hover has no linear loop."""
+        if of not in KNOWN:
+            return None
+        scenario = cast(Scenario, request)
+        loop = HoverLoop.of(scenario)
+        return lambda value: radius(loop, scenario, of, value)
+
+
+def local_limit(loop: HoverLoop, scenario: Scenario, of: str) -> float | None:
+    """Where the spectral radius first crosses one from below, in period or delay [s]; None: nowhere in the range."""
+    span = range_of(scenario.timing, of)
+    assert span is not None
+    low = min((*span.before, span.first))
+    fine = [low + 0.001 * i for i in range(int((span.last - low) / 0.001))]
+    bracket = first_failure(lambda value: radius(loop, scenario, of, value) >= 1.0, fine, 1e-6)
+    return bracket.good if bracket is not None else None
+
+
+def radius(loop: HoverLoop, scenario: Scenario, of: str, value: float) -> float:
+    """The spectral radius of `scenario` about hover with another period or delay [s]."""
+    timing = scenario.timing
+    period = (value if of == "period" else timing.period) / timing.clock_ratio
+    delay = (value if of == "delay" else timing.delay) + (period if timing.order == "jacobi" else 0.0)
+    return loop.spectral_radius(period, delay)
+
+
+def about_hover(scenario: Scenario, of: str) -> Local:
+    """The local limits of the quadrotor in period or delay, inside its boundary layer and just outside of it.
+
+    Raises `UsageError` for a scenario whose loop about hover cannot be had.
+    """
+    if scenario.timing.hold != "zero":
+        raise UsageError("the loop about hover is for zero-order hold only")
+    loop = HoverLoop.of(scenario)
+    edge = at_edge(scenario)
+    limit = local_limit(loop, scenario, of)
+    return Local(
+        limit=limit,
+        outside=None if edge is None else local_limit(loop.with_law(edge), edge, of),
+        method=HOVER,
+        accuracy=None if limit is None else HOVER_ACCURACY * limit,
+        reason="the spectral radius about hover stays below one in the range, or above",
+    )
+
+
+def _without_hover_loop(scenario: Scenario, varied: Varied, span: Range, why: str) -> Local:
+    """The quadrotor as any other system, and why."""
+    try:
+        hover = at_hover(scenario)
+    except UsageError as error:
+        return Local(reason=f"no local limit: {error}")
+    found = about_rest(lambda value: changed(hover, dict.fromkeys(varied.paths, value)), span)
+    if found.method is None:
+        return replace(found, reason=f"{found.reason} ({why})")
+    return replace(found, method=f"{found.method} ({why})")

@@ -1,0 +1,30 @@
+"""What a controller and a plant need to be wired to each other, under the names and with the units of the wiring."""
+
+from collections.abc import Iterable, Iterator
+
+from orchestration.checks.validation.roles import Port, Role
+from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD, TRAJECTORY
+from orchestration.quadrotor import wiring
+
+
+def _ports(causality: str, names: Iterable[str]) -> Iterator[Port]:
+    for name in names:
+        yield Port(name, causality, wiring.UNITS.get(name))
+
+
+CONTROLLER = Role(
+    told_by=wiring.COMMAND,
+    ports=(
+        *_ports("output", wiring.COMMAND),
+        *_ports("input", (*wiring.MEASUREMENT, *wiring.REFERENCE)),
+        *_ports("parameter", (SAMPLE_PERIOD, SAMPLE_OFFSET, *TRAJECTORY)),
+        Port(wiring.USE_REFERENCE_INPUTS, "parameter", None, "Boolean"),
+    ),
+)
+PLANT = Role(
+    told_by=wiring.MEASUREMENT,
+    ports=(
+        *_ports("output", wiring.MEASUREMENT),
+        *_ports("input", (*wiring.COMMAND, *wiring.EXTERNAL_FORCE)),
+    ),
+)

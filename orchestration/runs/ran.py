@@ -1,0 +1,46 @@
+"""What labels and figures need to know of a run."""
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from orchestration.recording.recording import Recording
+from orchestration.results.column_info import Described
+from orchestration.results.objectives import Metrics
+from orchestration.system.model import System
+from orchestration.system.request import Request
+
+
+class Ran(Protocol):
+    """A run, as `Result` has it."""
+
+    @property
+    def asked(self) -> Request:
+        """What was run."""
+
+    @property
+    def system(self) -> System:
+        """What that means."""
+
+    @property
+    def recording(self) -> Recording:
+        """Rows and events."""
+
+    @property
+    def metrics(self) -> Metrics:
+        """What it came to."""
+
+    @property
+    def described(self) -> Mapping[str, Described]:
+        """What is known of each column."""
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Of all components, by COMPONENT.NAME."""
+
+    @property
+    def divergence(self) -> str | None:
+        """What diverged; None if nothing did."""
+
+    @property
+    def interrupted_at(self) -> float | None:
+        """When Ctrl-C ended it [s]; None if it did not."""

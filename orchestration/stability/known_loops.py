@@ -1,0 +1,40 @@
+"""Loops whose local limits are known better than those of any system, by the kind of their request."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+from orchestration.basics.by_kind import ByKind
+
+if TYPE_CHECKING:
+    from orchestration.basics.bisection import Range
+    from orchestration.requests.ranges import Varied
+    from orchestration.system.request import Request
+
+
+@dataclass(frozen=True, kw_only=True)
+class Local:
+    """A local limit, None where there is none, and why."""
+
+    limit: float | None = None
+    outside: float | None = None
+    """of the quadrotor: with the gain just outside of its boundary layer"""
+    method: str | None = None
+    accuracy: float | None = None
+    reason: str
+
+
+class KnownLoop(Protocol):
+    """The linear loop of one kind of request about its operating point."""
+
+    def local_limits(self, varied: Varied, span: Range) -> Local:
+        """The local limit of a quantity, by whatever is known of the loop."""
+
+    def radius_over(self, request: Request, of: str) -> Callable[[float], float] | None:
+        """The spectral radius over a quantity; None for one that the loop is not known over. Raises `UsageError`."""
+
+
+LOOPS: ByKind[KnownLoop] = ByKind()
+"""Rooms above enter theirs"""

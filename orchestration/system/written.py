@@ -1,0 +1,47 @@
+"""A system as the tables of its file: the fields of its parts, by their names there."""
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+
+def tables_of(system: Any) -> dict[str, Any]:
+    """The tables of the system file that loads as a `System`, wherever it lies, without what is what it is anyway."""
+    tables: dict[str, Any] = {"stop_time": system.stop_time, "seed": system.seed, "optional": list(system.optional)}
+    tables["components"] = {
+        name: _without_defaults(component, keep=("fmu",)) for name, component in system.components.items()
+    }
+    for table in tables["components"].values():
+        if table["fmu"].endswith(".fmu"):
+            table["fmu"] = str(Path(table["fmu"]).absolute())
+    tables["connections"] = [_connection_table(x) for x in system.connections]
+    tables["sources"] = {name: _without_defaults(source) for name, source in system.sources.items()}
+    for table in tables["sources"].values():
+        if "file" in table:
+            table["file"] = str(Path(table["file"]).absolute())
+    for key in ("objectives", "streams", "operating_point"):
+        tables[key] = dict(getattr(system, key))
+    tables["criterion"] = _without_defaults(system.criterion)
+    return tables
+
+
+def _connection_table(x: Any) -> dict[str, Any]:
+    keys = _without_defaults(x, keep=("name",))
+    return {"name": keys.pop("name"), "from": keys.pop("start"), "to": keys.pop("end"), **keys}
+
+
+def _without_defaults(of: Any, keep: tuple[str, ...] = ()) -> dict[str, Any]:
+    result = {}
+    for field in dataclasses.fields(of):
+        value = getattr(of, field.name)
+        if field.name in keep or (value is not None and value != field.default and value != {}):
+            is_table = dataclasses.is_dataclass(value)
+            result[field.name] = _without_defaults(value) if is_table else _plain(value)
+    return result
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return list(value)
+    return dict(value) if isinstance(value, Mapping) else value
