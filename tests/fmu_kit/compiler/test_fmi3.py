@@ -14,6 +14,7 @@ from fmpy.model_description import ModelDescription
 from fmpy.validation import validate_fmu
 
 import quadcosim
+from fmu_kit.compiler import runtime
 from fmu_kit.compiler.emit import c_code
 from orchestration.building import fmus
 from orchestration.quadrotor.scenario import Scenario
@@ -27,7 +28,7 @@ from tests.native import assert_the_same
 START = 0.5
 """[s]"""
 TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
-SOURCES = Path(c_code.__file__).parent
+SOURCES = runtime.FOLDER
 
 
 def read(name: str) -> ModelDescription:

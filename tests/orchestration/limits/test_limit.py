@@ -18,6 +18,7 @@ import quadcosim
 from orchestration.basics.bisection import Range, first_failure
 from orchestration.basics.simulator import Floats
 from orchestration.basics.statistics import wilson
+from orchestration.flight import local_limit as local
 from orchestration.flight.hover_loop import COORDINATES, HoverLoop, hover_of
 from orchestration.flight.local_limit import local_limit
 from orchestration.fmi.reuse import Instances
@@ -29,7 +30,6 @@ from orchestration.quadrotor.scenario import FmuChoice, Record
 from orchestration.quadrotor.wiring import COMMAND
 from orchestration.requests.ranges import Varied
 from orchestration.runs.simulation import prepared
-from orchestration.stability import local_limit as local
 from orchestration.stability.known_loops import Local
 from orchestration.stability.local_limit import local_limits
 from orchestration.system.model import System

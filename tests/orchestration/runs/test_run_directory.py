@@ -206,7 +206,7 @@ def test_what_is_not_there_is_no_run(folder: Path) -> None:
 # -- when writing does not end well -----------------------------------------------------------------------
 
 
-@pytest.fixture(params=["results.tables.ToFolder.take", "results.tables.copy", "drawing.draw.draw"])
+@pytest.fixture(params=["recording.tables.ToFolder.take", "recording.tables.copy", "runs.draw.draw"])
 def failing(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """One of the steps of writing fails as on a full disk."""
 

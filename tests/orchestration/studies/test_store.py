@@ -416,7 +416,7 @@ def test_the_key_differs_with_everything_that_determines_a_run(tmp_path: Path) -
 
 def test_the_key_differs_with_the_versions_of_the_software(monkeypatch: pytest.MonkeyPatch) -> None:
     before = key_of(BASE)
-    monkeypatch.setattr("orchestration.workers.provenance.versions", lambda: {"numpy": "0.1"})
+    monkeypatch.setattr("orchestration.studies.run_key.versions", lambda: {"numpy": "0.1"})
     assert key_of(BASE) != before
 
 

@@ -140,9 +140,9 @@ def test_other_fmus_machines_and_sources_are_a_changed_study(
     if place == "hashes":
         monkeypatch.setattr(Study, "files", other)
     elif place == "machine":
-        monkeypatch.setattr("orchestration.workers.provenance.machine", lambda: "a Z80")
+        monkeypatch.setattr("orchestration.studies.run_key.machine", lambda: "a Z80")
     else:
-        monkeypatch.setattr("orchestration.workers.provenance.versions", lambda: edited)
+        monkeypatch.setattr("orchestration.studies.run_key.versions", lambda: edited)
     with pytest.raises(UsageError, match=said):
         sweep(study(PERIODS), folder=finished)
 
