@@ -1,6 +1,9 @@
 """What the files around the code say of it is so: versions, make targets, paths, Pythons."""
 
 import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -9,12 +12,14 @@ import yaml
 from orchestration.basics.documents import read_toml
 
 ROOT = Path(__file__).parents[1]
-PROJECT = read_toml(ROOT / "pyproject.toml", "project")["project"]
+SETTINGS = read_toml(ROOT / "pyproject.toml", "project")
+PROJECT = SETTINGS["project"]
 WORKFLOW = yaml.safe_load((ROOT / ".github/workflows/ci.yml").read_text(encoding="utf-8"))
 JOBS = WORKFLOW["jobs"]
 STEPS = [step for job in JOBS.values() for step in job["steps"]]
 RUN = " ".join(step.get("run", "") for step in STEPS)
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+ARCHITECTURE = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
 TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
 
 
@@ -36,13 +41,47 @@ def test_every_make_target_that_is_named_exists(named: list[str]) -> None:
     assert set(named) <= TARGETS
 
 
-@pytest.mark.parametrize("text", [RUN, CONTRIBUTING], ids=["workflow", "contributing"])
+@pytest.mark.parametrize("text", [RUN, CONTRIBUTING, ARCHITECTURE], ids=["workflow", "contributing", "architecture"])
 def test_every_path_that_is_named_exists(text: str) -> None:
     named = set(
         re.findall(r"(?<![\w/.-])(?:tests|docs|orchestration|controller_fmu|fmu_kit|examples)/[\w./-]*\w", text)
     )
     assert len(named) >= 3
     assert not [path for path in named if not (ROOT / path).exists()]
+
+
+def test_the_floors_of_the_architecture_are_those_that_imports_are_held_to() -> None:
+    contracts = SETTINGS["tool"]["importlinter"]["contracts"]
+    (layers,) = (each["layers"] for each in contracts if each.get("containers") == ["orchestration"])
+    drawn: list[list[str]] = []
+    for floor, room in re.findall(r"^\| (\d*) *\| `(\w+)` \|", ARCHITECTURE, re.M):
+        if floor:
+            drawn.append([])
+        drawn[-1].append(room)
+    assert drawn == [layer.split(" | ") for layer in layers]
+    rooms = {room for floor in drawn for room in floor}
+    assert rooms == {path.parent.name for path in (ROOT / "orchestration").glob("*/__init__.py")}
+
+
+@pytest.mark.parametrize("broken", ["a folder that is not listed", "a late import upward"])
+def test_a_tree_that_breaks_the_contract_does_not_pass(broken: str, tmp_path: Path) -> None:
+    """The contract is tried on a copy of the tree that breaks it."""
+    for name in ("quadcosim", "fmu_kit", "controller_fmu", "plant_fmu", "orchestration"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    if broken == "a folder that is not listed":
+        said = "attic"
+        (tmp_path / "orchestration/attic").mkdir()
+        (tmp_path / "orchestration/attic/__init__.py").touch()
+    else:
+        said = "orchestration.figures.lines -> orchestration.quadrotor"
+        with (tmp_path / "orchestration/figures/lines.py").open("a") as file:
+            file.write("\n\ndef late() -> None:\n    import orchestration.quadrotor.wiring\n")
+    done = subprocess.run(
+        [Path(sys.executable).with_name("lint-imports"), "--no-cache"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 1
+    assert said in done.stdout
 
 
 def test_the_quick_tests_exist() -> None:

@@ -13,6 +13,7 @@ import pydantic
 
 from docs.website.tables import table, words
 from orchestration.comparison.file import ComparisonFile
+from orchestration.quadrotor.initial_conditions import Starts
 from orchestration.quadrotor.scenario_file import ScenarioFile
 from orchestration.studies.study_file import StudyFile
 from orchestration.system.system_file import SystemTable
@@ -25,6 +26,8 @@ FILES = {
     "Comparison file": (ComparisonFile, "Controllers against each other; [how to write one](compare.md)."),
     "Tuning file": (TuningFile, "What `quadcosim tune` searches; [how to write one](tuning.md)."),
 }
+OF_THE_BASE = {"Comparison file": {"[starts]": Starts}, "Tuning file": {"[starts]": Starts}}
+"""Tables that are read by what a file builds on, here a scenario"""
 INTRODUCTION = """\
 # Keys of files
 
@@ -56,7 +59,7 @@ def page() -> str:
 
 
 def _file(title: str, shape: type, said: str) -> str:
-    tables = {"": shape, **dict(_tables_in(shape, ""))}
+    tables = {"": shape, **dict(_tables_in(shape, "")), **OF_THE_BASE.get(title, {})}
     sections = "".join(_section(place, each, title) for place, each in tables.items())
     return f"## {title}\n\n{said}\n\n{sections}"
 
