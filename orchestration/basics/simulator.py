@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 Floats: TypeAlias = npt.NDArray[np.float64]
+Integers: TypeAlias = npt.NDArray[np.int64]
 Transfer: TypeAlias = Callable[[], None]
 """Moves values between a simulator and the array that it was made for."""
 
@@ -34,6 +35,3 @@ class Simulator(Protocol):
 
     def restore(self, state: bytes) -> None:
         """Put back what `save` gave."""
-
-
-Integers: TypeAlias = npt.NDArray[np.int64]

@@ -20,9 +20,7 @@ from orchestration.engines.engine import Engine
 from orchestration.engines.engine import master as master_of
 from orchestration.engines.feeds import Feed
 from orchestration.engines.master import Master
-from orchestration.engines.sources import (
-    Values,
-)
+from orchestration.engines.sources import Values
 from orchestration.engines.watch import watch
 from orchestration.engines.wiring import checked, fixed_steps, signals_of, source_values
 from orchestration.fmi.instance import Instance, Loader

@@ -19,10 +19,11 @@ _ASIDE = (
     "orchestration.building.fmus",
     "orchestration.figures.gallery",
     "orchestration.recording.tables",
+    "orchestration.requests.ssp.reading",
     "orchestration.runs.draw",
     "orchestration.workers.row",
 )
-"""What finds FMUs, keeps results and draws them; it is imported there and changes no bit of them."""
+"""What finds FMUs, reads other forms of systems, keeps results and draws them; it is imported there and changes no bit of them."""
 _PACKAGES = ("orchestration", "fmu_kit")
 _FEATURES = ("fma", "fma4", "avx2", "avx512f")
 """of a processor, by which the C library and numpy choose among their mathematical functions"""
