@@ -57,7 +57,7 @@ class TuningFile:
     parameters: list[AxisTable]
     """What is tuned, each in a range: two at least."""
     starts: dict[str, Any] = field(default_factory=dict)
-    """The initial states that are flown from; and `judged`, how many more, after these, the result is judged on (200)."""
+    """The initial states that are flown from; and `judged`: on how many more, after these, it is judged (200)."""
     name: str | None = None
     """What the files of the result are called by; without it, the name of the file."""
     scenario: str | None = None

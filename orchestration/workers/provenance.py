@@ -23,7 +23,7 @@ _ASIDE = (
     "orchestration.runs.draw",
     "orchestration.workers.row",
 )
-"""What finds FMUs, reads other forms of systems, keeps results and draws them; it is imported there and changes no bit of them."""
+"""What finds FMUs, reads SSP, keeps results and draws them; it is imported there and changes no bit of them."""
 _PACKAGES = ("orchestration", "fmu_kit")
 _FEATURES = ("fma", "fma4", "avx2", "avx512f")
 """of a processor, by which the C library and numpy choose among their mathematical functions"""
