@@ -37,8 +37,10 @@ NAMES = (
     "periods", "fast_inner", "tuned", "tuned_mean", "delays", "inertias", "mismatches", "losses", "jitters", "vehicles",
 )  # fmt: skip
 FAST_INNER = "cascade, fast inner loops"
-TOLD = ("position_rmse", "ultimate_bound", "torque_max", "total_variation.torque")
+TOLD = ("settling_time", "residual", "position_rmse", "torque_max", "total_variation.torque")
 WORKERS = 2
+HORIZONS = (20.0, 30.0, 40.0, 60.0)
+"""[s] by which runs are counted, to see whether the shares still move"""
 BINS = 8
 """of the size of the initial error"""
 
@@ -140,21 +142,21 @@ def _batches() -> _Lanes:
 
 def _short(cell: dict[str, Any], rows: Any, comparison: Comparison) -> dict[str, Any]:
     """A cell as it is kept: counts, medians with their intervals, and counts by the size of the initial error."""
-    from orchestration.comparison.cells import Median, sizes
-    from orchestration.studies.figures import flew
+    from orchestration.comparison.cells import sizes
+    from orchestration.comparison.fates import FATES, SETTLING, survived
 
-    good = flew(rows)
     bins = (sizes(comparison, rows) * BINS).astype(int).clip(upper=BINS - 1)
-    residual = Median.of(rows[good]["ultimate_bound"].to_numpy(float))
-    medians = {key: [*each.values()] for key, each in cell["medians"].items()}
-    kept = {
-        key: cell[key] for key in ("cell", "vehicle", "condition", "controller", "value", "runs", "flown", "diverged")
-    }
+    alive, settling = survived(rows), rows[SETTLING].to_numpy(float)
+    counts = ("cell", "vehicle", "condition", "controller", "value", "count", "survives", "settles", "diverged")
     return {
-        **kept,
-        **medians,
-        "ultimate_bound": [residual.value, residual.low, residual.high],
-        "by_size": [[int((good & (bins == i)).sum()), int((bins == i).sum())] for i in range(BINS)],
+        **{key: cell[key] for key in (*counts, "diverged_late")},
+        **{name: [cell[f"{name}{end}"] for end in ("", ".low", ".high")] for name in TOLD},
+        "diverged_by": {f"{t:g}": int((~alive & (rows["divergence_time"].astype(float) <= t)).sum()) for t in HORIZONS},
+        "settled_by": {f"{t:g}": int((alive & (settling <= t)).sum()) for t in HORIZONS},
+        "by_size": {
+            fate: [[int((has(rows) & (bins == i)).sum()), int((bins == i).sum())] for i in range(BINS)]
+            for fate, has in FATES.items()
+        },
     }
 
 
@@ -191,13 +193,17 @@ def lines(name: str, content: Any) -> Iterator[str]:
     for one in content["limits"]:
         where = ", ".join(one[key] for key in ("vehicle", "condition", "controller"))
         rad = "" if one["bandwidth"] is None else f", {one['bandwidth']:.3g} rad/s"
-        yield f"  {where}: {one['share']} to {one['value']:g} [{one['low']:g}, {one['high'] or '...'}]{rad}"
+        ends = f"[{one['low']:g}, {one['high'] or '...'}]"
+        yield f"  {where}: {one['share']} {one['fate']} to {one['value']:g} {ends}{rad}"
     for cell in content["cells"]:
-        low, high = wilson(cell["flown"], cell["runs"])
+        shares = (wilson(cell[key], cell["count"]) for key in ("survives", "settles"))
+        (low, high), (least, most) = shares
         told = ", ".join(f"{key} {_numbers(cell[key])}" for key in TOLD)
         where = ", ".join(cell[key] for key in ("vehicle", "condition", "controller"))
-        yield (f"  cell {cell['cell']}: {where}, {cell['value']:g}: {cell['flown']} of {cell['runs']} fly "
-               f"({low:.1%} to {high:.1%}), {cell['diverged']} diverge; {told}")  # fmt: skip
+        by = "/".join(str(count) for count in cell["settled_by"].values())
+        yield (f"  cell {cell['cell']}: {where}, {cell['value']:g}: of {cell['count']} {cell['survives']} survive "
+               f"({low:.1%} to {high:.1%}, {cell['diverged_late']} lost late), {cell['settles']} settle "
+               f"({least:.1%} to {most:.1%}; by 20/30/40/60 s {by}); {told}")  # fmt: skip
 
 
 def _numbers(median: list[float | None]) -> str:
@@ -236,7 +242,8 @@ def figures() -> Iterator[tuple[str, Figure]]:
 
 def _limits(content: Any, factor: float = 1.0) -> Iterator[tuple[str, Any, Any, float]]:
     """Half and nine in ten of each controller, with the factor on the axis."""
-    for half, most in zip(content["limits"][::2], content["limits"][1::2], strict=True):
+    settling = [one for one in content["limits"] if one["fate"] == "settle"]
+    for half, most in zip(settling[::2], settling[1::2], strict=True):
         yield half["controller"], half, most, factor
 
 

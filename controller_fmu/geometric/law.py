@@ -31,7 +31,10 @@ SMALLEST_SINE = 1e-9
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Gains:
-    """The gains of the law; the defaults are those of the published example, per unit mass and inertia."""
+    """The gains of the law. Of attitude those of the published example, per unit inertia.
+
+    Of position half its natural frequency, with the same damping: it has k_x/m = 16 and k_v/m = 5.6.
+    """
 
     k_x: float = 4.0
     """position, k_x/m [1/s²]"""

@@ -1,6 +1,5 @@
 """`quadcosim compare`: what it prints and where it ends."""
 
-import dataclasses
 from pathlib import Path
 from typing import Any, Literal
 
@@ -51,7 +50,7 @@ def cell(comparison: Comparison, index: int, out: Path | None, *, workers: int, 
     lines = list(terminal.cell_lines(comparison, found))
     if same is not None:
         lines.append(f"{'in the store':<22}  {'the same' if same else 'another result'}")
-    return Answer(document={**dataclasses.asdict(found), "same_as_stored": same}, lines=lines)
+    return Answer(document={**found.row("value"), "same_as_stored": same}, lines=lines)
 
 
 def flight(comparison: Comparison, index: int | None, start: int, out: Path | None, *, engine: Engine | None) -> Answer:

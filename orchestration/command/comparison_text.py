@@ -3,55 +3,67 @@
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 
-from orchestration.comparison.cells import PEAK, VARIATION, Median, Result
+from orchestration.comparison.cells import PEAK, VARIATION, CellSummary, Median, Share
 from orchestration.comparison.design import Comparison
 from orchestration.comparison.limits import Limit
 from orchestration.comparison.outcome import Outcome
 
 
 def lines(comparison: Comparison, outcome: Outcome) -> Iterator[str]:
-    """For each vehicle and condition the share that flies by value of the axis; then how far each controller flies."""
+    """For each vehicle and condition how many survive and settle, by value of the axis; then how far each goes."""
     names = [one.name for one in comparison.controllers]
     axis = comparison.axis.name
     for (vehicle, condition), group in groupby(outcome.cells, lambda cell: (cell.vehicle, cell.condition)):
         cells = [*group]
-        yield f"{vehicle}, {condition}: share of {len(comparison.drawn)} starts that flies, with its 95 % interval"
+        yield (
+            f"{vehicle}, {condition}: of {len(comparison.drawn)} starts, those that survive / settle by "
+            f"{comparison.study.origin.stop_time:g} s, and the share that survives with its 95 % interval"
+        )
         rows = [[axis, *names]]
         for value in comparison.values:
             here = {cell.controller: cell for cell in cells if cell.value == value}
-            rows.append([f"{value:g}", *(_share(here[name]) if name in here else "-" for name in names)])
+            rows.append([f"{value:g}", *(_counts(here[name]) if name in here else "-" for name in names)])
         yield from _table(rows)
         yield ""
     if outcome.limits:
-        yield f"up to which {axis} half of the starts, and nine in ten, fly, with 95 % intervals"
-        yield from _table([["controller", "vehicle", "condition", "half", "nine in ten", "rad/s"], *_limits(outcome)])
+        yield f"up to which {axis} half of the starts, and nine in ten, survive, and settle, with 95 % intervals"
+        heads = ["controller", "vehicle", "condition", "they", "half", "nine in ten", "rad/s"]
+        yield from _table([heads, *_limits(outcome)])
 
 
-def cell_lines(comparison: Comparison, cell: Result) -> Iterator[str]:
+def cell_lines(comparison: Comparison, cell: CellSummary) -> Iterator[str]:
     """One cell, a quantity a line."""
     place = f"{cell.controller}, {cell.vehicle}, {cell.condition}, {comparison.axis.name} {cell.value:g}"
     yield f"cell {cell.cell}: {place}"
-    yield f"{'flies':<22}  {cell.flown} of {cell.runs}: {_share(cell)}"
-    units = {PEAK: " N.m", VARIATION: " N.m"}
+    yield f"{'survives':<22}  {cell.survives.count} of {cell.count}: {_share(cell.survives)}"
+    late = f", {cell.diverged_late} of them in the second half of the horizon" if cell.diverged_late else ""
+    yield f"{'diverged':<22}  {cell.diverged}{late}"
+    yield f"{'settles':<22}  {cell.settles.count} of {cell.count}: {_share(cell.settles)}"
+    units = {PEAK: " N.m", VARIATION: " N.m", "settling_time": " s", "residual": " m"}
     for name, median in cell.medians.items():
-        yield f"{name:<22}  {_median(median)}{units.get(name, '')}, median of those that fly"
+        those = "settle" if name == "settling_time" else "survive"
+        yield f"{name:<22}  {_median(median)}{units.get(name, '')}, median of those that {those}"
 
 
 def _limits(outcome: Outcome) -> Iterator[list[str]]:
-    for (vehicle, condition, controller), group in groupby(
-        outcome.limits, lambda one: (one.vehicle, one.condition, one.controller)
+    for (vehicle, condition, controller, fate), group in groupby(
+        outcome.limits, lambda one: (one.vehicle, one.condition, one.controller, one.fate)
     ):
         half, most = group
         bandwidth = "-" if half.bandwidth is None else f"{half.bandwidth:.3g}"
-        yield [controller, vehicle, condition, _limit(half), _limit(most), bandwidth]
+        yield [controller, vehicle, condition, fate, _limit(half), _limit(most), bandwidth]
 
 
 def _limit(limit: Limit) -> str:
     return f"{limit.value:.4g} [{limit.low:.4g}, {'...' if limit.high is None else f'{limit.high:.4g}'}]"
 
 
-def _share(cell: Result) -> str:
-    return f"{cell.share:.3f} [{cell.low:.3f}, {cell.high:.3f}]"
+def _counts(cell: CellSummary) -> str:
+    return f"{cell.survives.count} / {cell.settles.count}  {_share(cell.survives)}"
+
+
+def _share(share: Share) -> str:
+    return f"{share.value:.3f} [{share.low:.3f}, {share.high:.3f}]"
 
 
 def _median(median: Median) -> str:

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from orchestration.basics.statistics import wilson
 from orchestration.comparison.bandwidth import Bandwidths
-from orchestration.comparison.cells import PEAK, Result
+from orchestration.comparison.cells import PEAK, CellSummary, Share
 from orchestration.comparison.design import CONDITION, CONTROLLER, VEHICLE, Comparison
+from orchestration.comparison.fates import survived
 from orchestration.studies.axes import Value
-from orchestration.studies.figures import flew
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,22 +24,21 @@ BUDGETS = 8
 
 @dataclass(frozen=True, kw_only=True)
 class AtPhase:
-    """The share that flies where the axis is a given part of the time scale of the attitude loop."""
+    """The shares that survive and settle where the axis is a given part of the time scale of the attitude loop."""
 
     vehicle: str
     condition: str
     controller: str
     phase: float
     """axis times bandwidth [rad]"""
-    share: float
-    low: float
-    high: float
+    survives: float
+    settles: float
     """between those of the two cells beside it, by the logarithm of the axis"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class WithinTorque:
-    """The share of the starts that fly with no more than a given peak torque."""
+    """The share of the starts that survive with no more than a given peak torque."""
 
     vehicle: str
     condition: str
@@ -54,9 +52,9 @@ class WithinTorque:
     """Wilson interval at 95 %"""
 
 
-def at_equal_bandwidth(cells: Sequence[Result], bandwidths: Bandwidths) -> Iterator[AtPhase]:
+def at_equal_bandwidth(cells: Sequence[CellSummary], bandwidths: Bandwidths) -> Iterator[AtPhase]:
     """For an axis in seconds: each controller at the same values of axis times its own bandwidth."""
-    groups: dict[tuple[str, str, str], list[Result]] = {}
+    groups: dict[tuple[str, str, str], list[CellSummary]] = {}
     for cell in cells:
         groups.setdefault((cell.vehicle, cell.condition, cell.controller), []).append(cell)
     for (vehicle, condition, controller), group in groups.items():
@@ -67,13 +65,13 @@ def at_equal_bandwidth(cells: Sequence[Result], bandwidths: Bandwidths) -> Itera
             continue
         for phase in PHASES:
             if len(at) and at[0] <= math.log(phase) <= at[-1]:
-                share, low, high = (
-                    float(np.interp(math.log(phase), at, [getattr(cell, key) for cell in known]))
-                    for key in ("share", "low", "high")
+                survives, settles = (
+                    float(np.interp(math.log(phase), at, [share.value for share in shares]))
+                    for shares in ([cell.survives for cell in known], [cell.settles for cell in known])
                 )
                 yield AtPhase(
                     vehicle=vehicle, condition=condition, controller=controller,
-                    phase=phase, share=share, low=low, high=high,
+                    phase=phase, survives=survives, settles=settles,
                 )  # fmt: skip
 
 
@@ -81,16 +79,16 @@ def at_equal_torque(comparison: Comparison, table: "pd.DataFrame") -> Iterator[W
     """Each cell at the same peak torques, those that its vehicle's flights under its condition have."""
     done = table[table["status"] == "done"]
     for (vehicle, condition), group in done.groupby([VEHICLE, CONDITION], sort=False):
-        peaks = group.loc[flew(group), PEAK].dropna().to_numpy(float)
+        peaks = group.loc[survived(group), PEAK].dropna().to_numpy(float)
         if not len(peaks):
             continue
         budgets = [float(f"{q:.2g}") for q in np.quantile(peaks, np.linspace(0.1, 1.0, BUDGETS))]
         for (controller, value), rows in group.groupby([CONTROLLER, comparison.axis.name], sort=False):
-            within = rows.loc[flew(rows), PEAK].to_numpy(float)
+            within = rows.loc[survived(rows), PEAK].to_numpy(float)
             for torque in dict.fromkeys(budgets):
                 count = int((within <= torque).sum())
-                low, high = wilson(count, len(rows))
+                share = Share.of(count, len(rows))
                 yield WithinTorque(
                     vehicle=vehicle, condition=condition, controller=controller, value=value,
-                    torque=torque, share=count / len(rows), low=low, high=high,
+                    torque=torque, share=share.value, low=share.low, high=share.high,
                 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""What no other controller beats in error and in effort, on the starts that all of them fly."""
+"""What no other controller beats in error and in effort, on the starts that all of them survive."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -6,26 +6,26 @@ from typing import TYPE_CHECKING
 
 from orchestration.comparison.cells import Median
 from orchestration.comparison.design import CONDITION, CONTROLLER, START, VEHICLE, Comparison
+from orchestration.comparison.fates import survived
 from orchestration.studies.axes import Value
-from orchestration.studies.figures import flew
 
 if TYPE_CHECKING:
     import pandas as pd
 
 LEAST = 0.5
-"""Share of the starts that a controller has to fly to be weighed against others."""
+"""Share of the starts that a controller has to survive to be weighed against others."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Point:
-    """One controller among those that fly at a value of the axis."""
+    """One controller among those that survive at a value of the axis."""
 
     vehicle: str
     condition: str
     value: Value
     controller: str
     starts: int
-    """that all of these controllers fly"""
+    """that all of these controllers survive"""
     error: Median
     effort: Median
     """over those starts"""
@@ -34,16 +34,16 @@ class Point:
 
 
 def points(comparison: Comparison, table: "pd.DataFrame") -> Iterator[Point]:
-    """The controllers that fly half the starts or more, at each value of the axis."""
+    """The controllers that survive half the starts or more, at each value of the axis."""
     done = table[table["status"] == "done"]
     for (vehicle, condition, value), rows in done.groupby([VEHICLE, CONDITION, comparison.axis.name], sort=False):
-        good = rows[flew(rows)]
-        counts = good[CONTROLLER].value_counts()
+        alive = rows[survived(rows)]
+        counts = alive[CONTROLLER].value_counts()
         enough = LEAST * len(comparison.drawn)
         chosen = [one.name for one in comparison.controllers if counts.get(one.name, 0) >= enough]
-        good = good[good[CONTROLLER].isin(chosen)]
-        by_all = good[START].value_counts() == len(chosen)
-        common = good[good[START].isin(by_all[by_all].index)]
+        alive = alive[alive[CONTROLLER].isin(chosen)]
+        by_all = alive[START].value_counts() == len(chosen)
+        common = alive[alive[START].isin(by_all[by_all].index)]
         found = [(name, *_medians(comparison, common[common[CONTROLLER] == name])) for name in chosen]
         for name, error, effort in found:
             yield Point(

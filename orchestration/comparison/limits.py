@@ -1,4 +1,4 @@
-"""How far each controller flies: the value of the axis up to which a start flies, and its quantiles over the starts."""
+"""How far each controller goes: the value of the axis up to which a start survives, or settles, and its quantiles."""
 
 import math
 from collections.abc import Sequence
@@ -9,22 +9,26 @@ from typing import TYPE_CHECKING, Any
 from orchestration.basics.statistics import Estimate, quantile
 from orchestration.comparison.bandwidth import Bandwidths
 from orchestration.comparison.design import CONDITION, CONTROLLER, START, VEHICLE, Comparison
-from orchestration.studies.figures import flew
+from orchestration.comparison.fates import FATES
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from orchestration.comparison.fates import Fate
+
 SHARES = {"half": 0.5, "nine in ten": 0.9}
-"""Of the starts that fly up to the limit"""
+"""Of the starts that survive, or settle, up to the limit"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Limit:
-    """Up to which value of the axis so many of the starts fly, at every value below too."""
+    """Up to which value of the axis so many of the starts survive, or settle, at every value below too."""
 
     vehicle: str
     condition: str
     controller: str
+    fate: str
+    """survive, or settle"""
     share: str
     value: float
     """the last value of the axis up to which they do; 0 if not at the first"""
@@ -42,29 +46,31 @@ def limits(comparison: Comparison, table: "pd.DataFrame", bandwidths: Bandwidths
     for (vehicle, condition, controller), rows in done.groupby([VEHICLE, CONDITION, CONTROLLER], sort=False):
         if len(rows) < len(comparison.values) * len(comparison.drawn):
             continue
-        ends = first_ends(comparison, rows)
-        for name, share in SHARES.items():
-            value = _reached(ends, share)
-            found.append(
-                Limit(
-                    vehicle=vehicle,
-                    condition=condition,
-                    controller=controller,
-                    share=name,
-                    value=value,
-                    **_interval(quantile(ends, 1.0 - share), comparison),
-                    bandwidth=_at(bandwidths, controller, vehicle, value, comparison),
+        for fate, has in FATES.items():
+            ends = first_ends(comparison, rows, has)
+            for name, share in SHARES.items():
+                value = _reached(ends, share)
+                found.append(
+                    Limit(
+                        vehicle=vehicle,
+                        condition=condition,
+                        controller=controller,
+                        fate=fate,
+                        share=name,
+                        value=value,
+                        **_interval(quantile(ends, 1.0 - share), comparison),
+                        bandwidth=_at(bandwidths, controller, vehicle, value, comparison),
+                    )
                 )
-            )
     return found
 
 
-def first_ends(comparison: Comparison, rows: "pd.DataFrame") -> Sequence[float]:
-    """For each start the last value before the first at which it does not fly; 0 if it never does."""
-    cube = rows.assign(flew=flew(rows)).pivot(index=START, columns=comparison.axis.name, values="flew")
+def first_ends(comparison: Comparison, rows: "pd.DataFrame", has: "Fate") -> Sequence[float]:
+    """For each start the last value before the first at which it has not that fate; 0 if it never has."""
+    cube = rows.assign(has=has(rows)).pivot(index=START, columns=comparison.axis.name, values="has")
     values = [float(value) for value in cube.columns]
-    flown = (takewhile(lambda pair: pair[1], zip(values, row)) for row in cube.to_numpy())
-    return [max((value for value, _ in before), default=0.0) for before in flown]
+    before = (takewhile(lambda pair: pair[1], zip(values, row)) for row in cube.to_numpy())
+    return [max((value for value, _ in those), default=0.0) for those in before]
 
 
 def _at(bandwidths: Bandwidths, controller: str, vehicle: str, value: float, comparison: Comparison) -> float | None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from orchestration.comparison import equal_terms as slices
 from orchestration.comparison import fronts
 from orchestration.comparison.bandwidth import Bandwidths
-from orchestration.comparison.cells import Result, judged, results
+from orchestration.comparison.cells import CellSummary, results
 from orchestration.comparison.design import Comparison
 from orchestration.comparison.limits import Limit, limits
 from orchestration.comparison.pairs import Pair, pairs
@@ -26,7 +26,7 @@ CELLS, OUTCOME = "cells", "comparison.json"
 class Outcome:
     """All that is concluded from the runs of a comparison."""
 
-    cells: list[Result]
+    cells: list[CellSummary]
     limits: list[Limit]
     fronts: list[fronts.Point]
     pairs: list[Pair]
@@ -58,7 +58,8 @@ def as_json(comparison: Comparison, outcome: Outcome, bandwidths: Bandwidths) ->
             {"controller": controller, "vehicle": vehicle, "value": value, "bandwidth": bandwidth}
             for (controller, vehicle, value), bandwidth in bandwidths.items()
         ],
-        **dataclasses.asdict(outcome),
+        **dataclasses.asdict(dataclasses.replace(outcome, cells=[])),
+        "cells": [cell.row("value") for cell in outcome.cells],
     }
     found: dict[str, Any] = _finite(content)
     return found
@@ -69,8 +70,8 @@ def write(comparison: Comparison, outcome: Outcome, bandwidths: Bandwidths, fold
     import pandas as pd
 
     table = pd.DataFrame([cell.row(comparison.axis.name) for cell in outcome.cells])
-    medians = [name for name in table if name.startswith(judged(comparison))]
-    table = table.astype(dict.fromkeys(medians, float))
+    medians = [name for cell in outcome.cells[:1] for name in cell.medians]
+    table = table.astype({f"{name}{end}": float for name in medians for end in ("", ".low", ".high")})
     written = [folder / f"{CELLS}.parquet", folder / f"{CELLS}.csv", folder / OUTCOME]
     table.to_parquet(written[0], index=False)
     table.to_csv(written[1], index=False)

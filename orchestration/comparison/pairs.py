@@ -6,11 +6,15 @@ from typing import TYPE_CHECKING
 
 from orchestration.comparison.cells import Median
 from orchestration.comparison.design import CONDITION, CONTROLLER, START, VEHICLE, Comparison
+from orchestration.comparison.fates import settled, survived
 from orchestration.studies.axes import Value
-from orchestration.studies.figures import flew
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+_RATIOS = 2
+"""that are told of a pair"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,19 +27,24 @@ class Pair:
     controller: str
     against: str
     both: int
-    """starts that both fly"""
+    """starts that both survive"""
     only_it: int
     only_other: int
     neither: int
+    settles: int
+    """of those that both survive, starts that it alone settles from, less those that the other alone does"""
     error: Median
     effort: Median
-    """its value over that of the first, start by start, where both fly"""
+    """its value over that of the first, start by start, where both survive; the intervals hold for all pairs of the
+    comparison together (Bonferroni)"""
 
 
 def pairs(comparison: Comparison, table: "pd.DataFrame") -> Iterator[Pair]:
     """All controllers but the first, at each value of the axis."""
     first, *others = (one.name for one in comparison.controllers)
     done = table[table["status"] == "done"]
+    places = len(comparison.vehicles) * len(comparison.conditions) * len(comparison.values)
+    confidence = 1.0 - 0.05 / max(1, len(others) * places * _RATIOS)
     for (vehicle, condition, value), rows in done.groupby([VEHICLE, CONDITION, comparison.axis.name], sort=False):
         by_name = {name: one.set_index(START) for name, one in rows.groupby(CONTROLLER, sort=False)}
         if first not in by_name:
@@ -43,17 +52,23 @@ def pairs(comparison: Comparison, table: "pd.DataFrame") -> Iterator[Pair]:
         for name in others:
             if name in by_name:
                 place = {"vehicle": vehicle, "condition": condition, "value": value}
-                yield _pair(comparison, place, name, by_name[name], by_name[first])
+                yield _pair(comparison, place, name, by_name[name], by_name[first], confidence)
 
 
 def _pair(
-    comparison: Comparison, place: dict[str, Value], name: str, it: "pd.DataFrame", other: "pd.DataFrame"
+    comparison: Comparison,
+    place: dict[str, Value],
+    name: str,
+    it: "pd.DataFrame",
+    other: "pd.DataFrame",
+    confidence: float,
 ) -> Pair:
     known = it.index.intersection(other.index)
-    mine, its = flew(it.loc[known]), flew(other.loc[known])
+    mine, its = survived(it.loc[known]), survived(other.loc[known])
     both = known[mine & its]
+    ahead = settled(it.loc[both]).astype(int) - settled(other.loc[both]).astype(int)
     ratios = [
-        Median.of((it.loc[both, metric] / other.loc[both, metric]).to_numpy(float))
+        Median.of((it.loc[both, metric] / other.loc[both, metric]).to_numpy(float), confidence)
         for metric in (comparison.front.error, comparison.front.effort)
     ]
     return Pair(
@@ -66,6 +81,7 @@ def _pair(
         only_it=int((mine & ~its).sum()),
         only_other=int((~mine & its).sum()),
         neither=int((~mine & ~its).sum()),
+        settles=int(ahead.sum()),
         error=ratios[0],
         effort=ratios[1],
     )

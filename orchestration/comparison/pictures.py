@@ -1,8 +1,9 @@
-"""Pictures of a comparison: basins side by side, shares and limits with intervals, fronts."""
+"""Pictures of a comparison: basins, shares and limits with intervals, fronts; of who survives and who settles."""
 
 import math
 import re
 from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,8 +15,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from orchestration.basics.simulator import Floats
-from orchestration.comparison.cells import Median, Result, sizes
+from orchestration.comparison.cells import CellSummary, Median, sizes
 from orchestration.comparison.design import CONDITION, CONTROLLER, VEHICLE, Comparison
+from orchestration.comparison.fates import FATES
 from orchestration.comparison.fronts import Point
 from orchestration.comparison.limits import Limit
 from orchestration.comparison.outcome import Outcome
@@ -25,7 +27,7 @@ from orchestration.figures.style import SCREEN, Style
 from orchestration.requests.ranges import is_in_seconds
 from orchestration.results import display_names as labels
 from orchestration.studies.axis_labels import name_of
-from orchestration.studies.figures import flew, save
+from orchestration.studies.figures import save
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -57,55 +59,63 @@ def _of_one(
     found = [cell for cell in outcome.cells if (cell.vehicle, cell.condition) == of]
     fronts = [point for point in outcome.fronts if (point.vehicle, point.condition) == of and _is_known(point)]
     title, end = ", ".join(of), "_".join(re.sub(r"[^\w.-]+", "_", name) for name in of)
-    yield from save(lambda how: basins(comparison, rows, title, how), folder / f"basin_{end}", style)
+    for fate in FATES:
+        yield from save(partial(basins, comparison, rows, title, fate), folder / f"basin_{fate}_{end}", style)
     yield from save(lambda how: shares(comparison, found, title, how), folder / f"shares_{end}", style)
     if fronts:
         yield from save(lambda how: fronts_of(comparison, fronts, title, how), folder / f"front_{end}", style)
 
 
-def basins(comparison: Comparison, rows: "pd.DataFrame", title: str, style: Style = SCREEN) -> Figure:
-    """The share that flies over size of the initial error and axis, a panel for each controller; white: half."""
+def basins(comparison: Comparison, rows: "pd.DataFrame", title: str, fate: str, style: Style = SCREEN) -> Figure:
+    """The share that survives, or settles, over size of the initial error and axis, a panel for each controller.
+
+    The white line is where half of them do.
+    """
     names = [one.name for one in comparison.controllers if (rows[CONTROLLER] == one.name).any()]
     figure, panels = _panels(len(names), 22.0, style)
     bins = np.linspace(0.0, 1.0, BINS + 1)
     at, factor = _axis(comparison)
     x = cells.edges(at)
     for panel, name in zip(panels, names):
-        share = _by_size(comparison, rows[rows[CONTROLLER] == name], bins)
+        share = _by_size(comparison, rows[rows[CONTROLLER] == name], bins, fate)
         mesh = cells.fill(panel, x, bins, share, vmin=0.0, vmax=1.0)
         cells.hatch(panel, x, bins, np.isnan(share))
         cells.limit(panel, x, bins, np.where(np.isnan(share), np.nan, share >= 0.5), colors="white")
         panel.set_title(name)
-    figure.colorbar(mesh, ax=panels.tolist(), label="share that flies [1]")
+    figure.colorbar(mesh, ax=panels.tolist(), label=f"share that {fate}s [1]")
     figure.supxlabel(_label(comparison, factor))
     figure.supylabel("size of the initial error [1]")
-    figure.suptitle(f"{title}; above the white line less than half of the starts fly")
+    figure.suptitle(f"{title}; above the white line less than half of the starts {fate}")
     return figure
 
 
-def shares(comparison: Comparison, found: Sequence[Result], title: str, style: Style = SCREEN) -> Figure:
-    """The share of all starts that flies over the axis, with Wilson intervals, a line for each controller."""
+def shares(comparison: Comparison, found: Sequence[CellSummary], title: str, style: Style = SCREEN) -> Figure:
+    """The shares of all starts that survive and settle, with Wilson intervals, two lines for each controller."""
     figure = style.figure(32.0)
     panel = figure.add_subplot()
     _, factor = _axis(comparison)
     for color, name in _colored(comparison):
         group = [cell for cell in found if cell.controller == name]
         at = [factor * float(cell.value) for cell in group]
-        panel.plot(at, [cell.share for cell in group], ".-", color=color, label=name)
-        panel.fill_between(
-            at, [cell.low for cell in group], [cell.high for cell in group], color=color, alpha=0.15, linewidth=0.0
-        )
-    runs = max((cell.runs for cell in found), default=0)
-    panel.set(xlabel=_label(comparison, factor), ylabel="share that flies [1]", ylim=(-0.02, 1.02))
+        for line, those in ((".-", [cell.survives for cell in group]), (".:", [cell.settles for cell in group])):
+            panel.plot(at, [share.value for share in those], line, color=color, label=name if line == ".-" else None)
+            panel.fill_between(
+                at, [share.low for share in those], [share.high for share in those], color=color, alpha=0.1,
+                linewidth=0.0,
+            )  # fmt: skip
+    runs = max((cell.count for cell in found), default=0)
+    panel.plot([], [], ".-", color=GREY, label="survive")
+    panel.plot([], [], ".:", color=GREY, label="settle")
+    panel.set(xlabel=_label(comparison, factor), ylabel="share of the starts [1]", ylim=(-0.02, 1.02))
     panel.set_title(f"{title}; {runs} starts, 95 % intervals")
     panel.legend()
     return figure
 
 
 def limits_of(comparison: Comparison, limits: Sequence[Limit], style: Style = SCREEN) -> Figure:
-    """Up to where half and nine in ten of the starts fly, with intervals, an arrow for those that go beyond the axis.
+    """Up to where half and nine in ten of the starts survive, and settle, an arrow for those that go beyond the axis.
 
-    Beside it the same times the bandwidth.
+    With intervals; beside it, of those that settle, the same times the bandwidth.
     """
     last = float(comparison.values[-1])
     groups = [
@@ -113,20 +123,23 @@ def limits_of(comparison: Comparison, limits: Sequence[Limit], style: Style = SC
     ]
     in_seconds = _in_seconds(comparison)
     figure = style.figure(2.5 * len(groups) + 12.0)
-    panels = figure.subplots(1, 2 if in_seconds else 1, sharey=True, squeeze=False).ravel()
+    panels = figure.subplots(1, 3 if in_seconds else 2, sharey=True, squeeze=False).ravel()
     _, factor = _axis(comparison)
     for row, (_, group) in enumerate(groups):
-        for limit, color, shift in zip(group, (BLUE, ORANGE), (-0.15, 0.15)):
-            label = f"{limit.share} of the starts fly" if row == 0 else None
-            _bar(panels[0], limit, last, factor, row + shift, color, label)
-            if in_seconds and limit.bandwidth is not None:
-                _bar(panels[1], limit, last, limit.bandwidth, row + shift, color, None)
+        for limit in group:
+            color, shift = (BLUE, -0.15) if limit.share == "half" else (ORANGE, 0.15)
+            survives = limit.fate == "survive"
+            label = f"{limit.share} of the starts" if row == 0 and survives else None
+            _bar(panels[0 if survives else 1], limit, last, factor, row + shift, color, label)
+            if in_seconds and limit.bandwidth is not None and not survives:
+                _bar(panels[2], limit, last, limit.bandwidth, row + shift, color, None)
     several = len(comparison.vehicles) * len(comparison.conditions) > 1
     names = [", ".join((key[2], *key[:2])) if several else key[2] for key, _ in groups]
-    panels[0].set(yticks=range(len(names)), yticklabels=names, xlabel=f"up to {_label(comparison, factor)}")
+    panels[0].set(yticks=range(len(names)), yticklabels=names, xlabel=f"survive up to {_label(comparison, factor)}")
+    panels[1].set(xlabel=f"settle up to {_label(comparison, factor)}")
     panels[0].invert_yaxis()
     if in_seconds:
-        panels[1].set(xlabel=f"{name_of(comparison.axis)} · bandwidth of the attitude loop [rad]")
+        panels[2].set(xlabel=f"settle: {name_of(comparison.axis)} · bandwidth of the attitude loop [rad]")
     figure.legend(loc="outside upper center", ncols=2)
     return figure
 
@@ -162,15 +175,15 @@ def fronts_of(comparison: Comparison, points: Sequence[Point], title: str, style
     figure.legend(loc="outside right center")
     figure.supxlabel(labels.metric_with_unit(comparison.front.effort))
     figure.supylabel(labels.metric_with_unit(comparison.front.error))
-    figure.suptitle(f"{title}: medians over the starts that all fly; filled: on the front")
+    figure.suptitle(f"{title}: medians over the starts that all survive; filled: on the front")
     return figure
 
 
-def _by_size(comparison: Comparison, rows: "pd.DataFrame", edges: Floats) -> Floats:
-    """The share that flies, by bin of the size and value of the axis."""
+def _by_size(comparison: Comparison, rows: "pd.DataFrame", edges: Floats, fate: str) -> Floats:
+    """The share that survives, or settles, by bin of the size and value of the axis."""
     bins = np.clip(np.digitize(sizes(comparison, rows).to_numpy(float), edges) - 1, 0, BINS - 1)
-    counted = rows.assign(bin=bins, flew=flew(rows).astype(float))
-    found = counted.pivot_table(index="bin", columns=comparison.axis.name, values="flew")
+    counted = rows.assign(bin=bins, has=FATES[fate](rows).astype(float))
+    found = counted.pivot_table(index="bin", columns=comparison.axis.name, values="has")
     share: Floats = found.reindex(index=range(BINS), columns=[*comparison.values]).to_numpy(float)
     return share
 

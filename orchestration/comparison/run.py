@@ -10,7 +10,7 @@ from orchestration.basics.extras import explained
 from orchestration.basics.progress import CountHeard
 from orchestration.basics.terminal import say
 from orchestration.comparison.bandwidth import Bandwidths, bandwidths
-from orchestration.comparison.cells import Result, frame_of, results
+from orchestration.comparison.cells import CellSummary, frame_of, results
 from orchestration.comparison.design import Comparison
 from orchestration.comparison.outcome import Outcome, concluded, write
 from orchestration.engines.engine import Engine
@@ -55,10 +55,10 @@ class Compared:
         )
 
     def _repr_html_(self) -> str:
-        """As notebooks show it: how far each controller flies."""
+        """As notebooks show it: how far each controller goes."""
         rows = [
             (
-                f"{one.controller} on {one.vehicle}, {one.condition}: {one.share} of the starts up to",
+                f"{one.controller} on {one.vehicle}, {one.condition}: {one.share} of the starts {one.fate} up to",
                 f"{one.value:g}",
                 "",
             )
@@ -70,13 +70,13 @@ class Compared:
 
     @explained
     def to_pandas(self, what: Literal["cells", "limits", "runs"] = "cells") -> "pd.DataFrame":
-        """A row for each cell: how many starts fly, and medians with their intervals; or the limits, or the runs."""
+        """A row for each cell: how many starts survive and settle, medians; or the limits, or the runs."""
         import pandas as pd
 
         if what == "runs":
             return self.table
         found = self.outcome.limits if what == "limits" else self.outcome.cells
-        return pd.DataFrame([one.row(self.axis) if isinstance(one, Result) else vars(one) for one in found])
+        return pd.DataFrame([one.row(self.axis) if isinstance(one, CellSummary) else vars(one) for one in found])
 
 
 @explained
@@ -116,7 +116,7 @@ def compare(
     )
 
 
-def cell_again(comparison: Comparison, index: int, *, workers: int = 1, engine: Engine | None = None) -> Result:
+def cell_again(comparison: Comparison, index: int, *, workers: int = 1, engine: Engine | None = None) -> CellSummary:
     """Fly all runs of one cell, whatever a store has of it; raises `UsageError` for a cell that there is not."""
     cell, study = comparison.cell(index), comparison.study
     files = study.files()
@@ -130,14 +130,15 @@ def cell_again(comparison: Comparison, index: int, *, workers: int = 1, engine: 
     return found
 
 
-def agree(one: Result, other: Result) -> bool:
+def agree(one: CellSummary, other: CellSummary) -> bool:
     """Whether two results of a cell are the same, but for what lanes may differ by in a metric."""
-    counts = all(getattr(one, key) == getattr(other, key) for key in ("cell", "runs", "flown", "diverged"))
+    same = ("cell", "count", "survives", "settles", "diverged")
+    counts = all(getattr(one, key) == getattr(other, key) for key in same)
     pairs = ((one.medians[name], other.medians.get(name)) for name in one.medians)
     return counts and all(known is not None and median.is_near(known, TOLERATED) for median, known in pairs)
 
 
-def stored_cell(comparison: Comparison, index: int, folder: Path | None) -> Result | None:
+def stored_cell(comparison: Comparison, index: int, folder: Path | None) -> CellSummary | None:
     """The same cell by what is in the store; None if nothing is."""
     path = store_path(comparison.name, folder)
     if not path.is_file():

@@ -146,7 +146,8 @@ class Cell:
     condition: str
     controller: str
     value: float
-    share: Share
+    survives: Share
+    settles: Share
     diverged: int
     medians: Mapping[str, tuple[Number, Number, Number]]
     """by metric: value, and the ends of its interval at 95 %"""

@@ -4,7 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from orchestration.comparison.cells import Median, Result, results
+from orchestration.comparison.cells import CellSummary, Median, results
+from orchestration.comparison.cells import Share as Counted
 from orchestration.comparison.design import START, Comparison
 from orchestration.report.flights import Progress
 from orchestration.report.model import Cell, Compared, Report, Share
@@ -68,7 +69,7 @@ def _from_each_cell(comparison: Comparison, stored: Stored) -> Callable[[int], l
     return choose
 
 
-def _cell(found: Result) -> Cell:
+def _cell(found: CellSummary) -> Cell:
     value = float(found.value)
     return Cell(
         number=found.cell,
@@ -76,12 +77,15 @@ def _cell(found: Result) -> Cell:
         condition=found.condition,
         controller=found.controller,
         value=value,
-        share=Share(
-            label=number(value), value=value, good=found.flown, runs=found.runs, low=found.low, high=found.high
-        ),
+        survives=_share(found.survives, value, found.count),
+        settles=_share(found.settles, value, found.count),
         diverged=found.diverged,
         medians={name: _ends(median) for name, median in found.medians.items()},
     )
+
+
+def _share(found: Counted, value: float, runs: int) -> Share:
+    return Share(label=number(value), value=value, good=found.count, runs=runs, low=found.low, high=found.high)
 
 
 def _ends(median: Median) -> tuple[float | None, float | None, float | None]:

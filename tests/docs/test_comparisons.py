@@ -39,8 +39,10 @@ def test_one_cell_in_a_hundred_is_what_is_flown_again(name: str) -> None:
     for cell in random.Random(name).sample(kept, math.ceil(len(kept) / 100)):
         runs = comparisons.cell_flown(name, cell["cell"], paths)
         (found,) = results(comparison, frame_of(comparison, runs))
-        assert (found.runs, found.flown, found.diverged) == (cell["runs"], cell["flown"], cell["diverged"])
-        for key, median in found.medians.items():
-            again = [math.nan if one is None else one for one in (median.value, median.low, median.high)]
+        row = found.row("value")
+        for key in ("count", "survives", "settles", "diverged", "diverged_late"):
+            assert row[key] == cell[key], key
+        for key in comparisons.TOLD:
+            again = [math.nan if row[f"{key}{end}"] is None else row[f"{key}{end}"] for end in ("", ".low", ".high")]
             before = [math.nan if one is None else one for one in cell[key]]
             assert again == pytest.approx(before, rel=1e-4, nan_ok=True), key

@@ -38,26 +38,28 @@ function drawShares() {
 function drawSharesOfCells() {
   const { controllers, axis, unit } = report.compared;
   byId("shares").hidden = false;
-  byId("shares-title").textContent = `Share that is ${report.words[0]}, with 95 % intervals`;
-  byId("shares-text").textContent = "Wilson intervals, over the starts of each cell.";
-  const traces = controllers.map((controller, i) => {
+  byId("shares-title").textContent = "Shares that survive and settle, with 95 % intervals";
+  byId("shares-text").textContent = "Wilson intervals, over the starts of each cell. Lines: those that survive; dots: those that settle by the horizon.";
+  const traces = controllers.flatMap((controller, i) => {
     const found = cellsHere().filter((cell) => cell.controller === controller);
-    const share = found.map((cell) => cell.share.good / cell.share.runs);
-    return {
-      type: "scatter", mode: "lines+markers", name: escaped(controller), x: found.map((cell) => cell.value), y: share,
-      line: { color: COLORS[i % 8], dash: DASHES[i % 8], width: 1.6 }, marker: { symbol: SHAPES[i % 8], size: 7 },
-      text: found.map((cell) => `${escaped(controller)}, ${withUnit(cell.value, unit)}<br>${escaped(shareText(cell.share))}`), hovertemplate: "%{text}<extra></extra>",
-      error_y: { type: "data", symmetric: false, array: found.map((cell, k) => cell.share.high - share[k]), arrayminus: found.map((cell, k) => share[k] - cell.share.low), thickness: 1.1, width: 3 },
-    };
+    return [["survives", "survive", "lines+markers"], ["settles", "settle", "markers"]].map(([key, word, mode]) => {
+      const share = found.map((cell) => cell[key].good / cell[key].runs);
+      return {
+        type: "scatter", mode, name: escaped(controller), legendgroup: controller, showlegend: key === "survives", x: found.map((cell) => cell.value), y: share,
+        line: { color: COLORS[i % 8], dash: DASHES[i % 8], width: 1.6 }, marker: { symbol: SHAPES[i % 8] + (key === "settles" ? "-open" : ""), size: 7, color: COLORS[i % 8] },
+        text: found.map((cell) => `${escaped(controller)}, ${withUnit(cell.value, unit)}<br>${escaped(shareText(cell[key], word))}`), hovertemplate: "%{text}<extra></extra>",
+        error_y: { type: "data", symmetric: false, array: found.map((cell, k) => cell[key].high - share[k]), arrayminus: found.map((cell, k) => share[k] - cell[key].low), thickness: 1.1, width: 3 },
+      };
+    });
   });
   const layout = {
     height: 330, margin: { l: 60, r: 10, t: 10, b: 48 }, font: FONT, hovermode: "closest", hoverlabel: HOVER, legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom" },
     xaxis: { title: { text: escaped(titled(axis.replace(/_/g, " "), unit)) }, gridcolor: "#e8ebee", zeroline: false },
-    yaxis: { title: { text: `share ${escaped(report.words[0])}` }, range: [-0.03, 1.03], tickformat: ".0%", gridcolor: "#e8ebee", zeroline: false },
+    yaxis: { title: { text: "share of the starts" }, range: [-0.03, 1.03], tickformat: ".0%", gridcolor: "#e8ebee", zeroline: false },
   };
   Plotly.react(byId("shares-plot"), traces, layout, PLOTLY);
-  const rows = cellsHere().map((cell) => [`${cell.controller}, ${withUnit(cell.value, unit)}`, `${cell.share.good} of ${cell.share.runs}`, percent(cell.share.good / cell.share.runs), `${percent(cell.share.low)} to ${percent(cell.share.high)}`, String(cell.diverged)]);
-  byId("shares-table").replaceChildren(tableOf(rows, ["cell", report.words[0], "share", "95 % interval", "diverged"]));
+  const rows = cellsHere().map((cell) => [`${cell.controller}, ${withUnit(cell.value, unit)}`, `${cell.survives.good} of ${cell.survives.runs}`, `${percent(cell.survives.low)} to ${percent(cell.survives.high)}`, String(cell.settles.good), `${percent(cell.settles.low)} to ${percent(cell.settles.high)}`]);
+  byId("shares-table").replaceChildren(tableOf(rows, ["cell", "survive", "95 % interval", "settle", "95 % interval"]));
 }
 
 const cells = { place: 0, open: null };
@@ -92,7 +94,7 @@ function cellsHere() {
 function hoverOfCell(cell) {
   const { axis, unit } = report.compared;
   const medians = Object.entries(cell.medians).map(([name, [value, low, high]]) => `${escaped(report.labels[name] ?? name)}: ${withUnit(value, report.units[name])}${low === null || high === null ? "" : ` (${shown(low)} to ${shown(high)})`}`);
-  return [`<b>${escaped(cell.controller)}, ${escaped(axis)} ${withUnit(cell.value, unit)}</b>`, escaped(shareText(cell.share)), `${cell.diverged} diverged`, "<i>medians of those with their 95 % intervals</i>", ...medians].join("<br>");
+  return [`<b>${escaped(cell.controller)}, ${escaped(axis)} ${withUnit(cell.value, unit)}</b>`, escaped(shareText(cell.survives, "survive")), escaped(shareText(cell.settles, "settle")), "<i>medians of those that survive, with their 95 % intervals</i>", ...medians].join("<br>");
 }
 
 function drawCells() {
@@ -104,10 +106,10 @@ function drawCells() {
   const table = (make) => rows.map((controller) => values.map((value) => { const cell = at(controller, value); return cell ? make(cell) : null; }));
   const room = byId("map-plot").clientWidth > 42 * values.length + 180;
   const heat = {
-    type: "heatmap", x: values, y: rows, z: table((cell) => cell.share.good / cell.share.runs), zmin: 0, zmax: 1, colorscale: "Cividis", xgap: 1, ygap: 1,
-    text: table((cell) => (room ? String(Math.round((100 * cell.share.good) / cell.share.runs)) : "")), texttemplate: "%{text}", textfont: { size: 11 },
+    type: "heatmap", x: values, y: rows, z: table((cell) => cell.survives.good / cell.survives.runs), zmin: 0, zmax: 1, colorscale: "Cividis", xgap: 1, ygap: 1,
+    text: table((cell) => (room ? String(Math.round((100 * cell.survives.good) / cell.survives.runs)) : "")), texttemplate: "%{text}", textfont: { size: 11 },
     customdata: table((cell) => cell.number), hovertext: table(hoverOfCell), hovertemplate: "%{hovertext}<extra></extra>",
-    colorbar: { tickformat: ".0%", thickness: 14, outlinewidth: 0, title: { text: `share ${escaped(report.words[0])}`, side: "right" } },
+    colorbar: { tickformat: ".0%", thickness: 14, outlinewidth: 0, title: { text: "share that survives", side: "right" } },
   };
   const layout = {
     height: Math.max(220, 110 + 42 * rows.length), margin: { l: 20, r: 10, t: 10, b: 50 }, font: FONT, dragmode: false, hoverlabel: HOVER,
@@ -147,7 +149,7 @@ function openCell(cell) {
   Plotly.restyle(byId("map-plot"), { x: [x], y: [y] }, [1]);
   byId("cell").hidden = false;
   byId("cell-title").textContent = `${cell.controller}, ${report.compared.axis} ${withUnit(cell.value, report.compared.unit)}`;
-  byId("cell-text").textContent = `${shareText(cell.share)}; ${cell.diverged} diverged. Each point is a run; click one, or use the arrow keys, to open it.`;
+  byId("cell-text").textContent = `${shareText(cell.survives, "survive")}, ${shareText(cell.settles, "settle")}. Each point is a run; click one, or use the arrow keys, to open it.`;
   map.rows = rowsOfCell(cell);
   map.x = columnsByName.get("size of the initial error");
   map.y = VALUE;

@@ -41,10 +41,10 @@ function percent(share) {
   return `${Number((100 * share).toPrecision(3))} %`;
 }
 
-/** "12 of 20 (60 %, 95 % interval 39 % to 78 %)" */
-function shareText(share) {
+/** "12 of 20 settled (60 %, 95 % interval 39 % to 78 %)" */
+function shareText(share, word = report.words[0]) {
   const interval = share.low === null ? "" : `, 95 % interval ${percent(share.low)} to ${percent(share.high)}`;
-  return `${share.good} of ${share.runs} ${report.words[0]} (${percent(share.good / share.runs)}${interval})`;
+  return `${share.good} of ${share.runs} ${word} (${percent(share.good / share.runs)}${interval})`;
 }
 
 function byId(id) {

@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from orchestration.comparison.cells import Median, Result
+from orchestration.comparison.cells import CellSummary, Median, Share
 from orchestration.comparison.run import agree
 from orchestration.flight.bandwidth import crossover
 from orchestration.flight.hover_loop import COORDINATES, _controller_at_hover, _located, hover_of
@@ -80,16 +80,22 @@ def module_main() -> Main:
 def test_tables_tell_each_cell_and_pictures_are_drawn(table: str, folder: Path) -> None:
     cells = pd.read_csv(folder / "out" / "cells.csv")
     assert [*cells["cell"]] == [*range(CELLS)]
-    assert cells["runs"].eq(6).all()
+    assert cells["count"].eq(6).all()
     fast = cells[(cells["period"] == 0.02) & (cells["condition"] == "nominal")]
-    assert fast["flown"].gt(0).all()
-    assert cells[cells["period"] == 0.1]["flown"].eq(0).all()
+    assert fast["survives"].gt(0).all()
+    assert cells[cells["period"] == 0.1]["settles"].eq(0).all()
     assert fast["torque_max"].notna().all()
     for _, cell in fast.iterrows():
-        assert f"{cell['share']:.3f} [{cell['low']:.3f}, {cell['high']:.3f}]" in table
+        assert (
+            f"{cell['survives']} / {cell['settles']}  {cell['survives.share']:.3f} [{cell['survives.low']:.3f}" in table
+        )
     pd.testing.assert_frame_equal(pd.read_parquet(folder / "out" / "cells.parquet"), cells)
     drawn = {path.stem for path in (folder / "out").glob("*.png")}
-    kinds = {f"{kind}_base_{condition}" for kind in ("basin", "shares") for condition in ("nominal", "noise")}
+    kinds = {
+        f"{kind}_base_{condition}"
+        for kind in ("basin_survive", "basin_settle", "shares")
+        for condition in ("nominal", "noise")
+    }
     assert drawn >= {"limits", *kinds}
     assert json.loads((folder / "out" / "comparison.json").read_text())["starts"] == 6
 
@@ -111,14 +117,14 @@ def test_one_cell_flown_again_is_what_is_in_the_store(table: str, folder: Path, 
 
 def test_a_cell_with_another_count_or_median_is_not_the_same() -> None:
     median = Median(value=1.0, low=0.9, high=None)
-    cell = Result(
-        cell=0, vehicle="v", condition="c", controller="k", value=0.01, runs=6, flown=5, diverged=1, share=5 / 6,
-        low=0.4, high=0.9, medians={"torque_max": median},
+    cell = CellSummary(
+        cell=0, vehicle="v", condition="c", controller="k", value=0.01, count=6, survives=Share.of(5, 6),
+        settles=Share.of(4, 6), diverged=1, diverged_late=0, medians={"torque_max": median},
     )  # fmt: skip
     assert agree(cell, cell)
     assert agree(cell, replace(cell, medians={"torque_max": replace(median, value=1.0 + 1e-12)}))
     for other in (
-        replace(cell, flown=4),
+        replace(cell, settles=Share.of(3, 6)),
         replace(cell, medians={"torque_max": replace(median, value=1.0 + 1e-6)}),
         replace(cell, medians={"torque_max": replace(median, high=2.0)}),
     ):

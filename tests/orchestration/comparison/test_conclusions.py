@@ -1,6 +1,7 @@
 """What is concluded from runs, of tables made up so that the answers are known."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -12,6 +13,7 @@ from orchestration.comparison import fronts
 from orchestration.comparison.bandwidth import Bandwidths
 from orchestration.comparison.cells import frame_of, results
 from orchestration.comparison.design import Comparison, Condition, Controller, Craft
+from orchestration.comparison.fates import survived
 from orchestration.comparison.limits import first_ends, limits
 from orchestration.comparison.outcome import as_json, concluded
 from orchestration.comparison.pairs import pairs
@@ -46,6 +48,11 @@ def flew(controller: str, period: float, start: int) -> bool:
     return start < round(STARTS * (1.1 - SPEED[controller] * period))
 
 
+def settles(start: int) -> bool:
+    """Of those that survive, two in three, at any period."""
+    return start % 3 != 0
+
+
 @pytest.fixture(scope="module")
 def table(comparison: Comparison) -> pd.DataFrame:
     rows = []
@@ -55,7 +62,11 @@ def table(comparison: Comparison) -> pd.DataFrame:
         error = (2.0 if controller == "slow" else 1.0) * (1.0 + start)
         metrics = {
             "good": good,
-            "outcome": "settled" if good else "diverged",
+            "outcome": ("settled" if settles(start) else "bounded") if good else "diverged",
+            "horizon": 30.0 if good else 10.0 + start,
+            "divergence_time": None if good else 10.0 + start,
+            "settling_time": 1.0 + start if good and settles(start) else None,
+            "ultimate_bound": 0.01 * (1 + start) if good else None,
             "position_rmse": error if good else None,
             "torque_max": (1.0 if controller == "slow" else 3.0) + 0.01 * start if good else None,
             "total_variation.torque": 10.0 / error if good else None,
@@ -64,12 +75,17 @@ def table(comparison: Comparison) -> pd.DataFrame:
     return frame_of(comparison, rows)
 
 
-def test_a_cell_counts_what_flies_and_has_medians_of_that_alone(comparison: Comparison, table: pd.DataFrame) -> None:
+def test_a_cell_tells_survival_settling_and_residual_apart(comparison: Comparison, table: pd.DataFrame) -> None:
     cells = {(cell.controller, cell.value): cell for cell in results(comparison, table)}
     cell = cells["slow", 0.03]
-    assert (cell.runs, cell.flown, cell.diverged, cell.share) == (40, 32, 8, 0.8)
+    assert (cell.count, cell.survives.count, cell.settles.count, cell.diverged) == (40, 32, 21, 8)
+    assert cell.diverged_late == 8  # at 42 s and later, of a horizon of 30 s
     interval = binomtest(32, 40).proportion_ci(method="wilson")
-    assert (cell.low, cell.high) == pytest.approx((interval.low, interval.high), rel=1e-12)
+    assert (cell.survives.low, cell.survives.high) == pytest.approx((interval.low, interval.high), rel=1e-12)
+    interval = binomtest(21, 40).proportion_ci(method="wilson")
+    assert (cell.settles.low, cell.settles.high) == pytest.approx((interval.low, interval.high), rel=1e-12)
+    assert cell.medians["settling_time"].value == np.median([1.0 + k for k in range(32) if settles(k)])
+    assert cell.medians["residual"].value == pytest.approx(np.median([0.01 * (1 + k) for k in range(32)]))
     assert cell.medians["position_rmse"].value == np.median([2.0 * (1.0 + k) for k in range(32)])
     assert cell.medians["position_rmse"].low == 2.0 * 10  # of 32 the 10th and the 23rd
     assert cell.medians["position_rmse"].high == 2.0 * 23
@@ -78,7 +94,7 @@ def test_a_cell_counts_what_flies_and_has_medians_of_that_alone(comparison: Comp
 def test_a_limit_is_the_last_value_before_the_first_that_fails_with_the_grid_in_its_interval(
     comparison: Comparison, table: pd.DataFrame
 ) -> None:
-    found = {(one.controller, one.share): one for one in limits(comparison, table, BANDWIDTHS)}
+    found = {(one.controller, one.share): one for one in limits(comparison, table, BANDWIDTHS) if one.fate == "survive"}
     half = found["fast", "half"]
     assert half.value == 0.03  # of 40 starts 36, 28, 20, 12 fly
     assert (half.low, half.high, half.bandwidth) == (0.02, 0.04, 20.0)  # the 14th and the 27th, and the next
@@ -87,11 +103,23 @@ def test_a_limit_is_the_last_value_before_the_first_that_fails_with_the_grid_in_
     assert found["slow", "half"].high is None
 
 
+def test_what_survives_farther_than_it_settles_has_two_limits(comparison: Comparison, table: pd.DataFrame) -> None:
+    found = {
+        (one.fate, one.share): one.value for one in limits(comparison, table, BANDWIDTHS) if one.controller == "slow"
+    }
+    assert found == {  # 40, 36, 32 and 28 survive; of these 26, 24, 21 and 18 settle
+        ("survive", "half"): 0.04,
+        ("survive", "nine in ten"): 0.02,
+        ("settle", "half"): 0.03,
+        ("settle", "nine in ten"): 0.0,
+    }
+
+
 def test_what_flies_again_further_up_has_its_limit_before(comparison: Comparison, table: pd.DataFrame) -> None:
     rows = table[table["controller"] == "slow"].copy()
-    rows.loc[(rows["start"] == 0) & (rows["period"] == 0.02), "good"] = False
-    rows.loc[(rows["start"] == 1) & (rows["period"] == 0.01), "good"] = False
-    assert [*first_ends(comparison, rows)][:3] == [0.01, 0.0, 0.04]
+    rows.loc[(rows["start"] == 0) & (rows["period"] == 0.02), "outcome"] = "diverged"
+    rows.loc[(rows["start"] == 1) & (rows["period"] == 0.01), "outcome"] = "diverged"
+    assert [*first_ends(comparison, rows, survived)][:3] == [0.01, 0.0, 0.04]
 
 
 def test_controllers_with_missing_runs_have_no_limit_yet(comparison: Comparison, table: pd.DataFrame) -> None:
@@ -102,10 +130,10 @@ def test_at_equal_bandwidth_what_depends_on_that_alone_is_the_same(comparison: C
     found = {
         (one.controller, one.phase): one for one in slices.at_equal_bandwidth(results(comparison, table), BANDWIDTHS)
     }
-    assert found["slow", 0.2].share == found["fast", 0.2].share == pytest.approx(0.9)
-    assert found["slow", 0.4].share == found["fast", 0.4].share == pytest.approx(0.7)
+    assert found["slow", 0.2].survives == found["fast", 0.2].survives == pytest.approx(0.9)
+    assert found["slow", 0.4].survives == found["fast", 0.4].survives == pytest.approx(0.7)
+    assert found["slow", 0.4].settles == found["fast", 0.4].settles == pytest.approx(18 / 40)
     assert ("slow", 0.6) not in found  # beyond its periods
-    assert found["fast", 0.2].low < 0.9 < found["fast", 0.2].high
 
 
 def test_within_a_peak_torque_only_what_needs_no_more_counts(comparison: Comparison, table: pd.DataFrame) -> None:
@@ -142,6 +170,20 @@ def test_pairs_are_counted_and_compared_start_by_start(comparison: Comparison, t
     assert (pair.both, pair.only_it, pair.only_other, pair.neither) == (28, 0, 8, 4)
     assert (pair.error.value, pair.error.low, pair.error.high) == (0.5, 0.5, 0.5)
     assert pair.effort.value == pytest.approx(2.0)
+    assert pair.settles == 0
+
+
+def test_the_intervals_of_pairs_hold_for_all_of_them_together(comparison: Comparison, table: pd.DataFrame) -> None:
+    """With as many conditions again there are twice as many comparisons, and no interval is narrower."""
+    rng = np.random.default_rng(0)
+    noisy = table.assign(position_rmse=table["position_rmse"].astype(float) * rng.uniform(0.5, 2.0, len(table)))
+    (alone,) = (one for one in pairs(comparison, noisy) if one.value == 0.01)
+    conditions = tuple(Condition(name=name) for name in ("c", *map(str, range(300))))
+    (among,) = (one for one in pairs(replace(comparison, conditions=conditions), noisy) if one.value == 0.01)
+    assert alone.error.value == among.error.value
+    ends = (among.error.low, alone.error.low, alone.error.high, among.error.high)
+    assert None not in ends
+    assert sorted(set(ends)) == [*ends]
 
 
 def test_nothing_in_the_json_is_infinite(comparison: Comparison, table: pd.DataFrame) -> None:
