@@ -20,8 +20,11 @@ COLORS = {
     "unified, mean": ORANGE,
     "no coupling, mean": "#5b3f8f",
     "geometric": GREEN,
+    "geometric, published gains": "#8ecf9b",
     "geometric, mean": BROWN,
     "cascade, one rate": GREY,
+    "cascade, no rate derivative": "#3a3a3a",
+    "cascade, no velocity integral": "#b0b0b0",
     "unified, predictor": PURPLE,
     "no coupling, predictor": BROWN,
     "mean, predictor": GREEN,
@@ -38,7 +41,7 @@ COLORS = {
 
 
 def basins(cells: Rows, factors: Mapping[str, float]) -> Figure:
-    """Share that flies over size of the initial error and period, a panel for each controller; white: half.
+    """Share that survives over size of the initial error and period, a panel for each controller; white: half.
 
     `factors` are those on the periods, by controller: 1 unless told.
     """
@@ -51,20 +54,20 @@ def basins(cells: Rows, factors: Mapping[str, float]) -> Figure:
     for panel, name in zip(panels, names):
         mine = [cell for cell in cells if cell["controller"] == name]
         at = 1e3 * factors.get(name, 1.0) * np.array([cell["value"] for cell in mine])
-        share = np.array([[flown / count for flown, count in cell["by_size"]] for cell in mine]).T
+        share = np.array([[alive / count for alive, count in cell["by_size"]["survive"]] for cell in mine]).T
         x, sizes = cells_of.edges(at), np.linspace(0.0, 1.0, share.shape[0] + 1)
         mesh = cells_of.fill(panel, x, sizes, share, vmin=0.0, vmax=1.0)
         cells_of.limit(panel, x, sizes, (share >= 0.5).astype(float), colors="white")
         panel.set_title(name)
         panel.set_xlim(0.0, 300.0 * max(1.0, factors.get(name, 1.0) / 10.0))
-    figure.colorbar(mesh, ax=panels.tolist(), label="share that flies [1]", shrink=0.8)
+    figure.colorbar(mesh, ax=panels.tolist(), label="share that survives [1]", shrink=0.8)
     figure.supxlabel("period [ms]")
     figure.supylabel("size of the initial error [1]")
     return figure
 
 
 def limits(rows: Sequence[tuple[str, Mapping[str, Any], Mapping[str, Any], float]], last: float, label: str) -> Figure:
-    """Up to which value half of the starts and nine in ten fly, with intervals: (name, half, nine in ten, factor)."""
+    """Up to which value half and nine in ten of the starts settle: (name, half, nine in ten, factor on the axis)."""
     figure = Figure(figsize=(8.0, 0.42 * len(rows) + 1.2))
     panel = figure.add_subplot()
     for i, (_, half, most, factor) in enumerate(reversed(rows)):
@@ -82,7 +85,7 @@ def limits(rows: Sequence[tuple[str, Mapping[str, Any], Mapping[str, Any], float
 
 
 def shares(panels_of: Mapping[str, Rows], label: str, factor: float = 1e3) -> Figure:
-    """The share that flies over the axis, with Wilson intervals, a panel for each title, a line for each controller."""
+    """The shares that survive and settle, with Wilson intervals: a panel a title, a colour a controller."""
     columns = min(4, len(panels_of))
     rows = -(-len(panels_of) // columns)
     figure = Figure(figsize=(max(2.4 * columns, 4.0) + 3.0, 2.7 * rows + 0.7))
@@ -97,7 +100,7 @@ def shares(panels_of: Mapping[str, Rows], label: str, factor: float = 1e3) -> Fi
     handles, names = panels[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside right center")
     figure.supxlabel(label)
-    figure.supylabel("share that flies [1]")
+    figure.supylabel("share of 200 starts: line survives, dots settle by 60 s [1]")
     return figure
 
 
@@ -134,9 +137,10 @@ def colored(names: Sequence[str]) -> dict[str, str]:
 
 def _line(panel: Axes, cells: Rows, name: str, factor: float) -> None:
     at = factor * np.array([cell["value"] for cell in cells])
-    low, high = np.transpose([wilson(cell["flown"], cell["runs"]) for cell in cells])
+    low, high = np.transpose([wilson(cell["survives"], cell["count"]) for cell in cells])
     color = colored([name])[name]
-    panel.plot(at, [cell["flown"] / cell["runs"] for cell in cells], ".-", color=color, label=name, linewidth=1.2)
+    panel.plot(at, [cell["survives"] / cell["count"] for cell in cells], "-", color=color, label=name, linewidth=1.2)
+    panel.plot(at, [cell["settles"] / cell["count"] for cell in cells], ".", color=color, markersize=4)
     panel.fill_between(at, low, high, color=color, alpha=0.15, linewidth=0.0)
 
 

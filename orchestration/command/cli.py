@@ -297,6 +297,8 @@ interop.register(app)
 
 
 def _metrics(result: "Result") -> Answer:
+    from orchestration.results.criterion import unmet
+
     found = {**result.metrics, "wall_time": result.provenance["wall_time"], "engine": result.provenance["engine"]}
     width, units = max(map(len, found)), {**result.units, "wall_time": "s"}
     lines = []
@@ -305,6 +307,8 @@ def _metrics(result: "Result") -> Answer:
         lines.append(f"{name:<{width}}  {shown}{'' if value is None else after(units.get(name))}")
     if result.divergence is not None:
         lines.append(f"diverged: {result.divergence}")
+    if (missed := unmet(result.system, result.metrics, result.units)) is not None:
+        lines.append(f"not good: {missed}")
     return Answer(document=found, lines=lines)
 
 

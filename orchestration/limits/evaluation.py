@@ -1,14 +1,14 @@
 """Runs that decide whether a value of a quantity is good, with one seed or many."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 from orchestration.basics.bisection import Range
 from orchestration.basics.statistics import refutes, wilson
 from orchestration.requests.ranges import Varied
-from orchestration.studies.criteria import judged
+from orchestration.results.criterion import judged, unmet
 from orchestration.system.model import System
 from orchestration.workers.executors import Pool
 
@@ -47,6 +47,8 @@ class Tried:
     """Wilson interval of the share of seeds that are good, at the confidence; None: no chance, or not all run"""
     measured: float | None = None
     """what the criterion is about, of the first seed or of that one; None: it has no value"""
+    unmet: str | None = None
+    """what of the criterion that seed did not meet, in words; None: it did, or diverged"""
 
 
 class Trials:
@@ -58,12 +60,14 @@ class Trials:
         span: Range,
         seeds: int,
         confidence: float | None,
+        units: Mapping[str, str],
         pool: Pool,
         announce: Callable[[str], None],
         progress: Callable[[float], None],
     ) -> None:
         self._varied, self._span, self._seeds = varied, span, seeds
         self._confidence, self._pool, self._announce, self._progress = confidence, pool, announce, progress
+        self._units = units
         self._done = self._left = 0
         self.tolerance = span.tolerance
         self.tried: dict[float, Tried] = {}
@@ -102,6 +106,7 @@ class Trials:
             runs=len(metrics),
             share=wilson(flew, len(metrics), self._confidence) if known and self._confidence is not None else None,
             measured=measured if isinstance(measured, float) and math.isfinite(measured) else None,
+            unmet=None if down is None else unmet(system, down, self._units),
         )
         self._announce(f"{self._varied.of} {value:.6g}{self._span.unit}: {said(found)}")
         return found
@@ -114,5 +119,6 @@ def said(tried: Tried) -> str:
         return f"{tried.flew} of {tried.runs} seeds are good, a share of {low:.2f} to {high:.2f}"
     if tried.flew == tried.runs:
         return tried.outcome
-    at = "" if tried.divergence_time is None else f" at {tried.divergence_time:.3g} s"
-    return f"fails, {tried.outcome}{at}"
+    if tried.divergence_time is not None:
+        return f"fails, {tried.outcome} at {tried.divergence_time:.3g} s"
+    return f"fails, {tried.outcome}" + (f": {tried.unmet}" if tried.unmet else "")

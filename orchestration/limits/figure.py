@@ -14,9 +14,9 @@ from orchestration.figures.style import SCREEN, Style
 from orchestration.limits.evaluation import RELIABILITY, Tried
 from orchestration.limits.found import Found
 from orchestration.results import display_names as labels
+from orchestration.results.criterion import edge
 from orchestration.stability.known_loops import LOOPS
 from orchestration.studies import figures
-from orchestration.studies.criteria import edge
 from orchestration.system.request import Request, system_meant
 
 _PLACES = ("components", "connections", "sources")

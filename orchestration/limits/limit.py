@@ -17,9 +17,9 @@ from orchestration.limits.evaluation import RELIABILITY, Trials, is_random, said
 from orchestration.limits.found import Continuous, Found
 from orchestration.requests.ranges import Varied, range_asked_for
 from orchestration.results import html
+from orchestration.results.criterion import judged
 from orchestration.stability.known_loops import Local
 from orchestration.stability.local_limit import local_limits
-from orchestration.studies.criteria import judged
 from orchestration.system.request import Request, in_its_own_words, system_meant
 from orchestration.workers.executors import Pool
 
@@ -114,7 +114,7 @@ def find(
     local = local_limits(varied, span)
     with of_share(progress, "longest search") as hear, Pool(files, workers, engine) as pool:
         tell = announce or (lambda line: None)
-        trials = Trials(varied, span, seeds, confidence if random else None, pool, tell, hear)
+        trials = Trials(varied, span, seeds, confidence if random else None, units[0], pool, tell, hear)
         values = span.values()
         bracket = first_failure(
             trials.fails, values, span.tolerance, parts=FINER, left=lambda left: trials.expect(left + BEYOND)

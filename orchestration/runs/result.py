@@ -16,6 +16,7 @@ from orchestration.recording.recording import About, Event, Recording
 from orchestration.results import display_names as labels
 from orchestration.results import exports, html
 from orchestration.results.column_info import Described
+from orchestration.results.criterion import unmet
 from orchestration.results.objectives import Metrics
 from orchestration.system.model import System
 from orchestration.system.request import Request
@@ -97,7 +98,8 @@ class Result:
             str(self.metrics["outcome"] or "") or None,
             good if isinstance(good, bool) else None,
             f"{self.end:g} s in {len(self.recording)} rows of {len(self.columns)} columns"
-            + (f"; diverged: {self.divergence}" if self.divergence else ""),
+            + (f"; diverged: {self.divergence}" if self.divergence else "")
+            + (f"; not good: {missed}" if (missed := unmet(self.system, self.metrics, self.units)) else ""),
             [
                 (labels.metric(name), html.number(self.metrics[name]), labels.unit(self.units.get(name)) or "")
                 for name in named

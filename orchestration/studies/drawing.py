@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
 from orchestration.figures.style import SCREEN, Style, save
+from orchestration.results.criterion import edge, judged
 from orchestration.studies import figures, sensitivity
 from orchestration.studies.axes import Axis, unit_points
-from orchestration.studies.criteria import edge, judged
 from orchestration.studies.maps import heat_map
 from orchestration.studies.store import TEXTS, metrics_with, store_path
 from orchestration.studies.study import Study

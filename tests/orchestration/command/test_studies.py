@@ -185,7 +185,11 @@ def test_limit_prints_json_alone_on_standard_output_and_what_it_tries_on_standar
     assert found["confidence"] is None
     assert 0.0 < found["local_limit"] < 0.1
     assert found["large_signal_limit"] is None, "the paper's flight begins two metres away"
-    assert done.stderr.splitlines() == [f"delay {value:g} s: fails, bounded" for value in (0, 0.005, 0.01, 0.015, 0.02)]
+    tried = [line.partition(": ultimate_bound = ") for line in done.stderr.splitlines()]
+    assert [line[0] for line in tried] == [
+        f"delay {value:g} s: fails, bounded" for value in (0, 0.005, 0.01, 0.015, 0.02)
+    ]
+    assert all(line[2].endswith(" m, expected < 0.05 m") for line in tried)
     assert [one["outcome"] for one in found["tried"]] == ["bounded"] * 5
 
 

@@ -526,8 +526,9 @@ def test_what_flies_again_above_the_limit_is_told(stubbed: type[StubPool], monke
 
 
 @pytest.mark.parametrize(
-    ("bound", "said"), [(1.0, "(fails, bounded)"), (math.inf, "(fails, diverged at 3.25 s)")],
-)  # fmt: skip
+    ("bound", "said"),
+    [(1.0, "(fails, bounded: ultimate_bound = 1 m, expected < 0.05 m)"), (math.inf, "(fails, diverged at 3.25 s)")],
+)
 def test_what_the_value_that_fails_did_is_told(
     stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch, bound: float, said: str
 ) -> None:
@@ -597,7 +598,7 @@ def test_each_value_is_announced() -> None:
     find(scenario_of(), "period", announce=said.append)
     assert said[0] == "period 0.001 s: settled"
     assert "period 0.03 s: settled" in said
-    assert "period 0.035 s: fails, bounded" in said
+    assert "period 0.035 s: fails, bounded: ultimate_bound = 1 m, expected < 0.05 m" in said
 
 
 @pytest.mark.usefixtures("stubbed")

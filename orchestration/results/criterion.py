@@ -1,0 +1,59 @@
+"""What a criterion is about: the objective that it judges, where it draws the line, what of it a run did not meet."""
+
+import operator
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from orchestration.expressions.syntax import Name, Node, Number, Operation, names, parse
+from orchestration.system.model import System
+
+_HOLDS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
+
+
+def judged(system: System) -> str | None:
+    """The objective that the criterion is about, or the first one; None where there is none."""
+    named = names(parse(system.criterion.good)) if system.criterion.good is not None else ()
+    return next((name for name in named if name in system.objectives), next(iter(system.objectives), None))
+
+
+def edge(system: System, metric: str) -> float | None:
+    """The bound of a criterion that is `metric < number` and no more, or with another comparison."""
+    if system.criterion.good is None:
+        return None
+    match parse(system.criterion.good):
+        case Operation(operation, (Name(name), Number(bound))) if name == metric and operation in _HOLDS:
+            return bound
+    return None
+
+
+def unmet(system: System, metrics: Mapping[str, Any], units: Mapping[str, str]) -> str | None:
+    """Which part of the criterion a run did not meet, with its number against its bound; None: it did, or diverged.
+
+    `units` are those of its metrics, by name. Parts are what `and` joins; of one that is no comparison of an objective
+    with a number it is only said that it does not hold.
+    """
+    if system.criterion.good is None or metrics["good"] is not False or metrics["outcome"] == "diverged":
+        return None
+    parts = [text for part in _parts(parse(system.criterion.good)) if (text := _missed(part, metrics, units))]
+    return "; ".join(parts) or f"{system.criterion.good} does not hold"
+
+
+def _parts(node: Node) -> Iterator[Node]:
+    match node:
+        case Operation("and", (left, right)):
+            yield from _parts(left)
+            yield from _parts(right)
+        case _:
+            yield node
+
+
+def _missed(part: Node, metrics: Mapping[str, Any], units: Mapping[str, str]) -> str | None:
+    match part:
+        case Operation(operation, (Name(name), Number(bound))) if operation in _HOLDS and name in metrics:
+            value = metrics[name]
+            if value is not None and _HOLDS[operation](value, bound):
+                return None
+            unit = f" {units[name]}" if name in units else ""
+            found = "has no value" if value is None else f"= {value:.4g}{unit}"
+            return f"{name} {found}, expected {operation} {bound:g}{unit}"
+    return None

@@ -1,0 +1,56 @@
+"""What of a criterion a run did not meet is said with its number against its bound."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from orchestration.quadrotor.translation import quadrotor
+from orchestration.results.criterion import edge, unmet
+from orchestration.system.model import System
+
+
+def with_good(good: str | None) -> System:
+    system = quadrotor()
+    return replace(system, criterion=replace(system.criterion, good=good))
+
+
+def metrics(*, good: bool | None = False, outcome: str = "bounded", **objectives: float | None) -> dict[str, Any]:
+    return {"good": good, "outcome": outcome, **objectives}
+
+
+UNITS = {"ultimate_bound": "m", "settling_time": "s"}
+
+
+@pytest.mark.parametrize(
+    ("good", "found", "said"),
+    [
+        ("ultimate_bound < 0.05", {"ultimate_bound": 0.0623}, "ultimate_bound = 0.0623 m, expected < 0.05 m"),
+        ("ultimate_bound < 0.05", {"ultimate_bound": None}, "ultimate_bound has no value, expected < 0.05 m"),
+        (
+            "ultimate_bound < 0.05 and settling_time <= 5",
+            {"ultimate_bound": 0.01, "settling_time": 7.0},
+            "settling_time = 7 s, expected <= 5 s",
+        ),
+        (
+            "ultimate_bound < 0.05 and settling_time <= 5",
+            {"ultimate_bound": 0.1, "settling_time": 7.0},
+            "ultimate_bound = 0.1 m, expected < 0.05 m; settling_time = 7 s, expected <= 5 s",
+        ),
+        ("ultimate_bound + settling_time < 1", {}, "ultimate_bound + settling_time < 1 does not hold"),
+    ],
+)
+def test_the_part_that_failed_is_said(good: str, found: dict[str, float | None], said: str) -> None:
+    assert unmet(with_good(good), metrics(**found), UNITS) == said
+
+
+def test_of_a_run_that_is_good_or_diverged_nothing_is_said() -> None:
+    system = with_good("ultimate_bound < 0.05")
+    assert unmet(system, metrics(good=True, ultimate_bound=0.01), UNITS) is None
+    assert unmet(system, metrics(outcome="diverged", ultimate_bound=None), UNITS) is None
+    assert unmet(with_good(None), metrics(good=None), UNITS) is None
+
+
+def test_an_edge_is_the_bound_of_one_comparison_and_of_no_other_expression() -> None:
+    assert edge(with_good("ultimate_bound < 0.05"), "ultimate_bound") == 0.05
+    assert edge(with_good("ultimate_bound < 0.05 and settling_time < 5"), "ultimate_bound") is None
