@@ -203,6 +203,28 @@ class Store:
         _insert(self._connection, table, rows)
 
 
+def _make_if_need_be(connection: sqlite3.Connection, objectives: list[str]) -> None:
+    """Make the tables, all of them or none, whatever ends it; those that nothing was written into are made anew."""
+    schema, made_for = _schema(connection), _objectives(connection)
+    if made_for == objectives or (schema and not _is_unused(connection, schema, made_for)):
+        return
+    with connection:
+        connection.execute("BEGIN IMMEDIATE")  # without it each of these statements is a transaction of its own
+        for table in schema:
+            connection.execute(f"DROP TABLE {table}")
+        for statement in _tables(metrics_with(objectives)).values():
+            connection.execute(statement)
+        _insert(connection, "about", [(OBJECTIVES, json.dumps(objectives))])
+
+
+def _is_unused(connection: sqlite3.Connection, schema: Mapping[str, str], objectives: list[str] | None) -> bool:
+    """Whether a database is a store that says nothing of a study and has no rows yet."""
+    if objectives is None or schema != _tables(metrics_with(objectives)):
+        return False
+    query = "SELECT EXISTS (SELECT 1 FROM about WHERE name != ?) OR EXISTS (SELECT 1 FROM runs)"
+    return not connection.execute(query, (OBJECTIVES,)).fetchone()[0]
+
+
 def _insert(connection: sqlite3.Connection, table: str, rows: Iterable[tuple[Any, ...]]) -> None:
     summed = ((*row, _checksum(row)) for row in rows)
     first = next(summed, None)
@@ -217,7 +239,7 @@ def _insert(connection: sqlite3.Connection, table: str, rows: Iterable[tuple[Any
 def open_for_writing(path: Path, objectives: Iterable[str]) -> Iterator[Store]:
     """The store at `path`, made if need be with columns for these, for this process alone until the end of the block.
 
-    One that is there has the objectives that it was made with.
+    One that is there has the objectives that it was made with, once it is about a study.
     """
     import filelock
 
@@ -235,12 +257,7 @@ def open_for_writing(path: Path, objectives: Iterable[str]) -> Iterator[Store]:
             with _explained(path):
                 connection.execute("PRAGMA journal_mode=WAL")
                 connection.execute("PRAGMA synchronous=NORMAL")
-                if not _schema(connection):
-                    with connection:
-                        named = list(objectives)
-                        for statement in _tables(metrics_with(named)).values():
-                            connection.execute(statement)
-                        _insert(connection, "about", [(OBJECTIVES, json.dumps(named))])
+                _make_if_need_be(connection, list(objectives))
                 opened = Store(path, connection, _expect_sound(path, connection))
             opened.expect_whole()
             yield opened
@@ -292,6 +309,8 @@ def _read_only(path: Path) -> sqlite3.Connection:
 def _expect_sound(path: Path, connection: sqlite3.Connection) -> list[str]:
     """The objectives of a store; raises `QuadcosimError` unless the file is sound and says so of itself."""
     schema, objectives = _schema(connection), _objectives(connection)
+    if not schema:
+        raise QuadcosimError(f"{path}: expected the store of a study; nothing has been written into it yet")
     if objectives is None or schema != _tables(metrics_with(objectives)):
         raise QuadcosimError(
             f"{path}: no store of this version of quadcosim; expected one: take another --out, or remove it"

@@ -7,6 +7,7 @@ import json
 import math
 import random
 import shutil
+import signal
 import sqlite3
 import subprocess
 import sys
@@ -310,6 +311,61 @@ def test_a_full_disk_at_the_start_is_one_line(path: Path) -> None:
         written(path, row(0))
     one_line(caught.value)
     assert indices(written(path, row(0))) == [0]
+
+
+@pytest.mark.parametrize("pages", range(1, 10))
+def test_a_disk_that_is_full_while_a_store_is_made_leaves_one_that_can_be_used(path: Path, pages: int) -> None:
+    with (
+        connections(f"PRAGMA max_page_count = {pages}"),
+        contextlib.suppress(QuadcosimError),
+        open_for_writing(path, OBJECTIVES),
+    ):
+        pass
+    assert indices(written(path, row(0))) == [0]
+
+
+KILLED = """
+import os, signal, sqlite3, sys
+from pathlib import Path
+from orchestration.studies.store import open_for_writing
+
+genuine = sqlite3.connect
+
+def connect(*arguments, **options):
+    connection = genuine(*arguments, **options)
+    made = []
+
+    def hear(statement):
+        made.extend([statement] * statement.startswith("CREATE TABLE"))
+        if len(made) == int(sys.argv[2]):
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    connection.set_trace_callback(hear)
+    return connection
+
+sqlite3.connect = connect
+with open_for_writing(Path(sys.argv[1]), sys.argv[3:]):
+    pass
+"""
+
+
+@pytest.mark.parametrize("table", [1, 2, 3])
+def test_a_store_whose_making_is_killed_between_two_tables_is_made_by_the_next_sweep(path: Path, table: int) -> None:
+    ended = subprocess.run([sys.executable, "-c", KILLED, str(path), str(table), *OBJECTIVES], check=False)
+    assert ended.returncode == -signal.SIGKILL
+    with pytest.raises(QuadcosimError, match="nothing has been written into it yet"), open_for_reading(path):
+        pass
+    assert indices(written(path, row(0))) == [0]
+
+
+def test_a_store_that_is_about_no_study_yet_takes_the_objectives_of_the_next_one(path: Path) -> None:
+    with open_for_writing(path, ["of_the_first"]):
+        pass
+    with open_for_writing(path, ["of_the_next"]) as store:
+        assert store.metrics == stores.metrics_with(["of_the_next"])
+        store.add([row(0)])
+    with open_for_writing(path, ["of_the_last"]) as store:
+        assert store.metrics == stores.metrics_with(["of_the_next"])
 
 
 def test_a_locked_store_is_one_line_and_is_whole_afterwards(path: Path) -> None:
