@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence, S
 from pathlib import Path
 from typing import Any, TypeVar
 
-from orchestration.basics.errors import UsageError, expected_name, shown
+from orchestration.basics.errors import UsageError, no_such_key, shown
 
 Class = TypeVar("Class", bound=type)
 Check = Callable[[str, Any], Any]
@@ -41,7 +41,7 @@ def strict(place: str = "") -> Callable[[Class], Class]:
                 raise _unlike(cls.__name__, unnamed[0], f"values by name, as in {names[0]}=…")
             for name in given:
                 if name not in names:
-                    raise UsageError(f"{place}{name}: no such key; {expected_name(name, names)}")
+                    raise UsageError(no_such_key(place, name, names))
             for name in needed:
                 if name not in given:
                     raise UsageError(f"{place}{name}: expected a value")

@@ -43,9 +43,24 @@ def one_line(text: str) -> str:
 
 def expected_name(name: str, known: Sequence[str]) -> str:
     """The end of a message about a name that is none: the closest of those that are, and all of them."""
-    close = difflib.get_close_matches(name, known, n=1)
-    hint = f"did you mean {close[0]}? " if close else ""
+    close = _closest(name, known)
+    hint = "" if close is None else f"did you mean {close}? "
     return f"{hint}expected one of {', '.join(known)}"
+
+
+def no_such_key(table: str, key: str, known: Sequence[str], beside: str = "") -> str:
+    """What is said of a key that nobody reads; `table` is what it stands in, with its dot, `beside` ends the list."""
+    return f"{table}{key}: no such key; expected one of {', '.join(known)}{beside}{did_you_mean(key, known)}"
+
+
+def did_you_mean(name: str, known: Sequence[str]) -> str:
+    """The end of a message that lists what there is: which of it is closest to a name that is none, if any is close."""
+    close = _closest(name, known)
+    return "" if close is None else f"; did you mean {close}?"
+
+
+def _closest(name: str, known: Sequence[str]) -> str | None:
+    return next(iter(difflib.get_close_matches(name, known, n=1)), None)
 
 
 def shown(value: object) -> str:

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import pydantic
 
-from orchestration.basics.errors import UsageError, shown
+from orchestration.basics.errors import UsageError, no_such_key, shown
 
 Shape = TypeVar("Shape")
 
@@ -21,9 +21,23 @@ def parsed(tables: Mapping[str, Any], shape: type[Shape]) -> Shape:
         raise UsageError(_first_problem(error, shape)) from error
 
 
+_MISSING = ("missing", "missing_argument", "missing_keyword_only_argument")
+_UNREAD = ("unexpected_keyword_argument", "extra_forbidden")
+
+
+def telling(error: pydantic.ValidationError) -> Any:
+    """The first thing wrong with a document; where a key is missing, one beside it that nobody reads: it was meant."""
+    problems = error.errors()
+    first = problems[0]
+    if first["type"] not in _MISSING:
+        return first
+    beside = [each for each in problems if each["type"] in _UNREAD and each["loc"][:-1] == first["loc"][:-1]]
+    return next(iter(beside), first)
+
+
 def _first_problem(error: pydantic.ValidationError, file: type) -> str:
     """The first thing wrong with a document of the shape `file`, in one line that says what is valid."""
-    problem = error.errors()[0]
+    problem = telling(error)
     place = ".".join(str(part) for part in problem["loc"])
     if problem["type"] == "unexpected_keyword_argument":
         table: Any = file
@@ -32,9 +46,9 @@ def _first_problem(error: pydantic.ValidationError, file: type) -> str:
                 hint = next(f.type for f in dataclasses.fields(table) if f.name == part)
                 table = typing.get_args(hint)[0] if typing.get_origin(hint) is list else hint
         names = [*(f.name for f in dataclasses.fields(table)), *getattr(table, "SHORTHANDS", ())]
-        keys = ", ".join(names)
-        return f"{place}: no such key; expected one of {keys}"
-    if problem["type"] in ("missing", "missing_argument", "missing_keyword_only_argument"):
+        key = str(problem["loc"][-1])
+        return no_such_key(place.removesuffix(key), key, names)
+    if problem["type"] in _MISSING:
         return f"{place}: expected a value"
     value = problem["input"]
     message = problem["msg"].replace("Input should be", "expected")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from orchestration.basics.documents import read_toml
-from orchestration.basics.errors import UsageError
+from orchestration.basics.errors import UsageError, no_such_key
 from orchestration.comparison.design import FMU, Comparison, Condition, Controller, Craft, Front
 from orchestration.studies.axes import Value
 from orchestration.studies.linked_settings import Key
@@ -191,8 +191,10 @@ def _is_number(value: Value) -> bool:
 def _read(path: Path) -> dict[str, Value]:
     """The parameters of a controller in a file."""
     tables = read_toml(path, "file of parameters")
-    if tables.keys() != {"controller"} or not isinstance(tables["controller"], Mapping):
-        raise UsageError(f"{path}: {', '.join(tables) or 'nothing'}: expected parameters in [controller] only")
+    for key in tables.keys() - {"controller"}:
+        raise UsageError(no_such_key(f"{path}: ", key, ["controller"]))
+    if not isinstance(tables.get("controller"), Mapping):
+        raise UsageError(f"{path}: controller: expected a table of parameters")
     return _of_controller(parameters_in(tables["controller"], f"{path}: controller"))
 
 

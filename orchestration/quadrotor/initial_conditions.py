@@ -10,7 +10,7 @@ import numpy as np
 
 from fmu_kit.trajectory import Trajectory
 from orchestration.basics.constructors import strict
-from orchestration.basics.errors import UsageError
+from orchestration.basics.errors import UsageError, no_such_key
 from orchestration.basics.simulator import Floats
 from orchestration.fmi.kit import TRAJECTORY
 from orchestration.schedule.streams import Streams
@@ -82,7 +82,7 @@ def starts_in(table: Mapping[str, Any], beside: Sequence[str] = ()) -> Starts:
     names = [field.name for field in dataclasses.fields(Starts)]
     for key in table:
         if key not in names:
-            raise UsageError(f"starts.{key}: no such key; expected one of {', '.join([*names, *beside])}")
+            raise UsageError(no_such_key("starts.", key, [*names, *beside]))
     return Starts(**table)
 
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from orchestration.basics.bisection import Range
 from orchestration.basics.constructors import strict
-from orchestration.basics.errors import UsageError, shown
+from orchestration.basics.errors import UsageError, no_such_key, shown
 from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.quadrotor.initial_conditions import Starts, starts_in
 from orchestration.quadrotor.nominal_model import mismatch
@@ -304,7 +304,7 @@ def _expect_keys(prefix: str, given: Mapping[str, Any], table: type) -> None:
     known = [f.name for f in dataclasses.fields(table)]
     for key in given:
         if key not in known:
-            raise UsageError(f"{prefix}{key}: no such key; expected one of {', '.join(known)}")
+            raise UsageError(no_such_key(prefix, key, known))
 
 
 def _table(choice: FmuChoice) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
 from orchestration.basics.documents import read_toml
-from orchestration.basics.errors import UsageError, shown
+from orchestration.basics.errors import UsageError, no_such_key, shown
 from orchestration.basics.typed_tables import parsed
 from orchestration.quadrotor.presets import preset_timing
 from orchestration.quadrotor.scenario import FmuChoice, Record, Scenario
@@ -108,8 +108,8 @@ def _signal(place: str, table: dict[str, Any], kind: type[Signal], folder: Path)
     given: dict[str, Any] = {key: value for key, value in table.items() if key in own}
     parameters = {key: value for key, value in table.items() if key not in own}
     if parameters and not {"name", "file"} & {*given}:
-        keys = f"one of {', '.join(own)}; parameters beside name or file only"
-        raise UsageError(f"{place}.{next(iter(parameters))}: no such key; expected {keys}")
+        beside = "; parameters beside name or file only"
+        raise UsageError(no_such_key(f"{place}.", next(iter(parameters)), own, beside))
     for key, value in given.items():
         if key == "drag":
             continue

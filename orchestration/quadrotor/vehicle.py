@@ -7,19 +7,28 @@ from typing import Any
 
 from orchestration.basics.constructors import strict
 from orchestration.basics.documents import read_toml
-from orchestration.basics.errors import UsageError, expected_name
+from orchestration.basics.errors import UsageError, did_you_mean, expected_name
+from orchestration.building.models import MODELS
+from orchestration.quadrotor.wiring import DEFAULT_PLANT
 from orchestration.system.model import Parameter
 from orchestration.system.parameters import parameters_in
 
 SHIPPED = Path(__file__).with_name("vehicles")
 """Where the vehicles are that go by a name"""
 ENDING = ".toml"
+CONTROLLERS = tuple(name for name in MODELS if name != DEFAULT_PLANT)
+"""The FMUs of this project that fly a vehicle"""
+TABLES = ("plant", "controller", "controllers")
+"""of a vehicle file"""
 
 
 @strict()
 @dataclass(frozen=True, kw_only=True)
 class Vehicle:
-    """Parameters of the plant, of every controller, and of single controllers by the names of their FMUs."""
+    """Parameters of the plant, of every controller, and of single controllers by the names of their FMUs.
+
+    Raises `UsageError` for a controller that is none.
+    """
 
     name: str
     """What the vehicle is called."""
@@ -28,7 +37,13 @@ class Vehicle:
     controller: Mapping[str, Parameter] = field(default_factory=dict)
     """What every controller is told of it, likewise."""
     controllers: Mapping[str, Mapping[str, Parameter]] = field(default_factory=dict)
-    """What single controllers are told beside, by the names of their FMUs."""
+    """What single controllers are told beside, by the name of an FMU of this project or the path of an .fmu file."""
+
+    def __post_init__(self) -> None:
+        for fmu in self.controllers:
+            if fmu not in CONTROLLERS and not fmu.endswith(".fmu"):
+                expected = f"{expected_name(fmu, CONTROLLERS)}, or the path of an .fmu file"
+                raise UsageError(f"controllers.{fmu}: no controller of this project; {expected}")
 
     def with_parameters(self, *, plant: Mapping[str, Parameter], controller: Mapping[str, Parameter]) -> "Vehicle":
         """The same with other values of the plant, and of what every controller is told."""
@@ -45,8 +60,12 @@ class Vehicle:
         return {f"{side}.{name}": value for side, table in sides.items() for name, value in table.items()}
 
     def for_controller(self, fmu: str) -> dict[str, Parameter]:
-        """The parameters of a controller whose FMU has this name or path."""
-        return {**self.controller, **self.controllers.get(PurePath(fmu).stem, {})}
+        """The parameters of a controller whose FMU has this name or path, however it is packed."""
+        found = dict(self.controller)
+        for name, parameters in self.controllers.items():
+            if PurePath(name).stem == PurePath(fmu).stem:
+                found |= parameters
+        return found
 
 
 def names() -> list[str]:
@@ -57,22 +76,27 @@ def names() -> list[str]:
 def load_vehicle(given: str, folder: Path) -> Vehicle:
     """The vehicle of a name, or of a path that ends in .toml and starts at `folder`.
 
-    Raises `UsageError` for a name that none has, a file that cannot be read, or what does not belong in it.
+    Every controller that it names is held to what its FMU has, which is built if need be. Raises `UsageError` for a
+    name that none has, a file that cannot be read, or what does not belong in it.
     """
     path = folder / given if given.endswith(ENDING) else SHIPPED / f"{given}{ENDING}"
     if not given.endswith(ENDING) and given not in names():
         raise UsageError(f"vehicle {given}: {expected_name(given, names())}, or a path that ends in {ENDING}")
     tables = read_toml(path, "vehicle file")
     try:
-        return _vehicle(path.stem, tables)
+        found = _vehicle(path.stem, tables)
+        for fmu, parameters in found.controllers.items():
+            _expect_parameters(fmu, parameters, path.parent)
+        return found
     except UsageError as error:
         raise UsageError(f"{path}: {error}") from error
 
 
 def _vehicle(name: str, tables: dict[str, Any]) -> Vehicle:
     for key, table in tables.items():
-        if key not in ("plant", "controller", "controllers") or not isinstance(table, Mapping):
-            raise UsageError(f"{key}: expected the tables [plant], [controller] and [controllers.NAME] only")
+        if key not in TABLES or not isinstance(table, Mapping):
+            listed = "the tables [plant], [controller] and [controllers.NAME] only"
+            raise UsageError(f"{key}: expected {listed}{'' if key in TABLES else did_you_mean(key, TABLES)}")
     for fmu, table in tables.get("controllers", {}).items():
         if not isinstance(table, Mapping):
             raise UsageError(f"controllers.{fmu}: expected a table [controllers.NAME], NAME that of an FMU")
@@ -84,3 +108,14 @@ def _vehicle(name: str, tables: dict[str, Any]) -> Vehicle:
             fmu: parameters_in(table, f"controllers.{fmu}") for fmu, table in tables.get("controllers", {}).items()
         },
     )
+
+
+def _expect_parameters(fmu: str, parameters: Mapping[str, Parameter], folder: Path) -> None:
+    """Raise `UsageError` for what a controller cannot be told, which another flight than this one would find."""
+    from orchestration.building.fmus import locate  # not before: a vehicle is also made where no FMU is looked at
+    from orchestration.fmi.model import read_model
+    from orchestration.system.check import expect_parameter
+
+    model = read_model(locate(str(folder / fmu) if fmu.endswith(".fmu") else fmu))
+    for name, value in parameters.items():
+        expect_parameter(f"controllers.{fmu}.{name}", model, name, value)

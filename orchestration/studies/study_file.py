@@ -142,7 +142,19 @@ def _study(file: StudyFile, path: Path) -> Study:
     )
     if not study.points:
         raise UsageError("axes: expected at least one point")
+    _expect_consumed(file, study)
     return study
+
+
+def _expect_consumed(file: StudyFile, study: Study) -> None:
+    """Raise `UsageError` for what is said of samples where none are drawn, and of runs that there are not."""
+    if all(axis.values is not None for axis in study.axes):
+        for key in ("method", "samples", "seed"):
+            if getattr(file.design, key) != getattr(DesignTable, key):
+                raise UsageError(f"design.{key}: expected none; every axis has its values, so nothing is sampled")
+    for index in () if isinstance(study.keep_signals, bool) else study.keep_signals:
+        if not 0 <= index < len(study.points):
+            raise UsageError(f"keep_signals: {index}: expected the indices of runs, from 0 to {len(study.points) - 1}")
 
 
 def axis_of(table: AxisTable, folder: Path) -> Axis:
@@ -151,7 +163,8 @@ def axis_of(table: AxisTable, folder: Path) -> Axis:
         raise UsageError(f"axis {table.name}: expected sets or multiplies, not both")
     targets = tuple(table.multiplies or table.sets or [table.name])
     ranged = table.start is not None and table.stop is not None
-    if (table.values is None) != ranged or (table.values is not None and table.number is not None):
+    range_keys = (table.start, table.stop, table.number) != (None, None, None) or table.scale != "linear"
+    if (table.values is None) != ranged or (table.values is not None and range_keys):
         raise UsageError(f"axis {table.name}: expected values, or start and stop, with number or to be sampled")
     values: tuple[Value, ...] | None = None if table.values is None else _values(table.values, targets, folder)
     low, high = table.start or 0.0, 1.0 if table.stop is None else table.stop

@@ -50,7 +50,7 @@ def check_parameter(system: System, models: Mapping[str, Model], name: str, para
     """Raise `UsageError` for a parameter that a component's FMU does not have, or a value that it cannot take."""
     value, fed = system.components[name].parameters[parameter], f"{name}.{parameter}"
     is_fed = any(fed in x.end for x in system.connections)
-    _check_parameter(f"components.{name}.parameters.{parameter}", models[name], parameter, value, is_fed)
+    expect_parameter(f"components.{name}.parameters.{parameter}", models[name], parameter, value, is_fed=is_fed)
 
 
 def _check_divergence(condition: str, models: Mapping[str, Model]) -> None:
@@ -163,7 +163,8 @@ def _article(variable: Variable) -> str:
     return f"a{'n' if variable.causality[0] in 'aeiou' else ''} {variable.causality}"
 
 
-def _check_parameter(place: str, model: Model, name: str, value: Parameter, is_fed: bool) -> None:
+def expect_parameter(place: str, model: Model, name: str, value: Parameter, *, is_fed: bool = False) -> None:
+    """Raise `UsageError`, naming the `place`, for what a model has no parameter for, or a value that it cannot take."""
     variable = model.variable(name, place)
     if not variable.is_settable or is_fed:
         expected = "a parameter or an input that nothing is connected to"

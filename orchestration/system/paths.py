@@ -1,12 +1,11 @@
 """What can be changed of a system, by path: axes of studies, `limit --of`, flags and operating points."""
 
 import dataclasses
-import difflib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from orchestration.basics.errors import UsageError
+from orchestration.basics.errors import UsageError, did_you_mean
 from orchestration.system.model import Component, Connection, Sampling, Source, System
 
 TOP = ("stop_time", "seed")
@@ -88,7 +87,8 @@ def _split(system: System, path: str, table: str, rest: str) -> tuple[str, str]:
         "sources": system.sources,
     }
     if table not in tables:
-        raise UsageError(f"{path}: no such path; expected {', '.join(TOP)} or one that begins with {', '.join(tables)}")
+        listed = f"{', '.join(TOP)} or one that begins with {', '.join(tables)}"
+        raise UsageError(f"{path}: no such path; expected {listed}{did_you_mean(table, [*TOP, *tables])}")
     known = list(tables[table])
     names = [name for name in known if rest.startswith(f"{name}.")]
     if not names:
@@ -115,9 +115,8 @@ def _expect_key(path: str, table: str, system: System, name: str, key: str) -> N
         keys = [f.name for f in dataclasses.fields(Source)] + ["parameters.NAME"]
         known = key in keys[:-1] or (key.startswith("parameters.") and key != "parameters.")
     if not known:
-        near = difflib.get_close_matches(key, keys, n=1)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        raise UsageError(f"{path}: no such key; expected {table}.{name}. and one of {', '.join(keys)}{hint}")
+        listed = f"{table}.{name}. and one of {', '.join(keys)}"
+        raise UsageError(f"{path}: no such key; expected {listed}{did_you_mean(key, keys)}")
 
 
 def _component(place: str, component: Component, keys: Mapping[str, Any]) -> Component:

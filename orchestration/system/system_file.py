@@ -8,7 +8,8 @@ from typing import Annotated, Any, TypeVar
 import pydantic
 
 from orchestration.basics.documents import read_toml
-from orchestration.basics.errors import UsageError
+from orchestration.basics.errors import UsageError, no_such_key
+from orchestration.basics.typed_tables import telling
 from orchestration.system.model import (
     Align,
     Clock,
@@ -282,10 +283,11 @@ def _first_problem(error: Exception, tables: Mapping[str, Any]) -> str:
     """The first thing wrong with a document, in one line that names the place and what is valid there."""
     if not isinstance(error, pydantic.ValidationError):
         return "nested too deeply; expected the tables of a system file"
-    problem = error.errors()[0]
+    problem = telling(error)
     place = ".".join(str(part) for part in problem["loc"] if not str(part).startswith(("float", "dict[")))
     if problem["type"] == "extra_forbidden":
-        return f"{place}: no such key; expected one of {', '.join(_keys_at(problem['loc'][:-1]))}"
+        key = str(problem["loc"][-1])
+        return no_such_key(place.removesuffix(key), key, _keys_at(problem["loc"][:-1]))
     if problem["type"] == "missing":
         return f"{place}: expected to be given"
     message = problem["msg"]

@@ -1,6 +1,7 @@
 """Vehicles: what their files may say, whose word counts, and that one law flies them all alike."""
 
 import dataclasses
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 import quadcosim
+from orchestration.building.fmus import locate
 from orchestration.command.cli import main
 from orchestration.command.flags import FlightFlags, request_from
 from orchestration.quadrotor.vehicle import Vehicle, load_vehicle, names
@@ -47,6 +49,16 @@ def test_a_vehicle_gives_plant_and_controller_its_parameters(heavy: str) -> None
 @pytest.mark.parametrize("fmu", ["native/UnifiedController", "there/UnifiedController.fmu"])
 def test_what_is_for_one_controller_is_for_it_however_it_is_packed(heavy: str, fmu: str) -> None:
     assert "gain.theta" in load_vehicle(heavy, Path()).for_controller(fmu)
+
+
+def test_what_is_for_an_fmu_of_one_s_own_is_named_by_its_path_from_the_vehicle_file(heavy: str, tmp_path: Path) -> None:
+    (tmp_path / "own").mkdir()
+    shutil.copy(locate("GeometricController"), tmp_path / "own" / "Mine.fmu")
+    with Path(heavy).open("a", encoding="utf-8") as file:
+        file.write('[controllers."own/Mine.fmu"]\ngain_scaling = "inertia"\n')
+    vehicle = load_vehicle("heavy.toml", tmp_path)
+    assert vehicle.for_controller(str(tmp_path / "own" / "Mine.fmu"))["gain_scaling"] == "inertia"
+    assert "gain_scaling" not in vehicle.for_controller("GeometricController")
 
 
 def test_what_is_for_one_controller_is_for_no_other(heavy: str) -> None:
@@ -114,7 +126,31 @@ def test_ideal_flights_of_all_vehicles_are_the_same_path() -> None:
     ("text", "words"),
     [
         ("[motor]\nx = 1.0", "motor: expected the tables [plant], [controller] and [controllers.NAME] only"),
-        ("mass = 1.0", "mass: expected the tables"),
+        (
+            "[controler]\nmass = 1.0",
+            "controler: expected the tables [plant], [controller] and [controllers.NAME] only; did you mean "
+            "controller?",
+        ),
+        ("plant = 1.0", "plant: expected the tables"),
+        (
+            "[controllers.UnifiedControler]\ngain_scaling = 'inertia'",
+            "controllers.UnifiedControler: no controller of this project; did you mean UnifiedController? expected one "
+            "of UnifiedController, GeometricController, CascadedController, or the path of an .fmu file",
+        ),
+        ("[controllers.QuadrotorPlant]\nmass = 2.0", "controllers.QuadrotorPlant: no controller of this project"),
+        (
+            "[controllers.GeometricController]\ngain_scalin = 'inertia'",
+            "controllers.GeometricController.gain_scalin: GeometricController has no such variable; did you mean "
+            "gain_scaling?",
+        ),
+        (
+            "[controllers.GeometricController]\ngain_scaling = 'weight'",
+            "controllers.GeometricController.gain_scaling = weight: expected ",
+        ),
+        (
+            "[controllers.'own/Missing.fmu']\nmass = 2.0",
+            "fmu = ",
+        ),
         ("[controllers]\ngain = 1.0", "controllers.gain: expected a table [controllers.NAME], NAME that of an FMU"),
         ("[plant]\nmass = [1.0]", "plant.mass = [1.0]: expected a number, true, false or a text"),
         ("[plant", "expected TOML"),

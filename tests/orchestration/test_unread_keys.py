@@ -1,0 +1,178 @@
+"""What nobody reads is refused in every file that people write, with the name that was probably meant."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from orchestration.comparison.file import load_comparison
+from orchestration.requests.request import load_request
+from orchestration.studies.study_file import load_study
+from orchestration.tuning.tuning_file import load_tuning
+from quadcosim import UsageError
+
+SCENARIO = """
+stop_time = 1.0
+[controller]
+gain.eta = 15.0
+[timing]
+period = 0.01
+[reference]
+name = "circle"
+radius = 1.0
+[disturbance]
+name = "dryden"
+wind_speed = 8.0
+[record]
+plant = ["tilt"]
+"""
+SYSTEM = """
+stop_time = 1.0
+[components.plant]
+fmu = "QuadrotorPlant"
+step = 0.01
+[sources.wind]
+to = ["plant.external_force.x"]
+constant = 0.1
+[criterion]
+diverged = "plant.tilt > 3"
+[operating_point.components.plant.parameters]
+mass = 1.0
+"""
+STUDY = """
+[base]
+stop_time = 1.0
+[base.timing]
+period = 0.01
+[design]
+samples = 4
+[[axes]]
+name = "timing.delay"
+start = 0.0
+stop = 0.01
+"""
+COMPARISON = """
+[base]
+stop_time = 1.0
+[starts]
+count = 2
+[axis]
+name = "timing.period"
+values = [0.01, 0.02]
+[front]
+error = "position_rmse"
+[[vehicles]]
+name = "heavy"
+plant = { mass = 2.0 }
+[[controllers]]
+name = "unified"
+file = "gains.toml"
+[[conditions]]
+name = "nominal"
+sets = { "timing.delay" = 0.001 }
+"""
+GAINS = """
+[controller]
+"gain.eta" = 14.0
+"""
+TUNING = """
+[base]
+stop_time = 1.0
+[cost]
+of = "position_rmse"
+bad = 10.0
+[search]
+periods = [0.01]
+evaluations = 4
+seeds = [0]
+[starts]
+judged = 4
+[[parameters]]
+name = "controller.gain.eta"
+start = 1.0
+stop = 20.0
+[[parameters]]
+name = "controller.gain.theta"
+start = 1.0
+stop = 20.0
+"""
+FILES: dict[str, tuple[str, Callable[[Path], Any]]] = {
+    "scenario": (SCENARIO, load_request),
+    "system": (SYSTEM, load_request),
+    "study": (STUDY, load_study),
+    "comparison": (COMPARISON, load_comparison),
+    "tuning": (TUNING, load_tuning),
+    "gains": (GAINS, lambda path: load_comparison(path.with_name("comparison.toml"))),
+}
+
+
+def load(kind: str, folder: Path, given: str = "", written: str = "") -> None:
+    """Load a file of a kind in which what is `given` has become what is `written`."""
+    (folder / "comparison.toml").write_text(COMPARISON, encoding="utf-8")
+    (folder / "gains.toml").write_text(GAINS, encoding="utf-8")
+    text, read = FILES[kind]
+    assert given in text
+    path = folder / f"{kind}.toml"
+    path.write_text(text.replace(given, written, 1), encoding="utf-8")
+    read(path)
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_what_is_written_rightly_is_read(kind: str, tmp_path: Path) -> None:
+    load(kind, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "written", "meant"),
+    [
+        ("scenario", "stop_time", "stop_tim", "stop_time"),
+        ("scenario", "[timing]", "[timming]", "timing"),
+        ("scenario", "period", "perod", "period"),
+        ("scenario", "radius", "radios", "radius"),
+        ("scenario", "wind_speed", "windspeed", "wind_speed"),
+        ("scenario", "plant =", "plan =", "plant"),
+        ("system", "stop_time", "stop_tim", "stop_time"),
+        ("system", "step", "stepp", "step"),
+        ("system", "constant", "constnt", "constant"),
+        ("system", "diverged", "divergd", "diverged"),
+        ("system", "parameters", "paramters", "parameters.NAME"),
+        ("study", "[base]", "[bas]", "base"),
+        ("study", "period", "perod", "period"),
+        ("study", "samples", "sampels", "samples"),
+        ("study", "start", "stat", "start"),
+        ("comparison", "stop_time", "stop_tim", "stop_time"),
+        ("comparison", "count", "cont", "count"),
+        ("comparison", "values", "vales", "values"),
+        ("comparison", "error", "eror", "error"),
+        ("comparison", "plant", "plnt", "plant"),
+        ("comparison", "file", "fil", "file"),
+        ("comparison", "sets", "set", "sets"),
+        ("tuning", "bad", "badd", "bad"),
+        ("tuning", "evaluations", "evaluation", "evaluations"),
+        ("tuning", "judged", "juged", "judged"),
+        ("tuning", "stop =", "stopp =", "stop"),
+        ("gains", "controller", "controler", "controller"),
+    ],
+)
+def test_a_misspelt_key_is_refused_with_the_one_that_was_meant(
+    kind: str, given: str, written: str, meant: str, tmp_path: Path
+) -> None:
+    with pytest.raises(UsageError) as refused:
+        load(kind, tmp_path, given, written)
+    assert f"did you mean {meant}?" in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("given", "written", "said"),
+    [
+        ("start = 0.0\nstop = 0.01", "values = [0.0]", "design.samples: expected none; every axis has its values"),
+        ("start = 0.0\nstop = 0.01", "values = [0.0]\nstart = 0.0", "axis timing.delay: expected values, or start"),
+        ("start = 0.0\nstop = 0.01", "values = [0.0]\nscale = 'logarithmic'", "axis timing.delay: expected values"),
+        ("[base]", "keep_signals = [0, 4]\n[base]", "keep_signals: 4: expected the indices of runs, from 0 to 3"),
+    ],
+)
+def test_a_key_that_says_nothing_beside_another_is_refused(given: str, written: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=said):
+        load("study", tmp_path, given, written)
