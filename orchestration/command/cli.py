@@ -20,7 +20,7 @@ from orchestration.command import report as reports
 from orchestration.command import systems as system_commands
 from orchestration.command.answer import Answer, of_files
 from orchestration.command.flags import EngineFlag, FlightFlags, Timing, flies, request_from
-from orchestration.command.limit_flags import LimitFlags
+from orchestration.command.limit_flags import LimitFlags, ProcessFlags
 from orchestration.command.output_options import Manners
 from orchestration.command.registry import FLY, FMUS, TOOLS
 from orchestration.command.shared_flags import takes
@@ -149,6 +149,7 @@ def export_c(
     return of_files(each for path in written for each in (path.with_suffix(".h"), path))
 
 
+@takes("process", ProcessFlags)
 @flies
 def run(
     scenario: Annotated[
@@ -169,6 +170,7 @@ def run(
     engine: EngineFlag = None,
     *,
     flags: FlightFlags,
+    process: ProcessFlags,
 ) -> Answer:
     """Fly a scenario and print its metrics. FMUs that are missing or out of date are built first."""
     from orchestration.engines.engine import engine_named
@@ -179,7 +181,7 @@ def run(
     if pause_at is not None and out is None:
         raise UsageError("--pause-at: expected --out DIR for the state")
     with progress_bar("flying") as progress:
-        how: Any = {"progress": progress, "announce": say, "engine": engine_named(engine)}
+        how: Any = {"progress": progress, "announce": say, "engine": engine_named(engine), **vars(process)}
         if resume is not None:
             from orchestration.runs import pause
 

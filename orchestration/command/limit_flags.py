@@ -1,4 +1,4 @@
-"""Flags of the commands that look at foreign files: what the process that does so may take."""
+"""Flags of what a process may take: one that looks at foreign files, and one that flies."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -28,11 +28,48 @@ class LimitFlags:
 
     def __post_init__(self) -> None:
         for name in ("time", "memory", "size", "output"):
-            value, unit = getattr(self, f"{name}_limit"), "seconds" if name == "time" else "MB"
-            if not value > 0.0:
-                raise UsageError(f"--{name}-limit {value:g}: expected a positive number of {unit}")
+            expect_positive(f"--{name}-limit", getattr(self, f"{name}_limit"), "seconds" if name == "time" else "MB")
 
     @property
     def limits(self) -> Limits:
         """The same for the process."""
         return Limits(time=self.time_limit, memory=self.memory_limit, size=self.size_limit, output=self.output_limit)
+
+
+TimeLimit = Annotated[
+    float | None,
+    typer.Option(
+        "--time-limit",
+        help="Of the processor, that a run may take, waiting for nothing too; none unless told.",
+        metavar="SECONDS",
+        show_default=False,
+    ),
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProcessFlags:
+    """What was given on the command line of a run; raises `UsageError` for what is not positive."""
+
+    in_process: Annotated[
+        bool,
+        typer.Option(
+            "--in-process",
+            help="Without a process of its own for FMUs that quadcosim has not built: if one ends it, all ends.",
+            show_default=False,
+        ),
+    ] = False
+    time_limit: TimeLimit = None
+    memory_limit: Annotated[
+        float, typer.Option("--memory-limit", help="Of the process of a run, and what it starts (Linux).", metavar="MB")
+    ] = Limits.memory
+
+    def __post_init__(self) -> None:
+        expect_positive("--time-limit", self.time_limit, "seconds")
+        expect_positive("--memory-limit", self.memory_limit, "MB")
+
+
+def expect_positive(flag: str, value: float | None, unit: str) -> None:
+    """Raise `UsageError` for a limit that is none."""
+    if value is not None and not value > 0.0:
+        raise UsageError(f"{flag} {value:g}: expected a positive number of {unit}")

@@ -19,10 +19,12 @@ from orchestration.engines.condition import Step
 from orchestration.engines.loop import library
 from orchestration.engines.master import Diverged, Master
 from orchestration.engines.memory import Memory
+from orchestration.engines.room import EVENTS, ROWS, Room, loop_in, private
 from orchestration.engines.sources import Values
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.fmi3 import Fmi3Instance
 from orchestration.fmi.native import NativeInstance
+from orchestration.fmi.surroundings import ROUNDING
 from orchestration.schedule.schedule import Schedule
 from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS
@@ -65,8 +67,10 @@ class CompiledMaster(Master):
         simulators: Mapping[str, NativeInstance],
         *,
         condition: Condition,
+        room: Room = private,
         **others: Any,
     ) -> None:
+        self._room = room
         super().__init__(system, simulators, **others)
         self._pace = 4  # instants of a slice
         self._shared: list[_OnTheirWay] = []
@@ -74,7 +78,7 @@ class CompiledMaster(Master):
         self._failure: BaseException | None = None
         self._memory = memory = Memory(list(simulators.values()))
         self._row_table: Floats = self._new_row_table()
-        self._event_table: Integers = np.empty((0, 4), dtype=np.int64)
+        self._event_table: Integers = self._new_event_table(0)
         program, watched = condition(self.board)
         self._watched = list(watched)
         self._feed_table = (c.Feed * len(self._feeds))(
@@ -82,23 +86,27 @@ class CompiledMaster(Master):
         )
         self._channel_table = (c.Channel * len(self._channels))(*map(self._channel_of, range(len(self._channels))))
         self._components = (c.Component * len(self._names))(*map(self._component_of, range(len(self._names))))
-        self._loop = c.Loop(
-            components=self._components,
-            channels=self._channel_table,
-            feeds=self._feed_table,
-            tasks=memory.indices(list(self._tasks)),
-            some_by_themselves=self._some_by_themselves,
-            settles=self._settling,
-            stop=self._stop,
-            row=c.address(self.board.row),
-            rows=c.address(self._row_table),
-            width=len(self.board.columns),
-            stride=len(self.columns),
-            row_limit=len(self._row_table),
-            event_limit=self._most_events,
-            look=c.Look(self._look_for_c),
-            collect=c.Collect(lambda index: memory.instances[index].collect_warnings()),
-        )
+        begun: dict[str, Any] = {
+            "components": self._components,
+            "channels": self._channel_table,
+            "feeds": self._feed_table,
+            "tasks": memory.indices(list(self._tasks)),
+            "some_by_themselves": self._some_by_themselves,
+            "settles": self._settling,
+            "stop": self._stop,
+            "row": c.address(self.board.row),
+            "rows": c.address(self._row_table),
+            "width": len(self.board.columns),
+            "stride": len(self.columns),
+            "row_limit": len(self._row_table),
+            "event_limit": self._most_events,
+            "look": c.Look(self._look_for_c),
+            "collect": c.Collect(lambda index: memory.instances[index].collect_warnings()),
+            "calling": -1,
+        }
+        self._loop = loop_in(room)
+        for name, value in begun.items():
+            setattr(self._loop, name, value)
         if program is not None:
             self._loop.condition = (c.Operation * len(program))(*(c.Operation(*step) for step in program))
             self._loop.condition_length = len(program)
@@ -147,7 +155,15 @@ class CompiledMaster(Master):
         share = SLICE / max(clock.perf_counter() - begin, 1e-9)
         self._pace = min(max(1, int(self._pace * min(share, 8.0))), len(schedule))
         self.now, self.steps, self._position.at = loop.now, loop.steps, loop.at
+        self._hear_of_moves()
         return code
+
+    def _hear_of_moves(self) -> None:
+        """Instances whose FMUs have changed how numbers are rounded, which C has put back."""
+        for instance, component in zip(self._memory.instances, self._components):
+            if component.moved:
+                component.moved = 0
+                instance.has_changed(ROUNDING)
 
     def _fail(self, code: int) -> None:
         """Raise what C has come back with."""
@@ -193,7 +209,11 @@ class CompiledMaster(Master):
 
     def _new_row_table(self) -> Floats:
         """Room for a chunk, in which the columns of sources are filled in when it is handed over as it is."""
-        return np.empty((self._chunk // self.board.row.nbytes, len(self.columns)))
+        shape = (self._chunk // self.board.row.nbytes, len(self.columns))
+        return self._room(ROWS, 8 * shape[0] * shape[1]).view(np.float64).reshape(shape)
+
+    def _new_event_table(self, count: int) -> Integers:
+        return self._room(EVENTS, 32 * count).view(np.int64).reshape(count, 4)
 
     def _pending_events(self) -> Integers:
         return self._event_table[: self._loop.event_count]
@@ -206,7 +226,7 @@ class CompiledMaster(Master):
 
     def _keep_events(self, events: Integers) -> None:
         if len(events) > len(self._event_table):
-            self._event_table = events.copy()
+            self._event_table = self._new_event_table(len(events))
         self._event_table[: len(events)] = events
         self._loop.event_count = len(events)
 
@@ -245,7 +265,7 @@ class CompiledMaster(Master):
         most = schedule.most_events()
         loop, count = self._loop, self._loop.event_count
         if len(self._event_table) < max(self._most_events, count) + most:
-            table: Integers = np.empty((max(self._most_events, count) + 2 * most, 4), dtype=np.int64)
+            table = self._new_event_table(max(self._most_events, count) + 2 * most)
             table[:count] = self._event_table[:count]
             self._event_table = table
         self._arrived_table: Integers = np.empty((most, 4), dtype=np.int64)

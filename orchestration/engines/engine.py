@@ -8,6 +8,7 @@ from orchestration.basics.errors import QuadcosimError, UsageError, expected_nam
 from orchestration.basics.simulator import Simulator
 from orchestration.engines.compiled import CompiledMaster, Condition, obstacle
 from orchestration.engines.master import Master
+from orchestration.engines.room import Room, private
 from orchestration.fmi.native import NativeInstance
 from orchestration.system.model import System
 from orchestration.system.times import nanoseconds
@@ -25,12 +26,18 @@ def engine_named(name: str | None, *others: str) -> Engine | None:
 
 
 def master(
-    engine: Engine | None, system: System, simulators: Mapping[str, Simulator], *, condition: Condition, **others: Any
+    engine: Engine | None,
+    system: System,
+    simulators: Mapping[str, Simulator],
+    *,
+    condition: Condition,
+    room: Room = private,
+    **others: Any,
 ) -> Master:
     """The master of a run, by an engine or, without one, by the compiled loop where it can be had.
 
-    `others` are arguments of `Master`. Raises `QuadcosimError` naming what stands in the way of the compiled loop
-    if that was asked for.
+    The compiled loop keeps what it has not handed over in `room`; `others` are arguments of `Master`. Raises
+    `QuadcosimError` naming what stands in the way of the compiled loop if that was asked for.
     """
     hindered = None if engine == "python" else obstacle(simulators, nanoseconds(system.stop_time))
     if hindered:
@@ -39,4 +46,6 @@ def master(
         return Master(system, simulators, **others)
     if hindered:
         raise QuadcosimError(f"--engine compiled cannot be had: {hindered}")
-    return CompiledMaster(system, cast(Mapping[str, NativeInstance], simulators), condition=condition, **others)
+    return CompiledMaster(
+        system, cast(Mapping[str, NativeInstance], simulators), condition=condition, room=room, **others
+    )

@@ -2,6 +2,7 @@
    arrays of a schedule and records rows and events. All memory is Python's, which also begins and ends a run, and says
    what has failed in its own words. Structures are those of compiled_structures.py, field by field. */
 
+#include <fenv.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -44,6 +45,7 @@ typedef struct {
 typedef struct {
     void *fmu, *step;
     int32_t version, by_itself;
+    int32_t foreign, moved; /* whether it may change how numbers are rounded, and whether it has */
     bool *event, *ends, *early; /* what an FMU of FMI 3 says of a step */
     double *reached;
     const int64_t *heard; /* how many messages of it wait */
@@ -115,12 +117,34 @@ typedef struct {
     int64_t condition_length;
     const double *watched; /* sources of the condition at each instant */
     int64_t watched_size;
+    int64_t calling; /* the component whose FMU is called; -1: none */
+    int64_t mode;    /* how numbers are rounded in this run */
+    const fenv_t *environment;
 } Loop;
 
 typedef int Access(void *, const uint32_t *, size_t, void *);
 typedef int CountedAccess(void *, const uint32_t *, size_t, void *, size_t);
 typedef int Step2(void *, double, double, int);
 typedef int Step3(void *, double, double, bool, bool *, bool *, bool *, double *);
+
+/* -- what FMUs have in common --------------------------------------------------------------------------------------- */
+
+/* How this thread computes, as far as it can be seen in its results: to which side numbers are rounded, and whether
+   the smallest ones are taken for zero. */
+static int mode(void) {
+    static const volatile double one = 1.0, little = 0x1p-60, smallest = 0x1p-1022, half = 0.5, tiny = 0x1p-1074;
+    return (one + little != one) | (one - little != one) << 1 | (-one - little != -one) << 2 |
+           (smallest * half == 0.0) << 3 | (tiny * one == 0.0) << 4;
+}
+
+/* After each call of a foreign FMU: the others compute as they did. */
+static void called(Loop *loop, int64_t index) {
+    Component *c = &loop->components[index];
+    loop->calling = -1;
+    if (!c->foreign || mode() == loop->mode) return;
+    fesetenv(loop->environment);
+    c->moved = 1;
+}
 
 /* -- values ------------------------------------------------------------------------------------------------------- */
 
@@ -163,9 +187,11 @@ static void into(const Part *part, int64_t i, double x) {
 static int whole(const Part *part) { return part->type >= INT8 && part->type <= UINT64; }
 
 static int call(Loop *loop, const Part *part) {
+    loop->calling = part->component;
     int status = part->counts_values
         ? ((CountedAccess *)part->function)(part->fmu, part->references, part->count, part->buffer, part->values)
         : ((Access *)part->function)(part->fmu, part->references, part->count, part->buffer);
+    called(loop, part->component);
     if (status <= WARNING) return 0;
     loop->failed = part, loop->component = part->component;
     return FAILED;
@@ -339,11 +365,13 @@ static void note_sending(Loop *loop, const Message *message) {
 static int step(Loop *loop, int64_t index, double t, double h) {
     Component *c = &loop->components[index];
     loop->component = index, loop->failed = NULL, loop->end = t + h;
-    if (c->version == 3) {
-        if (((Step3 *)c->step)(c->fmu, t, h, true, c->event, c->ends, c->early, c->reached) > WARNING) return FAILED;
-        if (*c->event || *c->ends || *c->early) return EARLY;
-    } else if (((Step2 *)c->step)(c->fmu, t, h, 1) > WARNING)
-        return FAILED;
+    loop->calling = index;
+    int status = c->version == 3
+        ? ((Step3 *)c->step)(c->fmu, t, h, true, c->event, c->ends, c->early, c->reached)
+        : ((Step2 *)c->step)(c->fmu, t, h, 1);
+    called(loop, index);
+    if (status > WARNING) return FAILED;
+    if (c->version == 3 && (*c->event || *c->ends || *c->early)) return EARLY;
     if (*c->heard) loop->collect(index);
     return 0;
 }
@@ -499,6 +527,9 @@ static void record(Loop *loop, int64_t time) {
 
 /* Pass through instants of the schedule up to `until`; the code says why it ended. */
 __attribute__((visibility("default"))) int fly(Loop *loop, int64_t until) {
+    fenv_t environment;
+    fegetenv(&environment);
+    loop->environment = &environment, loop->mode = mode(), loop->calling = -1;
     while (loop->at < until) {
         int64_t time = loop->now = loop->schedule.times[loop->at];
         loop->arrived_count = 0;

@@ -195,7 +195,7 @@ class Master:
         return Chunk(
             columns=self.columns,
             rows=self._rows_with_sources(),
-            events=Events(self._connections, _in_order(events)),
+            events=Events(self._connections, in_order(events)),
         )
 
     @property
@@ -510,7 +510,7 @@ class Master:
         }
 
 
-def _in_order(events: Integers) -> Integers:
+def in_order(events: Integers) -> Integers:
     """A table of events sorted by time, a new one."""
     if (events[1:, 0] >= events[:-1, 0]).all():
         return np.array(events)

@@ -51,6 +51,7 @@ class Memory:
             fmu=instance.handle,
             step=instance.address(f"fmi{version}DoStep"),
             version=version,
+            foreign=instance.guard is not None,
             heard=ctypes.addressof(instance.messages_waiting),
             read=self.transfer(index, read, values),
             outputs=self.address(values),

@@ -40,6 +40,7 @@ class Component(Structure):
 
     _fields_: ClassVar = [
         ("fmu", c_void_p), ("step", c_void_p), ("version", c_int32), ("by_itself", c_int32),
+        ("foreign", c_int32), ("moved", c_int32),
         *((name, c_void_p) for name in ("event", "ends", "early", "reached", "heard")),
         ("read", Transfer), ("outputs", c_void_p), ("connected", c_int64),
         *((name, List) for name in ("feeds", "held", "ahead", "behind")),
@@ -100,7 +101,7 @@ class Loop(Structure):
         ("steps", c_int64), ("now", c_int64), ("failed", POINTER(Part)), ("component", c_int64), ("end", c_double),
         ("look", Look), ("collect", Collect), ("condition", POINTER(Operation)), ("condition_length", c_int64),
         ("watched", c_void_p),
-        ("watched_size", c_int64),
+        ("watched_size", c_int64), ("calling", c_int64), ("mode", c_int64), ("environment", c_void_p),
     ]  # fmt: skip
 
 

@@ -9,9 +9,11 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from orchestration.basics.errors import QuadcosimError
+from orchestration.basics.errors import QuadcosimError, UsageError
 
 DESCRIPTION = "modelDescription.xml"
+LARGEST, DENSEST = 1000.0, 20.0
+"""An FMU that unpacks to more MB than this, and to more than so many times its size, is none that is flown"""
 
 
 class UnreadableFmuError(QuadcosimError):
@@ -73,6 +75,18 @@ def read_archive(path: Path, size_limit: float = math.inf) -> Archive:
     if DESCRIPTION not in files:
         raise UnreadableFmuError(f"expected an FMU, with {DESCRIPTION} at the top of the archive")
     return Archive(path, tuple(archive.infolist()), files)
+
+
+def expect_honest_size(path: Path) -> None:
+    """Raise `UsageError` for an archive that is made to fill a disk, by what it says of its files."""
+    with zipfile.ZipFile(path) as archive:
+        unpacked = sum(entry.file_size for entry in archive.infolist())  # no more than that is unpacked
+    times = unpacked / path.stat().st_size
+    if unpacked > LARGEST * 1e6 and times > DENSEST:
+        raise UsageError(
+            f"{path}: unpacks to {unpacked / 1e6:.0f} MB, {times:.0f} times its size: expected at most {LARGEST:g} MB, "
+            f"or {DENSEST:g} times its size"
+        )
 
 
 def read_root(archive: Archive) -> Element:

@@ -30,7 +30,7 @@ class Fmi2Instance(NativeInstance):
             instanceName=self.name,
         )
         fmu.instantiate(callbacks=collecting_callbacks(self._messages, self.name, folder), loggingOn=True)
-        self._do_step = fmu.dll.fmi2DoStep
+        self._do_step = self.watched(fmu.dll.fmi2DoStep)
         return fmu
 
     def _enter(self, start: float, stop: float) -> None:

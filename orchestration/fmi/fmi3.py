@@ -41,7 +41,7 @@ class Fmi3Instance(NativeInstance):
             instanceName=self.name,
         )
         fmu.instantiate(loggingOn=True, logMessage=self._log)
-        self._do_step = fmu.dll.fmi3DoStep
+        self._do_step = self.watched(fmu.dll.fmi3DoStep)
         self._event, self._ends, self._early = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
         self._reached = ctypes.c_double()
         self.said = (self._event, self._ends, self._early, self._reached)

@@ -7,7 +7,6 @@ so that a step of the master costs one round trip.
 
 import contextlib
 import pickle
-import signal
 import struct
 import subprocess
 import weakref
@@ -23,6 +22,7 @@ from orchestration.fmi.instance import Instance
 from orchestration.fmi.model import read_model
 from orchestration.fmi.values import Value
 from orchestration.processes import subprocesses
+from orchestration.processes.confined import ended
 
 Command = tuple[Any, ...]
 """`("write", index, bytes)`, `("reader" or "writer", names)`, `("read",)` or the name of a method and its arguments"""
@@ -159,8 +159,7 @@ class IsolatedInstance(Instance):
 
     def _ending(self) -> str:
         with contextlib.suppress(subprocess.TimeoutExpired):
-            code = self._process.wait(_PATIENCE)
-            return f"ended by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+            return ended(self._process.wait(_PATIENCE))
         return "does not answer"
 
 

@@ -19,6 +19,7 @@ from fmpy.model_description import ModelDescription, ModelVariable
 from fmu_kit.packaging import read_source_hash
 from orchestration.basics.errors import UsageError
 from orchestration.basics.units import BASE, BaseUnits, Unit, named
+from orchestration.fmi.archive import expect_honest_size
 
 Kind = Literal["Real", "Integer", "Boolean", "Enumeration", "String", "Binary", "Clock"]
 """Types by their FMI 2.0 names; FMI 3.0's Float64 is a Real, its Int32 an Integer"""
@@ -142,7 +143,10 @@ def read_description(path: Path) -> ModelDescription:
     if not zipfile.is_zipfile(path):
         raise UsageError(f"{path}: expected an FMU, which is a zip file")
     try:
+        expect_honest_size(path)
         description: ModelDescription = fmpy.read_model_description(str(path), validate=False)
+    except UsageError:
+        raise
     except Exception as error:  # fmpy lets through whatever the readers of zip and XML raise
         raise UsageError(f"{path}: expected an FMU with a modelDescription.xml: {error}") from error
     if description.fmiMajorVersion not in (2, 3) or description.coSimulation is None:

@@ -24,6 +24,7 @@ from orchestration.fmi import pythonfmu
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.messages import WARNING, Messages, words
 from orchestration.fmi.model import Variable, read_model
+from orchestration.fmi.surroundings import FOLDER, ROUNDING, Surroundings, sentence
 from orchestration.fmi.values import Value, number_of, same, taken
 
 DIVERGENCE_CATEGORY = b"divergence"
@@ -75,6 +76,7 @@ class NativeInstance(Instance):
         self._folder: Scratch | None = None
         self.model = read_model(path)
         self._expect_supported()
+        self.guard = None if self.model.is_of_this_kit else Surroundings()
         found = fmpy.supported_platforms(str(path))
         if fmpy.platform not in found:
             raise QuadcosimError(f"{path}: has no binary for {fmpy.platform}, only for {', '.join(found) or 'none'}")
@@ -83,6 +85,7 @@ class NativeInstance(Instance):
             fmpy.extract(str(path), str(self._folder.path))
             pythonfmu.expect_readable_place(self._folder.path)
             self._fmu = self._instantiated(self._folder.path)
+            self.put_back()
             pythonfmu.release_interpreter_state(self._fmu.dll)
         except Exception as error:
             self.failed = True
@@ -239,6 +242,25 @@ class NativeInstance(Instance):
         self.reader((name,), value)()
         return bool(value[0]) if variable.kind == "Boolean" else float(value[0])
 
+    # -- what it shares with the others of this process ------------------------------------------------------------
+
+    guard: Surroundings | None
+    """what is put back after its calls; None for an FMU of this project's kit, which leaves it alone"""
+
+    def put_back(self) -> None:
+        """What it has changed for the whole process is as it was, and one more warning says so."""
+        if self.guard is not None:
+            if self.guard.put_back_rounding():
+                self.has_changed(ROUNDING)
+            if self.guard.put_back_folder():
+                self.has_changed(FOLDER)
+
+    def has_changed(self, what: str) -> None:
+        """Warn that it has changed something, once."""
+        warning = sentence([f"{self.name} ({self.model.name})"], what)
+        if warning not in self.warnings:
+            self.warnings.append(warning)
+
     # -- for a loop that makes the calls without Python ------------------------------------------------------------
 
     def calls_of(self, transfer: Transfer) -> Sequence[Call]:
@@ -273,13 +295,28 @@ class NativeInstance(Instance):
         at = (np.ctypeslib.as_ctypes_type(values.dtype) * len(values)).from_buffer(values)  # type: ignore[arg-type]
         counts = (ctypes.c_size_t(len(values)),) if self.counts_values else ()
         arguments = (self._component, of, ctypes.c_size_t(len(references)), at, *counts)
-        call, failure = self._fmu.dll[function], self.failure  # without the types by which ctypes would convert
+        call = self.watched(self._fmu.dll[function])  # without the types by which ctypes would convert
+        failure = self.failure
 
         def transfer() -> None:
             if call(*arguments) > WARNING:
                 raise failure(function)
 
         return transfer
+
+    def watched(self, call: Callable[..., int]) -> Callable[..., int]:
+        """A function of the FMU, called so that others compute as they did before."""
+        guard = self.guard
+        if guard is None:
+            return call
+
+        def called(*arguments: Any) -> int:
+            status = call(*arguments)
+            if guard.put_back_rounding():
+                self.has_changed(ROUNDING)
+            return status
+
+        return called
 
     def _put(self, variable: Variable, value: Value) -> None:
         if isinstance(value, str):
@@ -354,6 +391,8 @@ class NativeInstance(Instance):
             return getattr(self._fmu, method)(*args, **kwargs)
         except FMICallException as error:
             raise self.failure(error.function) from None
+        finally:
+            self.put_back()
 
     def _expect_alive(self) -> None:
         if self.failed:

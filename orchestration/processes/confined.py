@@ -52,11 +52,14 @@ class Ending:
     @property
     def described(self) -> str:
         """In words, after `the process`."""
-        if self.code is None:
-            return f"was stopped: {self.reached}"
-        if self.code < 0:
-            return f"ended by {signal.Signals(-self.code).name}"
-        return f"ended with exit code {self.code:#x}" if self.code > 255 else f"ended with exit code {self.code}"
+        return f"was stopped: {self.reached}" if self.code is None else ended(self.code)
+
+
+def ended(code: int) -> str:
+    """How a process ended by its exit code, in words, after `the process`."""
+    if code < 0:
+        return f"ended by {signal.Signals(-code).name}"
+    return f"ended with exit code {code:#x}" if code > 255 else f"ended with exit code {code}"
 
 
 def run(command: Sequence[str], environment: Mapping[str, str], limits: Limits) -> Ending:
@@ -80,6 +83,14 @@ def run(command: Sequence[str], environment: Mapping[str, str], limits: Limits) 
         out_of_time=reached == _late(limits),
         said=said[-1] if said else "",
     )
+
+
+def is_confined(pid: int) -> bool:
+    """Whether a process runs within limits of its own, as far as this system says (Linux)."""
+    try:
+        return f"\0{_MARK}=".encode() in b"\0" + Path(f"/proc/{pid}/environ").read_bytes()
+    except OSError:
+        return False
 
 
 def restrict(size: float) -> None:

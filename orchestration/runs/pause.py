@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +10,13 @@ import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.engines.engine import Engine
+from orchestration.processes.confined import Limits
 from orchestration.recording.recording import InMemory, Recorder
 from orchestration.recording.tables import InFolder, ToFolder
 from orchestration.requests.request import load_request
 from orchestration.runs.result import Result
 from orchestration.runs.run_directory import METRICS, SCENARIO, STATE, keep_flight
-from orchestration.runs.simulation import Announce, Progress, Simulation, prepared
+from orchestration.runs.simulation import Announce, Progress, Simulation, flown
 from orchestration.system.request import Request, system_meant
 from orchestration.system.times import nanoseconds
 
@@ -28,26 +30,39 @@ def fly_until(
     progress: Progress | None = None,
     announce: Announce | None = None,
     engine: Engine | None = None,
+    in_process: bool = False,
+    time_limit: float | None = None,
+    memory_limit: float = Limits.memory,
 ) -> Result | None:
     """Fly to the first communication point from `pause_at` [s] and write the state into `folder`, a new one.
 
-    Returns None, or the result if the run was over before: its directory is then in `folder`.
+    Returns None, or the result if the run was over before: its directory is then in `folder`. Where it is flown, and
+    within which limits, is as in `run`.
     """
     stop_time = system_meant(asked).stop_time
     if not 0.0 <= pause_at < stop_time:
         raise UsageError(f"pause at {pause_at:g} s: expected a time from 0 to before stop_time {stop_time:g} s")
 
     def fly(recorder: ToFolder) -> Result | None:
-        with prepared(asked, announce, recorder=recorder, engine=engine) as flight:
-            _expect_states(flight)
-            flight.master.initialise()
-            if flight.master.run(pause_at=nanoseconds(pause_at), progress=progress):
-                return flight.result()
+        result = flown(
+            asked, partial(_until, pause_at, recorder.folder.absolute()), recorder=recorder, progress=progress,
+            announce=announce, engine=engine, in_process=in_process, time_limit=time_limit, memory_limit=memory_limit,
+        )  # fmt: skip
+        if result is None:
             recorder.finish()
-            _write(flight, recorder.folder)
-            return None
+        return result
 
     return keep_flight(folder, fly, figures=figures, replaces=())
+
+
+def _until(pause_at: float, folder: Path, flight: Simulation, progress: Progress | None) -> bool:
+    """The course of a run that is paused: its state is then in `folder`."""
+    _expect_states(flight)
+    flight.master.initialise()
+    over = flight.master.run(pause_at=nanoseconds(pause_at), progress=progress)
+    if not over:
+        _write(flight, folder)
+    return over
 
 
 def resume(
@@ -58,26 +73,28 @@ def resume(
     progress: Progress | None = None,
     announce: Announce | None = None,
     engine: Engine | None = None,
+    in_process: bool = False,
+    time_limit: float | None = None,
+    memory_limit: float = Limits.memory,
 ) -> Result:
     """Go on with the run paused in `folder`, to the end; its directory is then in `out`, which may be `folder`.
 
-    Raises `UsageError` if there is none, or if the scenario, its reference or an FMU is not the one that it was
-    paused with.
+    Where it is flown, and within which limits, is as in `run`. Raises `UsageError` if there is none, or if the
+    scenario, its reference or an FMU is not the one that it was paused with.
     """
     folder = Path(folder)
     if not (folder / STATE).is_file():
         raise UsageError(f"{folder}: expected the directory of a paused run; it has no {STATE}")
     asked = load_request(folder / SCENARIO)
-    state, saved = read_state(folder / STATE)
+    read_state(folder / STATE)  # what is damaged is to be known now
 
     def fly(recorder: Recorder) -> Result:
-        with prepared(asked, announce, recorder=recorder, engine=engine) as flight:
-            _expect_same(state.pop("of"), flight, folder)
-            for chunk in InFolder(folder).chunks():
-                recorder.take(chunk)
-            flight.master.restore(state, saved)
-            flight.master.run(progress=progress)
-            return flight.result()
+        result = flown(
+            asked, partial(_rest, folder), recorder=recorder, progress=progress, announce=announce, engine=engine,
+            in_process=in_process, time_limit=time_limit, memory_limit=memory_limit,
+        )  # fmt: skip
+        assert result is not None
+        return result
 
     if out is None:
         return fly(InMemory())
@@ -85,6 +102,16 @@ def resume(
     result = keep_flight(out, fly, figures=figures, replaces=(METRICS, STATE) if same else (METRICS,))
     assert result is not None
     return result
+
+
+def _rest(folder: Path, flight: Simulation, progress: Progress | None) -> bool:
+    """The course of a run that was paused in `folder`."""
+    state, saved = read_state(folder / STATE)
+    _expect_same(state.pop("of"), flight, folder)
+    for chunk in InFolder(folder).chunks():
+        flight.recorder.take(chunk)
+    flight.master.restore(state, saved)
+    return flight.master.run(progress=progress)
 
 
 def read_state(path: Path) -> tuple[dict[str, Any], dict[str, bytes]]:

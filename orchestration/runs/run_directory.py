@@ -17,7 +17,7 @@ from orchestration.requests.request import load_request
 from orchestration.results.column_info import Described
 from orchestration.runs.folder import NewFolder, new_folder
 from orchestration.runs.result import Provenance, Result
-from orchestration.runs.simulation import RunInterrupted
+from orchestration.runs.simulation import RunInterrupted, RunLost
 from orchestration.system.request import system_meant
 
 SIGNALS, EVENTS = tables.SIGNALS, tables.EVENTS
@@ -121,22 +121,24 @@ def keep_flight(
     `fly` is given what records in the new directory as the flight goes on; if it comes to no result, it has
     written there what is to be kept. The directory takes the place of an earlier one that has a file of
     `replaces`. If that cannot be after all, it is kept beside `folder`, and `QuadcosimError` says where. After
-    Ctrl-C what was recorded is kept too, but not in place of anything: `RunInterrupted` says where. Raises
-    `UsageError` if `folder` holds something else or cannot be written.
+    Ctrl-C, or if its process has ended, what was recorded is kept too, but not in place of anything: `RunInterrupted`
+    or `RunLost` says where. Raises `UsageError` if `folder` holds something else or cannot be written.
     """
-    interrupted: RunInterrupted | None = None
+    ended: RunInterrupted | RunLost | None = None
     with run_folder(Path(folder), replaces) as new:
         try:
             result = fly(ToFolder(new.path))
-        except RunInterrupted as stop:
-            interrupted, result = stop, stop.result
+        except (RunInterrupted, RunLost) as stop:
+            if stop.result is None:
+                raise
+            ended, result = stop, stop.result
             new.replaces = result.interrupted_at is None
         new.precious = True
         if result is not None:
             _write(result, new.path, figures=figures)
-    if interrupted is not None:
-        result = replace(interrupted.result, recording=tables.InFolder(new.place))
-        raise RunInterrupted(f"{interrupted}; what was recorded is in {new.place}", result)
+    if ended is not None and result is not None:
+        result = replace(result, recording=tables.InFolder(new.place))
+        raise type(ended)(f"{ended}; what was recorded is in {new.place}", result) from ended
     return result and replace(result, recording=tables.InFolder(new.place))
 
 

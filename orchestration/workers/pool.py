@@ -19,6 +19,7 @@ from orchestration.basics import scratch
 from orchestration.basics.errors import QuadcosimError
 from orchestration.building.inputs import Files, all_with_files, with_files
 from orchestration.processes import subprocesses
+from orchestration.processes.confined import ended
 from orchestration.workers.provenance import versions
 from orchestration.workers.task import Broken, BrokenPlaceError, Chunk, Outcome, Ready, Task, row_of
 
@@ -57,9 +58,7 @@ class Died(Exception):
         self.code = code
 
     def __str__(self) -> str:
-        if self.code < 0:
-            return f"ended by {signal.Signals(-self.code).name}"
-        return f"ended with exit code {self.code}"
+        return ended(self.code)
 
 
 class InterruptedWorker(QuadcosimError):

@@ -279,7 +279,7 @@ def test_ctrl_c_is_heard_within_a_slice(fmu: Path) -> None:
     timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     with pytest.raises(RunInterrupted) as caught:
-        simulation.run(system, engine="compiled", recorder=_Nowhere())
+        simulation.run(system, engine="compiled", recorder=_Nowhere(), in_process=True)
     assert 0.0 < (caught.value.result.interrupted_at or 0.0) < 36000.0
 
 

@@ -1,5 +1,7 @@
 /* A small FMU in C: x' = gain u while `on`, of FMI 2.0 or, with FMI3, of FMI 3.0. Macros give it one habit each. */
+#include <fenv.h>
 #include <math.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -90,6 +92,9 @@ static int step(Model *m, double t, double h) {
 #ifdef CRASHES
     abort();
 #endif
+#ifdef ENDS /* what it does from 0.045 s on */
+    if (t > 0.045) { ENDS; }
+#endif
 #ifdef WARNS
     if (m->s.count == 0) say(m, WARNING, 7, 50.0);
 #endif
@@ -100,8 +105,17 @@ static int step(Model *m, double t, double h) {
 #ifdef PRINTS
     printf("stepping\n");
 #endif
+#ifdef SLOW
+    usleep(1000);
+#endif
+#ifdef THIRDS /* of which each is rounded */
+    for (int i = 0; i < 2; i++) m->s.x[i] += h / 3.0;
+#endif
     for (int i = 0; m->s.on && i < 2; i++) m->s.x[i] += h * m->s.gain * m->s.u[i] * (m->s.mode == 2 ? -1.0 : 1.0);
     m->s.count++;
+#ifdef PRINTS_PROCESS
+    m->s.count = getpid();
+#endif
     return OK;
 }
 
@@ -121,9 +135,20 @@ API void *fmi2Instantiate(const char *name, int kind, const char *guid, const ch
     m->environment = callbacks->environment;
     return m;
 }
-API void fmi2FreeInstance(void *c) { free(c); }
+API void fmi2FreeInstance(void *c) {
+#ifdef CRASHES_WHEN_FREED
+    abort();
+#endif
+    free(c);
+}
 API int fmi2SetupExperiment(void *c, int defined, double tolerance, double t, int ends, double stop) { return OK; }
-API int fmi2EnterInitializationMode(void *c) { forget(c); return OK; }
+API int fmi2EnterInitializationMode(void *c) {
+#ifdef EXITS_AT_START
+    exit(0);
+#endif
+    forget(c);
+    return OK;
+}
 API int fmi2ExitInitializationMode(void *c) { return OK; }
 API int fmi2Terminate(void *c) { return OK; }
 API int fmi2Reset(void *c) { return reset(c); }

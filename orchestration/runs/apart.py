@@ -1,0 +1,218 @@
+"""A run in a process of its own: however that ends, the run ends in words, and what it had recorded stays."""
+
+import logging
+import pickle
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from orchestration.basics import scratch
+from orchestration.basics.interrupt import Interrupt, interrupts_held_back
+from orchestration.engines.engine import Engine
+from orchestration.engines.master import in_order
+from orchestration.engines.room import Left, left_in
+from orchestration.fmi.isolated import receive, send
+from orchestration.processes import subprocesses
+from orchestration.processes.confined import ended
+from orchestration.processes.guard import Guard
+from orchestration.recording.recording import Chunk, Events, Recorder
+from orchestration.runs.result import Result
+from orchestration.runs.simulation import Course, Flown, Meant, Progress, RunLost, result_of
+from orchestration.schedule.streams import Streams
+from orchestration.system.request import Request
+
+_MESSAGES = logging.getLogger("quadcosim")
+_PATIENCE = 5.0
+"""[s] for a process that has said its last word"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Order:
+    """What the process is to do."""
+
+    asked: Request
+    course: Course
+    engine: Engine | None
+    level: int
+    """of the messages that are heard"""
+
+
+def flown(
+    meant: Meant,
+    course: Course,
+    recorder: Recorder,
+    *,
+    progress: Progress | None,
+    engine: Engine | None,
+    time_limit: float | None,
+    memory_limit: float,
+    started: float,
+) -> Result | None:
+    """As `simulation.flown`, which has found out what is `meant` and when it `started`."""
+    room = scratch.temporary()
+    try:
+        with interrupts_held_back() as interrupt:
+            order = Order(asked=meant.asked, course=course, engine=engine, level=_MESSAGES.getEffectiveLevel())
+            with _Process(order, room.path, interrupt, time_limit, memory_limit) as process:
+                heard = _Heard(recorder, progress)
+                why = process.heard_by(heard)
+            found = heard.flown
+            if found is None:
+                raise _lost(meant, heard, room.path, why or "ended", started)
+            if why is not None:
+                found = replace(found, warnings=(*found.warnings, f"after the run, its process {why}"))
+            if not heard.over:
+                return None
+            return result_of(meant, found, recorder, time.perf_counter() - started, interrupt.requested)
+    finally:
+        room.remove()
+
+
+class _Heard:
+    """What the process says, passed on to who is to hear it."""
+
+    def __init__(self, recorder: Recorder, progress: Progress | None) -> None:
+        self.flown: Flown | None = None
+        self.over = False
+        """whether the run is"""
+        self.doing = ""
+        """what the process is at"""
+        self.components: Sequence[str] = ()
+        """whose FMUs may be called at that"""
+        self.columns: tuple[str, ...] = ()
+        self.recorded_until = -1.0
+        """[s]"""
+        self.recorder, self._progress = recorder, progress
+
+    def describe(self, about: dict[str, dict[str, str]]) -> None:
+        self.recorder.describe(about)
+
+    def begin(self, columns: tuple[str, ...]) -> None:
+        self.columns = columns
+        self.recorder.begin(columns)
+
+    def take(self, chunk: Chunk) -> None:
+        self.recorder.take(chunk)
+        if len(chunk.rows):
+            self.recorded_until = float(chunk.rows[-1, 0])
+
+    def share(self, share: float) -> None:
+        if self._progress is not None:
+            self._progress(share)
+
+    def message(self, level: int, text: str) -> None:
+        _MESSAGES.log(level, "%s", text)
+
+    def stage(self, doing: str, components: Sequence[str]) -> None:
+        self.doing, self.components = doing, components
+
+    def come_to(self, over: bool, flown: Flown) -> None:
+        self.over, self.flown = over, flown
+
+    def error(self, error: BaseException) -> None:
+        raise error
+
+
+class _Process:
+    """The process, which ends with the block."""
+
+    def __init__(
+        self, order: Order, room: Path, interrupt: Interrupt, time_limit: float | None, memory_limit: float
+    ) -> None:
+        self._interrupt, self._told = interrupt, False
+        self._begun = False
+        """whether it is at the run itself: what it loads before is not limited in time, and hears of no Ctrl-C"""
+        self._process = subprocess.Popen(
+            subprocesses.command("orchestration.runs.apart_process", room),
+            env=subprocesses.environment(), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            start_new_session=True,  # Ctrl-C is passed on from here
+        )  # fmt: skip
+        self._guard = Guard(
+            self._process, time_limit=time_limit, memory_limit=memory_limit, each=self._pass_on_interrupt
+        )
+        assert self._process.stdin is not None
+        with suppress(OSError):  # it has ended: that is heard next
+            send(self._process.stdin, order)
+
+    def heard_by(self, heard: _Heard) -> str | None:
+        """Pass on all that it says; how it ended if that was before its last word."""
+        assert self._process.stdout is not None
+        while True:
+            try:
+                name, *content = receive(self._process.stdout)
+            except (EOFError, OSError, ValueError, pickle.UnpicklingError):
+                return self._ending()
+            if name == "stage" and not self._begun:
+                self._begun = True
+                self._guard.begin()
+            if name == "end":
+                with suppress(subprocess.TimeoutExpired):
+                    self._process.wait(_PATIENCE)
+                return None
+            getattr(heard, name)(*content)
+
+    def _ending(self) -> str:
+        with suppress(subprocess.TimeoutExpired):
+            code = self._process.wait(_PATIENCE)
+            if self._guard.reached is not None:
+                return f"was ended: {self._guard.reached}"
+            return ended(code)
+        return "does not answer"
+
+    def _pass_on_interrupt(self) -> None:
+        """Ctrl-C ends the run at its next instant; the second one, heard here, ends the process."""
+        if self._interrupt.requested and self._begun and not self._told:
+            self._told = True
+            with suppress(OSError):
+                self._process.send_signal(signal.SIGINT if sys.platform != "win32" else signal.SIGTERM)
+
+    def __enter__(self) -> "_Process":
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._guard.close()
+        self._process.kill()
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            with suppress(OSError):
+                if pipe is not None:
+                    pipe.close()
+
+
+def _lost(meant: Meant, heard: _Heard, room: Path, why: str, started: float) -> RunLost:
+    """What is left of a run whose process has ended without a last word."""
+    doing, called = heard.doing, [name for name in heard.components if name in meant.foreign]
+    left = left_in(room, heard.columns)
+    if left is not None:
+        if left.calling is not None:
+            doing, called = "in a call of", [list(meant.system.components)[left.calling]]
+        elif len(left.rows) or heard.recorded_until >= 0.0:
+            called = []
+        if len(left.rows) and left.rows[-1, 0] > heard.recorded_until:
+            heard.take(_chunk(meant, heard.columns, left))
+    end = heard.recorded_until
+    who = [f"{name} ({meant.models[name].name})" for name in called]
+    which = "" if not who else f", {doing} {who[0]}" if len(who) == 1 else f", {doing} one of {', '.join(who)}"
+    if end < 0.0:
+        return RunLost(f"the process of the run {why}{which}")
+    text = f"the process of the run {why}{which}, after t = {end:g} s of {meant.system.stop_time:g} s"
+    found = Flown(
+        end=end, steps=0 if left is None else left.steps, divergence=None, divergence_time=None, interrupted_at=end,
+        provenance={"engine": "python" if left is None else "compiled"}, warnings=(text,),
+    )  # fmt: skip
+    return RunLost(text, result_of(meant, found, heard.recorder, time.perf_counter() - started, interrupted=False))
+
+
+def _chunk(meant: Meant, columns: tuple[str, ...], left: Left) -> Chunk:
+    """Rows and events that the compiled loop has not handed over, with what sources say."""
+    rows, system = left.rows, meant.system
+    for name, values in meant.sources(Streams(system.seed, system.streams)).items():
+        places = [columns.index(signal) for signal in system.sources[name].signals(name)]
+        rows[:, places] = values.over(rows[:, 0])
+    names = tuple(x.name for x in system.connections)
+    return Chunk(columns=columns, rows=rows, events=Events(names, in_order(left.events)))
