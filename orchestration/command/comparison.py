@@ -20,13 +20,16 @@ def all_cells(
     *,
     workers: int,
     engine: Engine | Literal["batch"] | None,
+    time_limit: float | None,
     figures: bool,
     look: FigureFlags,
     again: str,
 ) -> Answer:
     """Fly what is missing, and tell what all cells come to; `again` is the command for one of them."""
     style = look.chosen if figures else None
-    found = run.compare(comparison, folder=out, workers=workers, engine=engine, figures=figures, style=style)
+    found = run.compare(
+        comparison, folder=out, workers=workers, engine=engine, time_limit=time_limit, figures=figures, style=style
+    )
     summary = found.summary
     say(f"{summary.path}: {summary.total} runs, {summary.flown} flown now; tables and pictures beside it")
     if summary.agreement is not None:

@@ -14,6 +14,7 @@ from orchestration.command import registry as registering
 from orchestration.command.answer import Answer, of_files
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.flags import EngineFlag, FlightFlags, Timing, flies, request_from
+from orchestration.command.limit_flags import TimeLimit
 from orchestration.command.shared_flags import takes
 
 if TYPE_CHECKING:
@@ -45,14 +46,16 @@ def sweep(
     ] = None,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Fly failed runs again.")] = False,
     engine: BatchFlag = None,
+    time_limit: TimeLimit = None,
 ) -> Answer:
     """Fly the runs of a study that are missing; kill it and start it again as you like."""
     from orchestration.studies.study_file import load_study
     from orchestration.studies.sweep import sweep as fly
 
     summary = fly(
-        load_study(study), folder=out, workers=workers, dask=dask, retry_failed=retry_failed, engine=_batch_or(engine)
-    )
+        load_study(study), folder=out, workers=workers, dask=dask, retry_failed=retry_failed, engine=_batch_or(engine),
+        time_limit=time_limit,
+    )  # fmt: skip
     failed = f", {summary.failed} failed (quadcosim export shows why; --retry-failed)" if summary.failed else ""
     lines = [f"{summary.path}: {summary.total} runs, {summary.flown} flown now{failed}"]
     if summary.agreement is not None:
@@ -162,6 +165,7 @@ def compare(
         bool, typer.Option("--native", help="The native twins of this project's FMUs, built if need be.")
     ] = False,
     engine: BatchFlag = None,
+    time_limit: TimeLimit = None,
     cell: Annotated[
         int | None,
         typer.Option("--cell", help="Fly this cell again, and nothing else.", metavar="K", show_default=False),
@@ -181,13 +185,16 @@ def compare(
 
     native = native or engine == "batch"
     chosen = dataclasses.replace(load_comparison(comparison), native=native)
+    if time_limit is not None and (cell is not None or start is not None):
+        raise UsageError("--time-limit: expected without --cell; it is of the runs of a whole comparison")
     alone = None if engine == "batch" else engine_named(engine, "batch")
     if start is not None:
         return command.flight(chosen, cell, start, out, engine=alone)
     if cell is not None:
         return command.cell(chosen, cell, out, workers=workers, engine=alone)
     return command.all_cells(
-        chosen, out, workers=workers, engine="batch" if engine == "batch" else alone, figures=figures, look=look,
+        chosen, out, workers=workers, engine="batch" if engine == "batch" else alone, time_limit=time_limit,
+        figures=figures, look=look,
         again=f"quadcosim compare {comparison}{' --native' if native else ''} --cell",
     )  # fmt: skip
 

@@ -86,6 +86,7 @@ def compare(
     folder: str | Path | None = None,
     workers: int = 1,
     engine: Engine | Literal["batch"] | None = None,
+    time_limit: float | None = None,
     figures: bool = True,
     style: "Style | None" = None,
     progress: CountHeard = "bar",
@@ -93,14 +94,15 @@ def compare(
 ) -> Compared:
     """Fly what is missing of a comparison, conclude, and write its tables and pictures beside its store.
 
-    `folder`, `workers`, `progress` and `announce` are those of `sweep`, which raises what this does. By the engine
-    `batch` the native twins of its FMUs are flown as lanes; pictures are left out unless `figures`, drawn
+    `folder`, `workers`, `time_limit`, `progress` and `announce` are those of `sweep`, which raises what this does. By
+    the engine `batch` the native twins of its FMUs are flown as lanes; pictures are left out unless `figures`, drawn
     in a `style`, for a screen unless told.
     """
     comparison = replace(comparison, native=True) if engine == "batch" else comparison
     summary = sweep(
-        comparison.study, folder=folder, workers=workers, engine=engine, progress=progress, announce=announce
-    )
+        comparison.study, folder=folder, workers=workers, engine=engine, time_limit=time_limit, progress=progress,
+        announce=announce,
+    )  # fmt: skip
     known = bandwidths(comparison)  # after the design has been checked, which names the run that cannot be
     place = summary.path.parent
     table = frame(summary.path)

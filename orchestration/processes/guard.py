@@ -4,8 +4,8 @@ import os
 import subprocess
 import threading
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -77,6 +77,20 @@ class Guard:
             with suppress(OSError):
                 os.kill(pid, 9)
         self._process.kill()
+
+
+@contextmanager
+def time_limited(process: "subprocess.Popen[bytes]", limit: float | None) -> Iterator[Guard | None]:
+    """A process that is ended if it takes more than `limit` [s] while the block runs; None: it is not watched."""
+    if limit is None:
+        yield None
+        return
+    guard = Guard(process, time_limit=limit)
+    guard.begin()
+    try:
+        yield guard
+    finally:
+        guard.close()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -49,6 +49,7 @@ def sweep(
     dask: str | None = None,
     retry_failed: bool = False,
     engine: Engine | Literal["batch"] | None = None,
+    time_limit: float | None = None,
     progress: CountHeard = "bar",
     announce: Announce | None = say,
 ) -> Swept:
@@ -57,7 +58,8 @@ def sweep(
     The store is in `folder`, `results/NAME` unless told: what is there is not flown again, so that a sweep may be
     stopped and called again. Runs are flown by `workers` processes of this machine, which need no guard of the main
     module and work from a notebook, or by those of a `dask` scheduler at that address; by the engine `batch` they are
-    flown as lanes of native FMUs, and some of them by the FMUs too, to compare. `progress` hears how many of how many
+    flown as lanes of native FMUs, and some of them by the FMUs too, to compare. A run that takes more than `time_limit`
+    [s] of the processor has failed, and says so. `progress` hears how many of how many
     are done, `announce` of runs that failed; None for silence.
 
     Raises `UsageError`, before anything is flown, for a design with a run that cannot be, or if the store holds
@@ -65,6 +67,8 @@ def sweep(
     `KeyboardInterrupt`, which says how far it came, after Ctrl-C.
     """
     _expect_workers(workers, dask)
+    if time_limit is not None and not time_limit > 0.0:
+        raise UsageError(f"--time-limit {time_limit:g}: expected a positive number of seconds")
     in_lanes = engine == "batch"
     study = replace(study, native=True) if in_lanes else study
     path = store.store_path(study.name, folder)
@@ -77,7 +81,8 @@ def sweep(
         missing = _missing(opened, study, retry_failed)
         counted = _Counted(len(study.points), opened, hear, announce)
         fly = _flying(Package.of(files), workers, dask)
-        tasks = (_task(study, index, files, None if engine == "batch" else engine) for index in missing)
+        alone = None if engine == "batch" else engine
+        tasks = (_task(study, index, files, alone, time_limit) for index in missing)
         lanes: dict[str, Row] = {}
         try:
             with contextlib.closing(fly(chunks(tasks, len(missing), workers) if in_lanes else tasks)) as outcomes:
@@ -85,7 +90,7 @@ def sweep(
                     _keep(some, opened)
                     counted.add(some)
                     lanes |= {each.row.key: each.row for each in some if each.in_lanes}
-            agreement = _compared(lanes, study, files, fly) if in_lanes else None
+            agreement = _compared(lanes, study, files, fly, time_limit) if in_lanes else None
         except KeyboardInterrupt:
             raise Interrupted(f"with {counted.done} of {counted.total} runs done") from None
         if agreement is not None:
@@ -111,10 +116,12 @@ def _flying(package: Package, workers: int, dask: str | None) -> Fly:
     return lambda tasks: run_locally(tasks, package, workers)
 
 
-def _compared(lanes: Mapping[str, Row], study: Study, files: Files, fly: Fly) -> Agreement | None:
+def _compared(
+    lanes: Mapping[str, Row], study: Study, files: Files, fly: Fly, time_limit: float | None
+) -> Agreement | None:
     """A sample of the runs that were flown in lanes, beside the same flown by FMUs; None if there were none."""
     chosen = sample(lanes)
-    tasks = [_task(study, lanes[key].index, files, None) for key in sorted(chosen)]
+    tasks = [_task(study, lanes[key].index, files, None, time_limit) for key in sorted(chosen)]
     alone = [outcome.row for some in fly(tasks) for outcome in some] if tasks else []
     found = [(row.index, lanes[row.key].metrics or {}, row.metrics or {"status": row.message}) for row in alone]
     return Agreement.of(found) if found else None
@@ -161,11 +168,11 @@ class _Counted:
         self._hear(self.done, self.total)
 
 
-def _task(study: Study, index: int, files: Files, engine: Engine | None) -> Task:
+def _task(study: Study, index: int, files: Files, engine: Engine | None, time_limit: float | None) -> Task:
     system = study.system(index, files.starts_of(study.origin))
     return Task(
         index=index, key=run_key(system, files), settings=dict(study.points[index]), system=system,
-        keep_signals=study.keeps_signals(index), engine=engine,
+        keep_signals=study.keeps_signals(index), engine=engine, time_limit=time_limit,
     )  # fmt: skip
 
 

@@ -20,6 +20,7 @@ from orchestration.basics.errors import QuadcosimError
 from orchestration.building.inputs import Files, all_with_files, with_files
 from orchestration.processes import subprocesses
 from orchestration.processes.confined import ended
+from orchestration.processes.guard import time_limited
 from orchestration.workers.provenance import versions
 from orchestration.workers.task import Broken, BrokenPlaceError, Chunk, Outcome, Ready, Task, row_of
 
@@ -61,6 +62,10 @@ class Died(Exception):
         return ended(self.code)
 
 
+class OutOfTime(Exception):
+    """A worker process was ended at the time limit of what it flew; the text says which."""
+
+
 class InterruptedWorker(QuadcosimError):
     """Somebody sent an interrupt to a worker process: it is meant for all."""
 
@@ -81,14 +86,23 @@ class WorkerProcess:
         )  # fmt: skip
 
     def ask(self, task: Task | Chunk) -> Any:
-        """The answer to a task, or to many; raises `Died`."""
+        """The answer to a task, or to many; raises `Died`, or `OutOfTime` if it was ended at its time limit."""
+        with time_limited(self.process, task.time_limit) as guard:
+            try:
+                self._tell(task)
+                return self.listen()
+            except Died:
+                if guard is not None and guard.reached is not None:
+                    raise OutOfTime(guard.reached) from None
+                raise
+
+    def _tell(self, task: Task | Chunk) -> None:
         assert self.process.stdin is not None
         try:
             pickle.dump(task, self.process.stdin)
             self.process.stdin.flush()
         except OSError:
             raise Died(self._end()) from None
-        return self.listen()
 
     def listen(self) -> Any:
         """What it says next; raises `Died`."""
@@ -137,6 +151,9 @@ class Pilot:
             worker = self._ready()
             try:
                 answer = worker.ask(task)
+            except OutOfTime as end:
+                self._drop()
+                return Outcome(row=row_of(task, None, f"it was ended: {end}", 0.0, self._machine))
             except Died as death:
                 self._drop()
                 if death.code == -signal.SIGINT:
@@ -160,12 +177,16 @@ class Pilot:
             return answer
 
     def fly_chunk(self, chunk: Chunk) -> list[Outcome]:
-        """The outcomes of many runs; they are flown one by one if they end their process together.
+        """The outcomes of many runs; they are flown one by one if they end their process together, or take
+        more time than all of them may.
 
         Raises `QuadcosimError` for what is no run's own failure.
         """
         try:
             answer = self._ready().ask(chunk)
+        except OutOfTime:
+            self._drop()
+            return [self.fly(task) for task in chunk.tasks]
         except Died as death:
             self._drop()
             if death.code == -signal.SIGINT:

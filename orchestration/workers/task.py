@@ -31,6 +31,8 @@ class Task:
     keep_signals: bool
     engine: Engine | None = None
     """that flies it; None: the fastest that can be had"""
+    time_limit: float | None = None
+    """[s] of the processor that it may take; None: as long as it takes"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +40,12 @@ class Chunk:
     """Runs of a study that are flown as lanes of a batch; all of native FMUs, of none are signals kept."""
 
     tasks: tuple[Task, ...]
+
+    @property
+    def time_limit(self) -> float | None:
+        """[s] of the processor that all of them may take; None: as long as they take."""
+        limits = [task.time_limit for task in self.tasks if task.time_limit is not None]
+        return sum(limits) if len(limits) == len(self.tasks) else None
 
 
 @dataclass(frozen=True, kw_only=True)
