@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import itertools
-import keyword
 import math
 import re
 from collections.abc import Container, Iterable, Mapping
 from typing import ClassVar
 
 from fmu_kit.compiler.trace.statements import TANGENT, Block, Call, Function, Place, Statement, ends
-from fmu_kit.compiler.trace.symbols import Kind, Symbol, TraceError, closure, node, value_of
+from fmu_kit.compiler.trace.symbols import Kind, Symbol, TraceError, closure, integer_of, node, value_of
 from fmu_kit.compiler.trace.tracing import Program
 
 _BINARY = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
@@ -23,6 +22,18 @@ _CALLED = {
     "mod": "q_modulo",
     "floordiv": "q_floor_divide",
 }  # fmt: skip
+_OF_BITS = ("bit_and", "bit_or", "bit_xor")
+_SIGNED_ZEROS = ("neg", "mul", "mod", "floordiv", "floor", "ceil")
+"""Operations that may give a zero with a sign, of real numbers."""
+_WIDE_COMPARED = {
+    "lt": ("less", False, False),
+    "ge": ("less", False, True),
+    "gt": ("less", True, False),
+    "le": ("less", True, True),
+    "eq": ("equal", False, False),
+    "ne": ("equal", False, True),
+}
+"""Of each comparison, by which it is done, whether the other way round, and whether it is the contrary"""
 _FORMATS = {"g": "general", "e": "exponential", "f": "fixed"}
 ERRORS = ("FmuError", "DivergenceError", "ZeroDivisionError", "OverflowError", "ValueError")
 """What a function may end with; the place here, from 1 on, is what it returns."""
@@ -38,10 +49,9 @@ def place_names(places: Iterable[Place]) -> dict[str, str]:
     """The name in C of each place."""
     found: dict[str, str] = {}
     for place in places:
-        name = _identifier(place.name).upper()
-        while name in found.values():
-            name += "_"
-        found[place.name] = name
+        kept = f"KEPT_{identifier(place.name.removeprefix('self')).strip('_')}"
+        name = (kept if place.reference is None else f"AT_{identifier(place.name)}").upper()
+        found[place.name] = _unused(name, found.values())
     return found
 
 
@@ -57,7 +67,9 @@ class Writer:
         self.scopes: list[dict[int, str]] = [{}]
         self.lines: list[list[str]] = [[]]
         self.count = 0
-        self.parameters = [f"{_identifier(name)}_" for name in function.names]
+        self.parameters: list[str] = []
+        for name in function.names:
+            self.parameters.append(_unused(f"p_{identifier(name)}", self.parameters))
         self.used = self._used(function.body)
         self.gives: dict[int, set[tuple[str, int]]] = {}
 
@@ -207,6 +219,33 @@ class Writer:
         return self.value(symbol) if kind == "bool" else self._lanes(symbol)
 
     def _expression(self, symbol: Symbol) -> str:
+        op, args = symbol.op, symbol.args
+        if op in _OF_BITS or any(each.kind == "wide" for each in (symbol, *args)):
+            return self._of_wide(symbol)
+        if symbol.kind == "int" and op in _SIGNED_ZEROS:
+            return f"({self._of_reals(symbol)}) + 0.0"  # a whole number has no zero with a sign
+        return self._of_reals(symbol)
+
+    def _of_wide(self, symbol: Symbol) -> str:
+        """An operation on whole numbers, or one that gives them, of more bits than a real number has."""
+        op, given = symbol.op, [self._wide(arg) for arg in symbol.args]
+        if op in ("narrow", "beyond"):
+            return f"{'q_narrow' if op == 'narrow' else 'q_wide_beyond'}({given[0]})"
+        if op in _WIDE_COMPARED:
+            name, turned, negated = _WIDE_COMPARED[op]
+            text = f"q_wide_compared(q_int128_{name}, {', '.join(given[::-1] if turned else given)})"
+            return f"q_not({text})" if negated else text
+        text = f"q_wide_{len(given)}(q_int128_{op}, {', '.join(given)})"
+        return text if symbol.kind == "wide" else f"q_narrow({text})"
+
+    def _wide(self, symbol: Symbol) -> str:
+        """A whole number as one of many bits."""
+        if symbol.op == "constant":
+            high, low = divmod(integer_of(symbol) % 2**128, 2**64)
+            return f"q_wide_known({high:#x}u, {low:#x}u)"
+        return self.value(symbol) if symbol.kind == "wide" else f"q_wide_of({self._lanes(symbol)})"
+
+    def _of_reals(self, symbol: Symbol) -> str:
         op, args = symbol.op, symbol.args
         if op in _BINARY:
             first = self._lanes(args[0]) if args[1].op == "constant" else self._real(args[0])
@@ -382,7 +421,11 @@ class Writer:
         self.scopes.pop()
         self._line("}")
         for symbol in self.used.values():
-            if symbol.op == "outcome" and symbol.data[1] is each:
+            if symbol.op != "outcome" or symbol.data[1] is not each:
+                continue
+            if len(self.scopes) > 1:  # it may be done in another branch too, and asked for after both
+                self._set(symbol, states[symbol.data[0]])
+            else:
                 self.scopes[-1][id(symbol)] = states[symbol.data[0]]
 
     def _goes_on(self, index: str, last: str) -> str:
@@ -435,31 +478,34 @@ class Writer:
                 self._line(f"q_text_{_FORMATS[spec[-1]]}(&m->text, {self.value(symbol)}, {precision});")
 
 
-def _identifier(name: str) -> str:
-    return re.sub(r"\W+", "_", name)
+def identifier(name: str) -> str:
+    """A name in the letters, digits and underscores that every compiler takes."""
+    return "".join(c if c.isascii() else f"u{ord(c):04x}" for c in re.sub(r"\W+", "_", name))
+
+
+def _unused(name: str, used: Iterable[str]) -> str:
+    """A name, with underscores behind it if something else has it."""
+    taken = set(used)
+    while name in taken:
+        name += "_"
+    return name
 
 
 def c_name(name: str) -> str:
-    """The name of a function in C: no word of C, none of libc."""
-    return f"{name}_of_the_model" if keyword.iskeyword(name) or name in _TAKEN else name
+    """The name of a function of the model in C: with a prefix that no word and no other function there has."""
+    of = name.removeprefix(TANGENT)
+    return f"{'model' if of == name else 'tangents'}_{identifier(of)}"
 
 
 KEYWORDS = frozenset({
     "auto", "case", "char", "const", "default", "do", "double", "enum", "extern", "float", "goto", "inline", "int",
     "long", "register", "restrict", "short", "signed", "sizeof", "static", "struct", "switch", "typedef", "union",
     "unsigned", "void", "volatile",
+    "asm", "bool", "catch", "delete", "explicit", "export", "false", "friend", "mutable", "namespace", "new",
+    "operator", "private", "protected", "public", "template", "this", "throw", "true", "typename", "using", "virtual",
+    "linux", "unix", "I", "NAN", "INFINITY", "NULL",
 })  # fmt: skip
-"""Words of C that are none of Python."""
-_TAKEN = KEYWORDS | {
-    "write", "read", "open", "close", "signal", "index", "time", "clock", "start", "select",
-    "warn", "fail", "tell", "refuse", "refuse_with", "refuse_number", "refuse_references", "expect", "settle",
-    "begin", "create", "advance", "end", "save", "restore", "forget", "derive", "to_bytes", "from_bytes",
-    "set_logging", "take_start_time", "enter_initialization", "exit_initialization", "are_of", "are_as_many",
-    "bring_up_to_date", "get_reals", "get_integers", "get_booleans", "get_reals_and_time", "set_reals", "set_integers",
-    "set_booleans", "get_enumerations", "set_enumerations", "text_begin", "text_add", "text_real", "text_integer",
-    "as_it_is", "as_int",
-    "owner", "log_if_wanted", "make_printable", "expect_own",
-}  # fmt: skip
+"""Words of C and C++ that are none of Python, and what headers and compilers give another meaning."""
 
 
 def c_string(text: str) -> str:
@@ -472,7 +518,7 @@ def c_string(text: str) -> str:
 
 def c_type(symbol: Symbol) -> str:
     """The type of a value in C."""
-    return "q_mask" if symbol.kind == "bool" else "q_real"
+    return {"bool": "q_mask", "wide": "q_wide"}.get(symbol.kind, "q_real")
 
 
 def _constant(symbol: Symbol) -> str:

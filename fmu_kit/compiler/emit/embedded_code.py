@@ -10,7 +10,7 @@ from ctypes import c_float
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from fmu_kit.compiler.emit.c_code import ERRORS, KEYWORDS, Writer
+from fmu_kit.compiler.emit.c_code import ERRORS, KEYWORDS, Writer, identifier
 from fmu_kit.compiler.trace.statements import Block, Statement
 from fmu_kit.compiler.trace.tracing import Program
 from fmu_kit.variables import Variable
@@ -41,7 +41,8 @@ def fields(program: Program) -> dict[str, str]:
     found: dict[str, str] = {}
     for place in program.places:
         group = GROUPS[None if place.reference is None else program.slave.variables[place.reference].causality]
-        name = re.sub(r"\W+", "_", place.name.removeprefix("self."), flags=re.ASCII)
+        name = identifier(place.name.removeprefix("self."))
+        name = (name.strip("_") or name) if group == "kept" else name
         name = f"_{name}" if name[0].isdigit() else name
         while f"{group}.{name}" in found.values() or keyword.iskeyword(name) or name in KEYWORDS:
             name += "_"
@@ -79,6 +80,7 @@ class _StructWriter(Writer):
     """Writes one function, for a microcontroller."""
 
     always: ClassVar[tuple[str, ...]] = ("m",)
+    first: ClassVar[tuple[str, ...]] = ("q_model *m",)
 
     def __init__(self, function: object, program: Program, places: dict[str, str], words: Words) -> None:
         super().__init__(function, program, places)  # type: ignore[arg-type]
@@ -102,7 +104,7 @@ class _StructWriter(Writer):
             self._line(f"return {number};")
             return
         text = _plain(words)
-        self._line(f"return fail(m, {self.words.status(text)}, {number}); /* {comment(text)} */")
+        self._line(f"return q_fail(m, {self.words.status(text)}, {number}); /* {comment(text)} */")
 
 
 def _plain(words: Iterable[str | tuple[str]]) -> str:

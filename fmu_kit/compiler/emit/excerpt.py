@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from fmu_kit.compiler.runtime import FOLDER
 
-_DOUBLE, _SINGLE = ("lanes.h", "mathematics.h"), ("single.h",)
+_DOUBLE, _SINGLE = ("lanes.h", "mathematics.h", "integers.h"), ("single.h", "integers.h")
 _NAME = re.compile(r"\b(?:[qQ]_\w+|QUADCOSIM_LANES)\b")
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _KNOWN = {"#if QUADCOSIM_LANES == 1": True, "#ifndef QUADCOSIM_LANES": True, "#ifdef QUADCOSIM_LIBM": False}

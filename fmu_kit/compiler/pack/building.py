@@ -37,7 +37,7 @@ from fmu_kit.documentation import Making
 from fmu_kit.model_description import GUID_PLACEHOLDER
 from fmu_kit.packaging import SOURCE_HASH_FILE, described, licences_and_icon, put_guid, slave_class, written
 
-BESIDE = ("instance.h", "lanes.c", "lanes.h", "mathematics.h", "text.h")
+BESIDE = ("instance.h", "integers.h", "lanes.c", "lanes.h", "mathematics.h", "text.h")
 """What lies beside the file to compile, the same for every slave."""
 _NEEDS = FOLDER / "needs.html"
 _PYTHON = "python"

@@ -41,7 +41,7 @@ _MEMCPY = """#include <float.h>
 #include <string.h>
 #endif
 """
-_INCLUDES = {False: _MEMCPY, True: "#include <float.h>\n#include <math.h>\n"}
+_INCLUDES = {False: _MEMCPY, True: "#include <float.h>\n#include <math.h>\n#include <stdint.h>\n"}
 _PRECISION = {
     False: "In double precision, without libm.",
     True: "In single precision, with libm: times are\n   floats too, so let a timer be the clock, not the model.",
@@ -55,7 +55,7 @@ def write(target: Target, folder: Path, *, single: bool = False) -> Path:
     """
     slave = slave_class(target)
     try:
-        program = precomputed(trace(slave, modules_of(target)))
+        program = precomputed(trace(slave, modules_of(target), digits=24 if single else 53))
         header, source = files(program, single=single)
     except TraceError as error:
         raise PackagingError(f"{target.model}: {error}") from error

@@ -51,7 +51,7 @@ class _Differentiation:
             body = _Body(self, f)
             self._made[f] = replace(
                 f,
-                name=f"{f.name}_with_tangents",
+                name=tangent_place(f.name),
                 parameters=(*f.parameters, *(body.tangent_of_parameter(p) for p in f.parameters)),
                 names=(*f.names, *(tangent_place(name) for name in f.names)),
                 body=body.block(f.body),

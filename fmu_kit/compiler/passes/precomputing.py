@@ -102,7 +102,7 @@ class _Precomputing:
 
     def is_worth_it(self, symbol: Symbol) -> bool:
         """Whether a value follows from parameters alone, with more than a few sums and products in it."""
-        return self._kinds.get(id(symbol)) == (True, True)
+        return symbol.kind != "wide" and self._kinds.get(id(symbol)) == (True, True)
 
     def _know(self, symbol: Symbol) -> None:
         """Note whether a value follows from parameters alone, and whether it is costly; of its operands it is noted."""

@@ -13,9 +13,9 @@ $mathematics
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif
 
-typedef $model Instance;
+typedef $model q_model;
 
-Q_ONE int fail(Instance *m, int status, int kind)
+Q_ONE int q_fail(q_model *m, int status, int kind)
 {
     m->status = status;
     return kind;
@@ -24,7 +24,7 @@ Q_ONE int fail(Instance *m, int status, int kind)
 $functions
 /* -- what is called from outside ----------------------------------------------------------------------------------- */
 
-static int refused_input(const Instance *m)
+static int refused_input(const q_model *m)
 {
     (void)m;
 $inputs    return 0;

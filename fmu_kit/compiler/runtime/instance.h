@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "integers.h"
 #include "mathematics.h"
 #include "text.h"
 
@@ -169,7 +170,7 @@ static Status take_start_time(Instance *m, double t)
         return ERROR;
     if (!q_isfinite(t))
         return refuse_number(m, t, bad_start_time);
-    m->state.memory[SELF_START_TIME] = t;
+    m->state.memory[KEPT_START_TIME] = t;
     m->state.time = t;
     return OK;
 }
@@ -187,7 +188,7 @@ static Status exit_initialization(Instance *m)
     int error;
     if (expect(m, EXIT_INITIALIZATION_MODE) != OK)
         return ERROR;
-    if ((error = enter_stepping(m)))
+    if ((error = model_enter_stepping(m)))
         return refuse(m, error);
     m->state.phase = STEPPING;
     return OK;
@@ -199,7 +200,7 @@ static Status advance(Instance *m, double t, double h)
     int error;
     if (expect(m, DO_STEP) != OK)
         return ERROR;
-    if ((error = do_step(m, t, h, &done)))
+    if ((error = model_do_step(m, t, h, &done)))
         return refuse(m, error);
     m->state.time = t + h;
     return OK;
@@ -241,11 +242,11 @@ static int are_of(References vr, size_t n, Type type)
 /* In initialisation mode, compute what is asked for anew if values were set that it has not seen. */
 static int bring_up_to_date(Instance *m, References vr, size_t n)
 {
-    if (m->state.phase != INITIALIZATION || m->state.memory[SELF_STALE] == 0.0)
+    if (m->state.phase != INITIALIZATION || m->state.memory[KEPT_STALE] == 0.0)
         return 0;
     for (size_t i = 0; i < n; i++)
         if (vr[i] >= VARIABLES || !(kinds[vr[i]] & GIVEN))
-            return enter_stepping(m);
+            return model_enter_stepping(m);
     return 0;
 }
 
@@ -258,7 +259,7 @@ static Status settle(Instance *m, unsigned vr, Type type)
     if ((refusal = refused_setting[vr][m->state.phase]))
         return refuse_with(m, refusal, "", "");
     if (!(kinds[vr] & INPUT) || m->state.phase != STEPPING)
-        m->state.memory[SELF_STALE] = 1.0;
+        m->state.memory[KEPT_STALE] = 1.0;
     return OK;
 }
 
@@ -411,7 +412,7 @@ static Status derive(Instance *m, References z, size_t nz, References v, size_t 
         copy.tangents = tangents;
         for (size_t i = 0; i < nv; i++)
             tangents[v[i]] = dv[i];
-        if ((error = enter_stepping_with_tangents(&copy))) {
+        if ((error = tangents_enter_stepping(&copy))) {
             memcpy(m->failure, copy.failure, sizeof m->failure);
             return refuse(m, error);
         }

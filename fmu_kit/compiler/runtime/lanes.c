@@ -16,6 +16,7 @@
 
 #ifdef QUADCOSIM_LANES
 
+#include "integers.h"
 #include "mathematics.h"
 #include "places.h"
 
@@ -89,8 +90,8 @@ void quadcosim_initialise(double *memory, const uint64_t *active, const double *
     q_place *v = (q_place *)memory;
     const q_mask live = lanes_of(active);
     q_real failed = q_all(0.0);
-    v[SELF_START_TIME] = q_select(live, values_of(start_time), v[SELF_START_TIME]);
-    const q_mask through = enter_stepping(v, live, &failed);
+    v[KEPT_START_TIME] = q_select(live, values_of(start_time), v[KEPT_START_TIME]);
+    const q_mask through = model_enter_stepping(v, live, &failed);
     tell_status(active, through, failed, status);
 }
 
@@ -99,7 +100,7 @@ EXPORT void quadcosim_do_step(double *memory, const uint64_t *active, const doub
 void quadcosim_do_step(double *memory, const uint64_t *active, const double *t, const double *h, int32_t *status)
 {
     q_real failed = q_all(0.0), done = q_all(0.0);
-    const q_mask through = do_step((q_place *)memory, lanes_of(active), &failed, values_of(t), values_of(h), &done);
+    const q_mask through = model_do_step((q_place *)memory, lanes_of(active), &failed, values_of(t), values_of(h), &done);
     tell_status(active, through, failed, status);
 }
 

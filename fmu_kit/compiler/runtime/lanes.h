@@ -42,6 +42,8 @@
 #define Q_SELDOM static
 #endif
 
+#define Q_WHOLE ((int64_t)1 << DBL_MANT_DIG) /* whole numbers smaller than it are exact, and so is what rounds to one */
+
 /* -- the square root of one double, without libm --------------------------------------------------------------- */
 
 /* Correctly rounded, as IEEE 754 has it: one instruction where the machine has that. gcc's own function calls libm

@@ -6,6 +6,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <stdint.h>
 
 #if defined(__FAST_MATH__)
 #error "quadcosim: compile without -ffast-math, which makes what is not a number go unnoticed"
@@ -16,6 +17,9 @@
 #undef Q_ONE
 #define Q_ONE static __inline
 #endif
+
+#define QUADCOSIM_LANES 1
+#define Q_WHOLE ((int64_t)1 << FLT_MANT_DIG) /* whole numbers smaller than it are exact, and so is what rounds to one */
 
 typedef float q_real;
 typedef int q_mask;
@@ -34,6 +38,8 @@ typedef struct {
 #define Q_NAN NAN
 
 Q_ONE q_real q_all(float x) { return x; }
+Q_ONE float q_lane(q_real x, int lane) { return (void)lane, x; }
+Q_ONE q_real q_with_lane(q_real x, int lane, float value) { return (void)x, (void)lane, value; }
 Q_ONE q_mask q_known(int holds) { return holds; }
 Q_ONE q_real q_select(q_mask condition, q_real yes, q_real no) { return condition ? yes : no; }
 Q_ONE q_mask q_not(q_mask condition) { return !condition; }

@@ -25,8 +25,9 @@ KEPT_BY_THE_BASE = ("_reals", "_others", "_stale", "_start_time")
 
 
 def name_of_kept(path: Path) -> str:
-    """The name of a place beside the variables."""
-    return ".".join(str(part).lstrip("_") for part in ("self", *path))
+    """The name of a place beside the variables, as a model writes it."""
+    named = [isinstance(part, str) and part.isidentifier() for part in path]
+    return "".join(["self", *(f".{part}" if is_name else f"[{part!r}]" for part, is_name in zip(path, named))])
 
 
 class Memory:

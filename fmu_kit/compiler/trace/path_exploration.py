@@ -6,7 +6,8 @@ other way, until all have been taken; then the paths are merged where they meet 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,6 +18,7 @@ from fmu_kit.compiler.trace.symbols import (
     Piece,
     Symbol,
     TraceError,
+    at_rest,
     common_kind,
     hooks,
     lifted,
@@ -97,8 +99,10 @@ class Recorder:
         """The next statement: an error, if the condition holds."""
         if condition is True:
             raise error
-        if condition is not False:
+        known = self._now.known
+        if condition is not False and known.get(id(condition)) is not False:
             self.add(*branched(truth(condition), (_raise(error),), ()))
+            known[id(condition)] = False
 
     def warn(self, key: str, text: str) -> None:
         """The next statement: a warning, the first time only."""
@@ -191,6 +195,7 @@ class Recorder:
 
     def _leaf(self, value: Any, roots: Any) -> _Leaf:
         view, holders = self.memory.view(roots)
+        value, view = _kept(value), _kept(view)
         return _Leaf(value, view, holders, dict(self.memory.written), self.memory.version)
 
     def _merged(self, tree: _Tree) -> tuple[Block, _Leaf | None]:
@@ -274,17 +279,17 @@ class Recorder:
         held.restore()
         memory.written, memory.version = written, version
         parameters = tuple(lifted(leaf) for _, leaf in leaves(given) if is_number(leaf))
-        return self._kept(name, method, (parameters, tuple(names)), block, len(results)), exit_view, value
+        return self._kept_function(name, method, (parameters, tuple(names)), block, len(results)), exit_view, value
 
-    def _kept(
+    def _kept_function(
         self, name: str, method: Any, head: tuple[tuple[Symbol, ...], tuple[str, ...]], block: Block, results: int
     ) -> Function:
         parameters, names = head
         key = (name, tuple(map(id, parameters)), tuple(map(id, block)))
         if key not in self._by_content:
-            same = sum(each.name.partition("__")[0] == name for each in self.functions)
+            taken = {each.name for each in self.functions}
             made = Function(
-                name=f"{name}__{same + 1}" if same else name,
+                name=next(each for each in _numbered(name) if each not in taken),
                 parameters=parameters,
                 names=names,
                 body=block,
@@ -388,6 +393,18 @@ class _Merge:
             self.then.append(statement("assign", (made, left)))
             self.otherwise.append(statement("assign", (made, right)))
         return made
+
+
+def _numbered(name: str) -> Iterator[str]:
+    """Names of functions that come from one method."""
+    return itertools.chain((name,), (f"{name}__{k}" for k in itertools.count(2)))
+
+
+def _kept(value: Any) -> Any:
+    """A value whose whole numbers can be kept, where there are larger ones in it."""
+    if any(isinstance(leaf, Symbol) and leaf.kind == "wide" for _, leaf in leaves(value)):
+        return mapped(value, lambda _, leaf: at_rest(leaf) if isinstance(leaf, Symbol) else leaf)
+    return value
 
 
 def _with_numbers(state: Any, op: str, kinds: list[Kind], of: Any) -> Any:

@@ -186,7 +186,7 @@ class _Converting(type):
 
     def __instancecheck__(cls, value: Any) -> bool:
         return isinstance(value, getattr(builtins, cls.__name__)) or (
-            isinstance(value, Symbol) and value.kind == cls.kind
+            isinstance(value, Symbol) and value.kind.replace("wide", "int") == cls.kind
         )
 
     def __call__(cls, *args: Any) -> Any:
@@ -199,7 +199,7 @@ class _Converting(type):
             return x if x.kind == "real" else x + 0.0
         if x.kind == "real":
             raise TraceError("int() of a computed float: expected math.floor or math.ceil")
-        return x if x.kind == "int" else x + 0
+        return x + 0 if x.kind == "bool" else x
 
 
 def _refused(name: str, instead: str) -> Callable[..., Any]:

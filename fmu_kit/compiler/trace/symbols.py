@@ -7,12 +7,17 @@ simplified: every one is the operation of Python floats, in their order, so that
 
 from __future__ import annotations
 
+import operator
 import re
 import struct
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Literal, NamedTuple
 
-Kind = Literal["real", "int", "bool"]
+from fmu_kit.compiler.trace import integers
+from fmu_kit.errors import FmuError
+
+Kind = Literal["real", "int", "wide", "bool"]
+"""A whole number is `int` where C can keep it as a real number, and `wide` within an expression, where it is larger"""
 
 
 class TraceError(Exception):
@@ -78,13 +83,30 @@ class Symbol:
         return _checked("pow", other, self)
 
     def __neg__(self) -> Symbol:
-        return node("neg", (self,), _number(self.kind))
+        return node("neg", (self,), "real") if self.kind == "real" else whole_number("neg", self)
 
     def __pos__(self) -> Symbol:
         return self
 
     def __abs__(self) -> Symbol:
-        return node("abs", (self,), _number(self.kind))
+        return node("abs", (self,), "real") if self.kind == "real" else whole_number("abs", self)
+
+    def __lshift__(self, bits: Any) -> Any:
+        return whole_number("mul", self, 1 << _known_bits(self, bits))
+
+    def __rshift__(self, bits: Any) -> Any:
+        return whole_number("floordiv", self, 1 << _known_bits(self, bits))
+
+    def __rlshift__(self, other: Any) -> Any:
+        return other << _known_bits(other, self)
+
+    def __rrshift__(self, other: Any) -> Any:
+        return other >> _known_bits(other, self)
+
+    def __xor__(self, other: Any) -> Any:
+        return _of_bits(lambda a, b: node("ne", (lifted(a), lifted(b)), "bool"), "bit_xor", self, other)
+
+    __rxor__ = __xor__
 
     # -- conditions ----------------------------------------------------------------------------------------
 
@@ -107,19 +129,19 @@ class Symbol:
         return _comparison("ne", self, other)
 
     def __and__(self, other: Any) -> Any:
-        return both(self, other)
+        return _of_bits(both, "bit_and", self, other)
 
     __rand__ = __and__
 
     def __or__(self, other: Any) -> Any:
-        return either(self, other)
+        return _of_bits(either, "bit_or", self, other)
 
     __ror__ = __or__
 
     def __invert__(self) -> Any:
-        if self.kind != "bool":
-            raise TraceError("~ of a number: expected a condition")
-        return negation(self)
+        if self.kind == "real":
+            raise TraceError("~ of a float: expected a condition or an integer")
+        return negation(self) if self.kind == "bool" else -self - 1
 
     def __bool__(self) -> bool:
         return hooks.decide(truth(self))
@@ -185,6 +207,8 @@ class Hooks:
     """how much has been done on this path that fails, warns, or changes what is kept"""
     is_running: Callable[[], bool] = staticmethod(lambda: False)
     """whether a path is being run: code of a slave, and none of ours"""
+    digits: int = 53
+    """of the real numbers that are traced for: whole numbers of so many bits are exact"""
 
 
 hooks = Hooks()
@@ -205,22 +229,28 @@ def node(op: str, args: Sequence[Symbol], kind: Kind, data: Any = None) -> Symbo
 
 def constant(value: float | int | bool) -> Symbol:
     """The node of a known number."""
+    if isinstance(value, int) and not _fits((value, value)):
+        return node("constant", (), "wide", value)
     kind: Kind = "bool" if isinstance(value, bool) else "int" if isinstance(value, int) else "real"
     return node("constant", (), kind, struct.pack("<d", value))
 
 
 def value_of(symbol: Symbol) -> float:
     """The number of a constant."""
-    (value,) = struct.unpack("<d", symbol.data)
-    return float(value)
+    return float(integer_of(symbol) if symbol.kind == "wide" else struct.unpack("<d", symbol.data)[0])
+
+
+def integer_of(symbol: Symbol) -> int:
+    """The whole number of a constant that is no float."""
+    return int(symbol.data if symbol.kind == "wide" else value_of(symbol))
 
 
 def lifted(value: Any) -> Symbol:
-    """A symbol as it is, a number as a constant; raises `TraceError` for what is neither."""
+    """A symbol as it can be kept, a number as a constant; raises `TraceError` for what is neither."""
     if isinstance(value, Symbol):
-        return value
+        return at_rest(value)
     if isinstance(value, bool | int | float):
-        return constant(value)
+        return at_rest(constant(value))
     raise TraceError(f"{type(value).__name__}: expected a number")
 
 
@@ -231,7 +261,8 @@ def is_known(*values: Any) -> bool:
 
 def truth(value: Symbol) -> Symbol:
     """Whether a value counts as true."""
-    return value if value.kind == "bool" else node("ne", (value, constant(0.0)), "bool")
+    value = _as_it_is(value)
+    return value if value.kind == "bool" else node("ne", (value, constant(0 if value.kind == "wide" else 0.0)), "bool")
 
 
 def negation(condition: Any) -> Any:
@@ -280,7 +311,7 @@ def whole(op: Literal["floor", "ceil"], x: Symbol) -> Symbol:
         return x
     hooks.fail_if(node("isnan", (x,), "bool"), raised(lambda: int(float("nan"))))
     hooks.fail_if(node("isinf", (x,), "bool"), raised(lambda: int(float("inf"))))
-    return node(op, (x,), "int")
+    return node(op, (x,), "wide")
 
 
 def raised(call: Callable[[], object]) -> Exception:
@@ -292,31 +323,36 @@ def raised(call: Callable[[], object]) -> Exception:
     raise AssertionError("expected the call to raise")
 
 
-def _number(kind: Kind) -> Kind:
-    return "int" if kind == "bool" else kind
+def _are_integers(*values: Any) -> bool:
+    return not any(isinstance(each, float) or (isinstance(each, Symbol) and each.kind == "real") for each in values)
+
+
+def _beside_a_float(value: Any) -> Symbol:
+    """An operand of an operation of floats: Python makes a float of it first."""
+    return constant(float(value)) if is_known(value) and not isinstance(value, bool) else lifted(_as_it_is(value))
 
 
 def _arithmetic(op: str, a: Any, b: Any) -> Any:
     if not (isinstance(a, Symbol | float | int) and isinstance(b, Symbol | float | int)):
         return NotImplemented
-    left, right = lifted(a), lifted(b)
-    kind: Kind = "real" if "real" in (left.kind, right.kind) else "int"
-    return node(op, (left, right), kind)
+    if _are_integers(a, b):
+        return whole_number(op, a, b)
+    return node(op, (_beside_a_float(a), _beside_a_float(b)), "real")
 
 
 def _checked(op: str, a: Any, b: Any) -> Any:
     """An operation that Python refuses for some operands."""
     if not (isinstance(a, Symbol | float | int) and isinstance(b, Symbol | float | int)):
         return NotImplemented
-    left, right = lifted(a), lifted(b)
-    integers = "real" not in (left.kind, right.kind)
     if op == "pow":
-        if integers and not (right.op == "constant" and value_of(right) >= 0.0):
-            raise TraceError("** of two integers: expected a float among them")
-        return power(left, right, _POWER_ERRORS, "int" if integers else "real")
-    zero: Any = _comparison("eq", right, 0.0)
-    hooks.fail_if(zero, raised((lambda: 1 // 0) if integers else _DIVISIONS[op]))
-    return node(op, (left, right), "int" if integers and op != "div" else "real")
+        if _are_integers(a, b):
+            return _integer_power(a, b)
+        return power(_beside_a_float(a), _beside_a_float(b), _POWER_ERRORS)
+    zero: Any = _comparison("eq", b, 0.0 if not _are_integers(b) else 0)
+    hooks.fail_if(zero, raised((lambda: 1 // 0) if _are_integers(a, b) else _DIVISIONS[op]))
+    if _are_integers(a, b) and op != "div":
+        return whole_number(op, a, b)
+    return node(op, (lifted(a), lifted(b)) if _are_integers(a, b) else (_beside_a_float(a), _beside_a_float(b)), "real")
 
 
 _DIVISIONS: dict[str, Callable[[], object]] = {
@@ -342,7 +378,7 @@ _POWER_ERRORS = PowerErrors(
 )
 
 
-def power(base: Symbol, exponent: Symbol, errors: PowerErrors, kind: Kind = "real") -> Symbol:
+def power(base: Symbol, exponent: Symbol, errors: PowerErrors) -> Symbol:
     """`base` to the power of `exponent`."""
     known = value_of(exponent) if exponent.op == "constant" else None
     if known is None or known < 0.0:
@@ -351,7 +387,7 @@ def power(base: Symbol, exponent: Symbol, errors: PowerErrors, kind: Kind = "rea
     if known is None or not known.is_integer():
         broken: Any = known is not None or node("ne", (exponent, node("floor", (exponent,), "real")), "bool")
         hooks.fail_if(both(base < 0.0, broken), errors.negative)
-    result = node("pow", (base, exponent), kind)
+    result = node("pow", (base, exponent), "real")
     finite = both(
         node("isfinite", (base,), "bool"), True if known is not None else node("isfinite", (exponent,), "bool")
     )
@@ -362,7 +398,137 @@ def power(base: Symbol, exponent: Symbol, errors: PowerErrors, kind: Kind = "rea
 def _comparison(op: str, a: Any, b: Any) -> Any:
     if not (isinstance(a, Symbol | float | int) and isinstance(b, Symbol | float | int)):
         return NotImplemented
-    return node(op, (lifted(a), lifted(b)), "bool")
+    if is_known(a, b):
+        return getattr(operator, op)(a, b)
+    if not _are_integers(a, b):
+        return node(op, (_compared_with_a_float(a), _compared_with_a_float(b)), "bool")
+    left, right = _as_it_is(_operand(a)), _as_it_is(_operand(b))
+    if "wide" in (left.kind, right.kind):
+        left, right = _within_an_expression(left), _within_an_expression(right)
+    return node(op, (left, right), "bool")
+
+
+def _compared_with_a_float(value: Any) -> Symbol:
+    """Python compares an integer with a float as they are: one that is known may be as large as a float can be."""
+    return constant(float(value)) if is_known(value) and float(value) == value else lifted(_as_it_is(value))
+
+
+# -- whole numbers: those at rest are real numbers in C, and exact; between two of them there may be larger ones -----
+
+_spans: dict[int, integers.Span] = {}
+"""of whole numbers that are computed here and now; all others are at rest"""
+
+
+def whole_number(op: str, *values: Any) -> Symbol:
+    """What an operation on whole numbers gives; raises `TraceError` where it is too large even within an expression."""
+    operands = tuple(_within_an_expression(_operand(value)) for value in values)
+    if not _is_within_an_expression(op, operands):
+        operands = tuple(each if each.op == "constant" else at_rest(each) for each in operands)
+    if not _is_within_an_expression(op, operands):
+        raise TraceError(f"an integer of more than {integers.BITS} bits: expected smaller ones, by % in between")
+    span = integers.span_of(op, *map(_span, operands))
+    made = node(op, operands, "int" if _fits(span) else "wide")
+    _spans[id(made)] = span
+    return made
+
+
+def at_rest(symbol: Symbol) -> Symbol:
+    """A symbol as it can be kept; the step fails where it is too large for that."""
+    if symbol.kind != "wide":
+        return symbol
+    if symbol.op == "constant":
+        raise TraceError(f"{symbol.data}: expected {_SMALL.format(hooks.digits)}")
+    if symbol.op in ("mod", "bit_and"):
+        raise TraceError(
+            f"an integer of {integers.size(_span(symbol)).bit_length()} bits: expected {_SMALL.format(hooks.digits)}"
+        )
+    if symbol.op in (*_ROUNDED, "add", "sub", "mul") and all(arg.kind != "wide" for arg in symbol.args):
+        kept = node(symbol.op, symbol.args, "int")  # what rounds to a smaller one has not been rounded
+        too_large = _is_too_large(kept)
+    else:
+        kept = node("narrow", (symbol,), "int")
+        too_large = node("beyond", (symbol,), "bool")
+    hooks.fail_if(too_large, _too_large())
+    return kept
+
+
+def _is_within_an_expression(op: str, operands: Iterable[Symbol]) -> bool:
+    return integers.size(integers.span_of(op, *map(_span, operands))).bit_length() <= integers.BITS
+
+
+_SMALL = "integers smaller than 2**{}, or larger ones only within an expression that ends in % or //"
+
+
+def _too_large() -> Exception:
+    return FmuError(f"an integer is too large for C: expected {_SMALL.format(hooks.digits)}")
+
+
+def _is_too_large(kept: Symbol) -> Symbol:
+    return node("ge", (node("abs", (kept,), "int"), constant(2.0**hooks.digits)), "bool")
+
+
+def _fits(span: integers.Span) -> bool:
+    return bool(integers.size(span) < 2**hooks.digits)
+
+
+_ROUNDED = ("floor", "ceil")
+"""Operations that give whole numbers of any size, which are real numbers in C, and exact."""
+
+
+def _as_it_is(value: Any) -> Any:
+    """What has been rounded, where nothing is computed with it but as with a float."""
+    return node(value.op, value.args, "int") if isinstance(value, Symbol) and value.op in _ROUNDED else value
+
+
+def _within_an_expression(symbol: Symbol) -> Symbol:
+    """An operand of an operation on whole numbers."""
+    return at_rest(node(symbol.op, symbol.args, "wide")) if symbol.op in _ROUNDED else symbol
+
+
+def _operand(value: Any) -> Symbol:
+    return value if isinstance(value, Symbol) else constant(value)
+
+
+def _span(symbol: Symbol) -> integers.Span:
+    if symbol.op == "constant":
+        return integer_of(symbol), integer_of(symbol)
+    if symbol.kind == "bool":
+        return 0, 1
+    most = 2**hooks.digits - 1
+    if symbol.op == "index":
+        return 0, most - 1  # smaller than the count
+    return _spans.get(id(symbol), (-most, most))
+
+
+def _integer_power(base: Any, exponent: Any) -> Any:
+    if not is_known(exponent) or exponent < 0:
+        raise TraceError("** of two integers: expected a float among them, or an exponent that is known")
+    if exponent > integers.BITS:
+        raise TraceError(f"an integer to the power of {exponent}: expected at most {integers.BITS}")
+    result: Any = 1
+    for _ in range(exponent):
+        result = result * base
+    return result
+
+
+def _known_bits(value: Any, bits: Any) -> int:
+    """By how much a whole number is shifted."""
+    if not _are_integers(value, bits):
+        raise TraceError("<< or >> of a float: expected integers")
+    if not is_known(bits):
+        raise TraceError("<< or >> by a computed integer: expected a known one")
+    if bits < 0:
+        raise ValueError("negative shift count")
+    return int(bits)
+
+
+def _of_bits(of_conditions: Callable[[Any, Any], Any], op: str, a: Any, b: Any) -> Any:
+    """&, | or ^: of conditions, or of the bits of whole numbers."""
+    if not _are_integers(a, b) or not isinstance(b, Symbol | int):
+        return NotImplemented
+    if all(isinstance(each, bool) or (isinstance(each, Symbol) and each.kind == "bool") for each in (a, b)):
+        return of_conditions(a, b)
+    return whole_number(op, a, b)
 
 
 def closure(symbols: Iterable[Symbol]) -> dict[int, Symbol]:
@@ -398,6 +564,7 @@ Piece = str | tuple[Symbol, str]
 
 def token(symbol: Symbol, spec: str) -> str:
     """What stands in a text for a value; raises `TraceError` for a format that C does not know."""
+    symbol = at_rest(_as_it_is(symbol))
     known = {"int": r"d?", "real": r"(\.\d+)?g|\.\d+[ef]|", "bool": ""}[symbol.kind]
     if spec != "failure" and not re.fullmatch(known, spec):
         raise TraceError(

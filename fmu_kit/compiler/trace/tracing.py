@@ -24,7 +24,7 @@ from fmu_kit.compiler.trace import symbolic_builtins as stand_ins
 from fmu_kit.compiler.trace.memory import Memory
 from fmu_kit.compiler.trace.path_exploration import Recorder
 from fmu_kit.compiler.trace.statements import Function, Place, Statement
-from fmu_kit.compiler.trace.symbols import Kind, TraceError
+from fmu_kit.compiler.trace.symbols import Kind, TraceError, hooks
 from fmu_kit.failure import place_of
 from fmu_kit.slave import Phase, Slave
 
@@ -56,11 +56,13 @@ class Program:
     """of the memory, after a call, by the one before it and the call"""
 
 
-def trace(slave: type[Slave], modules: list[types.ModuleType]) -> Program:
+def trace(slave: type[Slave], modules: list[types.ModuleType], *, digits: int = 53) -> Program:
     """The program of a slave class that is defined, with all that it uses, in `modules`.
 
+    `digits`: of the real numbers that it will compute with, in bits; whole numbers of so many are exact.
     Raises `TraceError` naming the line that does what cannot be traced.
     """
+    hooks.digits = digits
     kinds: dict[str, Kind] = {}
     while True:
         memory = Memory(slave(instance_name="traced"), kinds)

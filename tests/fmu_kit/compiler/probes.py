@@ -143,7 +143,7 @@ class Arithmetic(Probe):
     def step(self, t: float, h: float) -> None:
         """One of them, by the number n."""
         a, b, n = self.real("a"), self.real("b"), self.count("n")
-        i, k = (math.floor(min(max(x, -1e6), 1e6)) for x in (a, b))  # integers of C are exact up to 2**53
+        i, k = (math.floor(min(max(x, -1e6), 1e6)) for x in (a, b))
         if n == 0:
             self.put("y0", a / b)
         elif n == 1:
@@ -159,7 +159,7 @@ class Arithmetic(Probe):
         elif n == 6:
             self.put("y0", math.asin(a) + math.acos(b))
         elif n == 7:
-            self.put_count("count", math.ceil(b / 1e305) + math.floor(a) % 7)
+            self.put_count("count", math.ceil(b / 1e305) + i % 7)
         elif n == 8:
             self.put("y0", math.pow(a, b))
         elif n == 9:
@@ -176,6 +176,60 @@ class Arithmetic(Probe):
         self.put("y5", a**2 - b**-2.0 if b else a**0.5 if a > 0.0 else -a + +b)
         self.put("y6", float(math.isnan(a / 2.0)) + (a == b) + float(n))
         self.put("y7", (n * n - n // 2) / 4)
+
+
+# -- whole numbers -------------------------------------------------------------------------------------------------
+
+
+def _mixed(x: int) -> int:
+    """Xorshift of 32 bits."""
+    x = (x ^ (x << 13)) & 0xFFFFFFFF
+    x ^= x >> 17
+    return (x ^ (x << 5)) & 0xFFFFFFFF
+
+
+def _larger(x: int, y: int) -> int:
+    return x * x if x > y else x * y
+
+
+class Integers(Probe):
+    """Generators of pseudo-random numbers, and all else that whole numbers may be used for."""
+
+    description = "Integers."
+
+    def initialise(self, t: float) -> None:
+        """What is kept."""
+        self._congruential = 12345
+        self._shifted = 2463534242
+        self._large = 9007199254740991
+        self._seen = 0
+
+    def step(self, t: float, h: float) -> None:
+        """Each in turn."""
+        n, on = self.count("n"), self.boolean("on")
+        self._congruential = (self._congruential * 1103515245 + 12345) % 2147483648
+        self._shifted = _mixed(self._shifted + n)
+        self._seen += 1
+        self._large = (self._large * (self._large - n)) % (9007199254740881 if on else -9007199254740847)
+        self.put("y0", self._congruential / 2147483648)
+        self.put("y1", float(self._shifted))
+        self.put("y2", self._large)
+        self.put("y3", self._small(n, on))
+        self.put(
+            "y4", math.atan2(0.0, -n * (n - 3)) + math.copysign(1.0, (n * 0) * -1.0) + math.copysign(1.0, -(n - n))
+        )
+        self.put("y5", ((self._congruential << 40) // (7 * n + 11) >> 20) + (self._shifted * self._large) // 2**70)
+        self.put("y6", repeat(self.count("times"), lambda i, x: (x * (2**40 + i) + 1) % 1000003, n))
+        self.put_count("count", (_larger(self._shifted >> 8, self._congruential >> 8) + n**3) % 1000)
+        self.put_boolean("lit", (self._large * n > self._shifted * self._large) ^ on)
+        if self.real("a") > 2.0:
+            self.warn_once("a", f"{self._large} and {self._shifted * 2:d}, {-n * 0}, {2**53 - 1 - self._seen}")
+
+    def _small(self, n: int, on: bool) -> int:
+        """Of few bits."""
+        return (
+            (n & 5) + 10 * (n | 8) + 100 * (n ^ -3) + 1000 * ~n + 10000 * (n >> 1) + abs(n << 3) + (on & n) + (on ^ 1)
+        )
 
 
 # -- choices -------------------------------------------------------------------------------------------------------

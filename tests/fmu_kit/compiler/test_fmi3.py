@@ -1,7 +1,6 @@
 """Native FMUs of FMI 3.0: they say, answer and fly what those of FMI 2.0 do."""
 
 import ctypes
-import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,8 +13,6 @@ from fmpy.model_description import ModelDescription
 from fmpy.validation import validate_fmu
 
 import quadcosim
-from fmu_kit.compiler import runtime
-from fmu_kit.compiler.emit import c_code
 from orchestration.building import fmus
 from orchestration.quadrotor.scenario import Scenario
 from tests.commands import Main
@@ -28,7 +25,6 @@ from tests.native import assert_the_same
 START = 0.5
 """[s]"""
 TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
-SOURCES = runtime.FOLDER
 
 
 def read(name: str) -> ModelDescription:
@@ -220,16 +216,3 @@ def test_the_whole_life_of_an_instance_is_clean_for_the_sanitizers(tmp_path: Pat
 
 def test_the_command_has_none_with_python_inside(main: Main) -> None:
     assert "--fmi 3: expected --native with it" in main("build", "--fmi", "3", code=2).stderr
-
-
-def test_no_function_of_a_model_takes_the_name_of_one_that_is_there() -> None:
-    defined = {
-        name
-        for source in ("instance.h", "fmi2.c", "fmi3.c")
-        for name in re.findall(
-            r"^(?:static|Q_ONE) \w+ \*?(\w+)\(", (SOURCES / source).read_text(encoding="utf-8"), flags=re.MULTILINE
-        )
-    }
-    macros = {f"{action}_{kind}" for action in ("get", "set") for kind in ("reals", "integers", "booleans")}
-    assert len(defined) > 30
-    assert {name for name in defined | macros if c_code.c_name(name) == name} == set()

@@ -24,7 +24,7 @@ from tests.fmu_kit.compiler.compiled import compiler
 from tests.fmu_kit.compiler.in_lanes import Alone, Together, Values, bits
 from tests.fmu_kit.compiler.twins import GUID
 
-PROBES = {"Arithmetic": 4, "Branches": 8, "Kept": 4, "Loops": 4, "Memory": 1}
+PROBES = {"Arithmetic": 4, "Branches": 8, "Integers": 8, "Kept": 4, "Loops": 4, "Memory": 1}
 """Slaves that do what slaves may do, and in how many lanes"""
 FMU_ERROR, DIVERGENCE = (1 + ERRORS.index(name) for name in ("FmuError", "DivergenceError"))
 STRANGE = (0.0, -0.0, 1.0, -1.0, 3.0, 1e3, 1e200, -1e308)

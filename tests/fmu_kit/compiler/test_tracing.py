@@ -11,7 +11,7 @@ from fmu_kit.packaging import slave_class
 from tests.fmu_kit.compiler.compiled import compiler
 from tests.fmu_kit.compiler.twins import InC, InPython, Values, answers, library
 
-PROBES = ("Branches", "Arithmetic", "Choices", "Memory", "Kept", "Below", "Loops", "Words")
+PROBES = ("Branches", "Arithmetic", "Integers", "Choices", "Memory", "Kept", "Below", "Loops", "Words")
 NUMBERS = st.sampled_from([0.0, -0.0, 0.5, 1.0, -1.0, 2.0, 3.0, 7.25, 100.0, 1e3, 1e200, -1e308]) | st.floats(-8.0, 8.0)
 INPUTS = st.fixed_dictionaries({"a": NUMBERS, "b": NUMBERS, "n": st.integers(-3, 12), "on": st.booleans()})
 CHANGED = {"p": st.sampled_from([0.0, 2.0, -7.5, 13.0, 60.0, 200.0]), "mode": st.sampled_from([1, 2, 3, 0, 4])}

@@ -1,0 +1,128 @@
+"""Whatever a slave calls what it has, it can be written out as C: everything there has a prefix."""
+
+import importlib
+import itertools
+import keyword
+import re
+from pathlib import Path
+
+import pytest
+
+from fmu_kit.bundle import Target
+from fmu_kit.compiler.emit.c_code import KEYWORDS
+from fmu_kit.compiler.emit.standards import STANDARDS
+from fmu_kit.compiler.pack.building import c_sources, modules_of
+from fmu_kit.compiler.pack.c_compiler import compiled_here
+from fmu_kit.compiler.pack.embedded import write
+from fmu_kit.compiler.pack.lanes import compiled_lanes
+from fmu_kit.compiler.runtime import FOLDER
+from fmu_kit.compiler.trace.tracing import trace
+from fmu_kit.packaging import slave_class
+from fmu_kit.slave import _OF_PYTHONFMU, Slave
+from tests.fmu_kit.compiler.compiled import compiler
+from tests.fmu_kit.compiler.embedded import _succeeds, made
+from tests.fmu_kit.compiler.probes import Kept
+from tests.fmu_kit.compiler.twins import GUID, InC, InPython, answers, library
+
+FILES = ("instance.h", "fmi2.c", "fmi3.c", "lanes.c", "embedded.c", "embedded.h")
+HERE = {
+    name
+    for file in FILES
+    for name in re.findall(r"^\w.*?\b([A-Za-z]\w*)(?=\(|;)", (FOLDER / file).read_text("utf-8"), re.MULTILINE)
+}
+ELSEWHERE = {
+    "errno",
+    "stdin",
+    "signal",
+    "time",
+    "div",
+    "abs",
+    "exit",
+    "random",
+    "system",
+    "free",
+    "input",
+    "y0",
+    "real",
+}
+PERVERSE = {
+    "größe",
+    "step_with_tangents",
+    "x1",
+    "p_x1",
+    "KEPT_STALE",
+    "AT_error",
+    "values_of",
+    "error",
+    "model",
+    "warning",
+}
+OF_A_SLAVE = {name.lstrip("_") for name in (*dir(Kept(instance_name="kept")), *Slave.__annotations__, *_OF_PYTHONFMU)}
+NAMES = sorted(name for name in HERE | ELSEWHERE | PERVERSE | KEYWORDS if not keyword.iskeyword(name))
+NAMES = [name for name in NAMES if name not in OF_A_SLAVE and not hasattr(Slave, name)]
+SLAVE = """\
+from fmu_kit.interface import Input, Output, Parameter
+from fmu_kit.slave import Slave
+
+
+class {model}(Slave):
+    \"\"\"Names.\"\"\"
+
+{declared}
+    failed = Input("A number.", None, 1.0)
+    real = Parameter("A number.", None, 2.0)
+    sum_of_all = Output("A number.", None)
+
+    def initialise(self, t):
+{initialised}
+
+{methods}
+    def step(self, t, h):
+        total = self.failed + self.real
+{called}
+        self.sum_of_all = total
+"""
+
+
+def named(model: str, names: list[str]) -> str:
+    """A slave whose variables, methods, their parameters, and what it keeps, have these names."""
+    kinds = itertools.cycle(("Input", "Parameter", "Output"))
+    lines = {
+        "declared": [f'    {name} = {next(kinds)}("A number.", None, {k}.5)' for k, name in enumerate(names)],
+        "initialised": [f"        self._{name}_ = {k}.0" for k, name in enumerate(names)],
+        "methods": [
+            f"    def _{name}(self, {name}):\n        self._{name}_ += {name}\n        return self._{name}_\n"
+            for name in names
+        ],
+        "called": [f"        total += 2.0 * total + self._{name}(self.{name})" for name in names],
+    }
+    return SLAVE.format(model=model, **{key: "\n".join(value) for key, value in lines.items()})
+
+
+@pytest.fixture
+def target(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Target:
+    """A slave in which everything is called as something in C."""
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "names_of_c.py").write_text(named("Instance", NAMES), "utf-8")
+    importlib.invalidate_caches()
+    return Target("names_of_c", "Instance", tmp_path)
+
+
+def test_a_slave_may_call_its_own_what_it_likes(target: Target, tmp_path: Path) -> None:
+    compiler("cc")
+    assert len(NAMES) > 140
+    cls = slave_class(target)
+    sources = c_sources(trace(cls, modules_of(target)), GUID, STANDARDS[3])
+    assert compiled_here(sources, STANDARDS[3].main)
+    assert compiled_lanes(sources, 2)
+    expected = answers(InPython(cls(instance_name="names")), {}, [{}] * 3)
+    assert answers(InC.made(cls, library(target, tmp_path)), {}, [{}] * 3) == expected
+
+
+def test_so_it_may_for_a_microcontroller(target: Target, tmp_path: Path) -> None:
+    for single in (False, True):
+        source = write(target, tmp_path, single=single)
+        assert made(source, "cc", "-O0").is_file()
+    seen = tmp_path / "seen.cpp"
+    seen.write_text(f'#include <cmath>\n#include <cstdio>\n#include "{source.stem}.h"\n')
+    _succeeds([compiler("g++"), "-fsyntax-only", str(seen)])
