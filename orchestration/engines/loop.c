@@ -1,6 +1,6 @@
 /* The master's loop over instants, as orchestration/engines/master.py has it, to the bit: it steps FMUs through the
    arrays of a schedule and records rows and events. All memory is Python's, which also begins and ends a run, and says
-   what has failed in its own words. Structures are those of compiled_structures.py, field by field. */
+   what has failed in its own words. Structures are those of structures.py, field by field. */
 
 #include <fenv.h>
 #include <math.h>
