@@ -28,6 +28,18 @@ class SimulatorError(QuadcosimError):
         """The FMU's own traceback, for `--debug`."""
 
 
+class StoppedStepError(SimulatorError):
+    """An FMU has not simply done a step: it ends the run (`ends`), or has discarded the step.
+
+    `whole` if it has come to the end of the step nevertheless.
+    """
+
+    def __init__(self, text: str, *, ends: bool = False, whole: bool = False, details: str = "") -> None:
+        super().__init__(text, details=details)
+        self.ends = ends
+        self.whole = whole
+
+
 class RefusedValueError(SimulatorError, UsageError):
     """An FMU refused a value that the request sets; the text is the FMU's own, after the side it is on."""
 

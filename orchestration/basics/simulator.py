@@ -28,7 +28,10 @@ class Simulator(Protocol):
         """End initialisation; from here on the simulator can be stepped."""
 
     def step(self, t: float, h: float) -> None:
-        """Advance from `t` to `t + h` seconds with the inputs held."""
+        """Advance from `t` to `t + h` seconds with the inputs held.
+
+        Raises `StoppedStepError` for a model that ends the run, or discards the step.
+        """
 
     def save(self) -> bytes:
         """The whole state, serialised."""

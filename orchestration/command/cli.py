@@ -311,6 +311,8 @@ def _metrics(result: "Result") -> Answer:
         lines.append(f"diverged: {result.divergence}")
     if (missed := unmet(result.system, result.metrics, result.units)) is not None:
         lines.append(f"not good: {missed}")
+    if result.termination is not None:
+        lines.append(f"terminated: {result.termination}")
     return Answer(document=found, lines=lines)
 
 

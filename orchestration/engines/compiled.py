@@ -17,7 +17,7 @@ from orchestration.engines import structures as c
 from orchestration.engines.board import Board
 from orchestration.engines.condition import Step
 from orchestration.engines.loop import library
-from orchestration.engines.master import Diverged, Master
+from orchestration.engines.master import Diverged, Master, Terminated
 from orchestration.engines.memory import Memory
 from orchestration.engines.room import EVENTS, ROWS, Room, loop_in, private
 from orchestration.engines.sources import Values
@@ -31,7 +31,7 @@ from orchestration.system.times import NANOSECONDS
 
 SLICE = 0.05
 """[s] that C may be away for, about"""
-AT_END, FULL, PAUSED, FAILED, REFUSED, EARLY, NOT_FINITE, DIVERGED = range(8)
+AT_END, FULL, PAUSED, FAILED, REFUSED, STOPPED, OVER, NOT_FINITE, DIVERGED = range(9)
 """Why it comes back"""
 _EXACT = 2**53
 """Up to here a float holds every whole number"""
@@ -101,6 +101,7 @@ class CompiledMaster(Master):
             "row_limit": len(self._row_table),
             "event_limit": self._most_events,
             "look": c.Look(self._look_for_c),
+            "stopped": c.Stopped(self._stopped_for_c),
             "collect": c.Collect(lambda index: memory.instances[index].collect_warnings()),
             "calling": -1,
         }
@@ -124,8 +125,8 @@ class CompiledMaster(Master):
                     self._take_back()
                 if over is not None:
                     return over
-        except (Diverged, SimulatorError) as error:
-            self._diverged(error)
+        except (Diverged, Terminated, SimulatorError) as error:
+            self._ended(error)
         if progress is not None:
             progress(1.0)
         return True
@@ -168,18 +169,17 @@ class CompiledMaster(Master):
     def _fail(self, code: int) -> None:
         """Raise what C has come back with."""
         index, part = self._loop.component, self._loop.failed
-        instance = self._memory.instances[index]
-        function, transfer = self._memory.calls[ctypes.addressof(part.contents)] if part else ("", None)
-        if code == FAILED:
-            raise instance.failure(function or f"fmi{instance.model.version}DoStep")
-        if code == REFUSED and transfer is not None:
+        if code in (FAILED, REFUSED):
+            function, transfer = self._memory.calls[ctypes.addressof(part.contents)]
+            if code == FAILED:
+                raise self._memory.instances[index].failure(function)
             transfer()
-        elif code == EARLY:
-            instance.expect_whole_step(self._loop.end)
         elif code == NOT_FINITE:
             worked = self._bodies[index] if index in self._bodies else self._tasks[index]
             worked.expect_finite(self.now / NANOSECONDS)
-        elif self._failure is not None:
+        elif code == OVER:
+            raise Terminated(self.termination)
+        elif self._failure is not None:  # of what C has called in Python
             raise self._failure
         raise AssertionError(f"the compiled loop has ended with {code}, and Python sees no reason")
 
@@ -187,6 +187,15 @@ class CompiledMaster(Master):
         """Whether the run has diverged; no exception goes through C."""
         try:
             self._look(t)
+        except BaseException as error:
+            self._failure = error
+            return 1
+        return 0
+
+    def _stopped_for_c(self, status: int, until: int) -> int:
+        """Whether a step to `until` [ns] that was not simply done is not whole either; no exception goes through C."""
+        try:
+            self._stopped(self._memory.instances[self._loop.component].step_error(status, self._loop.end), until)
         except BaseException as error:
             self._failure = error
             return 1

@@ -14,7 +14,7 @@
 #define NANOSECONDS 1e9
 #define WARNING 1 /* the worst status of a call that was done */
 
-enum { AT_END, FULL, PAUSED, FAILED, REFUSED, EARLY, NOT_FINITE, DIVERGED };
+enum { AT_END, FULL, PAUSED, FAILED, REFUSED, STOPPED, OVER, NOT_FINITE, DIVERGED };
 enum { SAMPLED, SENT, ARRIVED, LOST };
 enum { FLOAT64, FLOAT32, INT8, UINT8, INT16, UINT16, INT32, UINT32, INT64, UINT64, BOOLEAN8, BOOLEAN32 };
 
@@ -111,7 +111,9 @@ typedef struct {
     const Part *failed;
     int64_t component; /* that failed, or whose output is not finite */
     double end;        /* of its step [s] */
+    int64_t is_over;   /* with this instant: an FMU ends the run */
     int (*look)(double t);
+    int (*stopped)(int status, int64_t until); /* whether a step that was not simply done leaves the instant undone */
     void (*collect)(int64_t component);
     const Operation *condition; /* NULL: ask `look` each time */
     int64_t condition_length;
@@ -362,16 +364,23 @@ static void note_sending(Loop *loop, const Message *message) {
 
 /* -- components --------------------------------------------------------------------------------------------------- */
 
-static int step(Loop *loop, int64_t index, double t, double h) {
+static int step(Loop *loop, int64_t index, double t, double h, int64_t until) {
     Component *c = &loop->components[index];
-    loop->component = index, loop->failed = NULL, loop->end = t + h;
+    int status, is_done;
+    loop->component = index, loop->end = t + h;
     loop->calling = index;
-    int status = c->version == 3
-        ? ((Step3 *)c->step)(c->fmu, t, h, true, c->event, c->ends, c->early, c->reached)
-        : ((Step2 *)c->step)(c->fmu, t, h, 1);
+    if (c->version == 3) {
+        status = ((Step3 *)c->step)(c->fmu, t, h, true, c->event, c->ends, c->early, c->reached);
+        is_done = status <= WARNING && !*c->event && !*c->ends && !*c->early;
+    } else {
+        status = ((Step2 *)c->step)(c->fmu, t, h, 1);
+        is_done = status <= WARNING;
+    }
     called(loop, index);
-    if (status > WARNING) return FAILED;
-    if (c->version == 3 && (*c->event || *c->ends || *c->early)) return EARLY;
+    if (!is_done) {
+        if (loop->stopped(status, until)) return STOPPED;
+        loop->is_over = 1;
+    }
     if (*c->heard) loop->collect(index);
     return 0;
 }
@@ -398,7 +407,8 @@ static int step_bodies(Loop *loop, int64_t time) {
         if (time == start) continue;
         if ((code = pass_on_each(loop, &body->ahead))) return code;
         body->now = time;
-        if ((code = step(loop, index, (double)start / NANOSECONDS, (double)(time - start) / NANOSECONDS))) return code;
+        double begin = (double)start / NANOSECONDS, length = (double)(time - start) / NANOSECONDS;
+        if ((code = step(loop, index, begin, length, time))) return code;
         loop->steps++;
         if ((code = read_outputs(loop, index))) return code;
         moved = 1;
@@ -414,7 +424,7 @@ static int step_task(Loop *loop, int64_t index, int64_t time, int64_t end) {
     Component *task = &loop->components[index];
     int64_t until = end < loop->stop ? end : loop->stop;
     double start = (double)time / NANOSECONDS, length = (double)(until - time) / NANOSECONDS;
-    int code = step(loop, index, task->ratio * start, task->ratio * length);
+    int code = step(loop, index, task->ratio * start, task->ratio * length, until);
     return code ? code : read_outputs(loop, index);
 }
 
@@ -537,6 +547,7 @@ __attribute__((visibility("default"))) int fly(Loop *loop, int64_t until) {
         if (code) return code;
         record(loop, time);
         loop->at++;
+        if (loop->is_over) return OVER;
         if (time >= loop->pause_at && time < loop->stop) return PAUSED;
         if (loop->row_count >= loop->row_limit || loop->event_count >= loop->event_limit) return FULL;
     }

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from orchestration.basics.errors import SimulatorError
+from orchestration.basics.errors import SimulatorError, StoppedStepError
 from orchestration.basics.simulator import Floats, Integers, Simulator, Transfer
 from orchestration.engines.board import Board
 from orchestration.engines.channel import Channel
@@ -104,6 +104,7 @@ class Master:
         self.interrupted_at: int | None = None
         self.divergence: str | None = None
         self.divergence_time: int | None = None
+        self.termination: str | None = None
         self.steps = 0
         self.now = 0
         self._system, self._simulators, self._stop = system, simulators, timetable.stop
@@ -138,12 +139,12 @@ class Master:
         try:
             self._exchange_first()
         except (Diverged, SimulatorError) as error:
-            self._diverged(error)
+            self._ended(error)
 
     def run(self, *, pause_at: int | None = None, progress: Callable[[float], None] | None = None) -> bool:
-        """Run to the end, to divergence or to the first instant from `pause_at` [ns]; whether it is over.
+        """Run to the end or to the first instant from `pause_at` [ns]; whether it is over.
 
-        So it is at the first instant after an interruption, but not at its end.
+        The end may be divergence, or an FMU's. A run is over at the first instant after an interruption too.
         """
         over = self.divergence is not None or self._run(pause_at, progress)
         if over and (self._is_pending() or not self._handed_over):
@@ -174,6 +175,8 @@ class Master:
                     self._events += self._arrived
                     self._arrived.clear()
                 self._record(time)
+                if self.termination is not None:
+                    raise Terminated(self.termination)
                 if self._interrupted() and time < stop:
                     self.interrupted_at = time
                     self._drop_later_events()
@@ -183,8 +186,8 @@ class Master:
                 count += 1
                 if progress is not None and count % 512 == 0:
                     progress(time / stop)
-        except (Diverged, SimulatorError) as error:
-            self._diverged(error)
+        except (Diverged, Terminated, SimulatorError) as error:
+            self._ended(error)
         if progress is not None:
             progress(1.0)
         return True
@@ -247,13 +250,27 @@ class Master:
             for channel in body.ahead:
                 channel.pass_on()
             body.now = time
-            body.step(start / NANOSECONDS, (time - start) / NANOSECONDS)
+            try:
+                body.step(start / NANOSECONDS, (time - start) / NANOSECONDS)
+            except SimulatorError as error:
+                self._stopped(error, time)
             self.steps += 1
             body.read()
             body.expect_finite(t)
             moved = True
         if moved:
             self._look(t)
+
+    def _stopped(self, error: SimulatorError, until: int) -> None:
+        """A step to `until` [ns] was not simply done: raise what that is, unless it was whole and ends the run.
+
+        Then the instant is gone through, and is the last one. So is that of a discarded step at the end of the run.
+        """
+        if not isinstance(error, StoppedStepError) or not (error.ends or until == self._stop):
+            raise error
+        if not error.whole:
+            raise Terminated(str(error))
+        self.termination = self.termination or str(error)
 
     def _look(self, t: float) -> None:
         complaint = self._watch(t)
@@ -305,8 +322,11 @@ class Master:
         self._send(due.sent, time)
 
     def _step_task(self, task: _Task, time: int, end: int) -> None:
-        start = time / NANOSECONDS
-        task.step(task.ratio * start, task.ratio * ((min(end, self._stop) - time) / NANOSECONDS))
+        start, until = time / NANOSECONDS, min(end, self._stop)
+        try:
+            task.step(task.ratio * start, task.ratio * ((until - time) / NANOSECONDS))
+        except SimulatorError as error:
+            self._stopped(error, until)
         task.read()
         task.expect_finite(start)
 
@@ -370,11 +390,14 @@ class Master:
         past = table[:, 0] <= self.now
         return (table, table[:0]) if past.all() else (table[past], table[~past])
 
-    def _diverged(self, error: Exception) -> None:
-        """Take divergence as the end of the run; any other failure of an FMU is raised."""
-        if isinstance(error, SimulatorError) and not error.divergence:
+    def _ended(self, error: Exception) -> None:
+        """Take divergence, or an FMU that ends the run, as its end; any other failure of an FMU is raised."""
+        if isinstance(error, Terminated):
+            self.termination = str(error)
+        elif isinstance(error, SimulatorError) and not error.divergence:
             raise error
-        self.divergence, self.divergence_time = str(error), self.now
+        else:
+            self.divergence, self.divergence_time, self.termination = str(error), self.now, None
         self._drop_later_events()
         if not len(self._pending_rows()) and not self._handed_over:
             self._record(self.now)
@@ -526,3 +549,7 @@ def _expect_finite(names: Sequence[str], values: Sequence[float], t: float) -> N
 
 class Diverged(Exception):
     """The loop has left the region that counts as running."""
+
+
+class Terminated(Exception):
+    """An FMU has ended the run."""

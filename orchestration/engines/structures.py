@@ -86,6 +86,7 @@ class Operation(Structure):
 
 
 Look: Any = ctypes.CFUNCTYPE(ctypes.c_int, c_double)
+Stopped: Any = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_int, c_int64)
 Collect: Any = ctypes.CFUNCTYPE(None, c_int64)
 
 
@@ -99,8 +100,8 @@ class Loop(Structure):
         ("row_count", c_int64), ("row_limit", c_int64), ("events", c_void_p), ("arrived", c_void_p),
         ("event_count", c_int64), ("event_limit", c_int64), ("arrived_count", c_int64), ("at", c_int64),
         ("steps", c_int64), ("now", c_int64), ("failed", POINTER(Part)), ("component", c_int64), ("end", c_double),
-        ("look", Look), ("collect", Collect), ("condition", POINTER(Operation)), ("condition_length", c_int64),
-        ("watched", c_void_p),
+        ("is_over", c_int64), ("look", Look), ("stopped", Stopped), ("collect", Collect),
+        ("condition", POINTER(Operation)), ("condition_length", c_int64), ("watched", c_void_p),
         ("watched_size", c_int64), ("calling", c_int64), ("mode", c_int64), ("environment", c_void_p),
     ]  # fmt: skip
 

@@ -1,12 +1,14 @@
 """An instance of an FMI 2.0 FMU for co-simulation."""
 
+import ctypes
+import math
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 from fmpy import fmi2
 
-from orchestration.basics.errors import UsageError
+from orchestration.basics.errors import SimulatorError, UsageError
 from orchestration.fmi.messages import WARNING, collecting_callbacks
 from orchestration.fmi.native import NativeInstance
 
@@ -39,10 +41,21 @@ class Fmi2Instance(NativeInstance):
 
     def step(self, t: float, h: float) -> None:
         """Advance from `t` to `t + h` seconds."""
-        if self._do_step(self._component, t, h, True) > WARNING:
-            raise self.failure("fmi2DoStep")
+        status = self._do_step(self._component, t, h, True)
+        if status > WARNING:
+            raise self.step_error(status, t + h)
         if self._messages:
             self.collect_warnings()
+
+    def step_error(self, status: int, end: float) -> SimulatorError:
+        """As `NativeInstance`; an FMU that has discarded a step is asked whether that ends the run."""
+        if status != fmi2.fmi2Discard:
+            return self.failure("fmi2DoStep")
+        ends, reached = fmi2.fmi2Boolean(), fmi2.fmi2Real(math.nan)
+        dll, known = self._fmu.dll, (fmi2.fmi2Terminated, fmi2.fmi2LastSuccessfulTime)
+        dll.fmi2GetBooleanStatus(self._component, known[0], ctypes.byref(ends))
+        dll.fmi2GetRealStatus(self._component, known[1], ctypes.byref(reached))
+        return self._stopped_step("fmi2DoStep", end, reached=reached.value, ends=bool(ends))
 
     def _access(self, action: str, type: str) -> str:
         return f"fmi2{action}{'Integer' if type == 'Enumeration' else type}"

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from fmpy import fmi3
 
-from orchestration.basics.errors import UsageError
+from orchestration.basics.errors import SimulatorError, UsageError
 from orchestration.fmi.messages import WARNING
 from orchestration.fmi.native import NativeInstance
 from orchestration.fmi.values import INTEGERS
@@ -56,18 +56,21 @@ class Fmi3Instance(NativeInstance):
 
     def step(self, t: float, h: float) -> None:
         """Advance from `t` to `t + h` seconds."""
-        if self._do_step(self._component, t, h, True, *self._said) > WARNING:
-            raise self.failure("fmi3DoStep")
-        if self._event or self._ends or self._early:
-            self.expect_whole_step(t + h)
+        status = self._do_step(self._component, t, h, True, *self._said)
+        if status > WARNING or self._event or self._ends or self._early:
+            raise self.step_error(status, t + h)
         if self._messages:
             self.collect_warnings()
 
-    def expect_whole_step(self, end: float) -> None:
-        """Raise `SimulatorError` if the last step did not come to `end` [s]."""
-        what = "ends the run" if self._ends else "asks for event mode" if self._event else "returns early"
-        if self._ends.value or self._event.value or self._early.value:
-            raise self.failure("fmi3DoStep", f"the FMU {what} at {self._reached.value:g} s, before {end:g} s")
+    def step_error(self, status: int, end: float) -> SimulatorError:
+        """As `NativeInstance`."""
+        if status > fmi3.fmi3Discard:
+            return self.failure("fmi3DoStep")
+        reached = self._reached.value
+        if self._ends or status == fmi3.fmi3Discard:
+            return self._stopped_step("fmi3DoStep", end, reached=reached, ends=self._ends.value)
+        what = "asks for event mode" if self._event else "returns early"
+        return self.failure("fmi3DoStep", f"the FMU {what} at {reached:g} s, before {end:g} s")
 
     def _access(self, action: str, type: str) -> str:
         return f"fmi3{action}{'Int64' if type == 'Enumeration' else type}"

@@ -24,6 +24,8 @@ class Instance(Simulator, Protocol):
     """what the FMU has warned of since it was instantiated or reset, and parameters that it has not kept"""
     failed: bool
     """Whether a call has failed: the instance is then never called again."""
+    stopped: bool
+    """Whether it has ended a run or discarded a step: it is then for no other run, whatever a reset would do."""
 
     def set(self, name: str, value: Value) -> None:
         """Set one variable before initialisation; raises `UsageError` for a value it cannot take."""

@@ -16,7 +16,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from orchestration.basics.errors import SimulatorError
+from orchestration.basics.errors import SimulatorError, StoppedStepError
 from orchestration.basics.simulator import Floats, Transfer
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.model import read_model
@@ -40,7 +40,7 @@ class IsolatedInstance(Instance):
         self.name = instance_name
         self.model = read_model(path)
         self.warnings: list[str] = []
-        self.failed = False
+        self.failed = self.stopped = False
         self._waiting: list[Command] = []  # writes
         self._values: list[Floats] = []  # of each reader
         self._fresh = False  # whether these are the values of now
@@ -154,6 +154,7 @@ class IsolatedInstance(Instance):
             self.failed = True
             raise
         if error is not None:
+            self.stopped |= isinstance(error, StoppedStepError)
             raise error
         return result
 

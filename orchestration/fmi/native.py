@@ -4,6 +4,7 @@ Every array of a step is allocated once, and every argument of a transfer is mad
 """
 
 import ctypes
+import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ import numpy.typing as npt
 from fmpy.fmi1 import FMICallException
 
 from orchestration.basics import scratch
-from orchestration.basics.errors import QuadcosimError, RefusedValueError, SimulatorError, UsageError
+from orchestration.basics.errors import QuadcosimError, RefusedValueError, SimulatorError, StoppedStepError, UsageError
 from orchestration.basics.scratch import Scratch
 from orchestration.basics.simulator import Floats, Transfer
 from orchestration.fmi import pythonfmu
@@ -28,6 +29,8 @@ from orchestration.fmi.surroundings import FOLDER, ROUNDING, Surroundings, sente
 from orchestration.fmi.values import Value, number_of, same, taken
 
 DIVERGENCE_CATEGORY = b"divergence"
+_AT_END = 1e-9
+"""Relative and in seconds: what an FMU that adds up its steps may miss the end of one by"""
 
 Numbers = npt.NDArray[Any]
 
@@ -68,7 +71,7 @@ class NativeInstance(Instance):
         self.path = path
         self.name = instance_name
         self.warnings: list[str] = []
-        self.failed = False
+        self.failed = self.stopped = False
         self._messages = Messages()
         self._given: dict[str, Value] = {}  # until initialisation ends, as then the FMU has taken all of it
         self._arrays: dict[int, Numbers] = {}  # what was last set of arrays, by reference: a call sets a whole one
@@ -116,6 +119,10 @@ class NativeInstance(Instance):
     @abstractmethod
     def _enter(self, start: float, stop: float) -> None:
         """Into initialisation mode."""
+
+    @abstractmethod
+    def step_error(self, status: int, end: float) -> SimulatorError:
+        """What the last step, to `end` [s], has come to that was not simply done; `status` is what the call gave."""
 
     @abstractmethod
     def _access(self, action: str, type: str) -> str:
@@ -422,6 +429,18 @@ class NativeInstance(Instance):
         return SimulatorError(
             f"{self.name} ({self.model.name}): {function}: {summary}", divergence=bool(diverged), details=details
         )
+
+    def _stopped_step(self, function: str, end: float, *, reached: float, ends: bool) -> StoppedStepError:
+        """The error for a step to `end` [s] of an FMU that has come to `reached` [s] and does not go on."""
+        self.stopped = True
+        at = f" at {reached:g} s" if math.isfinite(reached) else ""
+        what = f"ends the run{at}" if ends else f"discards the step to {end:g} s"
+        summary, details = words(self._messages, "")
+        self.collect_warnings()
+        return StoppedStepError(
+            f"{self.name} ({self.model.name}): {function}: {what}" + (f": {summary}" if summary else ""),
+            ends=ends, whole=math.isclose(reached, end, rel_tol=_AT_END, abs_tol=_AT_END), details=details,
+        )  # fmt: skip
 
     def _names_what_was_given(self, text: str) -> bool:
         """Whether the message `NAME = VALUE: expected …` is about a variable, or a vector of one, that was set."""

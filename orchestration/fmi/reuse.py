@@ -15,7 +15,7 @@ class Instances:
     """Gives an instance for each run: one that was there before, reset, or else a fresh one.
 
     It keeps one instance of each FMU and name if a run after a reset is the run of a fresh instance, to the bit;
-    one that has failed is left and made anew.
+    one that has failed, or ended its run, is left and made anew.
     """
 
     def __init__(self) -> None:
@@ -33,7 +33,7 @@ class Instances:
         try:
             yield instance
         finally:
-            if instance.failed or not repeatability.of(path).reset:
+            if instance.failed or instance.stopped or not repeatability.of(path).reset:
                 instance.close()
             else:
                 self._kept[key] = instance

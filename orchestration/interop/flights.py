@@ -112,8 +112,9 @@ class Flights:
                 flight.master.initialise()
                 flight.master.run()
                 result = flight.result()
-            if result.divergence is not None:
-                raise QuadcosimError(f"in this project's master, {order}: {result.divergence}; nothing to compare")
+            ended = result.divergence or result.termination
+            if ended is not None:
+                raise QuadcosimError(f"in this project's master, {order}: {ended}; nothing to compare")
             self._own[key] = np.column_stack([result.signals[name] for name in ("time", *self.loop.signals)])
         return self._own[key]
 

@@ -89,7 +89,8 @@ def _alone(system: System) -> Found | None:
     except QuadcosimError:
         return None
     wanted = ("time", *_columns(system))
-    return {name: result.signals[name] for name in wanted}, result.metrics, result.divergence
+    message = result.divergence or result.termination
+    return {name: result.signals[name] for name in wanted}, result.metrics, message
 
 
 def _columns(system: System) -> list[str]:

@@ -60,7 +60,7 @@ def _run(name: str, result: Result, tracks: Tracks, rows: int) -> Run:
         name=name,
         settings=_settings(result),
         metrics=result.metrics,
-        message=result.divergence,
+        message=result.divergence or result.termination,
         note=None if result.interrupted_at is None else f"interrupted at {number(result.interrupted_at)} s",
         track=tracks.whole(result.system, signals, result.described, rows),
     )

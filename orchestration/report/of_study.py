@@ -1,6 +1,7 @@
 """The report of a study: its store, and flights of some of its runs."""
 
 import json
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,7 @@ from orchestration.results.column_info import described
 from orchestration.studies.store import TEXTS, UNITS, open_for_reading
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import AGREEMENT, expect_current
+from orchestration.system.model import DIVERGED, TERMINATED
 from orchestration.workers.batching import Agreement
 
 AGREES = 1e-6
@@ -149,7 +151,8 @@ def words_of(stored: Stored, study: Study | None) -> tuple[str, str]:
     if study is not None:
         return study.origin.criterion.outcomes
     good = next((str(row["outcome"]) for row in stored.rows if row["good"] == 1), "good")
-    bad = next((str(r["outcome"]) for r in stored.rows if r["good"] == 0 and r["outcome"] != "diverged"), "bad")
+    others = (str(row["outcome"]) for row in stored.rows if row["good"] == 0)
+    bad = next((outcome for outcome in others if outcome not in (DIVERGED, TERMINATED)), "bad")
     return good, bad
 
 
@@ -168,9 +171,11 @@ def summary_of(overall: Share, words: tuple[str, str], stored: Stored) -> str:
     said = f"{flown}: {overall.good} {words[0]} ({percent(overall.good / overall.runs)}"
     if overall.low is not None and overall.high is not None:
         said += f", 95 % interval {percent(overall.low)} to {percent(overall.high)}"
-    diverged = sum(row["outcome"] == "diverged" for row in stored.rows)
+    outcomes = Counter(row["outcome"] for row in stored.rows)
     failed = sum(row["status"] == "failed" for row in stored.rows)
-    return f"{said}), {diverged} diverged" + (f", {failed} failed" if failed else "") + "."
+    said += f"), {outcomes[DIVERGED]} diverged"
+    said += f", {outcomes[TERMINATED]} terminated" if outcomes[TERMINATED] else ""
+    return said + (f", {failed} failed" if failed else "") + "."
 
 
 def messages_of(rows: Sequence[Row], places: Mapping[int, int]) -> dict[int, str]:

@@ -11,7 +11,7 @@ from orchestration.expressions.over_run import evaluate, expect_names
 from orchestration.expressions.recorded import Marks, Recorded, Spans, vectors
 from orchestration.expressions.syntax import names, parse
 from orchestration.recording.recording import Events, Recording
-from orchestration.system.model import System, expressions
+from orchestration.system.model import DIVERGED, TERMINATED, System, expressions
 from orchestration.system.times import NANOSECONDS
 
 Metrics = dict[str, float | int | bool | str | None]
@@ -23,18 +23,35 @@ PRINTED = ("wall_time", "engine")
 """Names of what `run` prints beside them."""
 
 
-def compute(system: System, spans: Spans, *, end: float, divergence_time: float | None, steps: int) -> Metrics:
+def compute(
+    system: System,
+    spans: Spans,
+    *,
+    end: float,
+    divergence_time: float | None,
+    steps: int,
+    terminated: bool = False,
+) -> Metrics:
     """The objectives of a run by name, and what became of it by its `end` [s].
 
     A run that diverged has no objective: an average over the time that it lasted would grow better the sooner it
-    ended. Raises `UsageError` for an objective that cannot be evaluated, naming it.
+    ended. One that an FMU has `terminated` has those of the time that it lasted, and is not good for the same reason.
+    Raises `UsageError` for an objective that cannot be evaluated, naming it.
     """
     if divergence_time is not None:
         return told(system, None, end=end, stop_time=system.stop_time, divergence_time=divergence_time, steps=steps)
     nodes = {name: parse(text) for name, text in system.objectives.items()}
     if system.criterion.good is not None:
         nodes[GOOD] = parse(system.criterion.good)
-    return told(system, evaluate(nodes, spans), end=end, stop_time=system.stop_time, divergence_time=None, steps=steps)
+    return told(
+        system,
+        evaluate(nodes, spans),
+        end=end,
+        stop_time=system.stop_time,
+        divergence_time=None,
+        steps=steps,
+        terminated=terminated,
+    )
 
 
 def told(
@@ -45,6 +62,7 @@ def told(
     stop_time: float,
     divergence_time: float | None,
     steps: int,
+    terminated: bool = False,
 ) -> Metrics:
     """The metrics of a run, from what its expressions, `GOOD` with them, have come to; None: it diverged.
 
@@ -55,9 +73,9 @@ def told(
     if found is not None:
         objectives |= found
         if good is not None:
-            good = bool(objectives.pop(GOOD))
+            good = bool(objectives.pop(GOOD)) and not terminated
     return {
-        "outcome": outcome(system, good=good, diverged=found is None),
+        "outcome": DIVERGED if found is None else TERMINATED if terminated else outcome(system, good),
         "good": good,
         "horizon": stop_time if found is None else end,
         **objectives,
@@ -67,10 +85,8 @@ def told(
     }
 
 
-def outcome(system: System, *, good: bool | None, diverged: bool) -> str | None:
-    """What a run is called; None if its system has no criterion."""
-    if diverged:
-        return "diverged"
+def outcome(system: System, good: bool | None) -> str | None:
+    """What a run is called that came to its end; None if its system has no criterion."""
     return None if good is None else system.criterion.outcomes[0 if good else 1]
 
 

@@ -86,6 +86,8 @@ def _title(result: Ran) -> str:
     parts = [headline] if (headline := result.asked.headline()) else []
     if result.divergence is not None:
         parts.append(f"diverged at {result.metrics['divergence_time']:g} s")
+    if result.termination is not None:
+        parts.append(f"terminated at {result.metrics['horizon']:g} s")
     if result.interrupted_at is not None:
         parts.append(f"interrupted at {result.interrupted_at:g} s")
     return ", ".join(parts)

@@ -42,5 +42,9 @@ class Ran(Protocol):
         """What diverged; None if nothing did."""
 
     @property
+    def termination(self) -> str | None:
+        """Which FMU has ended it; None if none did."""
+
+    @property
     def interrupted_at(self) -> float | None:
         """When Ctrl-C ended it [s]; None if it did not."""

@@ -57,8 +57,8 @@ class Provenance(TypedDict, total=False):
 class Result:
     """One run: what was asked, what was recorded, what it came to.
 
-    A run that diverged is a result too: `divergence` says what diverged, and objectives have no value then. In a
-    notebook a result shows its metrics.
+    A run that diverged is a result too: `divergence` says what diverged, and objectives have no value then. So is one
+    that an FMU has ended: `termination` says which. In a notebook a result shows its metrics.
     """
 
     asked: Request
@@ -78,6 +78,8 @@ class Result:
     """The numeric parameters of all components as they were flown, by COMPONENT.NAME, in the units of their FMUs."""
     divergence: str | None
     """What diverged, in words; None if nothing did."""
+    termination: str | None
+    """Which FMU has ended the run, and how; None if none did."""
     interrupted_at: float | None
     """The time [s] at which Ctrl-C ended the run; None if it went on to its end."""
     provenance: Provenance
@@ -99,7 +101,8 @@ class Result:
             good if isinstance(good, bool) else None,
             f"{self.end:g} s in {len(self.recording)} rows of {len(self.columns)} columns"
             + (f"; diverged: {self.divergence}" if self.divergence else "")
-            + (f"; not good: {missed}" if (missed := unmet(self.system, self.metrics, self.units)) else ""),
+            + (f"; not good: {missed}" if (missed := unmet(self.system, self.metrics, self.units)) else "")
+            + (f"; terminated: {self.termination}" if self.termination else ""),
             [
                 (labels.metric(name), html.number(self.metrics[name]), labels.unit(self.units.get(name)) or "")
                 for name in named

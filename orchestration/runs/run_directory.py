@@ -47,6 +47,7 @@ def _write(result: Result, folder: Path, *, figures: bool) -> None:
         "described": {name: asdict(one) for name, one in result.described.items()},
         "parameters": dict(result.parameters),
         "divergence": result.divergence,
+        "termination": result.termination,
         "interrupted_at": result.interrupted_at,
         "warnings": list(result.warnings),
     }
@@ -67,7 +68,7 @@ def load_run(folder: str | Path) -> Result:
     if missing:
         raise UsageError(f"{folder}: expected the directory of a run; it has no {', '.join(missing)}")
     notes = _object(
-        folder / PROVENANCE, divergence=_TEXT, units=(dict,), described=(dict,), parameters=(dict,),
+        folder / PROVENANCE, divergence=_TEXT, termination=_TEXT, units=(dict,), described=(dict,), parameters=(dict,),
         interrupted_at=_NUMBER, warnings=(list,),
     )  # fmt: skip
     recording = tables.InFolder(folder)
@@ -89,6 +90,7 @@ def load_run(folder: str | Path) -> Result:
         described={name: Described(**one) for name, one in notes.pop("described").items()},
         parameters=notes.pop("parameters"),
         divergence=notes.pop("divergence"),
+        termination=notes.pop("termination"),
         interrupted_at=notes.pop("interrupted_at"),
         warnings=tuple(notes.pop("warnings")),
         provenance=cast(Provenance, notes),

@@ -110,6 +110,7 @@ class Flown:
     steps: int
     divergence: str | None
     divergence_time: float | None
+    termination: str | None
     interrupted_at: float | None
     provenance: Provenance
     warnings: tuple[str, ...]
@@ -155,6 +156,7 @@ class Simulation:
             steps=master.steps,
             divergence=master.divergence,
             divergence_time=_seconds(master.divergence_time),
+            termination=master.termination,
             interrupted_at=_seconds(master.interrupted_at),
             provenance={**provenance(self.instances), "engine": master.engine},
             warnings=tuple(warning for instance in self.instances.values() for warning in instance.warnings),
@@ -188,11 +190,13 @@ def result_of(meant: Meant, flown: Flown, recorder: Recorder, wall_time: float, 
             end=flown.end,
             divergence_time=flown.divergence_time,
             steps=flown.steps,
+            terminated=flown.termination is not None,
         ),
         units=meant.units,
         described=described(meant.system, meant.models, recording.columns),
         parameters=meant.parameters,
         divergence=flown.divergence,
+        termination=flown.termination,
         interrupted_at=flown.interrupted_at,
         provenance={**flown.provenance, "wall_time": wall_time},
         warnings=(*meant.asked.warnings(meant.parameters), *flown.warnings),
@@ -226,7 +230,9 @@ def run(
     time_limit: float | None = None,
     memory_limit: float = Limits.memory,
 ) -> Result:
-    """Run a system, or fly a scenario of the quadrotor, the paper's if none is given; divergence is a result.
+    """Run a system, or fly a scenario of the quadrotor, the paper's if none is given.
+
+    Divergence is a result, and so is what was recorded until an FMU has ended the run.
 
     Its rows are kept in memory unless a `recorder` takes them. By the compiled loop where that can be had, unless an
     `engine` is named; the result is the same. With FMUs that are not built on this project's kit it is flown in a

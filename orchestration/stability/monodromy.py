@@ -91,7 +91,9 @@ def _come_to_rest(simulation: Simulation, begin: Fraction, period: Fraction) -> 
     rows = []
     for k in range(SETTLED):
         if master.run(pause_at=math.floor(begin + k * period)):
-            raise UsageError(f"the operating point is left: {master.divergence or 'the run was interrupted'}")
+            raise UsageError(
+                f"the operating point is left: {master.divergence or master.termination or 'the run was interrupted'}"
+            )
         rows.append([master.board.row[master.board.place[signal]] for signal in exchanged(system)])
     expect_rest(system, np.array(rows))
 

@@ -19,6 +19,7 @@ from orchestration.figures.ticks import plain
 from orchestration.results import display_names as labels
 from orchestration.studies.axes import Axis
 from orchestration.studies.axis_labels import SCALES, drawn, label
+from orchestration.system.model import DIVERGED, TERMINATED
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -95,6 +96,8 @@ def scatter(
     figure.supylabel(labels.metric_with_unit(metric, unit))
     kinds = zip((*words, DIVERGED), ("dots", "crosses", "below"), strict=True)
     counts = [f"{int((table['outcome'] == kind).sum())} {kind} ({mark})" for kind, mark in kinds]
+    terminated = int((table["outcome"] == TERMINATED).sum())
+    counts += [f"{terminated} {TERMINATED} (crosses)"] if terminated else []
     low, high = wilson(int((~fell).sum()), len(table))
     figure.suptitle(
         f"{len(table)} runs: {', '.join(counts)}{by_horizon(table)}\n"
@@ -171,9 +174,6 @@ def by_horizon(table: "pd.DataFrame") -> str:
     """The time by which the outcomes are judged, if it is one for all."""
     horizons = set(table["horizon"].dropna()) if "horizon" in table else set()
     return f", by {horizons.pop():g} s" if len(horizons) == 1 else ""
-
-
-DIVERGED = "diverged"
 
 
 def _scale(values: "pd.Series") -> str:

@@ -17,7 +17,8 @@ from orchestration.figures.ticks import plain
 from orchestration.results import display_names as labels
 from orchestration.studies.axes import Axis
 from orchestration.studies.axis_labels import SCALES, edges, label
-from orchestration.studies.figures import DIVERGED, by_horizon, flew
+from orchestration.studies.figures import by_horizon, flew
+from orchestration.system.model import DIVERGED, TERMINATED
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,7 +34,7 @@ def heat_map(
     style: Style = SCREEN,
 ) -> Figure:
     """A metric where runs are good, the outcome where not, the limit between the two; what is missing is hatched."""
-    kinds = {words[0]: 0, words[1]: 1, DIVERGED: 2}
+    kinds = {words[0]: 0, words[1]: 1, TERMINATED: 1, DIVERGED: 2}
     coded = table.assign(flew=flew(table).astype(float), kind=table["outcome"].map(kinds).astype(float))
     coded.loc[table["outcome"].isna(), "flew"] = np.nan
     values, good, kind = (_grid(coded, axes, name) for name in (metric, "flew", "kind"))
@@ -47,9 +48,10 @@ def heat_map(
     panel.set(xlabel=label(axes[0]), ylabel=label(axes[1]), xscale=SCALES[axes[0].scale], yscale=SCALES[axes[1].scale])
     bar = figure.colorbar(mesh, ax=panel, label=f"{labels.metric_with_unit(metric, unit)}, where {words[0]}")
     plain(bar.ax.yaxis)
+    bad = f"{words[1]} or {TERMINATED}" if (table["outcome"] == TERMINATED).any() else words[1]
     shown: list[Patch | Line2D] = [
         Patch(color=matplotlib.colormaps[SHADES](0.5), label=words[0]),
-        *(Patch(color=color, label=word) for word, color in ((words[1], NOT_GOOD), (DIVERGED, DARK))),
+        *(Patch(color=color, label=word) for word, color in ((bad, NOT_GOOD), (DIVERGED, DARK))),
         *([cells.hatched()] if np.isnan(kind).any() else []),
         *([Line2D([], [], color=RED, label=f"limit of what is {words[0]}{by_horizon(table)}")] if has_limit else []),
     ]

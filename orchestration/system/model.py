@@ -276,6 +276,10 @@ MOTION = tuple(f"{each}.{axis}" for each in ("position", "velocity", "accelerati
 """What a motion says, in its order"""
 
 
+DIVERGED, TERMINATED = "diverged", "terminated"
+"""What a run is called, whatever its criterion is, that left the region that counts, or that an FMU has ended"""
+
+
 @strict()
 @dataclass(frozen=True, kw_only=True)
 class Criterion:
@@ -286,12 +290,12 @@ class Criterion:
     diverged: str | None = None
     """The condition over signals that ends a run at the first instant at which it holds; None: none does."""
     outcomes: tuple[str, str] = ("good", "bad")
-    """What a run is called that is good, and one that is not; one that diverged is called so."""
+    """What a run is called that is good, and one that is not; one that diverged, or was terminated, is called so."""
 
     def __post_init__(self) -> None:
         given = ", ".join(self.outcomes)
-        two = len({*self.outcomes, "diverged", ""}) == 4 and given.isprintable()
-        require(two, "outcomes", ascii(given), "two names, and neither is diverged")
+        two = len({*self.outcomes, DIVERGED, TERMINATED, ""}) == 5 and given.isprintable()
+        require(two, "outcomes", ascii(given), f"two names, and neither is {DIVERGED} or {TERMINATED}")
 
 
 @strict()

@@ -98,7 +98,7 @@ class Hangar:
                 flight.master.initialise()
                 flight.master.run()
                 result = flight.result()
-                metrics, message = result.metrics, result.divergence
+                metrics, message = result.metrics, result.divergence or result.termination
                 signals = _parquet(result) if task.keep_signals else None
         except (SimulatorError, UsageError) as error:
             message = str(error)

@@ -18,7 +18,7 @@ typedef void (*Log2)(void *, const char *, int, const char *, const char *, ...)
 typedef void (*Log3)(void *, int, const char *, const char *);
 typedef struct { Log2 log; void *allocate, *release, *finished, *environment; } Callbacks;
 
-typedef struct { double u[2], x[2], gain; int on, mode, count; char label[32]; } State;
+typedef struct { double u[2], x[2], gain, next, reached; int on, mode, count, ended; char label[32]; } State;
 typedef struct { State s; char name[64]; Log2 log2; Log3 log3; void *environment; } Model;
 
 /* What libraries of its own would keep for the whole process, copies of this one included. */
@@ -79,6 +79,16 @@ static void forget(Model *m) {
 #endif
 }
 
+static void begin(Model *m, bool defined, double tolerance, double t) {
+    m->s.next = t;
+#ifdef TELLS_TOLERANCE
+    m->s.x[0] = defined ? tolerance : -1.0;
+#endif
+#ifdef TELLS_START
+    m->s.x[0] = t;
+#endif
+}
+
 static void set_gain(Model *m, double gain) {
 #ifndef IGNORES
     m->s.gain = gain;
@@ -107,6 +117,21 @@ static int step(Model *m, double t, double h) {
 #endif
 #ifdef SLOW
     usleep(1000);
+#endif
+#ifdef STRICT
+    if (fabs(t - m->s.next) > 1e-9) {
+        say(m, ERROR, 7, 50.0);
+        return ERROR;
+    }
+#endif
+    m->s.next = m->s.reached = t + h;
+#ifdef DISCARDS_FROM /* it does no step beyond that time */
+    m->s.reached = t;
+    if (t + h > DISCARDS_FROM) return DISCARD;
+#endif
+#ifdef ENDS_AT /* and with it the run */
+    m->s.ended = t + h > ENDS_AT - 1e-12;
+    if (m->s.ended) m->s.reached = ENDS_AT, h = ENDS_AT - t;
 #endif
 #ifdef THIRDS /* of which each is rounded */
     for (int i = 0; i < 2; i++) m->s.x[i] += h / 3.0;
@@ -141,7 +166,10 @@ API void fmi2FreeInstance(void *c) {
 #endif
     free(c);
 }
-API int fmi2SetupExperiment(void *c, int defined, double tolerance, double t, int ends, double stop) { return OK; }
+API int fmi2SetupExperiment(void *c, int defined, double tolerance, double t, int ends, double stop) {
+    begin(c, defined, tolerance, t);
+    return OK;
+}
 API int fmi2EnterInitializationMode(void *c) {
 #ifdef EXITS_AT_START
     exit(0);
@@ -152,7 +180,18 @@ API int fmi2EnterInitializationMode(void *c) {
 API int fmi2ExitInitializationMode(void *c) { return OK; }
 API int fmi2Terminate(void *c) { return OK; }
 API int fmi2Reset(void *c) { return reset(c); }
-API int fmi2DoStep(void *c, double t, double h, int no_set) { return step(c, t, h); }
+API int fmi2DoStep(void *c, double t, double h, int no_set) {
+    int status = step(c, t, h);
+    return ((Model *)c)->s.ended ? DISCARD : status;
+}
+API int fmi2GetBooleanStatus(void *c, int kind, int *value) {
+    *value = ((Model *)c)->s.ended;
+    return kind == 3 ? OK : ERROR;
+}
+API int fmi2GetRealStatus(void *c, int kind, double *value) {
+    *value = ((Model *)c)->s.reached;
+    return kind == 2 ? OK : ERROR;
+}
 
 API int fmi2GetReal(void *c, const unsigned vr[], size_t n, double v[]) {
     State *s = &((Model *)c)->s;
@@ -211,9 +250,7 @@ API int fmi2DeSerializeFMUstate(void *c, const char bytes[], size_t n, void **st
 #define UNUSED(name) API int name(void) { return ERROR; }
 UNUSED(fmi2CancelStep)
 UNUSED(fmi2GetStatus)
-UNUSED(fmi2GetRealStatus)
 UNUSED(fmi2GetIntegerStatus)
-UNUSED(fmi2GetBooleanStatus)
 UNUSED(fmi2GetStringStatus)
 UNUSED(fmi2SetRealInputDerivatives)
 UNUSED(fmi2GetRealOutputDerivatives)
@@ -233,17 +270,23 @@ API void *fmi3InstantiateCoSimulation(const char *name, const char *token, const
     return m;
 }
 API void fmi3FreeInstance(void *c) { free(c); }
-API int fmi3EnterInitializationMode(void *c, bool d, double tolerance, double t, bool ends, double stop) { forget(c); return OK; }
+API int fmi3EnterInitializationMode(void *c, bool defined, double tolerance, double t, bool ends, double stop) {
+    begin(c, defined, tolerance, t);
+    forget(c);
+    return OK;
+}
 API int fmi3ExitInitializationMode(void *c) { return OK; }
 API int fmi3Terminate(void *c) { return OK; }
 API int fmi3Reset(void *c) { return reset(c); }
 API int fmi3DoStep(void *c, double t, double h, bool no_set, bool *event, bool *ends, bool *early, double *last) {
-    *event = *ends = *early = false;
-    *last = t + h;
+    int status = step(c, t, h);
+    *event = *early = false;
+    *ends = ((Model *)c)->s.ended;
+    *last = ((Model *)c)->s.reached;
 #ifdef NEEDS_EVENTS
     *event = true;
 #endif
-    return step(c, t, h);
+    return status;
 }
 
 API int fmi3GetFloat64(void *c, const unsigned vr[], size_t n, double v[], size_t m) {
