@@ -36,7 +36,7 @@ class Fmi2Instance(NativeInstance):
         return fmu
 
     def _enter(self, start: float, stop: float) -> None:
-        self._call("setupExperiment", startTime=start, stopTime=stop)
+        self._call("setupExperiment", tolerance=self._tolerance, startTime=start, stopTime=stop)
         self._call("enterInitializationMode")
 
     def step(self, t: float, h: float) -> None:

@@ -52,7 +52,7 @@ class Fmi3Instance(NativeInstance):
         self._messages.append((status, category, message or b""))
 
     def _enter(self, start: float, stop: float) -> None:
-        self._call("enterInitializationMode", startTime=start, stopTime=stop)
+        self._call("enterInitializationMode", tolerance=self._tolerance, startTime=start, stopTime=stop)
 
     def step(self, t: float, h: float) -> None:
         """Advance from `t` to `t + h` seconds."""

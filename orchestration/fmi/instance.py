@@ -30,6 +30,9 @@ class Instance(Simulator, Protocol):
     def set(self, name: str, value: Value) -> None:
         """Set one variable before initialisation; raises `UsageError` for a value it cannot take."""
 
+    def set_tolerance(self, tolerance: float) -> None:
+        """Give its solver a relative tolerance, before initialisation, instead of that of its declared experiment."""
+
     def get(self, name: str) -> Value:
         """The value of one variable: a Boolean as one, a String as a text, any other as a float."""
 

@@ -88,6 +88,10 @@ class IsolatedInstance(Instance):
         """As any instance."""
         self._ask("set", name, value)
 
+    def set_tolerance(self, tolerance: float) -> None:
+        """As any instance."""
+        self._ask("set_tolerance", tolerance)
+
     def get(self, name: str) -> Value:
         """As any instance."""
         value: Value = self._ask("get", name)

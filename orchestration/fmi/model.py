@@ -104,6 +104,12 @@ class Model:
         """Whether a process can have one instance only."""
         return bool(self.description.coSimulation.canBeInstantiatedOnlyOncePerProcess)
 
+    @property
+    def tolerance(self) -> float | None:
+        """That of the experiment that it declares, relative; None if it declares none."""
+        found = _number(getattr(self.description.defaultExperiment, "tolerance", None))
+        return found if found is not None and found > 0.0 else None
+
     def variable(self, name: str, place: str) -> Variable:
         """A variable by name; raises `UsageError` naming the place and the variables that are near."""
         if name in self.variables:

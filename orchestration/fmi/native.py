@@ -78,6 +78,7 @@ class NativeInstance(Instance):
         self._calls: WeakKeyDictionary[Transfer, tuple[Call, ...]] = WeakKeyDictionary()
         self._folder: Scratch | None = None
         self.model = read_model(path)
+        self._tolerance = self.model.tolerance
         self._expect_supported()
         self.guard = None if self.model.is_of_this_kit else Surroundings()
         found = fmpy.supported_platforms(str(path))
@@ -118,7 +119,7 @@ class NativeInstance(Instance):
 
     @abstractmethod
     def _enter(self, start: float, stop: float) -> None:
-        """Into initialisation mode."""
+        """Into initialisation mode, with the tolerance if there is one."""
 
     @abstractmethod
     def step_error(self, status: int, end: float) -> SimulatorError:
@@ -163,6 +164,7 @@ class NativeInstance(Instance):
         self._given.clear()
         self._arrays.clear()
         self.warnings.clear()
+        self._tolerance = self.model.tolerance
 
     def save(self) -> bytes:
         """The whole state, serialised; raises `UsageError` for an FMU that cannot."""
@@ -237,6 +239,10 @@ class NativeInstance(Instance):
         given = taken(variable, value, f"{self.name}.{name}")
         self._given[name] = given
         self._put(variable, given)
+
+    def set_tolerance(self, tolerance: float) -> None:
+        """Give its solver a relative tolerance, before initialisation, instead of that of its declared experiment."""
+        self._tolerance = tolerance
 
     def get(self, name: str) -> Value:
         """The value of one variable."""

@@ -19,7 +19,7 @@ from orchestration.fmi.model import read_model
 from orchestration.processes import confined, subprocesses
 from orchestration.processes.confined import Limits
 
-_RULES = "1"
+_RULES = "2"
 """Of how it is shown; another number shows all anew"""
 RESULT = "result.json"
 MANNERS = ("moving", "held", "fine")

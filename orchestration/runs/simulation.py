@@ -385,6 +385,8 @@ def _version(package: str) -> str:
 def _set_parameters(instance: Instance, component: Component) -> None:
     for name, value in component.parameters.items():
         instance.set(name, value)
+    if component.tolerance is not None:
+        instance.set_tolerance(component.tolerance)
 
 
 def _set_clock(instance: Instance, component: Component, model: Model) -> None:

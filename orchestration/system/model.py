@@ -74,6 +74,8 @@ class Component:
     """The distance of the communication points [s] of a component in continuous time; None: it has `sampling`."""
     sampling: Sampling | None = None
     """When a digital task runs; None: it is in continuous time and has a `step`."""
+    tolerance: float | None = None
+    """The relative tolerance of the FMU's own solver; None: that of the experiment that the FMU declares, if any."""
     align: Align = "exact"
     """What becomes of an instant between two points of a component that takes its own fixed step only: an error
     (exact), or it moves to the next point (next)."""
@@ -82,6 +84,8 @@ class Component:
 
     def __post_init__(self) -> None:
         require_choice(self, align=Align)
+        if self.tolerance is not None:
+            require_positive(self, "tolerance")
         if self.sampling is None:
             require(self.step is not None, "step", "none", "step (continuous time) or sampling (a digital task)")
             require_positive(self, "step")

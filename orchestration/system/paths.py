@@ -104,7 +104,7 @@ def _expect_key(path: str, table: str, system: System, name: str, key: str) -> N
     if table == "components":
         digital = system.components[name].sampling is not None
         keys = [f"sampling.{f.name}" for f in dataclasses.fields(Sampling)] if digital else ["step"]
-        keys += ["align", "fmu", "record", "parameters.NAME"]
+        keys += ["align", "fmu", "record", "tolerance", "parameters.NAME"]
         known = key in keys or (key.startswith("parameters.") and key != "parameters.")
     elif table == "connections":
         fixed = ("name", "start", "end", "noise", "quantisation")

@@ -62,6 +62,10 @@ class ComponentTable(_Table):
     sampling: Annotated[
         SamplingTable | None, _says("When a digital task runs; a component has either this or `step`.")
     ] = None
+    tolerance: Annotated[
+        float | None,
+        _says("Relative tolerance of the FMU's own solver; without it, that of the experiment that the FMU declares."),
+    ] = None
     align: Annotated[
         Align,
         _says("Of an FMU that takes steps of one length only: an instant between its points is an error, or moves on."),
@@ -240,7 +244,7 @@ def _component(name: str, table: ComponentTable, folder: Path) -> Component:
             raise UsageError(f"{place}.parameters.{key} = {value!r}: expected a number, true, false or a text")
     sampling = None if table.sampling is None else _made(f"{place}.sampling", Sampling, table.sampling.model_dump())
     fmu = str(folder / table.fmu) if table.fmu.endswith(".fmu") else table.fmu
-    rest = {"step": table.step, "align": table.align, "record": table.record}
+    rest = {key: getattr(table, key) for key in ("step", "tolerance", "align", "record")}
     return _made(place, Component, {"fmu": fmu, "parameters": parameters, "sampling": sampling, **rest})
 
 

@@ -15,7 +15,7 @@ needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
 _SOURCE = Path(__file__).with_name("small.c")
 
 _FMI2 = """<fmiModelDescription fmiVersion="2.0" modelName="Small" guid="small">
-  <CoSimulation modelIdentifier="Small" {attributes}/>
+  <CoSimulation modelIdentifier="Small" {attributes}/>{experiment}
   <TypeDefinitions><SimpleType name="Mode"><Enumeration>{items}</Enumeration></SimpleType></TypeDefinitions>
   <ModelVariables>
     <ScalarVariable name="u" valueReference="0" causality="input"><Real start="0"/></ScalarVariable>
@@ -39,7 +39,7 @@ _FMI2 = """<fmiModelDescription fmiVersion="2.0" modelName="Small" guid="small">
 </fmiModelDescription>"""
 
 _FMI3 = """<fmiModelDescription fmiVersion="3.0" modelName="Small" instantiationToken="small">
-  <CoSimulation modelIdentifier="Small" {attributes}/>
+  <CoSimulation modelIdentifier="Small" {attributes}/>{experiment}
   <TypeDefinitions><EnumerationType name="Mode">{items}</EnumerationType></TypeDefinitions>
   <ModelVariables>
     <Float64 name="u" valueReference="0" causality="input" start="0 0"><Dimension start="2"/></Float64>
@@ -72,6 +72,7 @@ def small(
     once: bool = False,
     saves: bool = True,
     more: str = "",
+    tolerance: float | None = None,
 ) -> Path:
     """The FMU with these habits (macros of `small.c`) in `folder`, which says of itself what it is told to."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -95,7 +96,8 @@ def small(
     place = fmpy.platform_tuple if fmi == 3 else fmpy.platform
     path = folder / "small.fmu"
     with zipfile.ZipFile(path, "w") as archive:
-        described = text.format(attributes=attributes, items=_ITEMS, more=more)
+        experiment = "" if tolerance is None else f'<DefaultExperiment tolerance="{tolerance}"/>'
+        described = text.format(attributes=attributes, items=_ITEMS, more=more, experiment=experiment)
         archive.writestr("modelDescription.xml", described)
         archive.write(library, f"binaries/{place}/{library.name}")
     return path

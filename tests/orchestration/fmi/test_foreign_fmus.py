@@ -125,6 +125,37 @@ def test_a_fixed_step_is_kept_whatever_happens_between_its_points(tmp_path: Path
         ran(varying)
 
 
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("load", [instances.open_here, IsolatedInstance])
+def test_a_tolerance_is_that_of_the_file_else_of_the_declared_experiment(fmi: int, load: Any, tmp_path: Path) -> None:
+    of_none, of_one = (
+        small(tmp_path / f"{tolerance}", "TELLS_TOLERANCE", fmi=fmi, tolerance=tolerance) for tolerance in (None, 1e-3)
+    )
+    output, array = ("it.y[1]" if fmi == 3 else "it.y"), fmi == 3
+
+    def told(path: Path, **keys: Any) -> float:
+        """What initialisation is told: -1 for none."""
+        return float(ran(alone(path, array=array, **keys), load=load).signals[output][0])
+
+    assert (told(of_none), told(of_one)) == (-1.0, 1e-3)
+    assert (told(of_none, tolerance=1e-7), told(of_one, tolerance=1e-7)) == (1e-7, 1e-7)
+
+
+def test_a_tolerance_is_of_one_run(tmp_path: Path) -> None:
+    path = small(tmp_path, "TELLS_TOLERANCE", tolerance=1e-3)
+    with instances.open_here(path, "it") as it:
+        it.set_tolerance(1e-7)
+        it.reset()
+        it.enter_initialization(0.0, 1.0)
+        assert it.get("y") == 1e-3
+
+
+def test_a_tolerance_is_positive() -> None:
+    for tolerance in (0.0, -1e-3, float("nan"), float("inf")):
+        with pytest.raises(UsageError, match=rf"^tolerance = {tolerance}: expected a positive number$"):
+            Component(fmu="it.fmu", step=0.01, tolerance=tolerance)
+
+
 def test_parameters_that_initialisation_loses_are_set_again(tmp_path: Path) -> None:
     with prepared(alone(small(tmp_path, "LOSES"), parameters={"gain": 3.0, "label": "x"})) as simulation:
         simulation.master.initialise()

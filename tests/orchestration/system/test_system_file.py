@@ -11,6 +11,7 @@ from orchestration.requests.request import load_request
 from orchestration.schedule.cursor import Position
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
+from orchestration.system.paths import changed, value_at
 from orchestration.system.system_file import load_system, schema
 
 SHIPPED = Path(translation.__file__).with_name("system.toml")
@@ -25,6 +26,7 @@ fmu = "Tank.fmu"
 step = 0.01
 parameters = { area = 2.0, "pipe.length" = 3.0 }
 align = "next"
+tolerance = 1e-6
 
 [components.controller]
 fmu = "Controller.fmu"
@@ -162,6 +164,13 @@ def test_a_system_comes_back_from_the_file_that_it_writes(tmp_path: Path) -> Non
     (tmp_path / "elsewhere").mkdir()
     assert loaded(tmp_path / "elsewhere", first.to_toml()) == first
     assert loaded(tmp_path, quadrotor().to_toml()) == quadrotor()
+
+
+def test_a_tolerance_is_of_one_component_and_has_a_path(tmp_path: Path) -> None:
+    system = loaded(tmp_path, TANK)
+    assert {name: part.tolerance for name, part in system.components.items()} == {"tank": 1e-6, "controller": None}
+    path = "components.controller.tolerance"
+    assert value_at(changed(system, {path: 1e-3}), path) == 1e-3
 
 
 def test_the_order_at_the_top_is_that_of_connections_that_say_none(tmp_path: Path) -> None:
