@@ -63,7 +63,11 @@ COMMON_PARAMETERS = (
         (1.0, 1.0, 1.0, 0.0, 0.0, 0.0),
     ),
     fixed_parameter(
-        "sample_period", "of the FMU's own clock; 0: sample at every communication point", "s", 0.01, minimum=0.0
+        "sample_period",
+        "of the FMU's own clock; 0: sample at every communication point from sample_offset on",
+        "s",
+        0.01,
+        minimum=0.0,
     ),
     fixed_parameter("sample_offset", "time of the first sample of the FMU's own clock", "s", 0.0, minimum=0.0),
 )

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 TOLERANCE = 1e-6
 """Of a period: masters accumulate time, and some end with a step of 1e-13 s."""
+ROUNDING = 1e-9
+"""Of a time, for the same reason, where there is no period"""
 
 
 @dataclass(slots=True)
@@ -12,7 +14,7 @@ class SampleClock:
     """Due times offset + k·period, k = 0, 1, …; a sample happens at the first communication point from then."""
 
     period: float
-    """[s]; 0: every communication point is a sample"""
+    """[s]; 0: every communication point from the offset on is a sample"""
     offset: float
     """[s]"""
     next_index: int = 0
@@ -26,7 +28,7 @@ class SampleClock:
     def is_due(self, t: float) -> bool:
         """Whether a sample is due at the communication point `t` [s]; if so, the clock moves on to the next."""
         if self.period == 0.0:
-            return True
+            return t >= self.offset * (1.0 - ROUNDING)
         elapsed = (t - self.offset) / self.period + TOLERANCE
         if elapsed < self.next_index:
             return False

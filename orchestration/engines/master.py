@@ -6,7 +6,7 @@ delivered; the row is recorded. So a row is the value just after its instant, an
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -97,7 +97,12 @@ class Master:
         interrupted: Callable[[], bool] = lambda: False,
         watch: Callable[[Board], Watch] | None = None,
         first_exchange: Sequence[Sequence[int]] | None = None,
+        waiting: Collection[str] = (),
     ) -> None:
+        """`waiting` are components that begin at 0 and are stepped to their first sample without one.
+
+        Other sampled components, unless they have a clock of their own, begin at their first sample.
+        """
         self.board = board = Board(system, recorded)
         self._events: list[int] = []  # a table of `Events`, row after row: no object an event, for the collector to see
         self._arrived: list[int] = []  # of this instant: noted after what was sent at it
@@ -126,6 +131,7 @@ class Master:
         self._connections = tuple(x.name for x in system.connections)
         self._channels = [self._channel(i, streams) for i in range(len(system.connections))]
         self._first_exchange = [(i,) for i in range(len(self._channels))] if first_exchange is None else first_exchange
+        self._first_samples, self._waiting = timetable.first_samples, waiting
         self._readers = {name: simulators[name].reader(board.outputs[name], self._outputs(name)) for name in names}
         self._bodies = {names.index(name): self._body(name) for name in plan.continuous}
         self._tasks = {names.index(name): self._task(name) for name in plan.sampled}
@@ -452,7 +458,9 @@ class Master:
     def _exchange_first(self) -> None:
         stop = self._stop / NANOSECONDS
         for name in self._names:
-            self._simulators[name].enter_initialization(0.0, stop)
+            ratio, first = self._clock_of(name)
+            begin = 0 if name in self._waiting else first
+            self._simulators[name].enter_initialization(ratio * (begin / NANOSECONDS), ratio * stop)
         for feed in self._feeds:
             feed.write(0.0)
         for group in self._first_exchange:
@@ -465,7 +473,21 @@ class Master:
         for name in self._names:
             outputs = self._outputs(name)[: self.board.connected[name]].tolist()
             _expect_finite([f"{name}.{output}" for output in self.board.outputs[name]], outputs, 0.0)
+        for name in self._waiting:
+            ratio, first = self._clock_of(name)
+            if first > 0:
+                self._simulators[name].step(0.0, ratio * (first / NANOSECONDS))
         self._look(0.0)
+
+    def _clock_of(self, name: str) -> tuple[float, int]:
+        """How fast a component's own time passes, and its first sample [ns]; 0 for one that is stepped from the start.
+
+        FMI has the first step begin where initialisation was, and so do those that hold to it.
+        """
+        sampling = self._system.components[name].sampling
+        if sampling is None or sampling.clock == "fmu":
+            return 1.0, 0
+        return sampling.clock_ratio, self._first_samples.get(name, 0)
 
     def _exchange(self, group: Sequence[int]) -> None:
         """Pass on what the connections of a group carry; again and again until it stays, if they form a loop."""

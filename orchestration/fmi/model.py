@@ -20,6 +20,7 @@ from fmu_kit.packaging import read_source_hash
 from orchestration.basics.errors import UsageError
 from orchestration.basics.units import BASE, BaseUnits, Unit, named
 from orchestration.fmi.archive import expect_honest_size
+from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 
 Kind = Literal["Real", "Integer", "Boolean", "Enumeration", "String", "Binary", "Clock"]
 """Types by their FMI 2.0 names; FMI 3.0's Float64 is a Real, its Int32 an Integer"""
@@ -77,6 +78,11 @@ class Model:
     def is_of_this_kit(self) -> bool:
         """Whether it is built on `fmu_kit`, and so has the conventions of its slaves."""
         return read_source_hash(self.path) is not None
+
+    @property
+    def waits(self) -> bool:
+        """Whether it is told when its first sample is, and until then is stepped without one."""
+        return self.is_of_this_kit and {SAMPLE_PERIOD, SAMPLE_OFFSET} <= self.variables.keys()
 
     @property
     def name(self) -> str:

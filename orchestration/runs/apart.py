@@ -202,7 +202,8 @@ def _lost(meant: Meant, heard: _Heard, room: Path, why: str, started: float) -> 
         return RunLost(f"the process of the run {why}{which}")
     text = f"the process of the run {why}{which}, after t = {end:g} s of {meant.system.stop_time:g} s"
     found = Flown(
-        end=end, steps=0 if left is None else left.steps, divergence=None, divergence_time=None, interrupted_at=end,
+        end=end, steps=0 if left is None else left.steps, divergence=None, divergence_time=None, termination=None,
+        interrupted_at=end,
         provenance={"engine": "python" if left is None else "compiled"}, warnings=(text,),
     )  # fmt: skip
     return RunLost(text, result_of(meant, found, heard.recorder, time.perf_counter() - started, interrupted=False))

@@ -329,9 +329,10 @@ def prepared(
     with interrupts_held_back() as interrupt, ExitStack() as stack:
         instances = {name: stack.enter_context(load(path, name)) for name, path in meant.paths.items()}
         with in_its_own_words(asked):
+            timetable = Timetable(system, streams, fixed_steps(system, models))
             for name, component in system.components.items():
                 _set_parameters(instances[name], component)
-                _set_clock(instances[name], component, models[name])
+                _set_clock(instances[name], component, models[name], timetable.first_samples.get(name, 0))
             recorder.describe({name: one.as_words() for name, one in meant.described.items()})
             sources = meant.sources(streams)
             signals = {name: system.sources[name].signals(name) for name in sources}
@@ -340,7 +341,7 @@ def prepared(
                 engine,
                 system,
                 instances,
-                timetable=Timetable(system, streams, fixed_steps(system, models)),
+                timetable=timetable,
                 streams=streams,
                 recorded=recorded(system, models),
                 recorder=recorder,
@@ -351,6 +352,7 @@ def prepared(
                 condition=lambda board: program(system.criterion.diverged, board, *watched),
                 room=room,
                 first_exchange=initial.groups(system.connections, lambda name, output: models[name].depends_on(output)),
+                waiting=[name for name in system.components if models[name].waits],
             )
         yield Simulation(
             meant=meant, instances=instances, master=master, recorder=recorder, interrupt=interrupt, started=started
@@ -389,17 +391,17 @@ def _set_parameters(instance: Instance, component: Component) -> None:
         instance.set_tolerance(component.tolerance)
 
 
-def _set_clock(instance: Instance, component: Component, model: Model) -> None:
-    """A component built on `fmu_kit` samples at every step that it is given, unless it is to keep its own clock."""
+def _set_clock(instance: Instance, component: Component, model: Model, first: int) -> None:
+    """A component built on `fmu_kit` samples at every step from its `first` sample [ns] on, or keeps its own clock."""
     sampling = component.sampling
     if sampling is None or SAMPLE_PERIOD not in instance.variables:
         return
     if sampling.clock == "fmu":
         instance.set(SAMPLE_PERIOD, sampling.period)
         instance.set(SAMPLE_OFFSET, sampling.offset)
-    elif model.is_of_this_kit:
+    elif model.waits:
         instance.set(SAMPLE_PERIOD, 0.0)
-        instance.set(SAMPLE_OFFSET, 0.0)
+        instance.set(SAMPLE_OFFSET, sampling.clock_ratio * (first / NANOSECONDS))
 
 
 def _feeds(system: System, sources: Mapping[str, Values], instances: Mapping[str, Instance]) -> list[Feed]:

@@ -80,6 +80,7 @@ class Task:
         self._name, self._refused, self._stop = owner, refused, nanoseconds(plan.system.stop_time)
         self._fixed = [fixed[x] for x in sorted({connections[link.index].sender for link in self.incoming} & {*fixed})]
         self._k, self._next = 0, self._times(0, 1, -1)
+        self.first = int(self._next[0])
         self.rows: Integers = np.zeros((0, 3 + 2 * (len(self.incoming) + len(self.outgoing))), dtype=np.int64)
 
     def _times(self, first: int, end: int, before: int) -> Integers:

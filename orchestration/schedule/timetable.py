@@ -83,6 +83,10 @@ class Timetable:
             for i in sorted(self._bodies.tolist())
         }
         self._tasks = [Task(name, plan, links, streams, fixed, self._refused) for name in plan.sampled]
+        self.first_samples = {
+            name: task.first for name, task in zip(plan.sampled, self._tasks) if task.first < self.stop
+        }
+        """[ns], by sampled component that samples at all"""
         self._sender = np.array([names.index(x.sender) for x in system.connections], dtype=np.int64)
         self._receiver = np.array([names.index(x.receiver) for x in system.connections], dtype=np.int64)
         self._posted = {i: [links[j] for j in plan.posted if self._sender[j] == i] for i in self._points}

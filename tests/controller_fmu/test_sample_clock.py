@@ -163,3 +163,9 @@ def test_no_two_samples_fall_into_one_period_of_the_grid(period: float, step: fl
     slots = [int(p + 1e-6) for p in periods]
     assert len(set(slots)) == len(slots)
     assert len(slots) >= min(200, int(points[-1] / period))
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e-9, 0.02])
+def test_without_a_period_every_point_from_the_offset_on_is_a_sample(offset: float) -> None:
+    points = [0.0, offset / 2.0, offset * (1.0 - 1e-13), offset, offset + 0.01]
+    assert samples(started(0.0, offset), points) == ([2, 3, 4] if offset else [0, 1, 2, 3, 4])

@@ -22,6 +22,7 @@ from orchestration.fmi.values import number_of, taken
 from orchestration.schedule.schedule import Schedule
 from orchestration.schedule.schedule_cache import Windows
 from orchestration.schedule.streams import NOISE, Streams
+from orchestration.schedule.timetable import Timetable
 from orchestration.system.model import System, component_of, variable_of
 from orchestration.system.times import NANOSECONDS, nanoseconds
 
@@ -104,6 +105,7 @@ class Batch:
         self._of_channels = [self._arrays_of(len(x.start)) for x in connections]
         self._channels = (self._channel_type * max(1, len(connections)))(*map(self._channel, range(len(connections))))
         self._ratios = [self._array(1) for _ in kernels]
+        self._begins: list[Floats] = [np.zeros(self._lanes) for _ in kernels]
         self._components = (c.Component * len(kernels))(*map(self._component, range(len(kernels))))
         self._tracks = (self._track_type * self._lanes)()
         seen, fed = sum(map(len, shape.seen.values())), sum(len(s.to) for s in shape.system.sources.values())
@@ -271,6 +273,7 @@ class Batch:
         for lane, system in enumerate(systems):
             for i, name in enumerate(shape.numbers):
                 self._numbers[i, lane] = self._number(system, name)
+            self._begin(lane, system)
             self._numbers[len(shape.numbers), lane] = nanoseconds(system.stop_time) / NANOSECONDS
             for i, call in enumerate(shape.inner):
                 self._numbers[len(shape.numbers) + 1 + i, lane] = known[call][lane] if known else 0.0
@@ -332,9 +335,22 @@ class Batch:
         taken_: Floats = np.where(kinds == 1, values != 0.0, np.where(kinds == 2, np.rint(values), values))
         return taken_
 
+    def _begin(self, lane: int, system: System) -> None:
+        """When the own time of each component begins, as `Master` has it: 0 unless it begins with a later sample."""
+        names, late = self._shape.names, {}
+        for name, component in system.components.items():
+            sampling, waits = component.sampling, self._shape.models[name].waits
+            if sampling is None or sampling.clock == "fmu" or waits:
+                continue
+            if sampling.offset or sampling.jitter:
+                late[name] = sampling.clock_ratio
+        first = Timetable(system, Streams(system.seed, system.streams)).first_samples if late else {}
+        for index, name in enumerate(names):
+            self._begins[index][lane] = late.get(name, 0.0) * (first.get(name, 0) / NANOSECONDS)
+
     def _compute(self, index: int) -> Lanes:
         """The outputs of a component in initialisation mode; lanes in which that fails."""
-        active, start = np.full(self._lanes, 2**64 - 1, dtype=np.uint64), np.zeros(self._lanes)
+        active, start = np.full(self._lanes, 2**64 - 1, dtype=np.uint64), self._begins[index]
         status = np.zeros(self._lanes, dtype=np.int32)
         kernel = self._shape.kernels[self._shape.names[index]]
         kernel.lanes.initialise(

@@ -126,6 +126,27 @@ def test_a_fixed_step_is_kept_whatever_happens_between_its_points(tmp_path: Path
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("sampling", [{"offset": 0.013}, {"jitter": 0.015}, {"offset": 0.02, "clock_ratio": 1.25}])
+def test_the_first_step_of_a_task_begins_where_its_initialisation_was(
+    fmi: int, sampling: dict[str, float], tmp_path: Path
+) -> None:
+    """The FMU refuses a step that does not begin where the last one ended, or initialisation was."""
+    path = small(tmp_path, "STRICT", "TELLS_START", fmi=fmi)
+    output = "it.y[1]" if fmi == 3 else "it.y"
+    result = ran(
+        System(stop_time=0.1, components={"it": Component(fmu=str(path), sampling=Sampling(period=0.02, **sampling))})
+    )
+    first = result.signals["time"][result.signals["it.count"] == 1.0][0]
+    assert first > 0.0
+    assert result.signals[output][0] == sampling.get("clock_ratio", 1.0) * first
+
+
+def test_a_task_without_a_sample_begins_at_the_start(tmp_path: Path) -> None:
+    part = Component(fmu=str(small(tmp_path, "TELLS_START")), sampling=Sampling(period=0.02, offset=0.1))
+    assert last(ran(System(stop_time=0.1, components={"it": part})), "it.y") == 0.0
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("load", [instances.open_here, IsolatedInstance])
 def test_a_tolerance_is_that_of_the_file_else_of_the_declared_experiment(fmi: int, load: Any, tmp_path: Path) -> None:
     of_none, of_one = (

@@ -22,6 +22,7 @@ from orchestration.quadrotor.measures import desired
 from orchestration.quadrotor.scenario import FmuChoice, Record
 from orchestration.quadrotor.signals import ReferenceChoice
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE, REFERENCE
+from orchestration.runs.simulation import prepared
 from quadcosim import Result, RunInterrupted, Scenario, SimulatorError, Timing, UsageError
 
 EVERYTHING: dict[str, Any] = {
@@ -282,6 +283,32 @@ def test_parameters_of_the_scenario_reach_the_fmus() -> None:
     assert (heavy.rows[-1] != plain().rows[100]).any()
     weak = fly(0.1, {"controller.gain.attitude": 1.0})
     assert weak.signals["controller.torque.y"][0] != plain().signals["controller.torque.y"][0]
+
+
+@pytest.mark.parametrize("timing", [{"offset": 0.004}, {"jitter": 0.009}, {"offset": 0.004, "clock_ratio": 1.25}])
+def test_the_controller_is_stepped_to_its_first_sample_without_one(timing: dict[str, float]) -> None:
+    """FMI wants the first step to begin where initialisation was, and what is sampled stays what it is without it."""
+    steps: list[tuple[float, float]] = []
+
+    class Watched(Fmi2Instance):
+        def step(self, t: float, h: float) -> None:
+            if self.name == "controller":
+                steps.append((t, h))
+            super().step(t, h)
+
+    asked = Scenario(stop_time=0.1, timing=Timing(**timing))
+    with prepared(asked, load=Watched) as simulation:
+        simulation.master.initialise()
+        simulation.master.run()
+        result, count = simulation.result(), simulation.instances["controller"].get("sample_count")
+    ends = [0.0, *(t + h for t, h in steps)]
+    assert [t for t, _ in steps] == pytest.approx(ends[:-1], rel=1e-12)
+    samples = [event.time for event in result.events if event.kind == "sampled"]
+    assert samples[0] > 0
+    assert len(steps) == len(samples) + 1
+    assert count == len(samples)
+    at_once = fly(0.1, delay=0.5)  # the command of initialisation, which is held until the first arrival
+    assert result.signals["plant.thrust"][0] == at_once.signals["plant.thrust"][0]
 
 
 def test_the_initial_state_is_that_of_the_scenario() -> None:

@@ -15,8 +15,8 @@ def with_good(good: str | None) -> System:
     return replace(system, criterion=replace(system.criterion, good=good))
 
 
-def metrics(*, good: bool | None = False, outcome: str = "bounded", **objectives: float | None) -> dict[str, Any]:
-    return {"good": good, "outcome": outcome, **objectives}
+def metrics(found: dict[str, Any], good: bool | None = False, outcome: str = "bounded") -> dict[str, Any]:
+    return {"good": good, "outcome": outcome, **found}
 
 
 UNITS = {"ultimate_bound": "m", "settling_time": "s"}
@@ -41,14 +41,14 @@ UNITS = {"ultimate_bound": "m", "settling_time": "s"}
     ],
 )
 def test_the_part_that_failed_is_said(good: str, found: dict[str, float | None], said: str) -> None:
-    assert unmet(with_good(good), metrics(**found), UNITS) == said
+    assert unmet(with_good(good), metrics(found), UNITS) == said
 
 
 def test_of_a_run_that_is_good_or_diverged_nothing_is_said() -> None:
     system = with_good("ultimate_bound < 0.05")
-    assert unmet(system, metrics(good=True, ultimate_bound=0.01), UNITS) is None
-    assert unmet(system, metrics(outcome="diverged", ultimate_bound=None), UNITS) is None
-    assert unmet(with_good(None), metrics(good=None), UNITS) is None
+    assert unmet(system, metrics({"ultimate_bound": 0.01}, good=True), UNITS) is None
+    assert unmet(system, metrics({"ultimate_bound": None}, outcome="diverged"), UNITS) is None
+    assert unmet(with_good(None), metrics({}, good=None), UNITS) is None
 
 
 def test_an_edge_is_the_bound_of_one_comparison_and_of_no_other_expression() -> None:
