@@ -128,7 +128,7 @@ def test_a_fixed_step_is_kept_whatever_happens_between_its_points(tmp_path: Path
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("sampling", [{"offset": 0.013}, {"jitter": 0.015}, {"offset": 0.02, "clock_ratio": 1.25}])
 def test_the_first_step_of_a_task_begins_where_its_initialisation_was(
-    fmi: int, sampling: dict[str, float], tmp_path: Path
+    fmi: int, sampling: dict[str, Any], tmp_path: Path
 ) -> None:
     """The FMU refuses a step that does not begin where the last one ended, or initialisation was."""
     path = small(tmp_path, "STRICT", "TELLS_START", fmi=fmi)

@@ -286,7 +286,7 @@ def test_parameters_of_the_scenario_reach_the_fmus() -> None:
 
 
 @pytest.mark.parametrize("timing", [{"offset": 0.004}, {"jitter": 0.009}, {"offset": 0.004, "clock_ratio": 1.25}])
-def test_the_controller_is_stepped_to_its_first_sample_without_one(timing: dict[str, float]) -> None:
+def test_the_controller_is_stepped_to_its_first_sample_without_one(timing: dict[str, Any]) -> None:
     """FMI wants the first step to begin where initialisation was, and what is sampled stays what it is without it."""
     steps: list[tuple[float, float]] = []
 
