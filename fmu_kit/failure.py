@@ -96,7 +96,12 @@ def _in_the_fmu(error: BaseException) -> str:
 
 def _own_frames(error: BaseException) -> list[traceback.FrameSummary]:
     frames = traceback.extract_tb(error.__traceback__)
-    return [each for each in frames if each.filename.endswith(".py") and not _KIT & {*Path(each.filename).parents}]
+    return [each for each in frames if is_of_a_model(each.filename)]
+
+
+def is_of_a_model(filename: str) -> bool:
+    """Whether a file is Python, and none of what every slave stands on."""
+    return filename.endswith(".py") and not _KIT & {*Path(filename).parents}
 
 
 _KIT = {Path(__file__).parent, Path(inspect.getfile(LogMsg)).parent}

@@ -73,8 +73,12 @@ class Declared:
     ) -> None:
         """`name`: where that of the FMI variable is not the attribute's; bounds are of parameters, as in `Variable`.
 
-        Raises `ValueError` for a unit that is none.
+        Raises `ValueError` for a unit that is none, `TypeError` for a start that no variable can have.
         """
+        if not isinstance(start, float | int | Vec3 | Quaternion):
+            raise TypeError(
+                f"start = {start!r}: expected a number, a truth value, a member of an IntEnum, a Vec3 or a Quaternion"
+            )
         self.description = description
         self.start: Any = float(start) if type(start) is int and unit else start
         self._kind = next(kind for kind in _KINDS if isinstance(self.start, kind.type))

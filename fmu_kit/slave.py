@@ -148,10 +148,9 @@ class Slave(Values, Fmi2Slave):  # type: ignore[misc]
     def initialise(self, t: float) -> None:
         """Compute the outputs at the start time `t` [s]; may be called again before initialisation ends.
 
-        Unless a model says more, states are where they start, and all other variables have their start values.
+        States are where they start when it is called. Unless a model says more, all other variables have their start
+        values.
         """
-        for name, start in self._initial.items():
-            self.put(name, self.real(start))
 
     @abstractmethod
     def step(self, t: float, h: float) -> None:
@@ -333,6 +332,8 @@ class Slave(Values, Fmi2Slave):  # type: ignore[misc]
 
     def _initialise(self) -> None:
         self._take_parameters()
+        for name, start in self._initial.items():
+            self.put(name, self.real(start))
         try:
             self.initialise(self._start_time)
         except (ArithmeticError, ValueError) as error:

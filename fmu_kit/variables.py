@@ -33,7 +33,9 @@ class Variable:
     above: float | None = None
 
     def __post_init__(self) -> None:
-        """Raise `TypeError` for an Enumeration that a check of its range would not do for."""
+        """Raise `TypeError` for a start that no variable has, and an Enumeration whose range would not be checked."""
+        if not isinstance(self.start, float | int):
+            raise TypeError(f"{self.name}: start = {self.start!r}: expected a number or a truth value")
         if self.items and (self.causality != "parameter" or [*self.items.values()] != [*range(1, len(self.items) + 1)]):
             raise TypeError(f"{self.name}: expected an Enumeration to be a parameter, its items 1, 2, …")
 

@@ -1,6 +1,7 @@
 """Variables that are declared as attributes: what FMI sees of them, and what a law may do with them."""
 
 import enum
+import re
 from typing import Any
 
 import pytest
@@ -9,6 +10,7 @@ from fmu_kit.algebra import ZERO, Quaternion, Vec3
 from fmu_kit.failure import Failure
 from fmu_kit.interface import Declared, Input, Local, Output, Parameter, State
 from fmu_kit.slave import Slave
+from fmu_kit.variables import continuous_output
 
 
 class Mode(enum.IntEnum):
@@ -140,6 +142,14 @@ def test_names_that_every_slave_has_are_refused(name):
 def test_a_unit_that_is_none_is_refused_where_it_is_written():
     with pytest.raises(ValueError, match="unit m/sq: expected powers of"):
         Input("speed", "m/sq")
+
+
+@pytest.mark.parametrize("start", ["on", [1.0, 2.0], None])
+def test_a_start_that_no_variable_can_have_is_refused_where_it_is_written(start):
+    with pytest.raises(TypeError, match=re.escape(f"start = {start!r}: expected a number, a truth value, a member")):
+        Input("measured", "m", start)
+    with pytest.raises(TypeError, match=re.escape(f"x: start = {start!r}: expected a number or a truth value")):
+        continuous_output("x", "measured", "m", start)
 
 
 def test_variables_are_attributes_or_a_list():

@@ -16,6 +16,7 @@ from fmu_kit.compiler.trace.tree import (
     leaves,
     mapped,
     shape,
+    written,
 )
 from fmu_kit.slave import Slave
 
@@ -26,8 +27,7 @@ KEPT_BY_THE_BASE = ("_reals", "_others", "_stale", "_start_time")
 
 def name_of_kept(path: Path) -> str:
     """The name of a place beside the variables, as a model writes it."""
-    named = [isinstance(part, str) and part.isidentifier() for part in path]
-    return "".join(["self", *(f".{part}" if is_name else f"[{part!r}]" for part, is_name in zip(path, named))])
+    return f"self{written(path)}"
 
 
 class Memory:
@@ -69,9 +69,10 @@ class Memory:
             if name not in before and not may_add:
                 raise TraceError(f"self.{name} is first set {when}: expected it set by initialise")
             if name in before and shape(before[name]) != shape(value):
+                what = "what is kept" if name in KEPT_BY_THE_BASE else f"self.{name}"
+                found = difference({name: before[name]}, {name: value}, self.name)
                 raise TraceError(
-                    f"self.{name} changes {when} in more than numbers: {difference(before[name], value)}; "
-                    "expected one form from the beginning on"
+                    f"{what} changes {when} in more than numbers: {found}; expected one form from the beginning on"
                 )
         for name in before.keys() - now.keys():
             raise TraceError(f"self.{name} is deleted {when}: expected it to stay")
@@ -98,9 +99,13 @@ class Memory:
     def name(self, path: Path) -> str:
         """The name of a place."""
         first, *rest = path
-        if first in ("_reals", "_others"):
+        if first in ("_reals", "_others") and rest:
             return str(self.slave.variables[rest[0]].name)
         return name_of_kept(path)
+
+    def name_in_view(self, path: Path) -> str:
+        """The name of what lies in a view, or in what a function returns."""
+        return self.name(path[1:]) if path[:1] == ("self",) else f"it{written(path)}"
 
     def place(self, path: Path, symbol: Symbol) -> Place:
         """The place of a path, made when it is first seen."""

@@ -6,9 +6,13 @@ other way, until all have been taken; then the paths are merged where they meet 
 
 from __future__ import annotations
 
+import ast
+import functools
+import inspect
 import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from fmu_kit.compiler.trace.memory import Memory
@@ -30,6 +34,7 @@ from fmu_kit.compiler.trace.symbols import (
 )
 from fmu_kit.compiler.trace.tree import difference, expect_no_twins, is_number, leaves, mapped, shape
 from fmu_kit.errors import DivergenceError, FmuError
+from fmu_kit.failure import is_of_a_model
 
 
 class _EndedError(BaseException):
@@ -122,6 +127,7 @@ class Recorder:
         if id(condition) in path.known:
             return path.known[id(condition)]
         at = len(path.taken)
+        _expect_an_end(at)
         way = path.script[at] if at < len(path.script) else True
         path.taken.append(way)
         path.known[id(condition)] = way
@@ -160,7 +166,7 @@ class Recorder:
                 restore()
             runs += 1
             if runs > MOST_PATHS:
-                raise TraceError(f"more than {MOST_PATHS} paths: expected fewer conditions that depend on each other")
+                raise TraceError(_TOO_MANY)
             path = self._path = _Path(script, dict(outer.known) if outer else {})
             leaf = None
             try:
@@ -345,6 +351,30 @@ class Recorder:
 
 MOST_PATHS = 2000
 """Through one function; more take minutes."""
+MOST_ROUNDS = 200
+"""Of a `while` that asks for computed values: such a loop has no end while it is traced."""
+_TOO_MANY = f"more than {MOST_PATHS} paths: expected fewer conditions that depend on each other"
+
+
+def _expect_an_end(forks: int) -> None:
+    """Raise `TraceError` on a path that has come to so many forks that it will hardly end."""
+    if forks >= MOST_PATHS:
+        raise TraceError(_TOO_MANY)
+    if forks and forks % MOST_ROUNDS == 0:
+        frame = inspect.currentframe()
+        while frame is not None and not is_of_a_model(frame.f_code.co_filename):
+            frame = frame.f_back
+        if frame is not None and any(frame.f_lineno in loop for loop in _loops_in(frame.f_code.co_filename)):
+            rounds = f"more than {MOST_ROUNDS} rounds by a computed condition"
+            raise TraceError(f"while: {rounds}, expected fmu_kit.scalar.repeat for a loop")
+
+
+@functools.cache
+def _loops_in(path: str) -> tuple[range, ...]:
+    """The lines of each `while` in a file."""
+    tree = ast.parse(Path(path).read_text("utf-8"))
+    loops = [each for each in ast.walk(tree) if isinstance(each, ast.While)]
+    return tuple(range(loop.lineno, (loop.end_lineno or loop.lineno) + 1) for loop in loops)
 
 
 class _Merge:
@@ -370,7 +400,8 @@ class _Merge:
 
     def value(self, a: Any, b: Any, what: str) -> Any:
         if shape(a) != shape(b):
-            raise TraceError(f"{what} differs in more than numbers between two paths: {difference(a, b)}")
+            found = difference(a, b, self.memory.name_in_view)
+            raise TraceError(f"{what} differs in more than numbers between two paths: {found}")
         others = iter([leaf for _, leaf in leaves(b)])
 
         def either(_: Any, leaf: Any) -> Any:

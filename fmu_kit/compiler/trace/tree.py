@@ -72,14 +72,19 @@ def shape(value: Any) -> Any:
     return (type(value), tuple((key, shape(child)) for key, child in inside))
 
 
-def difference(a: Any, b: Any) -> str:
-    """In what two values differ beside their numbers."""
+def written(path: Path) -> str:
+    """A path as a model writes it, behind what it begins at."""
+    names = [isinstance(part, str) and part.isidentifier() for part in path]
+    return "".join(f".{part}" if is_name else f"[{part!r}]" for part, is_name in zip(path, names))
+
+
+def difference(a: Any, b: Any, name: Callable[[Path], str]) -> str:
+    """In what two values differ beside their numbers; `name` has the words for where."""
     one, other = dict(leaves(a)), dict(leaves(b))
     for path in [*one, *other]:
         if path not in one or path not in other or shape(one[path]) != shape(other[path]):
-            name = ".".join(str(part) for part in path) or "it"
             found = (_in_words(each[path]) if path in each else "absent" for each in (one, other))
-            return f"{name} is {' and '.join(found)}"
+            return f"{name(path)} is {' and '.join(found)}"
     return "their types"
 
 
@@ -127,8 +132,8 @@ def expect_no_twins(value: Any) -> None:
             children(value) and not isinstance(value, tuple) and not _is_frozen(value)
         ):
             if id(value) in places:
-                one, other = (".".join(map(str, each)) for each in (places[id(value)], path))
-                raise TraceError(f"self.{one} and self.{other} are one {type(value).__name__}: expected one of its own")
+                one, other = (f"self{written(each)}" for each in (places[id(value)], path))
+                raise TraceError(f"{one} and {other} are one {type(value).__name__}: expected one of its own")
             places[id(value)] = path
         for key, child in children(value):
             note(child, (*path, key))

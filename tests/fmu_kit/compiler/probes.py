@@ -5,8 +5,10 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
+from fmu_kit import interface
 from fmu_kit.algebra import Vec3
 from fmu_kit.errors import DivergenceError, FmuError, require
+from fmu_kit.interface import Input, Output, Parameter
 from fmu_kit.saved_state import State
 from fmu_kit.scalar import repeat
 from fmu_kit.slave import Slave
@@ -385,6 +387,25 @@ class Below(Kept):
 
     def _moved(self, x: float, by: float) -> float:
         return 2.0 * super()._moved(x, by) + super()._moved(by, x)
+
+
+class Pendulum(Slave):
+    """States, and what is computed of them at the start without a word to the base class."""
+
+    torque = Input("applied", "N.m")
+    angle = interface.State("from the vertical", "rad", 0.5)
+    place = interface.State("of the bob", "m", Vec3(0.0, 1.0, 2.0))
+    height = Output("of the bob", "m")
+    length = Parameter("of the rod", "m", 2.0)
+
+    def initialise(self, t: float) -> None:
+        """The height of where it starts."""
+        self.height = self.length * math.cos(self.angle) + self.place.y
+
+    def step(self, t: float, h: float) -> None:
+        """Somewhere."""
+        self.angle = self.angle + h * self.torque
+        self.height = self.length * math.cos(self.angle)
 
 
 # -- loops ---------------------------------------------------------------------------------------------------------

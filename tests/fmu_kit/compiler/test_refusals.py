@@ -68,10 +68,16 @@ IN_A_STEP = [
     ("self.log('a')", "self.log: expected self.warn_once"),
     ("self._new = a", "self._new is first set in a step: expected it set by initialise"),
     ("self.hidden = a", "self.hidden hides the one of its class: expected another name, set by initialise"),
-    ("self._kept = None", "self._kept changes in a step in more than numbers: it is a number and None"),
+    ("self._kept = None", "self._kept changes in a step in more than numbers: self._kept is a number and None"),
     ("self._kept = [a]", "self._kept changes in a step in more than numbers: "),
     ("if a > 1.0: self._kept = 'on'", "what is kept differs in more than numbers between two paths: "),
     ("self.put('y', min([a, t], key=abs))", "min() of computed values with key: expected values only"),
+    ("self.put('y', None)", "what is kept changes in a step in more than numbers: y is a number and None"),
+    ("if a > 1.0: self.put_count('count', 'on')", "between two paths: count is 'on' and a number"),
+    (
+        "while a > 1.0: a = a / 2.0",
+        "while: more than 200 rounds by a computed condition, expected fmu_kit.scalar.repeat",
+    ),
     ("assert a > 1.0", "AssertionError"),
     ("self.put('y', repeat(math.floor(a), lambda i, x: (x, x), a))", "repeat: expected the body to return what it is"),
     (
@@ -88,6 +94,7 @@ IN_A_STEP = [
 IN_INITIALISE = [
     ("self._queue = deque([0.0])", "deque: expected numbers in tuples, lists, dictionaries and objects"),
     ("self._one = self._other = Helper(t)", "self._one and self._other are one Helper: expected one of its own"),
+    ("self._one = Helper(t); self._all = {'b.c': [self._one]}", "self._one and self._all['b.c'][0] are one Helper"),
     ("raise ValueError(t)", "Refused.initialise fails whatever it is given"),
 ]
 
@@ -117,7 +124,7 @@ def test_what_a_step_may_not_do_is_said_in_a_line(
     assert words in said
     assert "\n" not in said
     if not re.match(
-        "Refused: (self.*(a step|its class)|.*(between two paths|of its type))", said
+        "Refused: (self.*(a step|its class)|what is kept.*a step|.*(between two paths|of its type))", said
     ):  # of the slave as a whole
         assert said.startswith(f"Refused: {path}, line {line_of(path, statement)}: ")
 
@@ -152,6 +159,19 @@ def test_errors_that_are_caught_are_refused_where_they_are(
     text = SLAVE.replace("{initialise}", "pass").replace("{step}", called) + method
     path, said = refusal(tmp_path, monkeypatch, text)
     assert said == f"Refused: {path}, line {line_of(path, where)}: {words}"
+
+
+def test_a_loop_without_an_end_is_refused_where_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    method = """
+def halved(x):
+    while True:
+        x = 0.5 * x
+        if x < 1.0:  # enough
+            return x
+"""
+    text = SLAVE.replace("{initialise}", "pass").replace("{step}", "self.put('y', halved(a))") + method
+    path, said = refusal(tmp_path, monkeypatch, text)
+    assert said.startswith(f"Refused: {path}, line {line_of(path, '# enough')}: while: more than 200 rounds")
 
 
 @pytest.mark.parametrize("name", ["get_real", "terminate", "_initialise"])

@@ -1,5 +1,6 @@
 """What slaves may do: written out as C they answer as they do in Python, to the last bit and letter."""
 
+import math
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 from fmu_kit.bundle import Target
 from fmu_kit.packaging import slave_class
 from tests.fmu_kit.compiler.compiled import compiler
+from tests.fmu_kit.compiler.probes import Pendulum
 from tests.fmu_kit.compiler.twins import InC, InPython, Values, answers, library
 
 PROBES = ("Branches", "Arithmetic", "Integers", "Choices", "Memory", "Kept", "Below", "Loops", "Words")
@@ -45,3 +47,13 @@ def test_a_slave_in_c_answers_as_in_python(probe: tuple[Target, Path]) -> None:
         assert answers(reset, given, steps) == expected
 
     answer_alike()
+
+
+def test_a_model_that_initialises_without_its_base_starts_from_its_initial_values(tmp_path: Path) -> None:
+    compiler("cc")
+    path = library(Target.parse("tests.fmu_kit.compiler.probes:Pendulum"), tmp_path)
+    given = {"initial.angle": 0.25, "initial.place.y": 3.0, "torque": 2.0}
+    expected = answers(InPython(Pendulum(instance_name="pendulum")), given, [{}, {}])
+    assert answers(InC.made(Pendulum, path), given, [{}, {}]) == expected
+    assert [float.fromhex(values[Pendulum._index["angle"]]) for values in expected] == [0.25, 0.75, 1.25]
+    assert float.fromhex(expected[0][Pendulum._index["height"]]) == 2.0 * math.cos(0.25) + 3.0
