@@ -91,13 +91,16 @@ def _difference(a: Current, b: Current) -> Current:
 
 
 def _norm(parts: Sequence[Current]) -> Current:
-    if all(isinstance(part, _At) for part in parts):
-        get = operator.itemgetter(*[part.place for part in parts if isinstance(part, _At)])
-        return (lambda values: math.hypot(*get(values))) if len(parts) > 1 else (lambda values: abs(get(values)))
-    if len(parts) == 3:
-        x, y, z = parts
-        return lambda values: math.hypot(x(values), y(values), z(values))
-    return lambda values: math.hypot(*[part(values) for part in parts])
+    """The root of the sum of the squares, one after another: what it comes to over rows and in lanes, to the bit."""
+
+    def norm(values: Sequence[float]) -> float:
+        total = 0.0
+        for part in parts:
+            x = part(values)
+            total += x * x
+        return math.sqrt(total)
+
+    return norm
 
 
 def _binary(function: Callable[[float, float], float]) -> Callable[[Current, Current], Current]:

@@ -111,8 +111,8 @@ def _applied(function: Callable[..., Any], values: list[Any]) -> Any:
 
 
 def _norm(*parts: Any) -> Any:
-    squares = [np.square(part).sum(axis=0) if np.ndim(part) == 2 else np.square(part) for part in parts]
-    return np.sqrt(sum(squares))
+    numbers = [number for part in parts for number in (part if np.ndim(part) == 2 else [part])]
+    return np.sqrt(sum(np.square(number) for number in numbers))
 
 
 def _logic(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -42,7 +42,7 @@ static void refusals(void *c, const uint8_t *bytes, void **state)
 
 static void live(void)
 {
-    const unsigned known = POSITION_X, unknown = THRUST, with_time[3] = {0, TIME, 1};
+    const unsigned known = AT_POSITION_X, unknown = AT_THRUST, with_time[3] = {0, TIME, 1};
     const double x = 1.5;
     void *c = instantiate(GUID), *state = NULL, *copy = NULL;
     uint8_t bytes[sizeof(State)];
