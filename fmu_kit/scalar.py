@@ -27,6 +27,8 @@ class ScalarOps:
     where: Callable[[Any, Scalar, Scalar], Scalar]
     all: Callable[[Any], Any]
     """Whether a condition holds, as one truth value: at every point of a batch."""
+    resolution: float = 2.0**-53
+    """Of a number about 1: what rounding may change."""
 
 
 FLOAT = ScalarOps(

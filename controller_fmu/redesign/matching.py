@@ -1,5 +1,6 @@
 """The constant command under which the nominal model ends a hold period nearest to a given state."""
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -9,8 +10,9 @@ from fmu_kit.scalar import FLOAT, Scalar, ScalarOps, repeat
 
 ITERATIONS = 4
 """Of Gauss-Newton: see `matched`."""
-DIFFERENCE = 1e-5
-"""[m/s²], [rad/s²]: between the commands that the Jacobian is found from."""
+DIFFERENCE, ROUNDINGS = 1e-5, 200.0
+"""[m/s²], [rad/s²]: between the commands that the Jacobian is found from; in coarser numbers it is this many times the
+root of their resolution, so that a period of milliseconds leaves a difference between where they lead."""
 TINY = 1e-150
 """[1]: below this, the vector part of a quaternion counts as zero."""
 
@@ -41,9 +43,14 @@ def matched(
     def tried(command: tuple[Scalar, ...]) -> _Try:
         return _Try(command, misses(flight(_wrench(command, model)), target, weight, ops))
 
+    difference = max(DIFFERENCE, ROUNDINGS * math.sqrt(ops.resolution))
+
     def improved(i: int, now: _Try) -> _Try:
         columns = [
-            [(there - here) / DIFFERENCE for there, here in zip(tried(_moved(now.command, k)).misses, now.misses)]
+            [
+                (there - here) / difference
+                for there, here in zip(tried(_moved(now.command, k, difference)).misses, now.misses)
+            ]
             for k in range(4)
         ]
         matrix = [[_inner(a, b) for b in columns] for a in columns]
@@ -90,8 +97,8 @@ def solved(matrix: list[list[Scalar]], right: list[Scalar]) -> list[Scalar]:
     return right
 
 
-def _moved(command: tuple[Scalar, ...], k: int) -> tuple[Scalar, ...]:
-    return tuple(x + DIFFERENCE if i == k else x for i, x in enumerate(command))
+def _moved(command: tuple[Scalar, ...], k: int, by: float) -> tuple[Scalar, ...]:
+    return tuple(x + by if i == k else x for i, x in enumerate(command))
 
 
 def _wrench(command: tuple[Scalar, ...], model: Body) -> Wrench:

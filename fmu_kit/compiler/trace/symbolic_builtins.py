@@ -260,6 +260,7 @@ def installed(modules: Iterable[types.ModuleType], extra: Mapping[Any, Any]) -> 
     by_identity: dict[int, Any] = {id(module): _Outside(module.__name__) for module in (random, time)}
     by_identity |= {id(math): _Math(), **{id(getattr(math, name)): f for name, f in MATH.items()}}
     by_identity.update({id(function): stand_in for function, stand_in in extra.items()})
+    scalars = {**SCALARS, "resolution": 2.0**-hooks.digits}
     kept = {field.name: getattr(scalar.FLOAT, field.name) for field in dataclasses.fields(scalar.FLOAT)}
     try:
         for module in modules:
@@ -268,7 +269,7 @@ def installed(modules: Iterable[types.ModuleType], extra: Mapping[Any, Any]) -> 
             changed |= {name: value for name, value in BUILTINS.items() if name not in names}
             undone.append((names, {name: names[name] for name in changed if name in names}, list(changed)))
             names.update(changed)
-        for name, function in SCALARS.items():
+        for name, function in scalars.items():
             object.__setattr__(scalar.FLOAT, name, function)
         yield
     finally:

@@ -116,6 +116,18 @@ def test_in_single_precision_the_flight_is_near(
     assert rows[-1, names.index("c.sample_count")] == STEPS
 
 
+def test_in_single_precision_the_redesign_finds_the_commands_of_double(
+    exported: dict[str, Path], tmp_path: Path
+) -> None:
+    single, double = (
+        on_this_machine("embedded_match.c", [exported[name]], tmp_path, f"-Dq_number={number}")
+        for name, number in (("single", "float"), ("UnifiedController", "double"))
+    )
+    found, expected = (np.array([list(map(float, line.split())) for line in lines]) for lines in (single, double))
+    assert not expected[:, 0].any()
+    np.testing.assert_allclose(found, expected, rtol=1e-3, atol=1e-3)
+
+
 def test_in_single_precision_a_clock_of_its_own_misses_samples(exported: dict[str, Path], tmp_path: Path) -> None:
     sides = [exported["single"], exported["QuadrotorPlant"]]
     names = to_note(sides[0], sides[1], tmp_path)

@@ -1,6 +1,7 @@
 """The norm is one number, wherever it is computed: at an instant, over rows, and in lanes."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +23,9 @@ def over_rows(node: Node, values: tuple[float, ...]) -> float:
     """As metrics have it."""
     signals = {name: np.array([values[place]] * 2) for name, place in PLACES.items()}
     run = Recorded(time=np.array([0.0, 1.0]), signals=signals, ends={}, numbers={}, arrivals={}, stop_time=1.0)
-    return float(evaluate({"x": Call("max", (node,))}, lambda: iter([run]))["x"])
+    found = evaluate({"x": Call("max", (node,))}, lambda: iter([run]))["x"]
+    assert found is not None
+    return found
 
 
 def in_lanes(node: Node, values: tuple[float, ...]) -> float:
@@ -31,7 +34,7 @@ def in_lanes(node: Node, values: tuple[float, ...]) -> float:
     (one,) = scalars(node, VECTORS)
     section = Section("x")
     name = writer.value(one, "row", section)
-    known = {"q_sqrt": math.sqrt, **{f"v{place}": value for place, value in enumerate(values)}}
+    known: dict[str, Any] = {"q_sqrt": math.sqrt, **{f"v{place}": value for place, value in enumerate(values)}}
     for line in section.lines:
         of, _, code = line.removeprefix("const q_real ").rstrip(";").partition(" = ")
         known[of] = eval(code, known)
