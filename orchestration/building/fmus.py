@@ -16,6 +16,7 @@ from fmu_kit.compiler.pack import freshness
 from fmu_kit.discovery import slave_beside, slaves_in
 from fmu_kit.packaging import read_source_hash
 from orchestration.basics.errors import QuadcosimError, UsageError
+from orchestration.building import consent
 from orchestration.building.models import MODELS
 from orchestration.processes import subprocesses
 from orchestration.system.model import System
@@ -68,8 +69,8 @@ def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
     """The .fmu for the name of one of this project's FMUs, or for a path; built first if need be.
 
     A path's FMU is built where a module beside it defines a slave of that name, unless it carries the hash of these
-    sources or is none of ours. Raises `UsageError` naming the valid names if there is none; `announce` hears of
-    a build.
+    sources or is none of ours; if somebody has to agree to that, `UsageError` says how. Raises `UsageError` naming the
+    valid names if there is none; `announce` hears of a build.
     """
     for packing in PACKINGS:
         name = fmu.rpartition("/")[2]
@@ -83,6 +84,7 @@ def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
     if path.suffix == ".fmu":
         packing, target = _slave_of(path)
         if target is not None and _is_old(path, target, packing):
+            consent.expect(path, path.parents[len(Path(packing.folder).parts)])
             _announce_build(path, announce)
             build_slaves([target], path.parent, announce, packing=packing)
         if path.is_file():
@@ -91,6 +93,16 @@ def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
         f"fmu = {fmu}: expected {' or '.join(MODELS)}, or the path of an .fmu file, which may be missing if a module "
         "beside it defines the slave"
     )
+
+
+def looked_up(fmu: str, announce: Callable[[str], None] | None = None) -> Path | None:
+    """The .fmu as `locate` finds it, but that nothing is built of modules that nobody allows now; None if it is not
+    there.
+    """
+    path = Path(fmu)
+    if path.suffix != ".fmu" or consent.is_allowed():
+        return locate(fmu, announce)
+    return path if path.is_file() else None
 
 
 def of_components(fmus: Mapping[str, str], announce: Callable[[str], None] | None = None) -> dict[str, Path]:

@@ -13,12 +13,14 @@ from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageErr
 from orchestration.basics.extras import extra_of
 from orchestration.basics.terminal import complain, progress_bar, say, warn
 from orchestration.basics.units import after
+from orchestration.building import consent
 from orchestration.command import completion, interop, plotting, studies
 from orchestration.command import new as beginning
 from orchestration.command import registry as registering
 from orchestration.command import report as reports
 from orchestration.command import systems as system_commands
 from orchestration.command.answer import Answer, of_files
+from orchestration.command.build_flag import ask
 from orchestration.command.flags import EngineFlag, FlightFlags, Timing, flies, request_from
 from orchestration.command.limit_flags import LimitFlags, ProcessFlags
 from orchestration.command.output_options import Manners
@@ -127,6 +129,7 @@ def build(
         how: Any = {"packing": packing, "systems": target, "progress": progress}
         if folder is None:
             return of_files(fmus.build(MODELS, where, say, **how))
+        consent.agree(folder)
         return of_files(fmus.build_slaves(fmus.slaves_of(folder), where, say, **how))
 
 
@@ -322,7 +325,7 @@ def main(arguments: list[str] | None = None) -> None:
     registering.arguments = given
     registering.behave(Manners(), anew=True)
     try:
-        with banners_to_stderr():
+        with banners_to_stderr(), consent.asking(ask):
             code = app(given or ["--help"], prog_name="quadcosim", standalone_mode=False)
         sys.exit(code if given else 2)
     except (KeyboardInterrupt, _Stopped) as stop:

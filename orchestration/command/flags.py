@@ -9,7 +9,8 @@ import typer
 
 from orchestration.basics.errors import UsageError
 from orchestration.command import completion
-from orchestration.command.shared_flags import takes
+from orchestration.command.build_flag import builds
+from orchestration.command.shared_flags import Command, takes
 from orchestration.quadrotor.timing import TIMING_KEYS
 
 if TYPE_CHECKING:
@@ -270,8 +271,9 @@ _BY_MEASUREMENT = ("noise", "quantisation")
 _TIMING_FLAGS = tuple(key for key in TIMING_KEYS if key not in _BY_MEASUREMENT)
 
 
-flies = takes("flags", FlightFlags)
-"""Gives a command all flight flags."""
+def flies(command: Command) -> Command:
+    """Give a command all flight flags, and that by which it may build."""
+    return builds(takes("flags", FlightFlags)(command))
 
 
 def request_from(path: Path | None, flags: FlightFlags, timing: Path | None = None) -> "Request":

@@ -8,8 +8,10 @@ import typer
 from orchestration.basics.terminal import progress_bar
 from orchestration.command import registry as registering
 from orchestration.command.answer import Answer, of_files
+from orchestration.command.build_flag import builds
 
 
+@builds
 def report(
     what: Annotated[
         list[Path],

@@ -12,6 +12,7 @@ from orchestration.basics.terminal import say
 from orchestration.command import completion
 from orchestration.command import registry as registering
 from orchestration.command.answer import Answer, of_files
+from orchestration.command.build_flag import builds
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.flags import EngineFlag, FlightFlags, Timing, flies, request_from
 from orchestration.command.limit_flags import TimeLimit
@@ -37,6 +38,7 @@ BatchFlag = Annotated[
 ]
 
 
+@builds
 def sweep(
     study: StudyFile,
     out: Out = None,
@@ -137,6 +139,7 @@ def draw(
     return of_files(draw_study(chosen, out, metric, look.chosen))
 
 
+@builds
 def tune(
     tuning: Annotated[
         Path, typer.Argument(help="What is tuned, and on what.", metavar="TUNING.toml", show_default=False)
@@ -154,6 +157,7 @@ def tune(
     return of_files(found.written)
 
 
+@builds
 @takes("look", FigureFlags)
 def compare(
     comparison: Annotated[

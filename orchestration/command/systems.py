@@ -9,6 +9,7 @@ import typer
 from orchestration.basics.terminal import say
 from orchestration.command import registry as registering
 from orchestration.command.answer import Answer
+from orchestration.command.build_flag import builds
 from orchestration.command.flags import FlightFlags, Timing, flies, request_from
 from orchestration.command.registry import FLY
 
@@ -24,6 +25,7 @@ def schema() -> Answer:
     return replace(answer, lines=answer.as_json.splitlines())
 
 
+@builds
 def connect(
     fmu: Annotated[list[str], typer.Argument(help="FMUs: paths, or names of this project's.", show_default=False)],
     out: Annotated[
@@ -80,15 +82,16 @@ def show(
 
 
 def _units_of(system: "System") -> dict[str, str]:
-    """Of its objectives; none where its FMUs are not there, or do not fit."""
+    """Of its objectives; none where its FMUs are not there, or do not fit: who looks runs no foreign module."""
     from orchestration.basics.errors import QuadcosimError
     from orchestration.building import fmus
     from orchestration.engines.wiring import checked
     from orchestration.fmi.model import read_model
 
     try:
-        models = {name: read_model(path) for name, path in fmus.of_components(system.fmus, say).items()}
-        return checked(system, models).units
+        paths = {name: fmus.looked_up(fmu, say) for name, fmu in system.fmus.items()}
+        models = {name: read_model(path) for name, path in paths.items() if path is not None}
+        return checked(system, models).units if models.keys() == paths.keys() else {}
     except QuadcosimError:
         return {}
 
