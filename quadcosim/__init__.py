@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from orchestration.runs.pause import fly_until, resume
     from orchestration.runs.result import Result
     from orchestration.runs.run_directory import load_run, save_run
-    from orchestration.runs.simulation import RunInterrupted, run
+    from orchestration.runs.simulation import RunInterrupted, RunLost, run
     from orchestration.studies.axes import Axis
     from orchestration.studies.study import Study
     from orchestration.studies.study_file import load_study
@@ -109,6 +109,7 @@ _HOMES = {
     "UsageError": "orchestration.basics.errors",
     "SimulatorError": "orchestration.basics.errors",
     "RunInterrupted": "orchestration.runs.simulation",
+    "RunLost": "orchestration.runs.simulation",
 }
 _OTHERWISE = {"limit": "find"}
 """Names that go by another one at home"""
@@ -129,6 +130,7 @@ __all__ = [
     "ReferenceChoice",
     "Result",
     "RunInterrupted",
+    "RunLost",
     "Sampling",
     "Scenario",
     "SimulatorError",

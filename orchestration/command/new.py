@@ -7,7 +7,6 @@ import typer
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.terminal import say
-from orchestration.building import consent
 from orchestration.command import registry as registering
 from orchestration.command.answer import Answer, of_files
 from orchestration.command.registry import FLY
@@ -28,7 +27,6 @@ def new(
         raise UsageError(f"new {kind}: expected {', '.join(kinds)}")
     whose = git_author() if author is None else author
     written = write(kinds[kind], name, Path(), author=whose, license=license)
-    consent.agree(written[0].parent)
     if not whose:
         say("the author is left open; it is the line author = in the class, or --author NAME")
     say(f"next: quadcosim run {name}/system.toml")

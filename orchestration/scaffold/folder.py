@@ -10,6 +10,7 @@ from string import Template
 from typing import Literal
 
 from orchestration.basics.errors import UsageError
+from orchestration.building import consent
 from orchestration.building.models import MODELS
 
 Kind = Literal["controller", "plant", "filter"]
@@ -39,6 +40,7 @@ def write(kind: Kind, name: str, where: Path, *, author: str, license: str) -> l
     for file, template in files.items():
         text = (_HERE / f"{kind}_{template}.tmpl").read_text(encoding="utf-8")
         (folder / file).write_text(Template(text).substitute(said), encoding="utf-8")
+    consent.agree(folder)
     return [folder / file for file in files]
 
 
