@@ -14,7 +14,7 @@ from orchestration.comparison.cells import CellSummary, results
 from orchestration.comparison.design import Comparison
 from orchestration.comparison.limits import Limit, limits
 from orchestration.comparison.pairs import Pair, pairs
-from orchestration.requests.ranges import is_in_seconds
+from orchestration.results.quantities import is_in_seconds
 
 if TYPE_CHECKING:
     import pandas as pd

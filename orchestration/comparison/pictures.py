@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from itertools import groupby
 from pathlib import Path
@@ -24,9 +24,9 @@ from orchestration.comparison.outcome import Outcome
 from orchestration.figures import cells
 from orchestration.figures.palette import BLUE, CYCLE, GREY, ORANGE
 from orchestration.figures.style import SCREEN, Style
-from orchestration.requests.ranges import is_in_seconds
 from orchestration.results import display_names as labels
-from orchestration.studies.axis_labels import name_of
+from orchestration.results.quantities import Quantity, is_in_seconds
+from orchestration.studies.axis_labels import quantity_of
 from orchestration.studies.figures import save
 
 if TYPE_CHECKING:
@@ -38,35 +38,51 @@ MOST_PANELS = 6
 
 
 def draw(
-    comparison: Comparison, outcome: Outcome, table: "pd.DataFrame", folder: Path, style: Style = SCREEN
+    comparison: Comparison,
+    outcome: Outcome,
+    table: "pd.DataFrame",
+    folder: Path,
+    style: Style = SCREEN,
+    *,
+    units: Mapping[str, str],
 ) -> list[Path]:
-    """Draw all pictures into a folder; the paths."""
+    """Draw all pictures into a folder; the paths. `units` are what the store says, by name of axis and metric."""
+    axis = quantity_of(comparison.axis, units)
     done = table[table["status"] == "done"]
     written = [
         path
         for (vehicle, condition), rows in done.groupby([VEHICLE, CONDITION], sort=False)
-        for path in _of_one(comparison, outcome, rows, (vehicle, condition), folder, style)
+        for path in _of_one(comparison, units, outcome, rows, (vehicle, condition), folder, style)
     ]
     if outcome.limits:
-        written += save(lambda how: limits_of(comparison, outcome.limits, how), folder / "limits", style)
+        written += save(lambda how: limits_of(comparison, axis, outcome.limits, how), folder / "limits", style)
     return written
 
 
 def _of_one(
-    comparison: Comparison, outcome: Outcome, rows: "pd.DataFrame", of: tuple[str, str], folder: Path, style: Style
+    comparison: Comparison,
+    units: Mapping[str, str],
+    outcome: Outcome,
+    rows: "pd.DataFrame",
+    of: tuple[str, str],
+    folder: Path,
+    style: Style,
 ) -> Iterator[Path]:
     """The pictures of one vehicle under one condition."""
+    axis = quantity_of(comparison.axis, units)
     found = [cell for cell in outcome.cells if (cell.vehicle, cell.condition) == of]
     fronts = [point for point in outcome.fronts if (point.vehicle, point.condition) == of and _is_known(point)]
     title, end = ", ".join(of), "_".join(re.sub(r"[^\w.-]+", "_", name) for name in of)
     for fate in FATES:
-        yield from save(partial(basins, comparison, rows, title, fate), folder / f"basin_{fate}_{end}", style)
-    yield from save(lambda how: shares(comparison, found, title, how), folder / f"shares_{end}", style)
+        yield from save(partial(basins, comparison, axis, rows, title, fate), folder / f"basin_{fate}_{end}", style)
+    yield from save(lambda how: shares(comparison, axis, found, title, how), folder / f"shares_{end}", style)
     if fronts:
-        yield from save(lambda how: fronts_of(comparison, fronts, title, how), folder / f"front_{end}", style)
+        yield from save(lambda how: fronts_of(comparison, units, fronts, title, how), folder / f"front_{end}", style)
 
 
-def basins(comparison: Comparison, rows: "pd.DataFrame", title: str, fate: str, style: Style = SCREEN) -> Figure:
+def basins(
+    comparison: Comparison, axis: Quantity, rows: "pd.DataFrame", title: str, fate: str, style: Style = SCREEN
+) -> Figure:
     """The share that survives, or settles, over size of the initial error and axis, a panel for each controller.
 
     The white line is where half of them do.
@@ -74,8 +90,7 @@ def basins(comparison: Comparison, rows: "pd.DataFrame", title: str, fate: str, 
     names = [one.name for one in comparison.controllers if (rows[CONTROLLER] == one.name).any()]
     figure, panels = _panels(len(names), 22.0, style)
     bins = np.linspace(0.0, 1.0, BINS + 1)
-    at, factor = _axis(comparison)
-    x = cells.edges(at)
+    x = cells.edges(axis.of(comparison.values))
     for panel, name in zip(panels, names):
         share = _by_size(comparison, rows[rows[CONTROLLER] == name], bins, fate)
         mesh = cells.fill(panel, x, bins, share, vmin=0.0, vmax=1.0)
@@ -83,20 +98,21 @@ def basins(comparison: Comparison, rows: "pd.DataFrame", title: str, fate: str, 
         cells.limit(panel, x, bins, np.where(np.isnan(share), np.nan, share >= 0.5), colors="white")
         panel.set_title(name)
     figure.colorbar(mesh, ax=panels.tolist(), label=f"share that {fate}s [1]")
-    figure.supxlabel(_label(comparison, factor))
+    figure.supxlabel(axis.title)
     figure.supylabel("size of the initial error [1]")
     figure.suptitle(f"{title}; above the white line less than half of the starts {fate}")
     return figure
 
 
-def shares(comparison: Comparison, found: Sequence[CellSummary], title: str, style: Style = SCREEN) -> Figure:
+def shares(
+    comparison: Comparison, axis: Quantity, found: Sequence[CellSummary], title: str, style: Style = SCREEN
+) -> Figure:
     """The shares of all starts that survive and settle, with Wilson intervals, two lines for each controller."""
     figure = style.figure(32.0)
     panel = figure.add_subplot()
-    _, factor = _axis(comparison)
     for color, name in _colored(comparison):
         group = [cell for cell in found if cell.controller == name]
-        at = [factor * float(cell.value) for cell in group]
+        at = axis.of([cell.value for cell in group])
         for line, those in ((".-", [cell.survives for cell in group]), (".:", [cell.settles for cell in group])):
             panel.plot(at, [share.value for share in those], line, color=color, label=name if line == ".-" else None)
             panel.fill_between(
@@ -106,13 +122,13 @@ def shares(comparison: Comparison, found: Sequence[CellSummary], title: str, sty
     runs = max((cell.count for cell in found), default=0)
     panel.plot([], [], ".-", color=GREY, label="survive")
     panel.plot([], [], ".:", color=GREY, label="settle")
-    panel.set(xlabel=_label(comparison, factor), ylabel="share of the starts [1]", ylim=(-0.02, 1.02))
+    panel.set(xlabel=axis.title, ylabel="share of the starts [1]", ylim=(-0.02, 1.02))
     panel.set_title(f"{title}; {runs} starts, 95 % intervals")
     panel.legend()
     return figure
 
 
-def limits_of(comparison: Comparison, limits: Sequence[Limit], style: Style = SCREEN) -> Figure:
+def limits_of(comparison: Comparison, axis: Quantity, limits: Sequence[Limit], style: Style = SCREEN) -> Figure:
     """Up to where half and nine in ten of the starts survive, and settle, an arrow for those that go beyond the axis.
 
     With intervals; beside it, of those that settle, the same times the bandwidth.
@@ -124,32 +140,33 @@ def limits_of(comparison: Comparison, limits: Sequence[Limit], style: Style = SC
     in_seconds = _in_seconds(comparison)
     figure = style.figure(2.5 * len(groups) + 12.0)
     panels = figure.subplots(1, 3 if in_seconds else 2, sharey=True, squeeze=False).ravel()
-    _, factor = _axis(comparison)
     for row, (_, group) in enumerate(groups):
         for limit in group:
             color, shift = (BLUE, -0.15) if limit.share == "half" else (ORANGE, 0.15)
             survives = limit.fate == "survive"
             label = f"{limit.share} of the starts" if row == 0 and survives else None
-            _bar(panels[0 if survives else 1], limit, last, factor, row + shift, color, label)
+            _bar(panels[0 if survives else 1], limit, last, axis.factor, row + shift, color, label)
             if in_seconds and limit.bandwidth is not None and not survives:
                 _bar(panels[2], limit, last, limit.bandwidth, row + shift, color, None)
     several = len(comparison.vehicles) * len(comparison.conditions) > 1
     names = [", ".join((key[2], *key[:2])) if several else key[2] for key, _ in groups]
-    panels[0].set(yticks=range(len(names)), yticklabels=names, xlabel=f"survive up to {_label(comparison, factor)}")
-    panels[1].set(xlabel=f"settle up to {_label(comparison, factor)}")
+    panels[0].set(yticks=range(len(names)), yticklabels=names, xlabel=f"survive up to {axis.title}")
+    panels[1].set(xlabel=f"settle up to {axis.title}")
     panels[0].invert_yaxis()
     if in_seconds:
-        panels[2].set(xlabel=f"settle: {name_of(comparison.axis)} · bandwidth of the attitude loop [rad]")
+        panels[2].set(xlabel=f"settle: {axis.name} · bandwidth of the attitude loop [rad]")
     figure.legend(loc="outside upper center", ncols=2)
     return figure
 
 
-def fronts_of(comparison: Comparison, points: Sequence[Point], title: str, style: Style = SCREEN) -> Figure:
+def fronts_of(
+    comparison: Comparison, units: Mapping[str, str], points: Sequence[Point], title: str, style: Style = SCREEN
+) -> Figure:
     """Error against effort at values of the axis; the line joins what nothing beats."""
     values = [*dict.fromkeys(point.value for point in points)]
     chosen = [values[round(i)] for i in np.linspace(0, len(values) - 1, min(len(values), MOST_PANELS))]
     figure, panels = _panels(len(chosen), 20.0, style)
-    _, factor = _axis(comparison)
+    axis = quantity_of(comparison.axis, units)
     colors = {name: color for color, name in _colored(comparison)}
     for panel, value in zip(panels, chosen):
         here = [point for point in points if point.value == value]
@@ -163,7 +180,7 @@ def fronts_of(comparison: Comparison, points: Sequence[Point], title: str, style
         line = sorted((p.effort.value or 0.0, p.error.value or 0.0) for p in here if p.on_front)
         panel.plot(*np.transpose(line), color=GREY, linewidth=0.8, zorder=0)
         starts = here[0].starts
-        panel.set_title(f"{factor * float(value):g}{' ms' if factor != 1.0 else ''}, {starts} starts")
+        panel.set_title(f"{axis.said(float(value))}, {starts} starts")
         panel.set(xscale="log", yscale="log")
         for ticks in (panel.xaxis, panel.yaxis):
             ticks.set_major_locator(LogLocator(subs=(1.0, 3.0)))
@@ -173,8 +190,8 @@ def fronts_of(comparison: Comparison, points: Sequence[Point], title: str, style
         if any(point.controller == name for point in points):
             panels[0].plot([], [], "o", color=color, label=name)
     figure.legend(loc="outside right center")
-    figure.supxlabel(labels.metric_with_unit(comparison.front.effort))
-    figure.supylabel(labels.metric_with_unit(comparison.front.error))
+    figure.supxlabel(labels.metric_with_unit(comparison.front.effort, units.get(comparison.front.effort)))
+    figure.supylabel(labels.metric_with_unit(comparison.front.error, units.get(comparison.front.error)))
     figure.suptitle(f"{title}: medians over the starts that all survive; filled: on the front")
     return figure
 
@@ -229,16 +246,6 @@ def _colored(comparison: Comparison) -> Iterator[tuple[str, str]]:
         yield matplotlib.colors.to_hex(color), name
 
 
-def _axis(comparison: Comparison) -> tuple[list[float], float]:
-    """The values of the axis as they are drawn, and the factor on them: milliseconds for times."""
-    factor = 1e3 if _in_seconds(comparison) else 1.0
-    return [factor * float(value) for value in comparison.values], factor
-
-
 def _in_seconds(comparison: Comparison) -> bool:
     axis = comparison.axis
     return not axis.multiplies and bool(axis.targets) and all(map(is_in_seconds, axis.targets))
-
-
-def _label(comparison: Comparison, factor: float) -> str:
-    return labels.with_unit(name_of(comparison.axis), "ms" if factor != 1.0 else None)

@@ -21,7 +21,7 @@ from orchestration.runs.simulation import run as fly
 from orchestration.studies.store import store_path
 from orchestration.studies.sweep import sweep
 from orchestration.studies.swept import Swept
-from orchestration.studies.table import export, frame
+from orchestration.studies.table import export, frame, units_in
 from orchestration.system.request import in_its_own_words
 from orchestration.workers.batching import TOLERATED
 from orchestration.workers.executors import Pool
@@ -112,7 +112,7 @@ def compare(
         from orchestration.comparison import pictures
         from orchestration.figures.style import SCREEN  # with it comes matplotlib
 
-        written += pictures.draw(comparison, outcome, table, place, style or SCREEN)
+        written += pictures.draw(comparison, outcome, table, place, style or SCREEN, units=units_in(summary.path))
     return Compared(
         axis=comparison.axis.name, summary=summary, table=table, bandwidths=known, outcome=outcome, written=written
     )

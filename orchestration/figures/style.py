@@ -116,6 +116,14 @@ SCREEN = STYLES["screen"]
 DOCS = replace(SCREEN, dpi=80.0)
 """Files small enough for a repository"""
 
+
+def style_named(name: str) -> Style:
+    """The style of a name; raises `UsageError` for one that there is not."""
+    if name not in STYLES:
+        raise UsageError(f"style {name}: expected one of {', '.join(STYLES)}")
+    return STYLES[name]
+
+
 _UNDATED: Mapping[str, dict[str, str | None]] = {
     "png": {"Software": "quadcosim"},
     "svg": {"Creator": "quadcosim", "Date": None},

@@ -14,64 +14,54 @@ from orchestration.figures.style import SCREEN, Style
 from orchestration.limits.evaluation import RELIABILITY, Tried
 from orchestration.limits.found import Found
 from orchestration.results import display_names as labels
-from orchestration.results.criterion import edge
+from orchestration.results import quantities
+from orchestration.results.quantities import Quantity
 from orchestration.stability.known_loops import LOOPS
 from orchestration.studies import figures
-from orchestration.system.request import Request, system_meant
+from orchestration.system.request import Request
 
-_PLACES = ("components", "connections", "sources")
+DIGITS = 4
+"""of what is said of a value"""
 
 
-def measured(found: Found, edge: float | None, style: Style = SCREEN) -> Figure:
-    """What the criterion is about over the quantity, or the share of good seeds, with the limits.
-
-    `edge` is where the criterion draws the line; None where it is no plain bound.
-    """
-    scale, unit = _scale(found)
+def measured(found: Found, style: Style = SCREEN) -> Figure:
+    """What the criterion is about over the quantity, or the share of good seeds, with the limits."""
+    across = _quantity(found)
     figure = style.figure(38.0)
     axes = figure.add_subplot()
     if found.confidence is None:
-        _values(axes, found, scale, edge)
+        _values(axes, found, across)
     else:
-        _shares(axes, found, scale)
-    tried = [one.value * scale for one in found.tried]
-    axes.set_xlim(_with_margin(tried))
-    _limits(axes, found, scale, unit)
-    axes.set_xlabel(labels.with_unit(in_words(found.of), unit))
-    axes.set_title(_title(found, scale, unit), loc="left")
+        _shares(axes, found, across)
+    axes.set_xlim(_with_margin([one.value * across.factor for one in found.tried]))
+    _limits(axes, found, across)
+    axes.set_xlabel(across.title)
+    axes.set_title(_title(found, across), loc="left")
     figure.legend(loc="outside lower center", ncols=3)
     return figure
 
 
-def in_words(path: str) -> str:
-    """What a path is of, for people: `components.pilot.sampling.period` is the period of pilot."""
-    place, _, rest = path.partition(".")
-    name, _, what = rest.partition(".")
-    if place in _PLACES and what:
-        return f"{labels.words(what.removeprefix('sampling.').removeprefix('parameters.'))} of {labels.words(name)}"
-    return labels.setting(path if "." in path else f"timing.{path}")
-
-
-def _values(axes: Axes, found: Found, scale: float, edge: float | None) -> None:
+def _values(axes: Axes, found: Found, across: Quantity) -> None:
     """One run a value: what the criterion is about, or good and not good where that has no value."""
     known = [one for one in found.tried if one.measured is not None]
     if not known:
-        _drawn(axes, found.tried, [float(is_good(one)) for one in found.tried], scale)
+        _drawn(axes, found.tried, [float(is_good(one)) for one in found.tried], across)
         axes.set(yticks=(0.0, 1.0), yticklabels=("not good", "good"), ylim=(-0.3, 1.3))
         return
-    _drawn(axes, known, [one.measured or 0.0 for one in known], scale)
-    down = [one.value * scale for one in found.tried if one.measured is None]
+    _drawn(axes, known, [one.measured or 0.0 for one in known], across)
+    down = [one.value * across.factor for one in found.tried if one.measured is None]
     axes.plot(
         down, np.full(len(down), 0.97), "^", color=RED, transform=axes.get_xaxis_transform(),
         label="diverged" if down else None,
     )  # fmt: skip
-    if edge is not None:
+    bound = found.judged_bound
+    if bound is not None:
         axes.axhline(
-            edge,
+            bound,
             color=GREY,
             linewidth=1.0,
             linestyle=":",
-            label=f"the criterion's bound, {_shown(edge, 1.0, found.judged_unit)}",
+            label=f"the criterion's bound, {Quantity(name='', unit=found.judged_unit).said(bound, DIGITS)}",
         )
     values = [one.measured or 0.0 for one in known]
     if min(values) > 0.0 and max(values) > 20.0 * min(values):
@@ -81,27 +71,27 @@ def _values(axes: Axes, found: Found, scale: float, edge: float | None) -> None:
     axes.set_ylabel(labels.with_unit(labels.metric(found.judged or ""), found.judged_unit))
 
 
-def _shares(axes: Axes, found: Found, scale: float) -> None:
+def _shares(axes: Axes, found: Found, across: Quantity) -> None:
     """Many runs a value: the share of seeds that are good, with its interval where all were run."""
     shares = [one.flew / one.runs for one in found.tried]
-    _drawn(axes, found.tried, shares, scale)
+    _drawn(axes, found.tried, shares, across)
     known = [one for one in found.tried if one.share is not None]
     low, high = (np.array([one.share[side] for one in known if one.share is not None]) for side in (0, 1))
     middle = np.array([one.flew / one.runs for one in known])
     apart = np.maximum(np.array([middle - low, high - middle]), 0.0)
     axes.errorbar(
-        [one.value * scale for one in known], middle, apart, fmt="none", ecolor=GREY, capsize=2,
+        [one.value * across.factor for one in known], middle, apart, fmt="none", ecolor=GREY, capsize=2,
         label=f"{found.confidence:.0%} interval",
     )  # fmt: skip
     axes.axhline(RELIABILITY, color=GREY, linewidth=1.0, linestyle=":", label=f"{RELIABILITY:.0%} of the seeds")
     axes.set(ylabel=f"share of {found.seeds} seeds that are good", ylim=(-0.05, 1.08))
 
 
-def _drawn(axes: Axes, tried: "list[Tried] | tuple[Tried, ...]", heights: list[float], scale: float) -> None:
+def _drawn(axes: Axes, tried: "list[Tried] | tuple[Tried, ...]", heights: list[float], across: Quantity) -> None:
     """A mark a value: dots where all runs were good, crosses where not."""
     for good, mark, color, label in ((True, "o", BLUE, "good"), (False, "X", RED, "not good")):
         chosen = [i for i, one in enumerate(tried) if is_good(one) is good]
-        x, y = [tried[i].value * scale for i in chosen], [heights[i] for i in chosen]
+        x, y = [tried[i].value * across.factor for i in chosen], [heights[i] for i in chosen]
         axes.plot(x, y, mark, color=color, markersize=6, label=label if chosen else None)
 
 
@@ -110,7 +100,7 @@ def is_good(tried: Tried) -> bool:
     return tried.flew == tried.runs
 
 
-def _limits(axes: Axes, found: Found, scale: float, unit: str | None) -> None:
+def _limits(axes: Axes, found: Found, across: Quantity) -> None:
     """The limits as lines, and what lies beyond the measured one shaded."""
     named = (
         (found.large_signal_limit, RED, "-", "measured limit"),
@@ -119,28 +109,23 @@ def _limits(axes: Axes, found: Found, scale: float, unit: str | None) -> None:
     )
     left, right = axes.get_xlim()
     for limit, color, style, name in named:
-        if limit is not None and left <= limit * scale <= right:
-            axes.axvline(limit * scale, color=color, linestyle=style, label=f"{name}  {_shown(limit, scale, unit)}")
+        at = None if limit is None else limit * across.factor
+        if limit is not None and at is not None and left <= at <= right:
+            axes.axvline(at, color=color, linestyle=style, label=f"{name}  {across.said(limit, DIGITS)}")
     if found.large_signal_limit is not None:
-        axes.axvspan(found.large_signal_limit * scale, right, color=RED, alpha=0.06, linewidth=0.0)
+        axes.axvspan(found.large_signal_limit * across.factor, right, color=RED, alpha=0.06, linewidth=0.0)
 
 
-def _title(found: Found, scale: float, unit: str | None) -> str:
-    what, until = in_words(found.of), f", in runs of {found.horizon:g} s"
+def _title(found: Found, across: Quantity) -> str:
+    what, until = across.name, f", in runs of {found.horizon:g} s"
     if found.large_signal_limit is not None:
-        return f"Good up to {_shown(found.large_signal_limit, scale, unit)}: {what}{until}"
+        return f"Good up to {across.said(found.large_signal_limit, DIGITS)}: {what}{until}"
     first = found.tried[0]
     return f"{what}: {'good throughout' if is_good(first) else 'never good'}{until}"
 
 
-def _scale(found: Found) -> tuple[float, str | None]:
-    """What to multiply values with to be read, and their unit then: times below two seconds are in milliseconds."""
-    largest = max((one.value for one in found.tried), default=0.0)
-    return (1e3, "ms") if found.unit == "s" and largest < 2.0 else (1.0, found.unit)
-
-
-def _shown(value: float, scale: float, unit: str | None) -> str:
-    return f"{value * scale:.4g} {labels.unit(unit) or ''}".rstrip()
+def _quantity(found: Found) -> Quantity:
+    return quantities.setting(found.of, [one.value for one in found.tried], found.unit)
 
 
 def _with_margin(values: list[float]) -> tuple[float, float]:
@@ -150,10 +135,8 @@ def _with_margin(values: list[float]) -> tuple[float, float]:
 
 def draw_limit(request: Request, found: Found, folder: Path, style: Style = SCREEN) -> list[Path]:
     """Draw what was measured, with both limits, and the spectral radius where a loop is known over the quantity."""
-    system = system_meant(request)
-    bound = None if found.judged is None else edge(system, found.judged)
     name = "limit_" + re.sub(r"[^A-Za-z0-9]+", "_", found.of).strip("_")
-    written = figures.save(lambda how: measured(found, bound, how), folder / name, style)
+    written = figures.save(lambda how: measured(found, how), folder / name, style)
     with contextlib.suppress(UsageError):  # where linear theory does not apply
         written += draw_spectral_radius(request, found, folder, style)
     return written

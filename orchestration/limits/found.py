@@ -28,6 +28,8 @@ class Found:
     """The objective that the criterion is about; None: it is about none."""
     judged_unit: str | None = None
     """The unit of that objective; None: it has none."""
+    judged_bound: float | None = None
+    """Where the criterion draws the line in that objective, in its unit; None: it is no plain bound."""
     local_limit: float | None
     """Where what is small about the operating point (hover) first ceases to decay, in the quantity's unit; None: it is
     not defined, or not reached."""

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from orchestration.basics.bisection import Bracket, Range, bisected, first_failure
 from orchestration.basics.errors import UsageError
@@ -17,7 +17,7 @@ from orchestration.limits.evaluation import RELIABILITY, Trials, is_random, said
 from orchestration.limits.found import Continuous, Found
 from orchestration.requests.ranges import Varied, range_asked_for
 from orchestration.results import html
-from orchestration.results.criterion import judged
+from orchestration.results.criterion import edge, judged
 from orchestration.stability.known_loops import Local
 from orchestration.stability.local_limit import local_limits
 from orchestration.system.request import Request, in_its_own_words, system_meant
@@ -58,14 +58,18 @@ class Limit(Found):
         )
 
     @explained
-    def plot(self) -> "Figures":
-        """The figure of what was measured over the quantity, with both limits; a notebook shows it."""
+    def plot(self, *, style: Literal["screen", "paper", "slides"] = "screen") -> "Figures":
+        """The figure of what was measured over the quantity, with both limits; a notebook shows it.
+
+        `style` is how large and in what type it is. Raises `UsageError` for a style that there is not.
+        """
         from orchestration.figures.gallery import Figures
-        from orchestration.figures.style import SCREEN
+        from orchestration.figures.style import style_named
         from orchestration.limits import figure as limit_figure
 
-        with SCREEN.applied():
-            return Figures({"limit": limit_figure.measured(self, None, SCREEN)}, SCREEN)
+        chosen = style_named(style)
+        with chosen.applied():
+            return Figures({"limit": limit_figure.measured(self, chosen)}, chosen)
 
     @explained
     def to_pandas(self) -> "pd.DataFrame":
@@ -131,6 +135,7 @@ def find(
     tried = tuple(trials.tried[value] for value in sorted(trials.tried))
     return Limit(
         of=of, unit=span.unit.strip() or None, judged=metric, judged_unit=units[0].get(metric or ""),
+        judged_bound=None if metric is None else edge(varied.system, metric),
         local_limit=local.limit, local_limit_outside=local.outside, local_method=local.method,
         local_accuracy=local.accuracy, large_signal_limit=None if bracket is None else bracket.good,
         refuted_limit=refuted, horizon=varied.system.stop_time, tolerance=span.tolerance, scan=span.step,

@@ -31,6 +31,7 @@ from orchestration.quadrotor.wiring import (
     RIGID_BODY,
     USE_REFERENCE_INPUTS,
 )
+from orchestration.results.quantities import setting
 from orchestration.system.model import Parameter, System
 from orchestration.system.paths import changed
 from orchestration.system.requirements import is_finite
@@ -212,9 +213,11 @@ class Scenario:
     def headline(self) -> str:
         """The controller and its timing."""
         timing = self.timing
-        parts = [f"{self.controller.fmu}, period {timing.period * 1e3:g} ms"]
-        if timing.delay:
-            parts.append(f"delay {timing.delay * 1e3:g} ms")
+        parts = [self.controller.fmu]
+        for key in ("period", "delay"):
+            if value := getattr(timing, key):
+                named = setting(f"timing.{key}", [value])
+                parts.append(f"{named.name} {named.said(value)}")
         if timing.order != "gauss-seidel":
             parts.append("Jacobi")
         return ", ".join(parts)

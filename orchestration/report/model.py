@@ -158,6 +158,8 @@ class Compared:
     """What a comparison adds to its table of runs."""
 
     axis: str
+    """the name of its column"""
+    label: str
     unit: str | None
     controllers: tuple[str, ...]
     cells: tuple[Cell, ...]

@@ -13,6 +13,8 @@ from orchestration.report.number_format import number
 from orchestration.report.of_study import Stored, read, report_of, ways_of
 from orchestration.report.subset import evenly
 from orchestration.report.tables import Way
+from orchestration.results import display_names as labels
+from orchestration.results.quantities import Quantity
 from orchestration.studies.table import frame
 
 SIZE = "size of the initial error"
@@ -33,7 +35,8 @@ def comparison_report(
     stored = _with_sizes(read(path, study), comparison)
     found = report_of(
         comparison.name, stored, study, command, wanted=wanted, most=most, progress=progress,
-        ways=[*ways_of(stored, study), Way(name=SIZE)], choose=_from_each_cell(comparison, stored),
+        ways=[*ways_of(stored, study), Way(name=SIZE, quantity=Quantity(name=SIZE))],
+        choose=_from_each_cell(comparison, stored),
     )  # fmt: skip
     cells = results(comparison, frame(path))
     axis = next(way for way in ways_of(stored, study) if way.name == comparison.axis.name)
@@ -43,9 +46,10 @@ def comparison_report(
         shares=(),
         compared=Compared(
             axis=axis.name,
-            unit=axis.unit,
+            label=axis.quantity.name,
+            unit=labels.unit(axis.quantity.unit),
             controllers=tuple(one.name for one in comparison.controllers),
-            cells=tuple(map(_cell, cells)),
+            cells=tuple(_cell(cell, axis.quantity) for cell in cells),
         ),
         summary=f"{len(cells)} cells of {len(comparison.drawn)} starts each. {found.summary}",
     )
@@ -69,8 +73,8 @@ def _from_each_cell(comparison: Comparison, stored: Stored) -> Callable[[int], l
     return choose
 
 
-def _cell(found: CellSummary) -> Cell:
-    value = float(found.value)
+def _cell(found: CellSummary, axis: Quantity) -> Cell:
+    value = float(axis.of(found.value))
     return Cell(
         number=found.cell,
         vehicle=found.vehicle,

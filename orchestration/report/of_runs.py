@@ -10,6 +10,7 @@ from orchestration.report.model import Report, Run, Setting
 from orchestration.report.number_format import number
 from orchestration.report.tracks import Tracks
 from orchestration.results import display_names as labels
+from orchestration.results import quantities
 from orchestration.runs.result import Result
 
 BYTES = 9_000_000
@@ -75,8 +76,8 @@ def _settings(result: Result) -> dict[str, Setting]:
         if isinstance(value, Mapping):
             waiting = [(f"{place}.{key}".lstrip("."), each) for key, each in value.items()] + waiting
         elif isinstance(value, float | int | bool | str):
-            unit = labels.SETTINGS.get(place, ("", None))[1]
-            found[labels.with_unit(labels.setting(place), unit)] = value
+            named = quantities.setting(place, [value])
+            found[named.title] = value if isinstance(value, int | str) else named.factor * value
     return found
 
 

@@ -16,9 +16,10 @@ from orchestration.report.number_format import percent
 from orchestration.report.subset import ALONE, MOST, chosen, points_for
 from orchestration.report.tables import Row, Way, share_of, shares_along, table_of
 from orchestration.report.tracks import Tracks
-from orchestration.requests.ranges import is_in_seconds
 from orchestration.results import display_names as labels
 from orchestration.results.column_info import described
+from orchestration.results.quantities import quantity
+from orchestration.studies.axis_labels import quantity_of
 from orchestration.studies.store import TEXTS, UNITS, open_for_reading
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import AGREEMENT, expect_current
@@ -122,17 +123,20 @@ def report_of(
 
 
 def ways_of(stored: Stored, study: Study | None) -> list[Way]:
-    """The axes, with units and scales where the study is known."""
+    """The axes, with the units of the store, and with scales where the study is known."""
     if study is None:
-        return [Way(name=name) for name in json.loads(stored.about["axes"])]
+        return [
+            Way(name=name, quantity=quantity(labels.words(name), stored.units.get(name), _values(stored, name)))
+            for name in json.loads(stored.about["axes"])
+        ]
     return [
-        Way(
-            name=axis.name,
-            unit="s" if axis.targets and not axis.multiplies and all(map(is_in_seconds, axis.targets)) else None,
-            logarithmic=axis.scale == "logarithmic",
-        )
+        Way(name=axis.name, quantity=quantity_of(axis, stored.units), logarithmic=axis.scale == "logarithmic")
         for axis in study.axes
     ]
+
+
+def _values(stored: Stored, axis: str) -> list[Any]:
+    return [row["settings"][axis] for row in stored.rows]
 
 
 def metric_of(stored: Stored, study: Study | None) -> str:

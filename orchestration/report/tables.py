@@ -14,6 +14,7 @@ from orchestration.report.model import Column, Share, Shares, Table
 from orchestration.report.number_format import number
 from orchestration.report.subset import evenly
 from orchestration.results import display_names as labels
+from orchestration.results.quantities import Quantity
 
 MOST_ROWS = 50_000
 """of a table; of a larger study every n-th row is in it"""
@@ -30,7 +31,9 @@ class Way:
     """An axis as the page draws it."""
 
     name: str
-    unit: str | None = None
+    """of the column"""
+    quantity: Quantity
+    """what it is of, and how its values are read"""
     logarithmic: bool = False
 
 
@@ -71,8 +74,8 @@ def _axis(way: Way, values: Sequence[Any], blobs: Blobs) -> Column:
     if any(isinstance(value, str | bool) for value in values):
         return _words(way.name, values, blobs, "axis")
     return Column(
-        name=way.name, label=labels.words(way.name), unit=way.unit, kind="axis", values=blobs.exact(values),
-        logarithmic=way.logarithmic,
+        name=way.name, label=way.quantity.name, unit=labels.unit(way.quantity.unit), kind="axis",
+        values=blobs.exact(way.quantity.of(values)), logarithmic=way.logarithmic,
     )  # fmt: skip
 
 
@@ -121,10 +124,12 @@ def shares_along(rows: Sequence[Row], way: Way, *, by_chance: bool) -> Shares | 
         groups: dict[Any, list[Row]] = {value: [] for value in _ordered(distinct)}
         for row, value in zip(rows, values):
             groups[value].append(row)
-        found = [share_of(_text(value), _number(value), some, by_chance=by_chance) for value, some in groups.items()]
+        read = {value: _read(value, way.quantity) for value in groups}
+        found = [share_of(_text(read[v]), _number(read[v]), some, by_chance=by_chance) for v, some in groups.items()]
     else:
-        found = [*_by_part(rows, np.array(values, dtype=float), way, by_chance=by_chance)]
-    return Shares(axis=labels.words(way.name), unit=way.unit, logarithmic=way.logarithmic, shares=tuple(found))
+        found = [*_by_part(rows, way.quantity.of(values), way, by_chance=by_chance)]
+    unit = labels.unit(way.quantity.unit)
+    return Shares(axis=way.quantity.name, unit=unit, logarithmic=way.logarithmic, shares=tuple(found))
 
 
 def _by_part(rows: Sequence[Row], values: Floats, way: Way, *, by_chance: bool) -> Iterator[Share]:
@@ -148,6 +153,11 @@ def _ordered(values: list[Any]) -> list[Any]:
 
 def _text(value: Any) -> str:
     return number(value) if isinstance(value, float) else str(value)
+
+
+def _read(value: Any, quantity: Quantity) -> Any:
+    """A value in the unit in which it is read; a word as it is."""
+    return value if quantity.factor == 1.0 else float(quantity.of(value))
 
 
 def _number(value: Any) -> float | None:

@@ -8,6 +8,7 @@ from orchestration.basics.bisection import Range
 from orchestration.basics.errors import UsageError, expected_name
 from orchestration.basics.units import after
 from orchestration.fmi.model import Model
+from orchestration.results.quantities import is_in_seconds
 from orchestration.system.model import System
 from orchestration.system.paths import TOP, changed, value_at
 from orchestration.system.request import Request, in_its_own_words, system_meant
@@ -87,17 +88,9 @@ def range_asked_for(
     )
 
 
-def is_in_seconds(path: str) -> bool:
-    """Whether the value at a path is a time [s]."""
-    return ".parameters." not in path and path.rpartition(".")[2] in _SECONDS
-
-
-_SECONDS = ("period", "offset", "step", "plant_interval", "jitter", "delay", "delay_jitter", "stop_time")
-
-
 def unit_at(path: str, models: Mapping[str, Model]) -> str | None:
     """The unit of the value at a path of a system; None where it has none, or none is known."""
-    if is_in_seconds(path) and not (path.startswith("connections.") and path.endswith(".offset")):
+    if is_in_seconds(path):
         return "s"
     for name, model in models.items():
         prefix = f"components.{name}.parameters."

@@ -100,11 +100,28 @@ def metric_with_unit(name: str, of: str | None = None) -> str:
 
 
 def setting(path: str) -> str:
-    """What a path of a scenario, system or study file sets, in words."""
-    if path in SETTINGS:
-        return SETTINGS[path][0]
+    """What a path of a scenario, system or study file sets, in words: the period of pilot for
+    `components.pilot.sampling.period`.
+    """
+    known = _known(path)
+    if known is not None:
+        return known[0]
     head, _, rest = path.partition(".")
+    name, _, what = rest.partition(".")
+    if head in ("components", "connections", "sources") and what:
+        return f"{words(what.removeprefix('sampling.').removeprefix('parameters.'))} of {words(name)}"
     return words(rest) if head in ("timing", "controller", "plant") and rest else words(path)
+
+
+def unit_of_setting(path: str) -> str | None:
+    """The unit of what a path of a scenario sets; None where none is known here."""
+    known = _known(path)
+    return None if known is None else known[1]
+
+
+def _known(path: str) -> tuple[str, str | None] | None:
+    """Of a path, or of a key of the timing by itself, as `limit` has it."""
+    return SETTINGS.get(path) or SETTINGS.get(f"timing.{path}")
 
 
 def signal(name: str, described: Mapping[str, Described]) -> str:

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from orchestration.basics.errors import UsageError
 from orchestration.figures.gallery import Figures
 from orchestration.figures.run import Run, Window
-from orchestration.figures.style import SCREEN, STYLES, Style
+from orchestration.figures.style import SCREEN, Style, style_named
 from orchestration.figures.views import VIEWS, view_of
 from orchestration.recording.recording import thinned
 from orchestration.runs.ran import Ran
@@ -51,10 +51,9 @@ def draw(
 
 def figures_of(results: Sequence[Ran], which: Collection[str] | None, *, window: Window | None, style: str) -> Figures:
     """The figures of runs laid over each other; raises `UsageError` for a name of a figure or a style that is none."""
-    if style not in STYLES:
-        raise UsageError(f"style {style}: expected one of {', '.join(STYLES)}")
+    chosen = style_named(style)
     names = told_apart(results, [f"run {i + 1}" for i in range(len(results))])
-    return Figures(draw(results, which, names=names, window=window, style=STYLES[style]), STYLES[style])
+    return Figures(draw(results, which, names=names, window=window, style=chosen), chosen)
 
 
 def runs_of(

@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
 
-from orchestration.results import display_names as labels
+from orchestration.results import quantities
+from orchestration.results.quantities import Quantity
 from orchestration.runs.ran import Ran
 
 if sys.version_info >= (3, 11):
@@ -22,7 +23,8 @@ def told_apart(results: Sequence[Ran], otherwise: Sequence[str]) -> list[str]:
     """A name for each run, as in "period 10 ms, κ 0"; the names `otherwise` where settings do not tell them apart."""
     settings = [_settings(result) for result in results]
     paths = [path for path in dict.fromkeys(path for one in settings for path in one) if _differs(path, settings)]
-    names = [_told(one, paths) for one in settings]
+    named = {path: quantities.setting(path, [one.get(path) for one in settings]) for path in paths}
+    names = [", ".join(_one(path, each, one.get(path)) for path, each in named.items()) for one in settings]
     if 0 < len(paths) <= MOST and len(set(names)) == len(names):
         return names
     return list(otherwise)
@@ -51,24 +53,10 @@ def _follows(path: str) -> bool:
     return path.endswith((".sample_period", ".sample_offset"))
 
 
-def _told(settings: Mapping[str, Any], paths: Sequence[str]) -> str:
-    return ", ".join(_one(path, settings.get(path)) for path in paths)
-
-
-def _one(path: str, value: Any) -> str:
-    name, unit = labels.SETTINGS.get(path, (labels.setting(path), None))
+def _one(path: str, named: Quantity, value: Any) -> str:
     if value is None:
-        return f"{name} as usual"
-    if isinstance(value, str):
-        return PurePath(value).stem if path.endswith((".fmu", ".file")) else f"{name} {value}"
-    return f"{name} {quantity(value, unit)}"
-
-
-def quantity(value: Any, unit: str | None) -> str:
-    """A value with its unit; short times in milliseconds."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return str(value)
-    if unit == "s" and 0.0 < abs(value) < 1.0:
-        return f"{1e3 * value:g} ms"
-    shown = labels.unit(unit)
-    return f"{value:g}" if shown is None else f"{value:g} {shown}"
+        return f"{named.name} as usual"
+    if isinstance(value, str) and path.endswith((".fmu", ".file")):
+        return PurePath(value).stem
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return f"{named.name} {named.said(value) if is_number else value}"

@@ -1,5 +1,6 @@
 """Which figures a study gets: decides by its axes, reads the store, writes beside it."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -50,25 +51,27 @@ def study_figures(
     Raises `UsageError` as `draw_study` does.
     """
     metric = metric_of(study, metric)
-    table, unit = frame(store), units_in(store).get(metric)
+    table, units = frame(store), units_in(store)
     indices = indices_of(study, numbers(table, metric), metric) if _is_screened(study) else []
     with style.applied():
         if indices:
             return {f"sensitivity_{metric}": figures.sensitivity_bars(indices, metric, style)}, indices
-        return _over_axes(study, table, metric, unit, style), []
+        return _over_axes(study, table, metric, units, style), []
 
 
-def _over_axes(study: Study, table: "pd.DataFrame", metric: str, unit: str | None, style: Style) -> dict[str, Figure]:
+def _over_axes(
+    study: Study, table: "pd.DataFrame", metric: str, units: Mapping[str, str], style: Style
+) -> dict[str, Figure]:
     axes = tuple(axis for axis in study.axes if _is_numeric(axis))
     if len(axes) != len(study.axes):
         raise UsageError(f"{study.name}: expected axes of numbers to draw")
     system = study.origin
     words = system.criterion.outcomes
     if len(axes) > 2:
-        return {metric: figures.scatter(table, axes, metric, words, unit=unit, style=style)}
-    made = {metric: figures.lines(table, axes, metric, words, edge(system, metric), unit=unit, style=style)}
+        return {metric: figures.scatter(table, axes, metric, words, units=units, style=style)}
+    made = {metric: figures.lines(table, axes, metric, words, edge(system, metric), units=units, style=style)}
     if len(axes) == 2 and all(axis.values is not None for axis in axes):
-        made[f"{metric}_map"] = heat_map(table, axes, metric, words, unit=unit, style=style)
+        made[f"{metric}_map"] = heat_map(table, axes, metric, words, units=units, style=style)
     return made
 
 

@@ -1,7 +1,7 @@
 """Figures of a study: a metric over one or two axes, the spectral radius, sensitivity bars."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,8 +17,9 @@ from orchestration.figures.style import SCREEN, Style
 from orchestration.figures.style import save as write
 from orchestration.figures.ticks import plain
 from orchestration.results import display_names as labels
+from orchestration.results.quantities import setting
 from orchestration.studies.axes import Axis
-from orchestration.studies.axis_labels import SCALES, drawn, label
+from orchestration.studies.axis_labels import SCALES, quantity_of
 from orchestration.system.model import DIVERGED, TERMINATED
 
 if TYPE_CHECKING:
@@ -34,23 +35,24 @@ def lines(
     words: tuple[str, str],
     edge: float | None = None,
     *,
-    unit: str | None = None,
+    units: Mapping[str, str],
     style: Style = SCREEN,
 ) -> Figure:
     """A metric against the first axis, one line for each value of the second; what is not good is crossed.
 
-    What diverged has no metric; it is marked along the lower edge. `unit` is the metric's.
+    What diverged has no metric; it is marked along the lower edge. `units` are those of metrics and axes that have one.
     """
     figure = style.figure(35.0)
     panel = figure.add_subplot()
     x = axes[0]
+    across, second = quantity_of(x, units), quantity_of(axes[-1], units)
     groups = [(None, table)] if len(axes) == 1 else list(table.groupby(axes[1].name, sort=True))
     colors = matplotlib.colormaps[SHADES](np.linspace(0.0, 0.9, len(groups)))
     for (value, group), color in zip(groups, [BLUE] if len(groups) == 1 else colors, strict=True):
         ordered = group.sort_values(x.name)
         fell = ~flew(ordered)
-        at, y = drawn(x, ordered[x.name].to_numpy(float)), ordered[metric].to_numpy(float)
-        named = None if value is None else f"{float(drawn(axes[1], value)):g}"
+        at, y = across.of(ordered[x.name]), ordered[metric].to_numpy(float)
+        named = None if value is None else f"{float(second.of(value)):g}"
         panel.plot(at, np.where(fell, np.nan, y), ".-", color=color, label=named)
         panel.plot(at[fell], y[fell], "x", color=color, markersize=5)
         down = at[(ordered["outcome"] == "diverged").to_numpy()]
@@ -60,13 +62,17 @@ def lines(
     panel.plot([], [], ".-", color=BLUE if len(groups) == 1 else GREY, label=words[0])
     panel.plot([], [], "x", color=GREY, label=words[1])
     panel.plot([], [], "v", color=GREY, markersize=4, label="diverged")
-    panel.set(xlabel=label(x), ylabel=labels.metric_with_unit(metric, unit), yscale=_scale(table[metric]))
+    panel.set(
+        xlabel=across.title, ylabel=labels.metric_with_unit(metric, units.get(metric)), yscale=_scale(table[metric])
+    )
     panel.set_xscale(SCALES[x.scale])
     plain(panel.yaxis)
     if edge is not None:
-        panel.axhline(edge, color=RED, linewidth=0.8, linestyle="--", label=f"{words[0]} up to {edge:g}{after(unit)}")
+        panel.axhline(
+            edge, color=RED, linewidth=0.8, linestyle="--", label=f"{words[0]} up to {edge:g}{after(units.get(metric))}"
+        )
     handles, names = panel.get_legend_handles_labels()
-    figure.legend(handles, names, title=None if len(axes) == 1 else label(axes[1]), loc="outside right upper")
+    figure.legend(handles, names, title=None if len(axes) == 1 else second.title, loc="outside right upper")
     return figure
 
 
@@ -76,7 +82,7 @@ def scatter(
     metric: str,
     words: tuple[str, str],
     *,
-    unit: str | None = None,
+    units: Mapping[str, str],
     style: Style = SCREEN,
 ) -> Figure:
     """A metric against each of many axes; what is not good is crossed, what diverged marked along the lower edge."""
@@ -84,16 +90,17 @@ def scatter(
     panels = figure.subplots(math.ceil(len(axes) / 2), 2, squeeze=False, sharey=True).ravel()
     fell = ~flew(table)
     for panel, axis in zip(panels, axes, strict=False):
+        across = quantity_of(axis, units)
         for chosen, marker, color in ((table[~fell], ".", BLUE), (table[fell], "x", RED)):
-            panel.plot(drawn(axis, chosen[axis.name]), chosen[metric], marker, color=color, markersize=4, alpha=0.7)
-        down = drawn(axis, table.loc[table["outcome"] == "diverged", axis.name])
+            panel.plot(across.of(chosen[axis.name]), chosen[metric], marker, color=color, markersize=4, alpha=0.7)
+        down = across.of(table.loc[table["outcome"] == "diverged", axis.name])
         panel.plot(down, np.full(len(down), 0.02), "v", color=RED, markersize=3, transform=panel.get_xaxis_transform())
-        panel.set(xlabel=label(axis), yscale=_scale(table[metric]))
+        panel.set(xlabel=across.title, yscale=_scale(table[metric]))
         panel.set_xscale(SCALES[axis.scale])
         plain(panel.yaxis)
     for panel in panels[len(axes) :]:
         panel.set_visible(False)
-    figure.supylabel(labels.metric_with_unit(metric, unit))
+    figure.supylabel(labels.metric_with_unit(metric, units.get(metric)))
     kinds = zip((*words, DIVERGED), ("dots", "crosses", "below"), strict=True)
     counts = [f"{int((table['outcome'] == kind).sum())} {kind} ({mark})" for kind, mark in kinds]
     terminated = int((table["outcome"] == TERMINATED).sum())
@@ -118,12 +125,14 @@ def spectral_radius(
     """The spectral radius of the sampled loop about hover against the period or delay [s], with both limits."""
     figure = style.figure(30.0)
     panel = figure.add_subplot()
-    panel.plot(values * 1e3, radii, color=BLUE)
+    across = setting(of, values)
+    panel.plot(across.of(values), radii, color=BLUE)
     panel.axhline(1.0, color=GREY, linewidth=0.8)
     for limit, color, name in ((local_limit, BLUE, "local"), (large_signal_limit, ORANGE, "large-signal")):
         if limit is not None:
-            panel.axvline(limit * 1e3, color=color, linestyle="--", label=f"{name} limit, {limit * 1e3:.1f} ms")
-    panel.set(xlabel=f"{of} [ms]", ylabel="spectral radius about hover [1]")
+            at = across.factor * limit
+            panel.axvline(at, color=color, linestyle="--", label=f"{name} limit, {across.said(limit, 4)}")
+    panel.set(xlabel=across.title, ylabel="spectral radius about hover [1]")
     panel.margins(x=0)
     if panel.get_legend_handles_labels()[0]:
         panel.legend()

@@ -1,5 +1,6 @@
 """A metric of a study over two axes, cell by cell."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import matplotlib
@@ -16,7 +17,7 @@ from orchestration.figures.style import SCREEN, Style
 from orchestration.figures.ticks import plain
 from orchestration.results import display_names as labels
 from orchestration.studies.axes import Axis
-from orchestration.studies.axis_labels import SCALES, edges, label
+from orchestration.studies.axis_labels import SCALES, edges, quantity_of
 from orchestration.studies.figures import by_horizon, flew
 from orchestration.system.model import DIVERGED, TERMINATED
 
@@ -30,7 +31,7 @@ def heat_map(
     metric: str,
     words: tuple[str, str],
     *,
-    unit: str | None = None,
+    units: Mapping[str, str],
     style: Style = SCREEN,
 ) -> Figure:
     """A metric where runs are good, the outcome where not, the limit between the two; what is missing is hatched."""
@@ -38,15 +39,17 @@ def heat_map(
     coded = table.assign(flew=flew(table).astype(float), kind=table["outcome"].map(kinds).astype(float))
     coded.loc[table["outcome"].isna(), "flew"] = np.nan
     values, good, kind = (_grid(coded, axes, name) for name in (metric, "flew", "kind"))
-    x, y = (edges(axis, coded[axis.name]) for axis in axes[:2])
+    across, up = (quantity_of(axis, units) for axis in axes[:2])
+    x, y = (edges(axis, each.of(coded[axis.name])) for axis, each in zip(axes, (across, up)))
     figure = style.figure(36.0)
     panel = figure.add_subplot()
     cells.fill_kinds(panel, x, y, np.where(kind > 0.0, kind - 1.0, np.nan), (NOT_GOOD, DARK))
     mesh = cells.fill(panel, x, y, np.where(good > 0.5, values, np.nan))
     cells.hatch(panel, x, y, np.isnan(kind))
     has_limit = cells.limit(panel, x, y, good) is not None
-    panel.set(xlabel=label(axes[0]), ylabel=label(axes[1]), xscale=SCALES[axes[0].scale], yscale=SCALES[axes[1].scale])
-    bar = figure.colorbar(mesh, ax=panel, label=f"{labels.metric_with_unit(metric, unit)}, where {words[0]}")
+    panel.set(xlabel=across.title, ylabel=up.title, xscale=SCALES[axes[0].scale], yscale=SCALES[axes[1].scale])
+    named = labels.metric_with_unit(metric, units.get(metric))
+    bar = figure.colorbar(mesh, ax=panel, label=f"{named}, where {words[0]}")
     plain(bar.ax.yaxis)
     bad = f"{words[1]} or {TERMINATED}" if (table["outcome"] == TERMINATED).any() else words[1]
     shown: list[Patch | Line2D] = [

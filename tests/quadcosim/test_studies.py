@@ -9,6 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import quadcosim
+from orchestration.figures.style import STYLES
 from orchestration.tuning.tuning_file import load_tuning
 from quadcosim import Axis, QuadcosimError, Scenario, Study, Swept, UsageError
 from tests.orchestration.tuning.test_tuning import FILE
@@ -109,7 +110,11 @@ def test_a_limit_is_a_table_of_what_was_tried(capsys: pytest.CaptureFixture[str]
     assert repr(found) == f"<Limit of connections.valve.delay: {found.note}>"
     assert "connections.valve.delay 0.1 s: good" in capsys.readouterr().err
     assert "last value that is good" in found._repr_html_()
-    assert list(found.plot()) == ["limit"]
+    figure = found.plot(style="paper")["limit"]
+    assert figure.get_figwidth() == pytest.approx(STYLES["paper"].width / 25.4)
+    assert any("the criterion's bound" in str(line.get_label()) for line in figure.axes[0].get_lines())
+    with pytest.raises(quadcosim.UsageError, match="style poster: expected one of screen, paper, slides"):
+        found.plot(style="poster")  # type: ignore[arg-type]
 
 
 def test_a_tuning_gives_its_searches_and_writes_their_files(tmp_path: Path) -> None:

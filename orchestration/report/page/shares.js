@@ -7,7 +7,7 @@ function startShares() {
   byId("shares").hidden = false;
   byId("shares-title").textContent = `Share that is ${report.words[0]}`;
   byId("shares-text").textContent = `All runs: ${shareText(report.overall)}.${report.overall.low === null ? " The runs are chosen, not drawn by chance, so that their shares have no interval." : " Bars: Wilson intervals at 95 %."}`;
-  byId("shares-controls").replaceChildren(choice("along", report.shares.map((each, i) => [i, each.axis.replace(/_/g, " ")]), 0, (i) => { shares.of = Number(i); drawShares(); }));
+  byId("shares-controls").replaceChildren(choice("along", report.shares.map((each, i) => [i, each.axis]), 0, (i) => { shares.of = Number(i); drawShares(); }));
   drawShares();
 }
 
@@ -24,7 +24,7 @@ function drawShares() {
   };
   const layout = {
     height: 270, margin: { l: 60, r: 10, t: 10, b: 48 }, font: FONT, paper_bgcolor: "#fff", plot_bgcolor: "#fff", hovermode: "closest", hoverlabel: HOVER,
-    xaxis: { title: { text: escaped(titled(axis.replace(/_/g, " "), unit)) }, type: isNumber ? (logarithmic ? "log" : "linear") : "category", gridcolor: "#e8ebee", zeroline: false },
+    xaxis: { title: { text: escaped(titled(axis, unit)) }, type: isNumber ? (logarithmic ? "log" : "linear") : "category", gridcolor: "#e8ebee", zeroline: false },
     yaxis: { title: { text: `share ${escaped(report.words[0])}` }, range: [-0.03, 1.03], tickformat: ".0%", gridcolor: "#e8ebee", zeroline: false },
   };
   Plotly.react(byId("shares-plot"), [trace], layout, PLOTLY);
@@ -36,7 +36,7 @@ function drawShares() {
 
 /** Shares over the axis, a line for each controller, with their intervals. */
 function drawSharesOfCells() {
-  const { controllers, axis, unit } = report.compared;
+  const { controllers, label: axis, unit } = report.compared;
   byId("shares").hidden = false;
   byId("shares-title").textContent = "Shares that survive and settle, with 95 % intervals";
   byId("shares-text").textContent = "Wilson intervals, over the starts of each cell. Lines: those that survive; dots: those that settle by the horizon.";
@@ -54,7 +54,7 @@ function drawSharesOfCells() {
   });
   const layout = {
     height: 330, margin: { l: 60, r: 10, t: 10, b: 48 }, font: FONT, hovermode: "closest", hoverlabel: HOVER, legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom" },
-    xaxis: { title: { text: escaped(titled(axis.replace(/_/g, " "), unit)) }, gridcolor: "#e8ebee", zeroline: false },
+    xaxis: { title: { text: escaped(titled(axis, unit)) }, gridcolor: "#e8ebee", zeroline: false },
     yaxis: { title: { text: "share of the starts" }, range: [-0.03, 1.03], tickformat: ".0%", gridcolor: "#e8ebee", zeroline: false },
   };
   Plotly.react(byId("shares-plot"), traces, layout, PLOTLY);
@@ -92,13 +92,13 @@ function cellsHere() {
 }
 
 function hoverOfCell(cell) {
-  const { axis, unit } = report.compared;
+  const { label: axis, unit } = report.compared;
   const medians = Object.entries(cell.medians).map(([name, [value, low, high]]) => `${escaped(report.labels[name] ?? name)}: ${withUnit(value, report.units[name])}${low === null || high === null ? "" : ` (${shown(low)} to ${shown(high)})`}`);
   return [`<b>${escaped(cell.controller)}, ${escaped(axis)} ${withUnit(cell.value, unit)}</b>`, escaped(shareText(cell.survives, "survive")), escaped(shareText(cell.settles, "settle")), "<i>medians of those that survive, with their 95 % intervals</i>", ...medians].join("<br>");
 }
 
 function drawCells() {
-  const { controllers, axis, unit } = report.compared;
+  const { controllers, label: axis, unit } = report.compared;
   const here = cellsHere();
   const values = [...new Set(here.map((cell) => cell.value))].sort((a, b) => a - b);
   const rows = [...controllers].reverse();
@@ -113,7 +113,7 @@ function drawCells() {
   };
   const layout = {
     height: Math.max(220, 110 + 42 * rows.length), margin: { l: 20, r: 10, t: 10, b: 50 }, font: FONT, dragmode: false, hoverlabel: HOVER,
-    xaxis: { title: { text: escaped(titled(axis.replace(/_/g, " "), unit)), standoff: 8 }, zeroline: false, showgrid: false }, yaxis: { type: "category", automargin: true },
+    xaxis: { title: { text: escaped(titled(axis, unit)), standoff: 8 }, zeroline: false, showgrid: false }, yaxis: { type: "category", automargin: true },
   };
   const holder = byId("map-plot");
   return Plotly.react(holder, [heat, chosenCell()], layout, PLOTLY).then(() => {
@@ -148,7 +148,7 @@ function openCell(cell) {
   const { x, y } = chosenCell();
   Plotly.restyle(byId("map-plot"), { x: [x], y: [y] }, [1]);
   byId("cell").hidden = false;
-  byId("cell-title").textContent = `${cell.controller}, ${report.compared.axis} ${withUnit(cell.value, report.compared.unit)}`;
+  byId("cell-title").textContent = `${cell.controller}, ${report.compared.label} ${withUnit(cell.value, report.compared.unit)}`;
   byId("cell-text").textContent = `${shareText(cell.survives, "survive")}, ${shareText(cell.settles, "settle")}. Each point is a run; click one, or use the arrow keys, to open it.`;
   map.rows = rowsOfCell(cell);
   map.x = columnsByName.get("size of the initial error");

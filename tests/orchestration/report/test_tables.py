@@ -1,5 +1,6 @@
 """The table of a study, its shares, and which runs are chosen for their flights."""
 
+import dataclasses
 from itertools import pairwise
 from typing import Any
 
@@ -9,6 +10,7 @@ from orchestration.basics.statistics import wilson
 from orchestration.report.blobs import Blobs
 from orchestration.report.subset import LEAST_POINTS, MOST_POINTS, chosen, evenly, points_for
 from orchestration.report.tables import Way, share_of, shares_along, table_of
+from orchestration.results.quantities import quantity
 from tests.orchestration.report.test_blobs import read
 
 
@@ -23,15 +25,21 @@ def row(index: int, good: bool, **settings: Any) -> dict[str, Any]:
 ROWS = [row(i, i < 6, period=0.01 * (i % 4), law="ab"[i % 2]) for i in range(8)]
 
 
+def way(name: str, unit: str | None = None) -> Way:
+    return Way(name=name, quantity=quantity(name, unit, [each["settings"].get(name) for each in ROWS]))
+
+
 def test_a_table_has_axes_words_and_the_metrics_that_some_run_has() -> None:
     blobs = Blobs()
     made = table_of(
-        [{**each, "never": None} for each in ROWS], [Way(name="period", unit="s"), Way(name="law")],
+        [{**each, "never": None} for each in ROWS], [way("period", "s"), way("law")],
         ["good", "error", "never", "steps"], {"error": "N.m"}, blobs, tracks={5: 0}, messages={7: "fell"}, is_grid=True,
     )  # fmt: skip
     columns = {column.name: column for column in made.columns}
     assert list(columns) == ["design_index", "period", "law", "outcome", "error", "steps"]
     assert columns["error"].unit == "N·m"
+    assert (columns["period"].label, columns["period"].unit) == ("period", "ms")
+    assert read(blobs.blobs[columns["period"].values]).tolist() == pytest.approx([0.0, 10.0, 20.0, 30.0] * 2)
     assert columns["law"].words == ("a", "b")
     assert read(blobs.blobs[columns["law"].values]).tolist() == [0.0, 1.0] * 4
     assert made.tracks == {"5": 0}
@@ -46,14 +54,14 @@ def test_a_share_has_wilsons_interval_only_where_runs_are_drawn_by_chance() -> N
 
 
 def test_shares_are_by_value_or_by_part_of_the_range() -> None:
-    by_value = shares_along(ROWS, Way(name="period"), by_chance=True)
+    by_value = shares_along(ROWS, way("period"), by_chance=True)
     assert by_value is not None
     assert [share.runs for share in by_value.shares] == [2, 2, 2, 2]
     many = [row(i, i % 2 == 0, period=10.0 ** (i / 100)) for i in range(100)]
-    by_part = shares_along(many, Way(name="period", logarithmic=True), by_chance=True)
+    by_part = shares_along(many, dataclasses.replace(way("period"), logarithmic=True), by_chance=True)
     assert by_part is not None
     assert sorted(share.runs for share in by_part.shares) == [12, 12, 12, 12, 13, 13, 13, 13]
-    assert shares_along([ROWS[0], ROWS[4]], Way(name="period"), by_chance=True) is None
+    assert shares_along([ROWS[0], ROWS[4]], way("period"), by_chance=True) is None
 
 
 @pytest.mark.parametrize(("count", "wanted"), [(10, 3), (10, 10), (3, 10), (10_000, 1000)])

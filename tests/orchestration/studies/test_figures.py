@@ -18,13 +18,15 @@ from orchestration.limits import figure as limit_figure
 from orchestration.limits.evaluation import Tried
 from orchestration.limits.figure import draw_limit
 from orchestration.limits.limit import Limit
+from orchestration.report.of_study import read, ways_of
 from orchestration.studies import figures
 from orchestration.studies.axes import Axis
-from orchestration.studies.drawing import draw_study
+from orchestration.studies.drawing import draw_study, study_figures
 from orchestration.studies.maps import heat_map
 from orchestration.studies.sensitivity import Index
 from orchestration.studies.store import open_for_writing, store_path
 from orchestration.studies.study import Study
+from orchestration.studies.sweep import sweep
 from quadcosim import UsageError
 from tests.orchestration.studies.common import OBJECTIVES, axis, row, short, study
 
@@ -148,7 +150,7 @@ def test_what_flies_has_settled() -> None:
 
 def test_a_line_goes_through_what_flies_in_order_and_the_rest_is_crossed() -> None:
     line, crosses, *_ = lines_of(
-        figures.lines(judged(table()), (axis("timing.period", 0.01),), "ultimate_bound", WORDS)
+        figures.lines(judged(table()), (axis("timing.period", 0.01),), "ultimate_bound", WORDS, units={})
     )
     assert line.get_xdata().tolist() == pytest.approx([10.0, 20.0, 30.0, 40.0, 50.0])
     assert np.isnan(line.get_ydata()).tolist() == [False] * 4 + [True]
@@ -160,7 +162,7 @@ def test_there_is_a_line_for_each_value_of_the_second_axis() -> None:
     runs = pd.concat([table().assign(delay=delay) for delay in (0.0, 0.01, 0.02)])
     second = axis("timing.delay", 0.0, 0.01, 0.02)
     runs = runs.rename(columns={"delay": "timing.delay"})
-    figure = figures.lines(judged(runs), (axis("timing.period", 0.01), second), "ultimate_bound", WORDS)
+    figure = figures.lines(judged(runs), (axis("timing.period", 0.01), second), "ultimate_bound", WORDS, units={})
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.get_texts()][:3] == ["0", "10", "20"]
     assert legend.get_title().get_text() == "delay [ms]"
@@ -170,25 +172,27 @@ def test_axes_have_names_for_people_and_their_unit() -> None:
     for target, label in (("timing.period", "period [ms]"), ("plant.mass", "mass [kg]"),
                           ("timing.measurement_loss", "loss of measurements")):  # fmt: skip
         runs = table().rename(columns={"timing.period": target})
-        figure = figures.lines(judged(runs), (axis(target, 0.01),), "ultimate_bound", WORDS)
+        figure = figures.lines(judged(runs), (axis(target, 0.01),), "ultimate_bound", WORDS, units={})
         assert figure.axes[0].get_xlabel() == label
 
 
 def test_a_metric_has_its_unit_wherever_it_is_drawn() -> None:
     runs = judged(pd.concat([table().assign(**{"timing.delay": delay}) for delay in (0.0, 0.01)]))
     axes = (axis("timing.period", 0.01), axis("timing.delay", 0.01))
-    drawn = figures.lines(runs, axes[:1], "ultimate_bound", WORDS, unit="m")
+    drawn = figures.lines(runs, axes[:1], "ultimate_bound", WORDS, units={"ultimate_bound": "m"})
     assert drawn.axes[0].get_ylabel() == "largest position error, last third [m]"
-    assert heat_map(runs, axes, "ultimate_bound", WORDS, unit="m").axes[1].get_ylabel() == (
+    assert heat_map(runs, axes, "ultimate_bound", WORDS, units={"ultimate_bound": "m"}).axes[1].get_ylabel() == (
         f"largest position error, last third [m], where {WORDS[0]}"
     )
-    scattered = figures.scatter(runs, axes, "ultimate_bound", WORDS, unit="m")
+    scattered = figures.scatter(runs, axes, "ultimate_bound", WORDS, units={"ultimate_bound": "m"})
     assert scattered.get_supylabel() == "largest position error, last third [m]"
 
 
 def test_a_map_has_a_cell_for_each_run_and_the_boundary_of_what_flies() -> None:
     runs = pd.concat([table().assign(**{"timing.delay": delay}) for delay in (0.0, 0.01, 0.02)])
-    figure = heat_map(judged(runs), (axis("timing.period", 0.01), axis("timing.delay", 0.01)), "ultimate_bound", WORDS)
+    figure = heat_map(
+        judged(runs), (axis("timing.period", 0.01), axis("timing.delay", 0.01)), "ultimate_bound", WORDS, units={}
+    )
     _, mesh, boundary = figure.axes[0].collections
     values: Any = np.ma.filled(np.ma.asarray(mesh.get_array()), np.nan).reshape(3, 5)
     assert np.isnan(values).tolist() == [[False] * 4 + [True]] * 3
@@ -219,7 +223,9 @@ def test_a_map_tells_bounded_from_diverged_with_the_horizon_beside_them() -> Non
     runs["outcome"] = ["settled", "bounded", "diverged", None, "settled"] * 2  # periods from 0.05 down
     runs.loc[runs["outcome"] == "diverged", "ultimate_bound"] = np.nan
     runs["horizon"] = 30.0
-    figure = heat_map(judged(runs), (axis("timing.period", 0.01), axis("timing.delay", 0.01)), "ultimate_bound", WORDS)
+    figure = heat_map(
+        judged(runs), (axis("timing.period", 0.01), axis("timing.delay", 0.01)), "ultimate_bound", WORDS, units={}
+    )
     fell = np.ma.filled(np.ma.asarray(figure.axes[0].collections[0].get_array()), np.nan).reshape(2, 5)[0]
     assert fell == pytest.approx([np.nan, np.nan, 1.0, 0.0, np.nan], nan_ok=True)
     assert [text.get_text() for text in figure.legends[0].get_texts()] == [
@@ -231,13 +237,17 @@ def test_a_line_marks_what_diverged_where_it_has_no_value() -> None:
     runs = table()
     runs["outcome"] = ["diverged", *runs["outcome"][1:]]
     runs.loc[runs["outcome"] == "diverged", "ultimate_bound"] = np.nan
-    _, _, down, *_ = lines_of(figures.lines(judged(runs), (axis("timing.period", 0.01),), "ultimate_bound", WORDS))
+    _, _, down, *_ = lines_of(
+        figures.lines(judged(runs), (axis("timing.period", 0.01),), "ultimate_bound", WORDS, units={})
+    )
     assert (down.get_marker(), down.get_xdata().tolist()) == ("v", pytest.approx([50.0]))
 
 
 def test_where_everything_flies_a_map_has_no_boundary() -> None:
     runs = pd.concat([table(4).assign(**{"timing.delay": delay}) for delay in (0.0, 0.01)])
-    figure = heat_map(judged(runs), (axis("timing.period", 0.01), axis("timing.delay", 0.01)), "ultimate_bound", WORDS)
+    figure = heat_map(
+        judged(runs), (axis("timing.period", 0.01), axis("timing.delay", 0.01)), "ultimate_bound", WORDS, units={}
+    )
     assert len(figure.axes[0].collections) == 2, "what fell, and what flies"
 
 
@@ -292,7 +302,7 @@ def ys(line: Line2D) -> list[float]:
 
 
 def test_a_limit_shows_each_value_that_was_tried_where_it_was_measured() -> None:
-    figure = limit_figure.measured(limit("components.pilot.sampling.period"), 0.06)
+    figure = limit_figure.measured(limit("components.pilot.sampling.period", judged_bound=0.06))
     (axes,) = figure.axes
     marks = {line.get_label(): line for line in axes.get_lines()}
     assert xs(marks["good"]) == pytest.approx([20.0, 40.0, 50.0])
@@ -310,7 +320,7 @@ def test_a_limit_of_many_seeds_shows_their_share_and_how_well_it_is_known() -> N
         Tried(value=v, outcome="settled", divergence_time=None, flew=n, runs=29, share=wilson(n, 29, 0.95))
         for v, n in ((0.1, 29), (0.2, 20))
     )
-    figure = limit_figure.measured(limit("loss", unit=None, confidence=0.95, seeds=29, tried=tried), None)
+    figure = limit_figure.measured(limit("loss", unit=None, confidence=0.95, seeds=29, tried=tried))
     (axes,) = figure.axes
     marks = {line.get_label(): line for line in axes.get_lines()}
     assert ys(marks["good"]) == [1.0]
@@ -318,16 +328,42 @@ def test_a_limit_of_many_seeds_shows_their_share_and_how_well_it_is_known() -> N
     assert axes.get_ylabel() == "share of 29 seeds that are good"
 
 
+@pytest.mark.parametrize(("longest", "title"), [(0.9, "period [ms]"), (1.5, "period [s]")])
+def test_a_limit_over_times_is_in_milliseconds_where_all_are_below_a_second(longest: float, title: str) -> None:
+    tried = tuple(dataclasses.replace(one, value=longest * one.value / 0.1) for one in limit("period").tried)
+    figure = limit_figure.measured(limit("period", tried=tried))
+    assert figure.axes[0].get_xlabel() == title
+    assert xs(figure.axes[0].get_lines()[1])[-1] == pytest.approx(longest * 0.8 * (1e3 if "ms" in title else 1.0))
+
+
+def test_the_axes_of_a_study_have_the_units_of_its_store(tmp_path: Path) -> None:
+    inertia = Axis(name="inertia xx", targets=("plant.inertia.xx", "controller.inertia.xx"), values=(0.5, 1.0))
+    chosen = study(inertia, axis("timing.period", 0.01, 0.02))
+    sweep(chosen, folder=tmp_path, progress=None, announce=None)
+    made, _ = study_figures(chosen, store_path(chosen.name, tmp_path), "position_rmse")
+    lines, cells_drawn = made["position_rmse"], made["position_rmse_map"]
+    assert (lines.axes[0].get_xlabel(), lines.legends[0].get_title().get_text()) == (
+        "inertia xx [kg·m²]", "period [ms]",
+    )  # fmt: skip
+    assert (cells_drawn.axes[0].get_xlabel(), cells_drawn.axes[0].get_ylabel()) == (
+        "inertia xx [kg·m²]", "period [ms]",
+    )  # fmt: skip
+    for known in (chosen, None):
+        found = {way.name: way.quantity for way in ways_of(read(store_path(chosen.name, tmp_path)), known)}
+        assert found["inertia xx"].title == "inertia xx [kg·m²]"
+        assert (found["timing.period"].unit, found["timing.period"].factor) == ("ms", 1e3)
+
+
 def test_a_limit_that_nothing_in_the_range_has_says_so() -> None:
     good = tuple(one for one in limit("delay").tried if one.flew)
-    figure = limit_figure.measured(limit("delay", tried=good, large_signal_limit=None), None)
+    figure = limit_figure.measured(limit("delay", tried=good, large_signal_limit=None))
     assert figure.axes[0].get_title(loc="left") == "delay: good throughout, in runs of 30 s"
 
 
 def test_dots_of_many_axes_are_apart_by_what_flies() -> None:
     runs = table().assign(**{"plant.mass": 1.0, "timing.delay": 0.0})
     axes = (axis("timing.period", 0.01), axis("plant.mass", 1), axis("timing.delay", 0.01))
-    figure = figures.scatter(judged(runs), axes, "ultimate_bound", WORDS)
+    figure = figures.scatter(judged(runs), axes, "ultimate_bound", WORDS, units={})
     for panel in figure.axes[:3]:
         dots, crosses, _ = panel.get_lines()
         assert (np.size(dots.get_xdata()), np.size(crosses.get_xdata())) == (4, 1)
