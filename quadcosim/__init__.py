@@ -42,10 +42,11 @@ if TYPE_CHECKING:
     from orchestration.quadrotor.timing import Timing
     from orchestration.quadrotor.vehicle import Vehicle, load_vehicle
     from orchestration.report.writing import report
+    from orchestration.runs.meant import RunInterrupted, RunLost
     from orchestration.runs.pause import fly_until, resume
     from orchestration.runs.result import Result
     from orchestration.runs.run_directory import load_run, save_run
-    from orchestration.runs.simulation import RunInterrupted, RunLost, run
+    from orchestration.runs.simulation import run
     from orchestration.studies.axes import Axis
     from orchestration.studies.study import Study
     from orchestration.studies.study_file import load_study
@@ -108,8 +109,8 @@ _HOMES = {
     "QuadcosimError": "orchestration.basics.errors",
     "UsageError": "orchestration.basics.errors",
     "SimulatorError": "orchestration.basics.errors",
-    "RunInterrupted": "orchestration.runs.simulation",
-    "RunLost": "orchestration.runs.simulation",
+    "RunInterrupted": "orchestration.runs.meant",
+    "RunLost": "orchestration.runs.meant",
 }
 _OTHERWISE = {"limit": "find"}
 """Names that go by another one at home"""

@@ -21,8 +21,8 @@ from orchestration.processes import subprocesses
 from orchestration.processes.confined import ended
 from orchestration.processes.guard import Guard
 from orchestration.recording.recording import Chunk, Events, Recorder
+from orchestration.runs.meant import Course, Flown, Meant, Progress, RunLost, result_of
 from orchestration.runs.result import Result
-from orchestration.runs.simulation import Course, Flown, Meant, Progress, RunLost, result_of
 from orchestration.schedule.streams import Streams
 from orchestration.system.request import Request
 

@@ -14,9 +14,10 @@ from orchestration.processes.confined import Limits
 from orchestration.recording.recording import InMemory, Recorder
 from orchestration.recording.tables import InFolder, ToFolder
 from orchestration.requests.request import load_request
+from orchestration.runs.meant import Announce, Progress
 from orchestration.runs.result import Result
 from orchestration.runs.run_directory import METRICS, SCENARIO, STATE, keep_flight
-from orchestration.runs.simulation import Announce, Progress, Simulation, flown
+from orchestration.runs.simulation import Simulation, flown
 from orchestration.system.request import Request, system_meant
 from orchestration.system.times import nanoseconds
 

@@ -16,8 +16,8 @@ from orchestration.recording.tables import ToFolder
 from orchestration.requests.request import load_request
 from orchestration.results.column_info import Described
 from orchestration.runs.folder import NewFolder, new_folder
+from orchestration.runs.meant import RunInterrupted, RunLost
 from orchestration.runs.result import Provenance, Result
-from orchestration.runs.simulation import RunInterrupted, RunLost
 from orchestration.system.request import system_meant
 
 SIGNALS, EVENTS = tables.SIGNALS, tables.EVENTS

@@ -26,9 +26,10 @@ from orchestration.fmi.instances import open_here
 from orchestration.fmi.native import NativeInstance
 from orchestration.recording.recording import InMemory
 from orchestration.runs import simulation
+from orchestration.runs.meant import RunInterrupted
 from orchestration.runs.pause import fly_until, resume
 from orchestration.runs.result import Result
-from orchestration.runs.simulation import RunInterrupted, prepared
+from orchestration.runs.simulation import prepared
 from orchestration.schedule import cursor as position
 from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
 from orchestration.system.system_file import load_system

@@ -15,9 +15,10 @@ import pytest
 
 from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.processes import subprocesses
+from orchestration.runs.meant import RunLost
 from orchestration.runs.pause import fly_until, resume
 from orchestration.runs.run_directory import load_run
-from orchestration.runs.simulation import RunLost, run
+from orchestration.runs.simulation import run
 from orchestration.system.model import Component, Connection, Source, System
 from tests.commands import Main
 from tests.orchestration.fmi.small import needs_compiler, small
