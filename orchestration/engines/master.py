@@ -18,7 +18,18 @@ from orchestration.engines.board import Board
 from orchestration.engines.channel import Channel
 from orchestration.engines.feeds import Feed
 from orchestration.engines.sources import Values
-from orchestration.recording.recording import ARRIVED, EVENTS, LOST, ROWS, SAMPLED, SENT, Chunk, Events, Recorder
+from orchestration.recording.recording import (
+    ARRIVED,
+    BYTES,
+    EVENTS,
+    LOST,
+    ROWS,
+    SAMPLED,
+    SENT,
+    Chunk,
+    Events,
+    Recorder,
+)
 from orchestration.schedule.cursor import Position
 from orchestration.schedule.plan import Plan
 from orchestration.schedule.schedule import Due, Message, Schedule
@@ -123,7 +134,8 @@ class Master:
         """of every row: those of the board, then the signals of the sources"""
         self._row = board.row.data.cast("B")
         self._rows = bytearray()  # not handed over yet, and the times of the events may lie before them
-        self._chunk, self._most_events = ROWS * board.row.nbytes, EVENTS
+        most = min(ROWS, max(1, BYTES // board.row.nbytes))
+        self._chunk, self._most_events = most * board.row.nbytes, EVENTS
         self._handed_over = False
         recorder.begin(self.columns)
         self._watch = watch(board) if watch is not None else lambda t: None

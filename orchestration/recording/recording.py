@@ -12,6 +12,8 @@ from orchestration.basics.simulator import Floats, Integers
 ROWS, EVENTS = 2**15, 2**18
 """A chunk is whole as soon as it has so many rows or events, so that what is computed by chunks does not depend on
 where they are kept."""
+BYTES = 2**27
+"""Or so many bytes of rows, where a row is wide"""
 
 
 class Event(NamedTuple):

@@ -20,8 +20,9 @@ _PARAMETERS = {
 _VARIABLE = '<ScalarVariable name="{}" valueReference="{}" causality="{}" variability="{}"><Real {}/></ScalarVariable>'
 
 
-def moving(folder: Path) -> Path:
-    """The FMU in `folder`, which can be computed in lanes too."""
+def moving(folder: Path, *, fixed_step: bool = False) -> Path:
+    """The FMU in `folder`, which can be computed in lanes too; it says if it is to take steps of one length only."""
+    folder.mkdir(exist_ok=True)
     library = folder / f"Moving{fmpy.sharedLibraryExtension}"
     source = Path(__file__).with_name("moving.c")
     subprocess.run([str(COMPILER), "-shared", "-fPIC", "-O1", "-w", str(source), "-o", str(library), "-lm"], check=True)
@@ -33,7 +34,7 @@ def moving(folder: Path) -> Path:
         for i, (name, value) in enumerate(_PARAMETERS.items())
     ]
     text = f"""<fmiModelDescription fmiVersion="2.0" modelName="Moving" guid="moving">
-      <CoSimulation modelIdentifier="Moving" canHandleVariableCommunicationStepSize="true"
+      <CoSimulation modelIdentifier="Moving" canHandleVariableCommunicationStepSize="{str(not fixed_step).lower()}"
         canGetAndSetFMUstate="true" canSerializeFMUstate="true"/>
       <ModelVariables>{"".join(variables)}</ModelVariables>
       <ModelStructure><Outputs><Unknown index="33"/><Unknown index="34"/></Outputs>

@@ -7,8 +7,9 @@ import shutil
 import signal
 import threading
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from orchestration.engines.compiled import CompiledMaster
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_here
+from orchestration.fmi.model import read_model
 from orchestration.fmi.native import NativeInstance
 from orchestration.recording.recording import InMemory
 from orchestration.runs import simulation
@@ -33,6 +35,7 @@ from orchestration.runs.simulation import prepared
 from orchestration.schedule import cursor as position
 from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
 from orchestration.system.system_file import load_system
+from orchestration.system.times import Grid, exact_nanoseconds
 from tests.native import assert_the_same
 from tests.orchestration.engines.moving import moving
 from tests.orchestration.engines.random_systems import systems, systems_of_fixed_steps
@@ -50,19 +53,25 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return moving(tmp_path_factory.mktemp("moving"))
 
 
+@pytest.fixture(scope="module")
+def fixed_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same, but that it takes steps of one length only."""
+    return moving(tmp_path_factory.mktemp("fixed"), fixed_step=True)
+
+
 class Kept:
-    """Instances of the FMU by name, reset between runs: its reset is whole."""
+    """Instances of the FMUs by path and name, reset between runs: its reset is whole."""
 
     def __init__(self) -> None:
-        self._instances: dict[str, NativeInstance] = {}
+        self._instances: dict[tuple[Path, str], NativeInstance] = {}
 
     @contextmanager
     def load(self, path: Path, instance_name: str) -> Iterator[Instance]:
-        name = instance_name
-        if name not in self._instances or self._instances[name].failed:
-            self._instances[name] = open_here(path, name)
-        self._instances[name].reset()
-        yield self._instances[name]
+        key = path, instance_name
+        if key not in self._instances or self._instances[key].failed:
+            self._instances[key] = open_here(*key)
+        self._instances[key].reset()
+        yield self._instances[key]
 
     def close(self) -> None:
         for instance in self._instances.values():
@@ -111,11 +120,35 @@ def test_random_systems_run_the_same_in_schedules_of_any_length(
 
 
 @settings(max_examples=20, derandomize=True, deadline=None)
-@given(systems_of_fixed_steps())
-def test_components_of_one_step_run_the_same(fmu: Path, kept: Kept, drawn: tuple[System, Sequence[str]]) -> None:
-    what = of(drawn[0], fmu)
-    with suppress(QuadcosimError):
-        both(what, load=kept.load)
+@given(systems_of_fixed_steps().filter(lambda drawn: len(drawn[1]) > 0))
+def test_components_of_one_step_run_the_same(
+    fmu: Path, fixed_fmu: Path, kept: Kept, drawn: tuple[System, Sequence[str]]
+) -> None:
+    """Those that the systems have move what happens to them to their grid, or both engines refuse in the same words."""
+    what, names = of(drawn[0], fmu), drawn[1]
+    parts = {
+        name: replace(part, fmu=str(fixed_fmu)) if name in names else part for name, part in what.components.items()
+    }
+    what = replace(what, components=parts)
+    assert all(not read_model(Path(parts[name].fmu)).varies_step for name in names)
+    said: list[str | bytes] = []
+    for engine in ("python", "compiled"):
+        try:
+            result = ran(what, engine, load=kept.load)
+        except QuadcosimError as error:
+            said.append(str(error))
+            continue
+        said.append(result.rows.tobytes())
+        for name in names:
+            grid = Grid(Fraction(0), exact_nanoseconds(parts[name].step or 0.0))
+            arrived = [e.time for e in result.events if e.kind == "arrived" and receiver_of(what, e.what) == name]
+            assert all(grid.from_(time) == time for time in arrived)
+    assert said[0] == said[1]
+
+
+def receiver_of(system: System, connection: str) -> str:
+    """Where a message over it goes."""
+    return next(x.receiver for x in system.connections if x.name == connection)
 
 
 LOOP = System(
@@ -273,6 +306,22 @@ def test_chunks_are_whole_at_the_same_rows_and_events(fmu: Path, kept: Kept, mon
                 sizes.append([(len(chunk.rows), len(chunk.events)) for chunk in recorder.chunks()])
             assert sizes[0] == sizes[1]
             assert len(sizes[0]) > 3
+
+
+def test_rows_that_are_wide_are_handed_over_before_they_fill_the_memory(
+    fmu: Path, kept: Kept, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Room is made for a chunk of them at once."""
+    monkeypatch.setattr("orchestration.engines.master.BYTES", 1000)
+    for engine in ("python", "compiled"):
+        recorder = InMemory()
+        with prepared(of(LOOP, fmu), engine=engine, load=kept.load, recorder=recorder) as run:
+            if isinstance(run.master, CompiledMaster):
+                assert run.master._row_table.nbytes <= 1000
+            run.master.initialise()
+            run.master.run()
+        sizes = {chunk.rows.nbytes for chunk in recorder.chunks()}
+        assert 500 < max(sizes) <= 1000
 
 
 def test_ctrl_c_is_heard_within_a_slice(fmu: Path) -> None:
