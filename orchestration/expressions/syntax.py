@@ -3,6 +3,7 @@
 import ast
 import difflib
 import functools
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -160,9 +161,12 @@ def _node(tree: ast.expr, text: str, depth: int) -> Node:
             return Number(float(value))
         case ast.Constant(value=int() | float() as value):
             try:
-                return Number(float(value))
+                number = float(value)
             except OverflowError:
-                raise UsageError(f"{_short(text)}: expected numbers that a float can hold") from None
+                number = math.inf
+            if math.isinf(number):
+                raise UsageError(f"{_short(text)}: expected numbers that a float can hold")
+            return Number(number)
         case ast.Name() | ast.Attribute() | ast.Subscript():
             return Name(_dotted(tree, text))
         case ast.BinOp(op=op) if type(op) in _BINARY:

@@ -27,7 +27,7 @@ def described(system: System, models: Mapping[str, Model], columns: Iterable[str
     fed = {
         signal: end
         for name, source in system.sources.items()
-        if source.trajectory is None
+        if source.to
         for signal, end in zip(source.signals(name), source.to, strict=True)
     }
     found = {"time": Described(unit="s", text="time")}

@@ -26,6 +26,10 @@ LONGEST = 2**60
 """[ns], 36 years: a few of them together still are a whole number of 64 bits"""
 
 
+MOST_AHEAD = 10**6
+"""Samples that a measurement may be late by: all of them are drawn before the first one"""
+
+
 class _Collected:
     """Instants of a window, and who halts at them: a component, or nobody (-1)."""
 
@@ -235,6 +239,8 @@ class Timetable:
 def _expect_no_longer(system: System) -> None:
     """Raise `UsageError` for a time beyond `LONGEST`."""
     times = {"stop_time": system.stop_time}
+    times |= {f"components.{name}.step": component.step or 0.0 for name, component in system.components.items()}
+    times |= {f"sources.{name}.period": source.period or 0.0 for name, source in system.sources.items()}
     for name, component in system.components.items():
         if component.sampling is not None:
             for key in ("period", "offset"):
@@ -245,6 +251,16 @@ def _expect_no_longer(system: System) -> None:
     for place, time in times.items():
         if time >= LONGEST / NANOSECONDS:
             raise UsageError(f"{place} = {time:g} s: expected less than {LONGEST / NANOSECONDS:.4g} s")
+    for x in system.connections:
+        sampling = system.components[x.receiver].sampling
+        if sampling is None or system.components[x.sender].sampling is not None:
+            continue
+        period = sampling.period / sampling.clock_ratio
+        if x.delay + x.delay_jitter > MOST_AHEAD * period:
+            raise UsageError(
+                f"connections.{x.name}.delay: is measured {x.delay + x.delay_jitter:g} s before a sample of "
+                f"{x.receiver}, every {period:g} s: expected at most {MOST_AHEAD} samples"
+            )
 
 
 def _pace(system: System) -> float:

@@ -10,6 +10,8 @@ from orchestration.schedule.cursor import Position
 from orchestration.schedule.fixed_step import FixedStep
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import LONGEST, Timetable
+from orchestration.system.model import Source
+from orchestration.system.paths import changed
 from orchestration.system.times import Grid, exact_nanoseconds
 from tests.orchestration.engines.stubs import continuous, sampled, system, wire
 
@@ -74,6 +76,35 @@ def test_in_jacobi_order_a_command_goes_out_with_the_next_sample():
     assert [(i.time // MS, sent // MS) for i in found for due in i.dues for _, _, sent, _ in due.sent] == [
         (0, 200), (200, 400), (400, 600),
     ]  # fmt: skip
+
+
+def test_posted_messages_go_out_and_arrive_by_their_senders_and_then_in_the_order_of_the_file():
+    ends = ("b.y", "a.u"), ("a.y", "b.u"), ("b.y", "a.v"), ("a.y", "b.v")
+    what = system(
+        {"a": continuous(0.1), "b": continuous(0.1)},
+        [wire(start, end, f"{i}", delay=0.05, noise={"y": 1.0}) for i, (start, end) in enumerate(ends)],
+        stop_time=0.3,
+    )
+    found = instants(what)
+    assert [[connection for connection, *_ in i.posted] for i in found if i.posted] == [[1, 3, 0, 2]] * 4
+    assert [[connection for connection, *_ in i.arrivals] for i in found if i.arrivals] == [[1, 3, 0, 2]] * 3
+
+
+@pytest.mark.parametrize("place", ["components.a.step", "sources.wind.period"])
+def test_a_time_that_no_run_reaches_is_refused_by_name(place):
+    plain = system({"a": continuous(0.1)}, sources={"wind": Source(noise=1.0, period=0.1, to=("a.u",))})
+    with pytest.raises(UsageError, match=rf"^{place} = 1e\+300 s: expected less than 1.153e\+09 s$"):
+        instants(changed(plain, {place: 1e300}))
+
+
+def test_a_measurement_that_is_late_by_too_many_samples_is_refused_by_name():
+    late = loop(sampled(0.1), measurement={"delay": 1e9})
+    line = (
+        r"^connections.measurement.delay: is measured 1e\+09 s before a sample of controller, every 0.1 s: expected at"
+    )
+    with pytest.raises(UsageError, match=line):
+        instants(late)
+    assert instants(loop(sampled(0.1), command={"delay": 1e9}))
 
 
 def test_components_that_are_due_together_follow_what_feeds_what():
