@@ -44,6 +44,11 @@ class RefusedValueError(SimulatorError, UsageError):
     """An FMU refused a value that the request sets; the text is the FMU's own, after the side it is on."""
 
 
+def no_utf8(error: UnicodeEncodeError) -> UsageError:
+    """The error for the name of a file or folder that no text in UTF-8 can have in it."""
+    return UsageError(f"{error.object}: expected names of files and folders in UTF-8")
+
+
 def one_line(text: str) -> str:
     """`text` in one line of printable characters, cut where it is longer than a message may be."""
     if not text.isprintable():

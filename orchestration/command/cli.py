@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 import typer.core
 
-from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageError
+from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageError, no_utf8
 from orchestration.basics.extras import extra_of
 from orchestration.basics.terminal import complain, progress_bar, say, warn
 from orchestration.basics.units import after
@@ -344,6 +344,8 @@ def _told(error: Exception) -> int:
         if isinstance(error, SimulatorError) and error.details:
             say(f"in the FMU:\n{error.details}")
     misread = _misread(error)
+    if isinstance(error, UnicodeEncodeError) and error.reason.startswith("surrogates"):
+        error = no_utf8(error)
     if isinstance(error, (QuadcosimError, OSError)):
         text = str(error)
     elif misread is not None:

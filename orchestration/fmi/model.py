@@ -17,7 +17,7 @@ import fmpy
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmu_kit.packaging import read_source_hash
-from orchestration.basics.errors import UsageError
+from orchestration.basics.errors import UsageError, no_utf8
 from orchestration.basics.units import BASE, BaseUnits, Unit, named
 from orchestration.fmi.archive import expect_honest_size
 from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
@@ -159,6 +159,8 @@ def read_description(path: Path) -> ModelDescription:
         description: ModelDescription = fmpy.read_model_description(str(path), validate=False)
     except UsageError:
         raise
+    except UnicodeEncodeError as error:
+        raise no_utf8(error) from error
     except Exception as error:  # fmpy lets through whatever the readers of zip and XML raise
         raise UsageError(f"{path}: expected an FMU with a modelDescription.xml: {error}") from error
     if description.fmiMajorVersion not in (2, 3) or description.coSimulation is None:

@@ -5,6 +5,7 @@ Every array of a step is allocated once, and every argument of a transfer is mad
 
 import ctypes
 import math
+import tempfile
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -94,6 +95,11 @@ class NativeInstance(Instance):
         except Exception as error:
             self.failed = True
             self.close()
+            if (
+                isinstance(error, OSError) and error.errno is not None
+            ):  # of the disk: libraries that fail have no number
+                what = f"cannot be unpacked in {tempfile.gettempdir()}, which TMPDIR names: {error.strerror}"
+                raise QuadcosimError(f"{path}: {what}") from error
             said, _ = words(self._messages, str(error))
             raise QuadcosimError(f"{path}: expected a co-simulation FMU that loads here: {said}") from error
         self._component = ctypes.c_void_p(self._fmu.component)

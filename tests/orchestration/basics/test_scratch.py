@@ -1,13 +1,17 @@
 """What a killed process leaves in the folder for temporary files is gone when the next one has started."""
 
+import errno
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
+import fmpy
 import pytest
 
 from orchestration.basics import scratch
+from orchestration.basics.errors import QuadcosimError
+from orchestration.fmi.fmi2 import Fmi2Instance
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="folders have no locks there")
 
@@ -62,3 +66,17 @@ def test_others_cannot_enter_it(temporary: Path) -> None:
     folder = scratch.temporary()
     assert folder.path.stat().st_mode & 0o777 == 0o700
     folder.remove()
+
+
+def test_no_room_to_unpack_is_told_with_the_place(
+    built: dict[str, Path], temporary: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(fmpy, "extract", full)
+    with pytest.raises(QuadcosimError) as told:
+        Fmi2Instance(built["QuadrotorPlant"], "plant")
+    said = f"cannot be unpacked in {temporary}, which TMPDIR names: No space left on device"
+    assert str(told.value) == f"{built['QuadrotorPlant']}: {said}"
+    assert not list(temporary.iterdir())

@@ -15,6 +15,7 @@ import pytest
 from orchestration.building import fmus
 from orchestration.building.models import MODELS
 from orchestration.flight.names import FIGURES as FLIGHT
+from orchestration.processes import subprocesses
 from quadcosim import Scenario, Timing, load_run, run, save_run
 from tests.commands import Done, Main
 
@@ -503,3 +504,23 @@ def test_fmus_are_built_into_the_project_when_they_are_missing_or_old(project: P
     (line,) = run()
     assert line.startswith("building")
     assert "QuadrotorPlant" in line
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
+def test_a_folder_whose_name_is_no_text_is_named_and_nothing_else_is_blamed(
+    built: dict[str, Path], tmp_path: Path
+) -> None:
+    folder = tmp_path / os.fsdecode(b"caf\xe9")
+    folder.mkdir()
+    (folder / "it.fmu").write_bytes(built["QuadrotorPlant"].read_bytes())
+    (folder / "system.toml").write_text('stop_time = 0.01\n[components.it]\nfmu = "it.fmu"\nstep = 0.01\n')
+    for arguments in (("run", "system.toml"), ("run", "--stop-time", "0.01", "--out", folder / "kept")):
+        done = subprocess.run(
+            subprocesses.command("orchestration.command.cli", *arguments), cwd=folder, capture_output=True, check=False,
+            env=subprocesses.environment(),
+        )  # fmt: skip
+        (line,) = done.stderr.decode().splitlines()
+        assert done.returncode == 2
+        assert line.startswith("quadcosim: ")
+        assert "caf\\udce9" in line
+        assert line.endswith(": expected names of files and folders in UTF-8")
