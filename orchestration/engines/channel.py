@@ -40,7 +40,7 @@ class Channel:
         self.stream = noise
         """of the noise"""
         self._scale, self._offset = connection.scale, connection.offset
-        self._plain = connection.scale == 1.0 and connection.offset == 0.0
+        self._plain = not connection.converts
         self._extrapolates = connection.hold == "first"
         self.in_flight: dict[int, Floats] = {}
         """messages on their way"""

@@ -73,7 +73,7 @@ class Memory:
             size=len(places),
             noisy=bool(sigma.any()),
             rounds=bool(quantum.any()),
-            converts=x.scale != 1.0 or x.offset != 0.0,
+            converts=x.converts,
             extrapolates=x.hold == "first",
             sigma=self.address(sigma),
             quantum=self.address(quantum),

@@ -62,7 +62,7 @@ class Loop:
 def loop_of(given: Carried) -> Loop:
     """The loop of a system; raises `UsageError` for a connection that does not pass on values as they are."""
     for x in given.system.connections:
-        if x.scale != 1.0 or x.offset != 0.0:
+        if x.converts:
             raise UsageError(f"connections.{x.name}: has scale or offset; expected none to compare with other masters")
     sampled = {name for name, component in given.system.components.items() if component.sampling is not None}
     outputs = [(part.name, f"{part.name}.{name}") for part in given.parts for name in part.outputs]

@@ -37,6 +37,8 @@ def check(system: System, models: Mapping[str, Model]) -> None:
         for start, end in zip(x.start, x.end):
             _check_pair(f"connections.{x.name}", x, _end(models, start), _end(models, end))
     for name, source in system.sources.items():
+        if not (source.to or source.trajectory or source.is_motion):
+            raise UsageError(f"sources.{name}.to = nothing: expected inputs; only a motion may feed none")
         for end in source.to:
             _expect_input(f"sources.{name}.to", end, _end(models, end))
         if source.trajectory is not None and source.trajectory not in system.components:
@@ -110,7 +112,7 @@ def _check_pair(place: str, x: Connection, start: End, end: End) -> None:
         raise UsageError(f"{place}.from: {start[0]} is a {output.kind}; only {_list(NUMERIC)} can be connected")
     receiver = _expect_input(f"{place}.to", end[0], end)
     _check_kinds(place, start[0], output, end[0], receiver)
-    if x.scale == 1.0 and x.offset == 0.0:
+    if not (x.stated or x.converts):
         _check_units(place, start[0], model, output, end[0], end[1], receiver)
 
 

@@ -129,6 +129,14 @@ class Connection:
     """The factor in scale · value + offset, which is what arrives."""
     offset: float = 0.0
     """What is added after the scale, in the unit of the receiver."""
+    stated: bool = False
+    """Whether scale and offset are meant as they are even if they change nothing: then units may differ. In files they
+    are where one of them is given."""
+
+    @property
+    def converts(self) -> bool:
+        """Whether scale and offset change a value."""
+        return self.scale != 1.0 or self.offset != 0.0
 
     def __post_init__(self) -> None:
         require_choice(self, order=Order, hold=Hold, jitter_distribution=Distribution)
@@ -182,7 +190,7 @@ class Source:
     """
 
     to: tuple[str, ...] = ()
-    """The inputs that it feeds, as COMPONENT.VARIABLE; it may be empty for what only objectives need."""
+    """The inputs that it feeds, as COMPONENT.VARIABLE; of a motion it may be empty, for what only objectives need."""
     constant: float | None = None
     """A constant value, in the unit of the inputs."""
     file: Path | None = None

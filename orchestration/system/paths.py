@@ -107,7 +107,7 @@ def _expect_key(path: str, table: str, system: System, name: str, key: str) -> N
         keys += ["align", "fmu", "record", "tolerance", "parameters.NAME"]
         known = key in keys or (key.startswith("parameters.") and key != "parameters.")
     elif table == "connections":
-        fixed = ("name", "start", "end", "noise", "quantisation")
+        fixed = ("name", "start", "end", "noise", "quantisation", "stated")
         keys = [f.name for f in dataclasses.fields(Connection) if f.name not in fixed]
         keys += ["noise", "quantisation", "noise.VARIABLE", "quantisation.VARIABLE"]
         known = key in keys or key.partition(".")[0] in ("noise", "quantisation")
@@ -145,7 +145,7 @@ def _by_variable(connection: Connection, keys: Mapping[str, Any]) -> dict[str, A
             result[kind] = {**result.get(kind, getattr(connection, kind)), variable: value}
         else:
             result[kind] = for_each(connection.start, value)
-    return result
+    return result | ({"stated": True} if {"scale", "offset"} & keys.keys() else {})
 
 
 def for_each(start: Iterable[str], value: Any) -> Any:

@@ -109,8 +109,11 @@ class ConnectionTable(_Table):
         float | dict[str, Any],
         _says("Values are rounded to multiples of this: a number for all signals, or a table by variable."),
     ] = {}
-    scale: Annotated[float, _says("What arrives is scale · value + offset.")] = 1.0
-    offset: Annotated[float, _says("What is added after the scale.")] = 0.0
+    scale: Annotated[
+        float | None,
+        _says("What arrives is scale · value + offset; without either of them, units must be the same."),
+    ] = None
+    offset: Annotated[float | None, _says("What is added after the scale.")] = None
 
 
 class SourceTable(_Table):
@@ -252,6 +255,9 @@ def _connection(index: int, table: ConnectionTable, order: Order) -> Connection:
     keys = table.model_dump()
     keys["name"] = table.name if table.name is not None else str(index)
     keys["order"] = table.order or order
+    conversion = {key: keys.pop(key) for key in ("scale", "offset")}
+    given = {key: value for key, value in conversion.items() if value is not None}
+    keys |= {**given, "stated": bool(given)}
     for what in ("noise", "quantisation"):
         keys[what] = for_each(table.start, keys[what])
         for variable, value in keys[what].items():

@@ -27,7 +27,8 @@ def tables_of(system: Any) -> dict[str, Any]:
 
 
 def _connection_table(x: Any) -> dict[str, Any]:
-    keys = _without_defaults(x, keep=("name",))
+    keys = _without_defaults(x, keep=("name", "scale") if x.stated else ("name",))
+    keys.pop("stated", None)
     return {"name": keys.pop("name"), "from": keys.pop("start"), "to": keys.pop("end"), **keys}
 
 

@@ -471,7 +471,7 @@ class Batch:
     def _channel(self, i: int) -> Any:
         x, ends, arrays = self._shape.system.connections[i], self._ends[i], self._of_channels[i]
         sigma, quantum = changes_of(x)
-        names, converts = self._shape.names, x.scale != 1.0 or x.offset != 0.0
+        names, converts = self._shape.names, x.converts
         return self._channel_type(
             sender=c.address(self.memories[names.index(x.sender)]),
             receiver=c.address(self.memories[names.index(x.receiver)]),

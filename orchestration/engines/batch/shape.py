@@ -41,7 +41,7 @@ def _outline_of(x: Connection) -> Hashable:
     late = bool(x.delay or x.delay_jitter)
     return (
         x.name, x.start, x.end, x.order, x.hold, is_plain(x), late, any(x.noise.values()), any(x.quantisation.values()),
-        x.scale == 1.0 and x.offset == 0.0,
+        x.converts,
     )  # fmt: skip
 
 

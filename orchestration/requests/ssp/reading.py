@@ -31,6 +31,8 @@ class Signal:
     end: str
     """COMPONENT.VARIABLE"""
     conversion: Conversion
+    stated: bool
+    """whether that is all there is to its units, by suppressUnitConversion somewhere on the way"""
 
 
 def tables_of(path: Path, timing: Mapping[str, Any]) -> dict[str, Any]:
@@ -152,9 +154,10 @@ def _signals(structure: Structure, names: Mapping[Path_, str], models: Mapping[P
     for node in structure.kinds:
         giver = _giver(structure, node) if node[0] in names else None
         if giver is not None:
-            conversion = _along(list(structure.way_to(node)), structure, models)
+            wires = list(structure.way_to(node))
+            conversion, stated = _along(wires, structure, models), not all(wire.converts_units for wire in wires)
             start, end = (f"{names[place]}.{variable}" for place, variable in (giver, node))
-            found.append(Signal(start=start, end=end, conversion=conversion))
+            found.append(Signal(start=start, end=end, conversion=conversion, stated=stated))
     return found
 
 
@@ -201,15 +204,15 @@ def _connections(signals: Sequence[Signal], timing: object) -> list[dict[str, An
             raise UsageError(f"{place}: has scale or offset, which the SSP decides")
         members = _named(place, table, left)
         left = [signal for signal in left if signal not in members]
-        if len({signal.conversion for signal in members}) > 1:
+        if len({(signal.conversion, signal.stated) for signal in members}) > 1:
             raise UsageError(f"{place}: its signals are converted differently; expected a connection for each")
         tables.append(_table(members) | {key: value for key, value in table.items() if key not in ("from", "to")})
-    groups: dict[tuple[str, str, Conversion], list[Signal]] = {}
+    groups: dict[tuple[str, str, Conversion, bool], list[Signal]] = {}
     for signal in left:
         pair = component_of(signal.start), component_of(signal.end)
-        groups.setdefault((*pair, signal.conversion), []).append(signal)
+        groups.setdefault((*pair, signal.conversion, signal.stated), []).append(signal)
     taken = {table["name"] for table in tables if "name" in table}
-    for (sender, receiver, _), members in groups.items():
+    for (sender, receiver, _, _), members in groups.items():
         base = f"{sender}_to_{receiver}"
         name = next(n for k in range(1, 2 + len(taken)) if (n := base if k == 1 else f"{base}_{k}") not in taken)
         taken.add(name)
@@ -218,8 +221,9 @@ def _connections(signals: Sequence[Signal], timing: object) -> list[dict[str, An
 
 
 def _table(members: Sequence[Signal]) -> dict[str, Any]:
-    conversion = members[0].conversion
-    changed = {} if conversion.is_none else {"scale": conversion.scale, "offset": conversion.offset}
+    conversion, stated = members[0].conversion, members[0].stated
+    is_said = stated or not conversion.is_none
+    changed = {"scale": conversion.scale, "offset": conversion.offset} if is_said else {}
     return {"from": [signal.start for signal in members], "to": [signal.end for signal in members], **changed}
 
 

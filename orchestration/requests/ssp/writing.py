@@ -117,7 +117,7 @@ def _structure(given: Carried, name: str, about: Mapping[str, str]) -> Element:
 def _add_connections(connections: Element, system: System) -> None:
     """With the conversion that the system states, and no other."""
     for x in system.connections:
-        is_plain = x.scale == 1.0 and x.offset == 0.0
+        is_plain = not (x.stated or x.converts)
         for start, end in zip(x.start, x.end, strict=True):
             connection = add(
                 connections,

@@ -8,6 +8,8 @@ from orchestration.basics.errors import UsageError
 from orchestration.fmi.model import read_model
 from orchestration.results import objectives
 from orchestration.system.check import check, recorded
+from orchestration.system.model import System
+from orchestration.system.paths import changed
 from orchestration.system.system_file import load_system
 from tests.orchestration.system.described import described
 
@@ -66,6 +68,30 @@ def checked(folder: Path, text: str) -> None:
 
 def test_what_is_right_is_not_refused(tmp_path: Path) -> None:
     checked(tmp_path, TANK)
+
+
+@pytest.mark.parametrize("stated", ["scale = 1.0", "offset = 0.0", "scale = 1000.0"])
+def test_units_may_differ_where_a_conversion_is_stated(stated: str, tmp_path: Path) -> None:
+    differing = TANK.replace('["controller.level"]', '["controller.height"]')
+    with pytest.raises(UsageError, match=r"connections.level: tank.level is in m, controller.height in mm; expected "):
+        checked(tmp_path, differing)
+    said = differing.replace('["controller.height"]', f'["controller.height"]\n{stated}')
+    checked(tmp_path, said)
+    checked(tmp_path, load_system(tmp_path / "system.toml").to_toml())
+    checked(tmp_path, changed(system_of(tmp_path, differing), {"connections.level.scale": 1.0}).to_toml())
+
+
+@pytest.mark.parametrize("kind", ["constant = 1.0", 'file = "rain.csv"', "noise = 1.0\nperiod = 0.1"])
+def test_a_source_that_feeds_nothing_is_refused(kind: str, tmp_path: Path) -> None:
+    rest = TANK.replace('to = ["tank.inflow"]\n', "")
+    with pytest.raises(UsageError, match=r"^sources.rain.to = nothing: expected inputs; only a motion may feed none$"):
+        checked(tmp_path, rest.replace("constant = 1.0", kind))
+    checked(tmp_path, rest.replace("constant = 1.0", 'signal = "circle"'))
+
+
+def system_of(folder: Path, text: str) -> System:
+    (folder / "system.toml").write_text(text)
+    return load_system(folder / "system.toml")
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,10 @@ from pathlib import Path
 import pytest
 
 from fmu_kit.packaging import write_archive
+from orchestration.fmi.model import read_model
 from orchestration.requests.request import load_request
 from orchestration.requests.ssp import package, writing
+from orchestration.system.check import check
 from orchestration.system.model import Sampling, System
 from quadcosim import Scenario, UsageError
 from tests.commands import Main
@@ -118,6 +120,15 @@ Loaded = Callable[..., System]
 def wires(read: System) -> dict[str, tuple[str, float, float]]:
     """By end: start, scale and offset."""
     return {end: (start, x.scale, x.offset) for x in read.connections for start, end in zip(x.start, x.end)}
+
+
+def test_a_conversion_that_is_suppressed_leaves_the_value_whatever_the_units(loaded: Loaded) -> None:
+    suppressed = LOOP.replace('endConnector="x"', 'endConnector="x" suppressUnitConversion="true"')
+    assert wires(loaded(structure(LOOP)))["law.x"] == ("plant.x", 1000.0, 0.0)
+    read = loaded(structure(suppressed))
+    assert wires(read)["law.x"] == ("plant.x", 1.0, 0.0)
+    models = {name: read_model(Path(part.fmu)) for name, part in read.components.items()}
+    check(read, models)
 
 
 # -- structure --------------------------------------------------------------------------------------------
