@@ -22,6 +22,7 @@ class SampledController(Slave):
 
     author, license = AUTHOR, LICENSE
     initial_outputs_depend_on_inputs = True
+    initially_idle = frozenset({"sample_offset"})
 
     @abstractmethod
     def read_gains(self) -> None:

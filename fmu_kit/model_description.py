@@ -158,13 +158,11 @@ def type_attributes(variable: Variable) -> dict[str, str]:
     return found
 
 
-def dependencies(slave: Any) -> tuple[list[int], list[int]]:
-    """The value references of the outputs, and of the inputs on which all of them depend when initialisation ends."""
-    outputs, inputs = (
-        [i for i, v in enumerate(slave.variables) if v.causality == causality] for causality in ("output", "input")
-    )
-    moving = [i for i in inputs if slave.variables[i].name not in slave.initially_idle]
-    return outputs, moving if slave.depends_initially() else []
+def initial_dependencies(slave: Any) -> dict[int, list[int]]:
+    """By the value reference of each output, those of what it depends on when initialisation ends, in their order."""
+    names = [v.name for v in slave.variables]
+    known = {i: slave.initial_dependencies(v.name) for i, v in enumerate(slave.variables) if v.causality == "output"}
+    return {output: [i for i, name in enumerate(names) if name in found] for output, found in known.items()}
 
 
 def _simple_type(types: Element, name: str) -> Element:
@@ -180,10 +178,10 @@ def _literal(value: float | int | bool) -> str:
 def _add_structure(root: Element, slave: Any) -> None:
     """FMI 2.0 names variables by their place in the list, from 1."""
     structure = SubElement(root, "ModelStructure")
-    outputs, known = dependencies(slave)
+    known = initial_dependencies(slave)
     listed = SubElement(structure, "Outputs")
-    for reference in outputs:
+    for reference in known:
         SubElement(listed, "Unknown", index=str(reference + 1), dependencies="")
     initial = SubElement(structure, "InitialUnknowns")
-    for reference in outputs:
-        SubElement(initial, "Unknown", index=str(reference + 1), dependencies=" ".join(str(each + 1) for each in known))
+    for reference, needed in known.items():
+        SubElement(initial, "Unknown", index=str(reference + 1), dependencies=" ".join(str(i + 1) for i in needed))

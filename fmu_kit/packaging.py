@@ -32,8 +32,10 @@ from fmu_kit.failure import place_of
 from fmu_kit.model_description import GUID_PLACEHOLDER, PYTHON_REQUIRED, to_xml
 from fmu_kit.versions import generation_tool, version_of
 
-PAGE, ICON = "documentation/index.html", "model.png"
-"""The documentation of an FMU and its icon, by their place in the archive."""
+PAGE = "documentation/index.html"
+"""The documentation of an FMU, by its place in the archive."""
+ICONS = {2: "model.png", 3: "terminalsAndIcons/icon.png"}
+"""The icon of an FMU, by the version of FMI (2.0.4, section 2.3; 3.0, section 2.5)."""
 
 NATIVE_TABLES = "sources/tables.h"
 """Of an FMU without Python inside: the file of its sources that has the GUID."""
@@ -243,13 +245,16 @@ def unchanged_files(target: Target) -> dict[str, bytes]:
     return {**_binaries(target.model), **licences_and_icon(target, pythonfmu=_license_of_pythonfmu())}
 
 
-def licences_and_icon(target: Target, **others: str) -> dict[str, bytes]:
-    """The licence of quadcosim and those of others by name, a list of them, and the slave's icon if it has one."""
+def licences_and_icon(target: Target, version: int = 2, **others: str) -> dict[str, bytes]:
+    """The licence of quadcosim and those of others by name, a list of them, and the slave's icon if it has one.
+
+    Each at its place in an FMU of a version of FMI.
+    """
     texts = {"quadcosim": _text(Path(__file__).with_name("LICENSE")), **others}
     texts["license"] = "".join(f"{name}.txt: {_LICENCES[name]}\n" for name in texts) + _LICENCE_OF_THE_MODEL
     files = {f"documentation/licenses/{name}.txt": text.encode() for name, text in texts.items()}
     if target.icon.is_file():
-        files[ICON] = target.icon.read_bytes()
+        files[ICONS[version]] = target.icon.read_bytes()
     return files
 
 

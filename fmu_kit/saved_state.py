@@ -5,6 +5,7 @@ the class after an exception while it makes or writes a state.
 """
 
 import json
+import zlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -16,16 +17,34 @@ State = dict[str, Any]  # of JSON types only: it is serialised as JSON
 DEEPEST = 8
 """Levels of lists and dictionaries in a state; the states of slaves have less than half of them."""
 
+_KEPT: dict[str, tuple[type, ...]] = {
+    "phase": (int,),
+    "start_time": (float,),
+    "stop_time": (float,),
+    "reached": (float, type(None)),
+    "stale": (bool,),
+    "warned": (list,),
+}
 _INTEGERS = range(-(2**31), 2**31)
+_CHECKSUM, DAMAGED = "checksum", "damaged"
+"""Beside the parts of a state: the checksum in its bytes; that they have another one"""
+
+
+def serialised(state: State) -> bytes:
+    """The bytes of a state, with a checksum of it."""
+    return json.dumps({_CHECKSUM: _checksum(state), **state}).encode("utf-8")
 
 
 def parsed(content: bytes) -> State:
-    """The state in `content`; an empty one, which `expect_state` refuses, for whatever is none. Never raises."""
+    """The state that was serialised; one that `expect_state` refuses if `content` is anything else. Never raises."""
     try:
         state = json.loads(content.decode("utf-8"))
     except Exception:
         return {}
-    return state if isinstance(state, dict) and _is_shallow(state, DEEPEST) else {}
+    if not (isinstance(state, dict) and _is_shallow(state, DEEPEST)):
+        return {}
+    checksum = state.pop(_CHECKSUM, None)
+    return state if checksum == _checksum(state) else {**state, DAMAGED: True}
 
 
 def expect_state(state: State, model: str, variables: Sequence[Variable]) -> None:
@@ -35,6 +54,8 @@ def expect_state(state: State, model: str, variables: Sequence[Variable]) -> Non
     found = (state.get("model"), len(given) if isinstance(given, list | tuple) else 0)
     mine = (model, len(reals))
     require(found == mine, "FMU state (model, number of Reals)", found, f"{mine}")
+    if DAMAGED in state:
+        raise FmuError("FMU state (its bytes): expected them as they were serialised, their checksum is another")
     for variable, value in zip(reals, given):
         require(type(value) is float, f"FMU state ({variable.name})", repr(value), "a float")
     others = dict(enumerate(variables[len(reals) :], start=len(reals)))
@@ -46,9 +67,14 @@ def expect_state(state: State, model: str, variables: Sequence[Variable]) -> Non
             require(value in (0, 1), name, repr(value), "0 or 1")
         else:
             require(type(value) is int and value in _INTEGERS, name, repr(value), "an integer of 32 bits")
-    for key, kind in (("phase", int), ("start_time", float), ("stale", bool), ("warned", list)):
-        require(type(state.get(key)) is kind, f"FMU state ({key})", repr(state.get(key)), f"of type {kind.__name__}")
+    for key, (kind, *more) in _KEPT.items():
+        value = state.get(key, ...)
+        require(type(value) in (kind, *more), f"FMU state ({key})", repr(value), f"of type {kind.__name__}")
     require("internal" in state, "FMU state (internal)", "missing", "what the model saves")
+
+
+def _checksum(state: State) -> int:
+    return zlib.crc32(json.dumps(state).encode("utf-8"))
 
 
 def _by_reference(pairs: Any) -> dict[int, Any]:

@@ -23,7 +23,7 @@ from fmu_kit import model_description
 from fmu_kit.errors import DivergenceError, FmuError, require
 from fmu_kit.failure import Failure, printf_safe, report
 from fmu_kit.interface import Declared, declared_in, initial_values, variables_of
-from fmu_kit.saved_state import State, expect_state, parsed
+from fmu_kit.saved_state import State, expect_state, parsed, serialised
 from fmu_kit.unloading import release_at_exit
 from fmu_kit.values import Values
 from fmu_kit.variables import Variable
@@ -38,6 +38,9 @@ class Phase(enum.IntEnum):
     TERMINATED = 3
     FAILED = 4
 
+
+TIME_TOLERANCE = 1e-9
+"""Relative; masters add up times, or round them"""
 
 _Method = TypeVar("_Method", bound=Callable[..., Any])
 
@@ -71,7 +74,7 @@ class Slave(Values, Fmi2Slave):  # type: ignore[misc]
     """Whether the first outputs, those at the end of initialisation, depend on the inputs. Later ones never do.
     Unless told, they do if the model defines `initialise`."""
     initially_idle: ClassVar[frozenset[str]] = frozenset()
-    """Inputs on which not even the first outputs depend."""
+    """Inputs and parameters on which not even the first outputs depend."""
 
     author: ClassVar[str] = ""
     license: ClassVar[str] = ""
@@ -133,7 +136,8 @@ class Slave(Values, Fmi2Slave):  # type: ignore[misc]
         }  # all but Reals, by value reference
         self._phase = Phase.INSTANTIATED
         self._initialised = False
-        self._start_time = 0.0
+        self._start_time, self._stop_time = 0.0, math.inf
+        self._reached: float | None = None  # where the next step begins; None: anywhere, before the first
         self._stale = True  # values were set that initialise() or step() has not seen yet
         self._quickly_settable: frozenset[int] = frozenset()
         self._warned: list[str] = []
@@ -172,6 +176,20 @@ class Slave(Values, Fmi2Slave):  # type: ignore[misc]
         told = cls.initial_outputs_depend_on_inputs
         return cls.initialise is not Slave.initialise if told is None else told
 
+    @classmethod
+    def initial_dependencies(cls, output: str) -> frozenset[str]:
+        """The inputs and parameters on which an output depends when initialisation ends.
+
+        Unless a model says more: a state, where nothing but this class initialises it, on where it starts; outputs of
+        a model that defines `initialise` on all parameters, and on all inputs if on any.
+        """
+        if cls.initialise is Slave.initialise:
+            return frozenset({cls._initial[output]} if output in cls._initial else ())
+        known = {v.name for v in cls.variables if v.causality == "parameter"}
+        if cls.depends_initially():
+            known |= {v.name for v in cls.variables if v.causality == "input"}
+        return frozenset(known - cls.initially_idle)
+
     @property
     def is_fresh(self) -> bool:
         """Whether nobody steps it yet: then whoever made it may set its inputs and parameters by their names."""
@@ -194,7 +212,9 @@ class Slave(Values, Fmi2Slave):  # type: ignore[misc]
         """fmi2SetupExperiment; some versions of pythonfmu pass the start time alone."""
         self._expect(Phase.INSTANTIATED, "fmi2SetupExperiment")
         require(math.isfinite(start_time), "startTime", start_time, "a finite time")
-        self._start_time = start_time
+        if stop_time is not None:
+            require(stop_time >= start_time, "stopTime", stop_time, f"a time not before startTime = {start_time}")
+        self._start_time, self._stop_time = start_time, math.inf if stop_time is None else stop_time
 
     @guarded
     def enter_initialization_mode(self) -> None:
@@ -215,6 +235,13 @@ class Slave(Values, Fmi2Slave):  # type: ignore[misc]
     def do_step(self, current_time: float, step_size: float) -> bool:
         """fmi2DoStep."""
         self._expect(Phase.STEPPING, "fmi2DoStep")
+        self._expect_in_time(current_time, step_size)
+        self._advance(current_time, step_size)
+        self._reached = current_time + step_size
+        return True
+
+    def _advance(self, current_time: float, step_size: float) -> None:
+        """A step that comes when it should; what is written out as C for it begins here."""
         if not (step_size > 0.0 and math.isfinite(current_time + step_size)):
             require(math.isfinite(current_time), "currentCommunicationPoint", current_time, "a finite time")
             require(False, "communicationStepSize", step_size, "a positive number of seconds")
@@ -224,11 +251,11 @@ class Slave(Values, Fmi2Slave):  # type: ignore[misc]
             self.step(current_time, step_size)
         except (ArithmeticError, ValueError) as error:  # a float left its range on the way to a result
             raise DivergenceError(f"at t = {current_time}: {error}, expected finite values") from error
-        return True
 
     @guarded
     def terminate(self) -> None:
         """fmi2Terminate."""
+        self._expect(Phase.STEPPING, "fmi2Terminate")
         self._phase = Phase.TERMINATED
 
     @guarded
@@ -294,6 +321,8 @@ class Slave(Values, Fmi2Slave):  # type: ignore[misc]
             "others": [[vr, value] for vr, value in self._others.items()],
             "phase": int(self._phase),
             "start_time": self._start_time,
+            "stop_time": self._stop_time,
+            "reached": self._reached,
             "stale": self._stale,
             "warned": list(self._warned),
             "internal": self.internal_state() if self._initialised else None,
@@ -305,7 +334,8 @@ class Slave(Values, Fmi2Slave):  # type: ignore[misc]
         self._reals[:] = state["reals"]
         self._others.update(state["others"])
         self._phase = Phase(state["phase"])
-        self._start_time = state["start_time"]
+        self._start_time, self._stop_time = state["start_time"], state["stop_time"]
+        self._reached = state["reached"]
         self._stale = state["stale"]
         self._warned = list(state["warned"])
         self._quickly_settable = self._inputs if self._phase is Phase.STEPPING else frozenset()
@@ -318,6 +348,10 @@ class Slave(Values, Fmi2Slave):  # type: ignore[misc]
                 self.restore(state["internal"])
             except (LookupError, TypeError, ValueError) as error:
                 raise FmuError(f"FMU state (internal) = {state['internal']}: expected what the model saves") from error
+
+    @staticmethod
+    def _fmu_state_to_bytes(state: State) -> bytes:
+        return serialised(state)
 
     @staticmethod
     def _fmu_state_from_bytes(content: bytes) -> State:
@@ -357,6 +391,17 @@ class Slave(Values, Fmi2Slave):  # type: ignore[misc]
     def _expect(self, phase: Phase, call: str) -> None:
         if self._phase is not phase:
             raise FmuError(f"{call} in phase {self._phase.name.lower()}: expected phase {phase.name.lower()}")
+
+    def _expect_in_time(self, t: float, h: float) -> None:
+        """Raise `FmuError` for a step that does not begin where the last one ended, or that ends past the stop time.
+
+        What is not finite is not looked at here.
+        """
+        slack = TIME_TOLERANCE * max(abs(t), h)
+        if self._reached is not None and abs(t - self._reached) > slack:
+            raise FmuError(f"currentCommunicationPoint = {t}: expected {self._reached}, where the last step ended")
+        if t + h - self._stop_time > slack:
+            raise FmuError(f"communicationStepSize = {h} from {t}: expected no step past stopTime = {self._stop_time}")
 
     def _settable(self, vr: int, *types: str) -> Variable:
         """The variable of `vr`, of one of the types, if its value may be set now; raises `FmuError` if not."""

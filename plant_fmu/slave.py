@@ -9,6 +9,7 @@ from fmu_kit.rigid_body import Body, RigidState, Wrench, acceleration, derivativ
 from fmu_kit.saved_state import State
 from fmu_kit.scalar import FLOAT, repeat
 from fmu_kit.slave import Slave
+from fmu_kit.variables import QUATERNION_AXES
 from plant_fmu.actuators import Actuators, Box, Channels, Motors
 from plant_fmu.interface import MOTION, QUADROTOR
 from plant_fmu.payload import Payload
@@ -26,6 +27,12 @@ class QuadrotorPlant(Slave):
     description = "Quadrotor as a rigid body: thrust and body torques in, motion out"
     author, license = AUTHOR, LICENSE
     initial_outputs_depend_on_inputs = False
+
+    @classmethod
+    def initial_dependencies(cls, output: str) -> frozenset[str]:
+        """The motion on where it starts; the quaternion, which is normalised, on all four parts of that."""
+        vector, _, axis = output.rpartition(".")
+        return frozenset(f"initial.{vector}.{other}" for other in (QUATERNION_AXES if vector == "quaternion" else axis))
 
     def read_parameters(self) -> None:
         """Build the body, the wind, the payload and the actuators."""

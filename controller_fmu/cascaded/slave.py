@@ -24,9 +24,10 @@ class CascadedController(SampledController):
         "Cascade of position, velocity, attitude and rate loops for a quadrotor, with PX4's structure, sampled"
     )
 
-    initially_idle = frozenset(
-        {"angular_velocity.z", *(f"reference.{name}.{axis}" for name in ("jerk", "snap") for axis in "xyz")}
-    )
+    initially_idle = SampledController.initially_idle | {
+        "angular_velocity.z",
+        *(f"reference.{name}.{axis}" for name in ("jerk", "snap") for axis in "xyz"),
+    }
 
     def read_gains(self) -> None:
         """Take over the loops, the airframe and the ratios."""

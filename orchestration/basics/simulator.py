@@ -22,7 +22,7 @@ class Simulator(Protocol):
         """A call that sets the variables `names` from the array `source`."""
 
     def enter_initialization(self, start: float, stop: float) -> None:
-        """Begin initialisation of a run over [start, stop] seconds."""
+        """Begin initialisation of a run over [start, stop] seconds; without an end if `stop` is infinite."""
 
     def exit_initialization(self) -> None:
         """End initialisation; from here on the simulator can be stepped."""

@@ -10,6 +10,7 @@ position error and is largest at the edge of the layer: `at_edge` is the scenari
 """
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -283,10 +284,12 @@ def _controller_at_hover(hover: Scenario, fleet: Instances) -> tuple[Floats, Flo
         _initialise(controller, wiring.MEASUREMENT, at_rest)
         step = min(STEP, 1e-3 * _value(controller, wiring.BOUNDARY_LAYER, absent=1.0))
 
-        def command(measurement: Floats, t: float = 0.0) -> Floats:
+        instants = itertools.count()
+
+        def command(measurement: Floats) -> Floats:
             result: Floats = np.zeros(_COMMANDS)
             controller.writer(wiring.MEASUREMENT, measurement)()
-            controller.step(t, hover.timing.period)
+            controller.step(next(instants) * hover.timing.period, hover.timing.period)
             controller.reader(wiring.COMMAND, result)()
             return result
 
@@ -296,7 +299,7 @@ def _controller_at_hover(hover: Scenario, fleet: Instances) -> tuple[Floats, Flo
             columns.append((plus - minus) / (2.0 * step))
         trim = command(at_rest)
         away = at_rest + 1e3 * step
-        later = [command(x, (k + 1) * hover.timing.period) for k, x in enumerate((away, away, at_rest))]
+        later = [command(x) for x in (away, away, at_rest)]
         if np.abs(later[-1] - trim).max() > _FORGOTTEN * max(1.0, float(np.abs(trim).max())):
             raise UsageError("the controller's command depends on what it measured before")
         return trim, np.column_stack(columns)
@@ -325,6 +328,6 @@ def _measurement(initial: dict[str, float]) -> Floats:
 
 
 def _initialise(fmu: Instance, inputs: tuple[str, ...], values: Floats) -> None:
-    fmu.enter_initialization(0.0, 1.0)
+    fmu.enter_initialization(0.0, math.inf)
     fmu.writer(inputs, values)()
     fmu.exit_initialization()

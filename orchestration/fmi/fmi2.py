@@ -35,7 +35,7 @@ class Fmi2Instance(NativeInstance):
         self._do_step = self.watched(fmu.dll.fmi2DoStep)
         return fmu
 
-    def _enter(self, start: float, stop: float) -> None:
+    def _enter(self, start: float, stop: float | None) -> None:
         self._call("setupExperiment", tolerance=self._tolerance, startTime=start, stopTime=stop)
         self._call("enterInitializationMode")
 

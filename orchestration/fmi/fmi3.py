@@ -51,7 +51,7 @@ class Fmi3Instance(NativeInstance):
     def _log(self, environment: Any, status: int, category: bytes | None, message: bytes | None) -> None:
         self._messages.append((status, category, message or b""))
 
-    def _enter(self, start: float, stop: float) -> None:
+    def _enter(self, start: float, stop: float | None) -> None:
         self._call("enterInitializationMode", tolerance=self._tolerance, startTime=start, stopTime=stop)
 
     def step(self, t: float, h: float) -> None:

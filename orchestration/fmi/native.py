@@ -124,8 +124,8 @@ class NativeInstance(Instance):
         """fmpy's instance of the FMU unpacked in `folder`, its messages collected."""
 
     @abstractmethod
-    def _enter(self, start: float, stop: float) -> None:
-        """Into initialisation mode, with the tolerance if there is one."""
+    def _enter(self, start: float, stop: float | None) -> None:
+        """Into initialisation mode, with the tolerance if there is one; `stop` is None if no end is defined."""
 
     @abstractmethod
     def step_error(self, status: int, end: float) -> SimulatorError:
@@ -138,9 +138,9 @@ class NativeInstance(Instance):
     # -- a run ---------------------------------------------------------------------------------------------------
 
     def enter_initialization(self, start: float, stop: float) -> None:
-        """Begin initialisation of a run over [start, stop] seconds; what the FMU has lost is set once more."""
+        """As `Simulator`; what the FMU has lost is set once more."""
         self._expect_alive()
-        self._enter(start, stop)
+        self._enter(start, None if math.isinf(stop) else stop)
         for name, value in self._lost():
             self._put(self.variable(name), value)
         for name, value in self._lost():

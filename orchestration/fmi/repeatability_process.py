@@ -156,7 +156,7 @@ def _further_is_same(runs: _Runs, expected: bytes) -> bool:
     """Whether it is in an instance beside one that takes the same steps, and in one after both."""
     try:
         with runs.opened() as beside, runs.opened() as instance:
-            beside.enter_initialization(0.0, 1.0)
+            beside.enter_initialization(0.0, math.inf)
             beside.exit_initialization()
             if runs.compared(instance, beside.step) != expected:
                 return False

@@ -215,6 +215,10 @@ class Watched:
 
         return transfer
 
+    def enter_initialization(self, start: float, stop: float) -> None:
+        """As `Simulator`, without an end: from where this run has come to rest, others begin."""
+        self.fmu.enter_initialization(start, math.inf)
+
     def step(self, t: float, h: float) -> None:
         """As `Simulator`."""
         self.fmu.step(t, h)

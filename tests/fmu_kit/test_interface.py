@@ -95,6 +95,20 @@ def test_first_outputs_depend_on_inputs_where_the_law_says_how_it_begins():
     assert (Law.depends_initially(), Begins.depends_initially()) == (False, True)
 
 
+def test_first_outputs_depend_on_the_start_of_a_state_or_where_the_law_says_how_it_begins_on_all_that_is_given():
+    class Begins(Law):
+        """Begins."""
+
+        initially_idle = frozenset({"gain"})
+
+        def initialise(self, t: float) -> None: ...
+
+    given = {v.name for v in Law.variables if v.causality in ("input", "parameter")}
+    assert Law.initial_dependencies("angle") == {"initial.angle"}
+    assert Law.initial_dependencies("force.x") == set()
+    assert Begins.initial_dependencies("force.x") == Begins.initial_dependencies("angle") == given - {"gain"}
+
+
 @pytest.mark.parametrize(
     ("statement", "words"),
     [

@@ -9,7 +9,7 @@ from tests.fmus.flights import FLIGHTS, STEPS, Flight
 from tests.fmus.instance import Instance
 from tests.fmus.making import MAKINGS, Making
 
-OF_BOTH_MAKINGS = ("errors", "instances", "other_masters", "state")
+OF_BOTH_MAKINGS = ("errors", "instances", "other_masters", "state", "times")
 """Modules of tests that hold for an FMU with Python inside and for the same slave written out as C."""
 
 

@@ -42,7 +42,7 @@ def make(built: dict[str, Path]) -> Iterator[Make]:
 def initialise(simulator: Fmi2Instance, values: Values) -> None:
     for name, value in values.items():
         simulator.set(name, value)
-    simulator.enter_initialization(0.0, 1.0)
+    simulator.enter_initialization(0.0, math.inf)
     simulator.exit_initialization()
 
 

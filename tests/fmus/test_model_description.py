@@ -146,8 +146,26 @@ def test_declared_initial_dependencies_are_the_inputs_that_a_controller_uses_and
     inputs = [v.name for v in description.modelVariables if v.causality == "input" and v.name not in idle]
     expected = [] if description.modelName == "QuadrotorPlant" else inputs
     outputs = {v.name for v in description.modelVariables if v.causality == "output"}
-    declared = {u.variable.name: [d.name for d in u.dependencies] for u in description.initialUnknowns}
+    declared = {
+        u.variable.name: [d.name for d in u.dependencies if d.causality == "input"] for u in description.initialUnknowns
+    }
     assert declared == dict.fromkeys(outputs, expected)
+
+
+def test_declared_initial_dependencies_are_the_parameters_of_a_controller_and_where_the_plant_starts(
+    description: ModelDescription,
+) -> None:
+    declared = {
+        u.variable.name: [d.name for d in u.dependencies if d.causality == "parameter"]
+        for u in description.initialUnknowns
+    }
+    if description.modelName == "QuadrotorPlant":
+        assert declared["position.y"] == ["initial.position.y"]
+        assert declared["quaternion.x"] == [f"initial.quaternion.{axis}" for axis in "xyzw"]
+    else:
+        parameters = [v.name for v in description.modelVariables if v.causality == "parameter"]
+        assert {"mass", "gravity", "use_reference_inputs"} < {*parameters}
+        assert declared["thrust"] == [name for name in parameters if name != "sample_offset"]
 
 
 def test_in_initialisation_mode_reference_inputs_that_are_not_used_move_nothing(built: dict[str, Path]) -> None:

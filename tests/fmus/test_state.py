@@ -165,6 +165,7 @@ def test_a_changed_tunable_parameter_is_in_the_state(built: dict[str, Path]) -> 
         controller.set({"gain.eta": 3.0})  # not seen by a step yet
         content = controller.save()
         first = flight.fly(controller, SAVED, END)
+        controller.restore(content)
         controller.set({"gain.eta": 20.0})
         assert flight.fly(controller, SAVED, END) != first
         controller.restore(content)

@@ -69,8 +69,8 @@ def _time(value_reference: int) -> Element:
 
 def _add_structure(root: Element, slave: Any) -> None:
     structure = SubElement(root, "ModelStructure")
-    outputs, known = model_description.dependencies(slave)
-    for reference in outputs:
+    known = model_description.initial_dependencies(slave)
+    for reference in known:
         SubElement(structure, "Output", valueReference=str(reference), dependencies="")
-    for reference in outputs:
-        SubElement(structure, "InitialUnknown", valueReference=str(reference), dependencies=" ".join(map(str, known)))
+    for reference, needed in known.items():
+        SubElement(structure, "InitialUnknown", valueReference=str(reference), dependencies=" ".join(map(str, needed)))

@@ -47,6 +47,7 @@ STANDARDS = {
             "ENTER_INITIALIZATION_MODE": "fmi2EnterInitializationMode",
             "EXIT_INITIALIZATION_MODE": "fmi2ExitInitializationMode",
             "DO_STEP": "fmi2DoStep",
+            "TERMINATE": "fmi2Terminate",
         },
         types={
             "Real": "Real",
@@ -66,6 +67,7 @@ STANDARDS = {
             "ENTER_INITIALIZATION_MODE": "fmi3EnterInitializationMode",
             "EXIT_INITIALIZATION_MODE": "fmi3ExitInitializationMode",
             "DO_STEP": "fmi3DoStep",
+            "TERMINATE": "fmi3Terminate",
         },
         types={
             "Real": "Float64",

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from fmu_kit.compiler.emit.c_code import ERRORS, c_string, place_names
 from fmu_kit.compiler.emit.standards import Standard
@@ -17,8 +17,8 @@ from fmu_kit.compiler.trace.symbols import TraceError
 from fmu_kit.compiler.trace.tracing import Program
 from fmu_kit.compiler.trace.tree import is_number, leaves
 from fmu_kit.errors import FmuError
-from fmu_kit.saved_state import expect_state
-from fmu_kit.slave import Phase, Slave
+from fmu_kit.saved_state import DAMAGED, expect_state
+from fmu_kit.slave import TIME_TOLERANCE, Phase, Slave
 
 _UNUSED = 4_242_424_242
 """A value reference that no variable has."""
@@ -27,6 +27,7 @@ _CALLS = {
     "ENTER_INITIALIZATION_MODE": Phase.INSTANTIATED,
     "EXIT_INITIALIZATION_MODE": Phase.INITIALIZATION,
     "DO_STEP": Phase.STEPPING,
+    "TERMINATE": Phase.STEPPING,
 }
 """The phase that each call is for."""
 _SET_REAL, _SET_START = inspect.unwrap(Slave.set_real), inspect.unwrap(Slave.setup_experiment)
@@ -64,8 +65,11 @@ def tables(program: Program, guid: str, standard: Standard) -> str:
         _array("Text bad_value[VARIABLES][2]", (_refused_value(slave, i) for i in range(len(variables)))),
         "/* The text before the model and the number of Reals of another state, and after them. */",
         "static const Text foreign_state[2] = "
-        f"{_around('None, 0', slave, expect_state, {}, program.model, variables)};",
-        f"static const Text bad_start_time[2] = {_around('nan', slave, _SET_START, slave, math.nan)};",
+        f"{_around(['None, 0'], slave, expect_state, {}, program.model, variables)};",
+        f"static const Text damaged_state = {c_string(_damaged(slave))};",
+        "/* The texts around what is wrong with a time. */",
+        f"#define TIME_TOLERANCE {TIME_TOLERANCE!r}",
+        *_of_times(program.slave(instance_name="times")),
         _array("Text wrong_type[5][2]", (_wrong_type(slave, alike[type], standard.types[type]) for type in alike)),
     ]
     return "\n".join(parts) + "\n"
@@ -111,26 +115,48 @@ def _refused(slave: Slave, call: Callable[..., object], *given: object) -> str:
     return _row(_answer(slave, phase, call, *given) for phase in Phase)
 
 
+def _of_times(slave: Slave) -> Iterator[str]:
+    """What it answers to times that cannot be; asked with times that can be told apart in its texts."""
+    slave._reached, slave._stop_time = 2.5, 4.5
+    asked = {
+        "bad_start_time": _around(["nan"], slave, _SET_START, slave, math.nan),
+        "bad_stop_time": _around(["0.5", "1.5"], slave, _SET_START, slave, 1.5, 0.5),
+        "bad_time": _around(["3.5", "2.5"], slave, slave._expect_in_time, 3.5, 0.25),
+        "bad_end": _around(["2.25", "2.5", "4.5"], slave, slave._expect_in_time, 2.5, 2.25),
+    }
+    for name, around in asked.items():
+        yield f"static const Text {name}[] = {around};"
+
+
+def _damaged(slave: Slave) -> str:
+    """What it answers to a state whose bytes are not those that were serialised."""
+    state = {**slave._get_fmu_state(), DAMAGED: True}
+    return _answer(slave, Phase.INSTANTIATED, expect_state, state, type(slave).__name__, slave.variables) or ""
+
+
 def _refused_value(slave: Slave, reference: int) -> str:
     """What it answers to a value that is not finite: before the value, and after it."""
     variable = slave.variables[reference]
     if variable.type != "Real" or not variable.has_start:
         return _row(("", ""))
-    return _around("nan", slave, _SET_REAL, slave, [reference], [math.nan])
+    return _around(["nan"], slave, _SET_REAL, slave, [reference], [math.nan])
 
 
 def _wrong_type(slave: Slave, types: list[str], called: str) -> str:
     """What it answers to a value reference that no variable of some types has: before the reference, and after it."""
-    return _around(f"{_UNUSED}", slave, slave._of_type, [_UNUSED], *types).replace(f" {types[0]} ", f" {called} ")
+    return _around([f"{_UNUSED}"], slave, slave._of_type, [_UNUSED], *types).replace(f" {types[0]} ", f" {called} ")
 
 
-def _around(value: str, slave: Slave, call: Callable[..., object], *given: object) -> str:
-    """What the slave answers to a value: before the value, and after it."""
-    text = _answer(slave, Phase.INSTANTIATED, call, *given) or ""
-    before, found, after = text.partition(value)
-    if not found:
-        raise TraceError(f"{text!r}: expected a refusal that names {value}")
-    return _row((before, after))
+def _around(values: Sequence[str], slave: Slave, call: Callable[..., object], *given: object) -> str:
+    """What the slave answers to values that it names in this order: before, between and after them."""
+    text = rest = _answer(slave, Phase.INSTANTIATED, call, *given) or ""
+    parts = []
+    for value in values:
+        before, found, rest = rest.partition(value)
+        if not found:
+            raise TraceError(f"{text!r}: expected a refusal that names {', '.join(values)}")
+        parts.append(before)
+    return _row((*parts, rest))
 
 
 def _answer(slave: Slave, phase: Phase, call: Callable[..., object], *given: object) -> str | None:

@@ -66,7 +66,7 @@ def build(
     files = {f"sources/{name}": text for name, text in sources.items()}
     files |= standard.sources(target.model, standard.main)
     files |= {f"documentation/{_PYTHON}/{path}": text.encode() for path, text in _python_sources(target).items()}
-    files |= licences_and_icon(target)
+    files |= licences_and_icon(target, version)
     files[SOURCE_HASH_FILE] = source_hash(target, version).encode()
     making = Making(
         version=version,

@@ -18,4 +18,4 @@ def source_hash(target: Target, version: int = 2) -> str:
     Not of the compiler: every one makes a library that gives the same bits.
     """
     own = sorted(path for path in _COMPILER.rglob("*") if path.suffix in (".py", ".c", ".h", ".html"))
-    return hash_of(target, [*own, TEMPLATE], {"version": str(version)}, licences_and_icon(target))
+    return hash_of(target, [*own, TEMPLATE], {"version": str(version)}, licences_and_icon(target, version))

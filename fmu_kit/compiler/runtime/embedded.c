@@ -49,11 +49,10 @@ int ${model}_start($model *c, $real t)
 
 int ${model}_step($model *c, $real t, $real h)
 {
-    q_real done;
     if (c->status) return c->status;
     if (!c->started) return c->status = $early;
     if ((c->status = refused_input(c))) return c->status;
-    $do_step(c, t, h, &done);
+    $do_step(c, t, h);
     return c->status;
 }
 

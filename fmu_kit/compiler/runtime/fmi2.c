@@ -69,8 +69,8 @@ CALL(SetDebugLogging, int on, size_t n, const Text *categories)
 CALL(SetupExperiment, int has_tolerance, double tolerance, double start_time, int has_stop, double stop)
 {
     INSTANCE;
-    (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
-    return take_start_time(m, start_time);
+    (void)has_tolerance, (void)tolerance;
+    return take_times(m, start_time, has_stop, stop);
 }
 
 PLAIN(EnterInitializationMode)
@@ -161,7 +161,7 @@ CALL(SerializedFMUstateSize, void *state, size_t *size)
 {
     INSTANCE;
     (void)state;
-    *size = sizeof(State);
+    *size = sizeof(Serialised);
     return OK;
 }
 

@@ -95,8 +95,8 @@ CALL(SetDebugLogging, bool on, size_t n, const Text *categories)
 CALL(EnterInitializationMode, bool has_tolerance, double tolerance, double start_time, bool has_stop, double stop)
 {
     INSTANCE;
-    (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
-    return take_start_time(m, start_time) == OK ? enter_initialization(m) : ERROR;
+    (void)has_tolerance, (void)tolerance;
+    return take_times(m, start_time, has_stop, stop) == OK ? enter_initialization(m) : ERROR;
 }
 
 PLAIN(ExitInitializationMode)
@@ -232,7 +232,7 @@ CALL(FreeFMUState, void **state)
 CALL(SerializedFMUStateSize, void *state, size_t *size)
 {
     INSTANCE;
-    *size = sizeof(State);
+    *size = sizeof(Serialised);
     return OK;
 }
 

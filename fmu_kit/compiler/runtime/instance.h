@@ -46,9 +46,17 @@ typedef struct {
     Owner owner;
     double memory[PLACES];
     double time;     /* of the last communication point */
+    double reached;  /* where the next step begins; not a number: anywhere, before the first */
+    double stop;     /* past which there is no step; infinite if none is defined */
     unsigned warned; /* bits of the warnings that were given */
     Phase phase;
 } State;
+
+/* Its bytes, as they are given to a host. */
+typedef struct {
+    State state;
+    uint64_t checksum;
+} Serialised;
 
 typedef struct {
     State state;
@@ -105,12 +113,14 @@ static Status refuse_with(Instance *m, Text before, Text middle, Text after)
     return refuse(m, 0);
 }
 
-static Status refuse_number(Instance *m, double x, const Text around[2])
+static Status refuse_numbers(Instance *m, size_t n, const double *x, const Text *around)
 {
     text_begin(m);
     text_add(m, around[0]);
-    text_real(m, x);
-    text_add(m, around[1]);
+    for (size_t i = 0; i < n; i++) {
+        text_real(m, x[i]);
+        text_add(m, around[i + 1]);
+    }
     fail(m, 0);
     return refuse(m, 0);
 }
@@ -149,6 +159,8 @@ static void begin(Instance *m)
     memset(&m->state, 0, sizeof m->state);
     m->state.owner = owner();
     memcpy(m->state.memory, starts, sizeof starts);
+    m->state.reached = Q_NAN;
+    m->state.stop = Q_INFINITY;
     m->state.phase = INSTANTIATED;
 }
 
@@ -164,14 +176,17 @@ static Instance *create(size_t size, Text name, int logs)
     return m;
 }
 
-static Status take_start_time(Instance *m, double t)
+static Status take_times(Instance *m, double t, int has_stop, double stop)
 {
     if (expect(m, SETUP_EXPERIMENT) != OK)
         return ERROR;
     if (!q_isfinite(t))
-        return refuse_number(m, t, bad_start_time);
+        return refuse_numbers(m, 1, &t, bad_start_time);
+    if (has_stop && !(stop >= t))
+        return refuse_numbers(m, 2, (double[]){stop, t}, bad_stop_time);
     m->state.memory[KEPT_START_TIME] = t;
     m->state.time = t;
+    m->state.stop = has_stop ? stop : Q_INFINITY;
     return OK;
 }
 
@@ -194,20 +209,32 @@ static Status exit_initialization(Instance *m)
     return OK;
 }
 
+/* A step begins where the last one ended, and does not end past the stop time; as `_expect_in_time` has it. */
+static Status expect_in_time(Instance *m, double t, double h)
+{
+    const double slack = TIME_TOLERANCE * (h > q_fabs(t) ? h : q_fabs(t));
+    if (q_fabs(t - m->state.reached) > slack)
+        return refuse_numbers(m, 2, (double[]){t, m->state.reached}, bad_time);
+    if (t + h - m->state.stop > slack)
+        return refuse_numbers(m, 3, (double[]){h, t, m->state.stop}, bad_end);
+    return OK;
+}
+
 static Status advance(Instance *m, double t, double h)
 {
-    double done;
     int error;
-    if (expect(m, DO_STEP) != OK)
+    if (expect(m, DO_STEP) != OK || expect_in_time(m, t, h) != OK)
         return ERROR;
-    if ((error = model_do_step(m, t, h, &done)))
+    if ((error = model_do_step(m, t, h)))
         return refuse(m, error);
-    m->state.time = t + h;
+    m->state.time = m->state.reached = t + h;
     return OK;
 }
 
 static Status end(Instance *m)
 {
+    if (expect(m, TERMINATE) != OK)
+        return ERROR;
     m->state.phase = TERMINATED;
     return OK;
 }
@@ -304,7 +331,7 @@ static Status set_reals(Instance *m, References vr, size_t n, const double *valu
         if (settle(m, vr[i], REAL) != OK)
             return ERROR;
         if (!q_isfinite(value[i]))
-            return refuse_number(m, value[i], bad_value[vr[i]]);
+            return refuse_numbers(m, 1, &value[i], bad_value[vr[i]]);
         m->state.memory[vr[i]] = value[i];
     }
     return OK;
@@ -371,27 +398,42 @@ static Status forget(void **state)
     return OK;
 }
 
+/* Another one for every other byte, and with bytes swapped or lost all but surely (FNV-1a, 64 bits). */
+static uint64_t checksum_of(const State *state)
+{
+    const unsigned char *bytes = (const unsigned char *)state;
+    uint64_t found = 0xcbf29ce484222325u;
+    for (size_t i = 0; i < sizeof *state; i++)
+        found = (found ^ bytes[i]) * 0x100000001b3u;
+    return found;
+}
+
 static Status to_bytes(Instance *m, const void *state, void *bytes, size_t size)
 {
-    if (!state || size < sizeof(State))
+    Serialised given;
+    if (!state || size < sizeof given)
         return refuse_with(m, "FMU state: expected one, and room for its bytes", "", "");
-    memcpy(bytes, state, sizeof(State));
+    memcpy(&given.state, state, sizeof given.state);
+    given.checksum = checksum_of(&given.state);
+    memcpy(bytes, &given, sizeof given);
     return OK;
 }
 
 static Status from_bytes(Instance *m, const void *bytes, size_t size, void **state)
 {
-    State found;
+    Serialised found;
     if (expect_own(m, bytes, size) != OK)
         return ERROR;
-    if (size != sizeof(State))
+    if (size != sizeof found)
         return refuse_with(m, "FMU state (its bytes): expected all of them", "", "");
     memcpy(&found, bytes, sizeof found);
-    if ((unsigned)found.phase >= PHASES)
+    if (found.checksum != checksum_of(&found.state))
+        return refuse_with(m, damaged_state, "", "");
+    if ((unsigned)found.state.phase >= PHASES)
         return refuse_with(m, "FMU state (phase): expected one of this FMU", "", "");
     if (!*state && !(*state = malloc(sizeof(State))))
         return refuse_with(m, "FMU state: no memory for it", "", "");
-    memcpy(*state, &found, sizeof found);
+    memcpy(*state, &found.state, sizeof found.state);
     return OK;
 }
 

@@ -99,8 +99,8 @@ void quadcosim_initialise(double *memory, const uint64_t *active, const double *
 EXPORT void quadcosim_do_step(double *memory, const uint64_t *active, const double *t, const double *h, int32_t *status);
 void quadcosim_do_step(double *memory, const uint64_t *active, const double *t, const double *h, int32_t *status)
 {
-    q_real failed = q_all(0.0), done = q_all(0.0);
-    const q_mask through = model_do_step((q_place *)memory, lanes_of(active), &failed, values_of(t), values_of(h), &done);
+    q_real failed = q_all(0.0);
+    const q_mask through = model_do_step((q_place *)memory, lanes_of(active), &failed, values_of(t), values_of(h));
     tell_status(active, through, failed, status);
 }
 

@@ -100,7 +100,7 @@ def _traced(slave: type[Slave], modules: list[types.ModuleType], memory: Memory)
         memory.expect_as_before(made, after, "when it is initialised", may_add=True)
         memory._set_attributes(after)
         instance._phase = Phase.STEPPING
-        step = functools.partial(inspect.unwrap(Slave.do_step), instance)
+        step = functools.partial(Slave._advance, instance)
         do_step, stepped, _ = recorder.function(lambda t, h: step(t, h), "do_step", {"t": 0.0, "h": 0.0}, catches=True)
         if stepped is None:
             raise TraceError(f"{slave.__name__}.step fails whatever it is given")

@@ -4,7 +4,7 @@ import datetime
 from collections.abc import Iterator
 
 from fmu_kit.loader import GUID_FILE
-from fmu_kit.packaging import ICON, NATIVE_TABLES, content_guid
+from fmu_kit.packaging import ICONS, NATIVE_TABLES, content_guid
 from orchestration.building.models import MODELS
 from orchestration.checks.validation.fmu import Fmu, Variable
 from orchestration.checks.validation.roles import ROLES
@@ -78,8 +78,9 @@ def documentation(fmu: Fmu) -> Iterator[str]:
     files = fmu.archive.files
     if not files.get(PAGE, b"").strip():
         yield f"{PAGE}: expected a page, found {'an empty file' if PAGE in files else 'none'}"
-    if fmu.root.get("modelName") in MODELS and not files.get(ICON, b"").startswith(_PNG):
-        yield f"{ICON}: expected an icon in PNG, found {'another file' if ICON in files else 'none'}"
+    icon = ICONS[2]
+    if fmu.root.get("modelName") in MODELS and not files.get(icon, b"").startswith(_PNG):
+        yield f"{icon}: expected an icon in PNG, found {'another file' if icon in files else 'none'}"
 
 
 def ports(fmu: Fmu) -> Iterator[str]:

@@ -44,10 +44,11 @@ def begun(law: type[RedesignedController], values: Mapping[str, float], kind: Di
 
 
 def stepped(slave: RedesignedController, times: list[float] | None = None) -> np.ndarray:
-    """The command that is held after steps at these times."""
+    """The command that is held after steps at these times, of length H but for what is left to the next."""
     slave.exit_initialization_mode()
-    for t in [1.0] if times is None else times:
-        slave.do_step(t, H)
+    times = [1.0] if times is None else times
+    for t, end in zip(times, [*times[1:], times[-1] + H]):
+        slave.do_step(t, H if math.isclose(end - t, H) else end - t)
     return np.array(get(slave, *COMMAND))
 
 

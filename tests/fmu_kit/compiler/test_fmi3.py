@@ -17,6 +17,7 @@ from orchestration.building import fmus
 from orchestration.quadrotor.scenario import Scenario
 from tests.commands import Main
 from tests.fmu_kit.compiler.compiled import compiled
+from tests.fmus.archive import files_of
 from tests.fmus.expected import MEASUREMENT
 from tests.fmus.making import PAIR
 from tests.fmus.process import run, run_script
@@ -95,6 +96,43 @@ def test_it_has_the_variables_of_the_other(name: str) -> None:
         ]
         assert found[0] == found[1]
         assert found[0]
+
+
+@pytest.mark.parametrize("name", PAIR)
+def test_its_icon_is_where_fmi_3_has_icons(name: str) -> None:
+    two, three = (files_of(fmus.locate(f"native/{folder}{name}")) for folder in ("", "fmi3/"))
+    assert three["terminalsAndIcons/icon.png"] == two["model.png"]
+    assert "model.png" not in three
+
+
+@pytest.mark.parametrize(
+    ("t", "h", "text"),
+    [
+        (START, 0.1, f"currentCommunicationPoint = {START}: expected {START + 0.1}, where the last step ended"),
+        (START + 0.1, 0.5, f"communicationStepSize = 0.5 from {START + 0.1}: expected no step past stopTime = 1.0"),
+    ],
+)
+def test_a_step_that_is_not_the_next_one_or_goes_past_the_stop_is_refused(
+    t: float, h: float, text: str, controller: Instance
+) -> None:
+    controller.fmu.enterInitializationMode(startTime=START, stopTime=1.0)
+    controller.fmu.exitInitializationMode()
+    controller.fmu.doStep(START, 0.1)
+    with pytest.raises(FMICallException):
+        controller.fmu.doStep(t, h)
+    assert text in controller.messages[-1]
+
+
+def test_a_run_does_not_stop_before_it_starts_and_ends_once(controller: Instance) -> None:
+    with pytest.raises(FMICallException):
+        controller.fmu.enterInitializationMode(startTime=START, stopTime=0.25)
+    assert f"stopTime = 0.25: expected a time not before startTime = {START}" in controller.messages[-1]
+    controller.fmu.reset()
+    controller.initialise()
+    controller.fmu.terminate()
+    with pytest.raises(FMICallException):
+        controller.fmu.terminate()
+    assert "fmi3Terminate in phase terminated: expected phase stepping" in controller.messages[-1]
 
 
 @pytest.mark.parametrize("name", PAIR)
