@@ -14,7 +14,7 @@ typedef struct {
 } Callbacks;
 
 typedef struct { double x, u, tau; } State;
-typedef struct { State s; char name[64]; const Callbacks *callbacks; } Model;
+typedef struct { State s; char name[64]; const Callbacks *callbacks; int ends; double stop; } Model;
 
 static void start(State *s) { s->x = 0.0; s->u = 1.0; s->tau = 0.1; }
 
@@ -45,7 +45,10 @@ void *fmi2Instantiate(const char *name, int kind, const char *guid, const char *
     return m;
 }
 void fmi2FreeInstance(void *c) { free(c); }
-int fmi2SetupExperiment(void *c, int defined, double tolerance, double t, int ends, double stop) { return 0; }
+int fmi2SetupExperiment(void *c, int defined, double tolerance, double t, int ends, double stop) {
+    ((Model *)c)->ends = ends, ((Model *)c)->stop = stop;
+    return 0;
+}
 int fmi2EnterInitializationMode(void *c) { return 0; }
 int fmi2ExitInitializationMode(void *c) { return 0; }
 int fmi2Terminate(void *c) { return 0; }
@@ -72,6 +75,9 @@ int fmi2SetString(void *c, const unsigned vr[], size_t n, const char *const v[])
 
 int fmi2DoStep(void *c, double t, double h, int no_set) {
     Model *m = c;
+#ifndef ENDLESS
+    if (m->ends && t + h > m->stop + 1e-9) return 3;
+#endif
 #ifdef REFUSES
     m->callbacks->logger(m->callbacks->environment, m->name, 3, "logStatusError", "%s: %d of %g at 100%%", m->name, 7, t);
     return 3;

@@ -297,6 +297,10 @@ STRUCTURE = (
         words=("thrust moves with reference.acceleration.z",),
         damage=_drop_dependency("thrust", "reference.acceleration.z"),
     ),
+    Mutant(
+        name="dependency on a parameter dropped", rule="undeclared-dependency", model=CONTROLLER,
+        words=("thrust moves with gravity in initialisation mode",), damage=_drop_dependency("thrust", "gravity"),
+    ),
 )  # fmt: skip
 
 _TILT = 'self.put("tilt", tilt(state.quaternion))'
@@ -340,8 +344,8 @@ BEHAVIOUR = (
     Mutant(
         name="serialised state rounded", rule="serialised-state", words=("from the bytes",),
         damage=source(
-            "fmu_kit/saved_state.py", 'json.loads(content.decode("utf-8"))',
-            'json.loads(content.decode("utf-8"), parse_float=lambda text: round(float(text), 9))',
+            "fmu_kit/saved_state.py", "return state if checksum",
+            'return {**state, "reals": [round(x, 9) for x in state["reals"]]} if checksum',
         ),
     ),
     Mutant(
@@ -397,6 +401,26 @@ BEHAVIOUR = (
     Mutant(
         name="value not finite taken", rule="not-finite-refused", words=("thrust = nan",),
         damage=source("fmu_kit/slave.py", "require(math.isfinite(value), ", "require(True, "),
+    ),
+    Mutant(
+        name="step past the stop time", rule="stop-time", words=("stopTime = 0.02",),
+        damage=source("fmu_kit/slave.py", "if t + h - self._stop_time > slack:", "if False:"),
+    ),
+    Mutant(
+        name="step anywhere", rule="consecutive-steps", words=("at the beginning of the step before",),
+        damage=source("fmu_kit/slave.py", "abs(t - self._reached) > slack", "False"),
+    ),
+    Mutant(
+        name="step not looked back", rule="consecutive-steps", words=("a step after its end",),
+        damage=source("fmu_kit/slave.py", "abs(t - self._reached) > slack", "t < self._reached - slack"),
+    ),
+    Mutant(
+        name="stop time before the start", rule="stop-before-start", words=("stopTime = -0.01",),
+        damage=source("fmu_kit/slave.py", "require(stop_time >= start_time,", "require(True,"),
+    ),
+    Mutant(
+        name="terminated twice", rule="terminated-once", words=("fmi2Terminate",),
+        damage=source("fmu_kit/slave.py", 'self._expect(Phase.STEPPING, "fmi2Terminate")', "pass"),
     ),
     Mutant(
         name="fixed parameter set later", rule="fixed-parameters", words=("mass",),

@@ -118,6 +118,7 @@ def summary(path: Path, **limits: float) -> list[tuple[str, bool]]:
         ("SHIFT=1e-9", [("saved-state", True), ("serialised-state", True)]),  # the simulation can go on
         ("SHIFT=1e-2", [("saved-state", False), ("serialised-state", False)]),
         ("FORKS", []),
+        ("ENDLESS", [("stop-time", False)]),
     ],
 )
 def test_only_what_breaks_the_standard_is_a_problem(macro: str, found: list[tuple[str, bool]], tmp_path: Path) -> None:

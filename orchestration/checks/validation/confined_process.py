@@ -74,6 +74,7 @@ def _run(bench: Bench, report: Report) -> None:
     report.tried(rules.OF_RUNS, bench, RefusedError)
     if bench.repeats is None:
         report.tried(rules.OF_EQUAL_RUNS, bench, RefusedError)
+    report.tried(rules.LAST_OF_RUNS, bench, RefusedError)
     if fmu.is_ours:
         report.tried(rules.OUR_RUNS, bench, RefusedError)
 

@@ -1,6 +1,7 @@
 """Rules on what is declared of outputs and inputs: each input is moved, and what moves with it is looked at."""
 
 import contextlib
+import math
 from collections import defaultdict, deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -11,6 +12,10 @@ from orchestration.checks.validation.probe import Bench, Plan
 
 MOST_SWITCHES = 16
 """Boolean parameters that are tried the other way round, each with all inputs"""
+MOST_PARAMETERS = 200
+"""Parameters that are moved, of an FMU that has many more"""
+MOST_REFUSED = 10
+"""Moves that may be refused before the others are left: each takes an instance with it"""
 _POINTS = (0, 3)
 """Communication points, in steps, at which the inputs are moved"""
 
@@ -32,7 +37,7 @@ class Mode:
 
 
 def undeclared_dependency(bench: Bench) -> Iterator[str]:
-    """No output moves with an input that it is declared not to depend on."""
+    """No output moves with an input, nor at initialisation with a parameter, that it is declared not to depend on."""
     for mode in _modes(bench):
         for name, outputs in mode.moved.items():
             for output in sorted(outputs):
@@ -63,9 +68,11 @@ def _modes(bench: Bench) -> Iterator[Mode]:
     later = Mode("at a communication point", _declared(bench.fmu, bench.fmu.outputs))
     for values in _configurations(bench):
         with contextlib.suppress(RefusedError):  # a configuration that is refused shows nothing
-            _move(bench, values, None, initial.moved)
+            _move(bench, bench.inputs, values, None, initial.moved)
+            parameters = [v for v in _parameters(bench) if v.name not in values]
+            _move(bench, parameters, values, None, initial.moved, most_refused=MOST_REFUSED)
             for steps in _POINTS if bench.fmu.is_ours else ():
-                _move(bench, values, steps, later.moved)
+                _move(bench, bench.inputs, values, steps, later.moved)
     yield initial
     if bench.fmu.is_ours:
         yield later
@@ -80,13 +87,27 @@ def _configurations(bench: Bench) -> Iterator[dict[str, Value]]:
         yield {**inputs, v.name: not v.start_value}
 
 
-def _move(bench: Bench, values: Values, steps: int | None, moved: Moved) -> None:
-    """Move each input a little, one after another, and note what moves with it.
+def _parameters(bench: Bench) -> list[Variable]:
+    """Those that may be set in initialisation mode and moved a little; a text may be a path, which has no beside."""
+    found = [v for v in bench.fmu.of_causality("parameter") if v.initial == "exact" and v.type != "String"]
+    return found[:MOST_PARAMETERS]
+
+
+def _move(
+    bench: Bench,
+    variables: Iterable[Variable],
+    values: Values,
+    steps: int | None,
+    moved: Moved,
+    most_refused: float = math.inf,
+) -> None:
+    """Move each variable a little, one after another, and note what moves with it.
 
     After `steps` steps; None: in initialisation mode. A value that is refused shows nothing, and ends its instance.
     """
-    waiting = deque(bench.inputs)
-    while waiting:
+    waiting, refused = deque(variables), -1
+    while waiting and refused < most_refused:
+        refused += 1
         with bench.instance() as instance:
             _prepare(bench, instance, values, steps)
             before = instance.get(bench.outputs)
@@ -97,7 +118,7 @@ def _move(bench: Bench, values: Values, steps: int | None, moved: Moved) -> None
 
 
 def _moving(bench: Bench, instance: Instance, v: Variable, before: Row) -> set[str]:
-    """The outputs that move with an input, which is put back."""
+    """The outputs that move with a variable, which is put back."""
     value, *near = bench.around(v)
     outputs = set()
     for other in near:

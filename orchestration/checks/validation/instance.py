@@ -59,17 +59,17 @@ class Instance:
 
     # -- a run ----------------------------------------------------------------------------------------------
 
-    def begin(self, values: Values, start: float) -> None:
-        """Set parameters, enter initialisation mode, set inputs."""
+    def begin(self, values: Values, start: float, stop: float | None = None) -> None:
+        """Set parameters, enter initialisation mode, set inputs; `stop` is None if no stop time is defined."""
         inputs = {name: value for name, value in values.items() if self._variables[name].causality == "input"}
         self.set({name: value for name, value in values.items() if name not in inputs})
-        self._call("setupExperiment", startTime=start)
+        self._call("setupExperiment", startTime=start, stopTime=stop)
         self._call("enterInitializationMode")
         self.set(inputs)
 
-    def initialise(self, values: Values, start: float) -> None:
+    def initialise(self, values: Values, start: float, stop: float | None = None) -> None:
         """Through initialisation."""
-        self.begin(values, start)
+        self.begin(values, start, stop)
         self._call("exitInitializationMode")
 
     def step(self, t: float, h: float) -> bool:

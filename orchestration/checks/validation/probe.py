@@ -135,7 +135,7 @@ class Bench:
         return values
 
     def around(self, v: Variable) -> list[Value]:
-        """The value of an input at step 0, and values near it that it may take."""
+        """The value of an input at step 0, or that a parameter starts at, and values near it that it may take."""
         value = v.start_value
         if v.type == "Boolean":
             return [value, not value]
@@ -144,7 +144,7 @@ class Bench:
         if v.type == "Enumeration":
             return [value, *(item for item in v.items if item != value)]
         if v.type == "Real":
-            value = float(self.inputs_at(0)[v.name])
+            value = float(self.inputs_at(0).get(v.name, v.start_value))
             return [value, *(_within(v, value + sign * _scale(v) / 16.0) for sign in (1.0, -1.0))]
         return [value, *(int(_within(v, value + sign)) for sign in (1, -1))]
 

@@ -1,7 +1,7 @@
 """Rules of this project on calls: those that must be refused, and a run that must not be."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from orchestration.checks.validation.fmu import Variable
 from orchestration.checks.validation.instance import RefusedError, Value
@@ -54,6 +54,42 @@ def not_finite_refused(bench: Bench) -> Iterator[str]:
                 break
 
 
+def consecutive_steps(bench: Bench) -> Iterator[str]:
+    """A step that does not begin where the last one ended is refused: FMI leaves that to the master."""
+    for shift, where in ((-1.0, "at the beginning of the step before"), (1.0, "a step after its end")):
+        with bench.instance() as instance:
+            bench.begin(instance, PLAIN)
+            (t, h), (then, _), *_ = bench.points(PLAIN)
+            instance.step(t, h)
+            if _done(lambda: instance.step(then + shift * h, h)):  # noqa: B023
+                yield f"a second step begins {where}: expected it refused"
+
+
+def stop_before_start(bench: Bench) -> Iterator[str]:
+    """A stop time before the start time is refused."""
+    with bench.instance() as instance:
+        if _done(lambda: instance.begin({}, bench.start, stop=bench.start - bench.step)):
+            yield f"stopTime = {bench.start - bench.step} is taken, with startTime = {bench.start}: expected it refused"
+
+
+def terminated_once(bench: Bench) -> Iterator[str]:
+    """An instance that has been terminated is not terminated again."""
+    with bench.instance() as instance:
+        bench.begin(instance, PLAIN)
+        instance.terminate()
+        if _done(instance.terminate):
+            yield "fmi2Terminate is done twice: expected the second refused"
+
+
+def _done(call: Callable[[], object]) -> bool:
+    """Whether the FMU carries out a call."""
+    try:
+        call()
+    except RefusedError:
+        return False
+    return True
+
+
 def _accepts(bench: Bench, v: Variable, value: Value, *, initialised: bool) -> bool:
     """Whether the FMU goes on with a value: through initialisation, or through a step."""
     try:
@@ -82,4 +118,12 @@ def _takes(bench: Bench, v: Variable, value: Value, *, initialised: bool) -> boo
     return True
 
 
-RULES = (general_run, fixed_parameters, bounds_enforced, not_finite_refused)
+RULES = (
+    general_run,
+    fixed_parameters,
+    bounds_enforced,
+    not_finite_refused,
+    consecutive_steps,
+    stop_before_start,
+    terminated_once,
+)

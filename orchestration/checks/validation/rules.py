@@ -19,11 +19,21 @@ OF_RUNS = run_rules.RULES
 """After `run_rules.FIRST`, without which they cannot be tried."""
 OF_EQUAL_RUNS = (*run_rules.COMPARED, *dependencies.RULES)
 """For FMUs whose runs can be repeated."""
+LAST_OF_RUNS = run_rules.LAST
+"""When nothing but rules of this project comes after."""
 
 OUR_DESCRIPTIONS = own_rules.RULES
 OUR_RUNS = refusals.RULES
 
-STANDARD = (*OF_ARCHIVES, description.standard, *OF_DESCRIPTIONS, *run_rules.FIRST, *OF_RUNS, *OF_EQUAL_RUNS)
+STANDARD = (
+    *OF_ARCHIVES,
+    description.standard,
+    *OF_DESCRIPTIONS,
+    *run_rules.FIRST,
+    *OF_RUNS,
+    *OF_EQUAL_RUNS,
+    *LAST_OF_RUNS,
+)
 """For every FMU."""
 OURS = (*OUR_DESCRIPTIONS, own_description, *OUR_RUNS)
 """For those that quadcosim built."""

@@ -1,5 +1,6 @@
 """Rules that run the FMU: it runs, and every run is the same run, whatever happened before or beside it."""
 
+import contextlib
 import math
 from collections.abc import Iterator
 from dataclasses import replace
@@ -7,7 +8,7 @@ from dataclasses import replace
 from orchestration.checks.validation.finding import Note
 from orchestration.checks.validation.fmu import Variable
 from orchestration.checks.validation.instance import RefusedError, Row, Value, same
-from orchestration.checks.validation.probe import PLAIN, Bench, Plan
+from orchestration.checks.validation.probe import FEWEST, PLAIN, Bench, Plan
 from orchestration.fmi.messages import WARNING
 
 _DIGITS = 5e-15
@@ -180,8 +181,24 @@ def serialised_state(bench: Bench) -> Iterator[str]:
     yield from bench.parted(after, bench.expected[half:], text)
 
 
+def stop_time(bench: Bench) -> Iterator[str]:
+    """A step past the stop time that was set is an error, or ends the run (FMI 2.0.4, section 2.1.6)."""
+    *allowed, (t, h) = bench.points(Plan(steps=FEWEST))
+    if not allowed:
+        return
+    with bench.instance() as instance:
+        instance.initialise({}, bench.start, stop=t)
+        if not all(instance.step(*point) for point in allowed):
+            return
+        with contextlib.suppress(RefusedError):
+            if instance.step(t, h):
+                yield f"a step from {t} to {t + h} is done, though stopTime = {t}: expected it refused"
+
+
 FIRST = (runs, getters)
 """Without these the others cannot be tried"""
 RULES = (start_values, finite_outputs, variable_steps, repeatable)
 COMPARED = (inputs_set_twice, reset, instances, saved_state, serialised_state)
 """For FMUs whose runs can be repeated"""
+LAST = (stop_time,)
+"""They leave an instance that has failed, which another one may not stand beside"""

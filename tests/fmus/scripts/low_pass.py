@@ -17,6 +17,7 @@ class LowPass(Fmi2Slave):  # type: ignore[misc]
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         self.u, self.y, self.tau, self.inverted, self.steps, self.label = 0.5, 0.0, 0.3, False, 0, "low pass"
+        self.stop: float | None = None
         self.register_variable(Real("u", causality=Fmi2Causality.input))
         self.register_variable(Real("y", causality=Fmi2Causality.output))
         tunable = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.tunable}
@@ -25,7 +26,14 @@ class LowPass(Fmi2Slave):  # type: ignore[misc]
         self.register_variable(String("label", **tunable))
         self.register_variable(Integer("steps", causality=Fmi2Causality.output, variability=Fmi2Variability.discrete))
 
+    def setup_experiment(
+        self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
+    ) -> None:
+        self.stop = stop_time
+
     def do_step(self, current_time: float, step_size: float) -> bool:
+        if self.stop is not None and current_time + step_size > self.stop + 1e-9:
+            raise ValueError("past the stop time")
         target = -self.u if self.inverted else self.u
         self.y += (target - self.y) * min(1.0, step_size / self.tau)
         self.steps += 1
