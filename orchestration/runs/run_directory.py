@@ -1,7 +1,8 @@
 """A run's directory: there when it is whole, so that a killed run leaves none that looks it."""
 
+import hashlib
 import json
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -22,6 +23,9 @@ from orchestration.system.request import system_meant
 
 SIGNALS, EVENTS = tables.SIGNALS, tables.EVENTS
 METRICS, SCENARIO, PROVENANCE = "metrics.json", "scenario.toml", "provenance.json"
+CHECKSUMS = "checksums"
+"""in the provenance, of all files of a run"""
+_CHECKED = (SIGNALS, EVENTS, METRICS, SCENARIO)
 MAT = "run.mat"
 """of a run that has been exported so"""
 STATE = "paused.npz"
@@ -53,6 +57,7 @@ def _write(result: Result, folder: Path, *, figures: bool) -> None:
     }
     (folder / METRICS).write_text(json.dumps(result.metrics, indent=2) + "\n", encoding="utf-8")
     (folder / SCENARIO).write_text(result.asked.to_toml(), encoding="utf-8")
+    notes[CHECKSUMS] = _checksums(folder, notes)
     (folder / PROVENANCE).write_text(json.dumps(notes, indent=2) + "\n", encoding="utf-8")
     if figures:
         from orchestration.figures import style
@@ -62,15 +67,16 @@ def _write(result: Result, folder: Path, *, figures: bool) -> None:
 
 
 def load_run(folder: str | Path) -> Result:
-    """Read the directory of a run; raises `UsageError` if it is none, or damaged."""
+    """Read the directory of a run; raises `UsageError` if it is none, or a file of it is not as it was written."""
     folder = Path(folder)
-    missing = [name for name in (SIGNALS, EVENTS, METRICS, SCENARIO, PROVENANCE) if not (folder / name).is_file()]
+    missing = [name for name in (*_CHECKED, PROVENANCE) if not (folder / name).is_file()]
     if missing:
         raise UsageError(f"{folder}: expected the directory of a run; it has no {', '.join(missing)}")
     notes = _object(
         folder / PROVENANCE, divergence=_TEXT, termination=_TEXT, units=(dict,), described=(dict,), parameters=(dict,),
-        interrupted_at=_NUMBER, warnings=(list,),
+        interrupted_at=_NUMBER, warnings=(list,), checksums=(dict,),
     )  # fmt: skip
+    checksums = notes.pop(CHECKSUMS)
     recording = tables.InFolder(folder)
     asked = load_request(folder / SCENARIO)
     system = system_meant(asked)
@@ -81,11 +87,15 @@ def load_run(folder: str | Path) -> Result:
         raise UsageError(f"{folder}: expected the directory of a run; it has no rows")
     for _ in recording.chunks():  # what is damaged is to be known now
         pass
+    metrics = _object(folder / METRICS, diverged=(bool,), divergence_time=_NUMBER)
+    for name, found in _checksums(folder, notes).items():  # what only disagrees with the rest, too
+        if checksums.get(name) != found:
+            raise UsageError(f"{folder / name}: has been changed since the run; expected it as it was written")
     return Result(
         asked=asked,
         system=system,
         recording=recording,
-        metrics=_object(folder / METRICS, diverged=(bool,), divergence_time=_NUMBER),
+        metrics=metrics,
         units=notes.pop("units"),
         described={name: Described(**one) for name, one in notes.pop("described").items()},
         parameters=notes.pop("parameters"),
@@ -95,6 +105,21 @@ def load_run(folder: str | Path) -> Result:
         warnings=tuple(notes.pop("warnings")),
         provenance=cast(Provenance, notes),
     )
+
+
+def _checksums(folder: Path, notes: Mapping[str, object]) -> dict[str, str]:
+    """Of every file of a run, by its name; of that of its provenance, of the other notes in it."""
+    found = {name: _checksum(folder / name) for name in _CHECKED}
+    return {**found, PROVENANCE: hashlib.sha256(json.dumps(notes).encode()).hexdigest()}
+
+
+def _checksum(path: Path) -> str:
+    """SHA-256 of a file that may be larger than the memory."""
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()
 
 
 _TEXT, _NUMBER = (str, type(None)), (int, float, type(None))

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import cast
 
 import matplotlib.image
 import numpy as np
@@ -447,3 +448,32 @@ def test_notes_of_another_shape_are_refused(result: Result, folder: Path, name: 
     with pytest.raises(UsageError) as refused:
         load_run(folder)
     assert expected in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("metrics.json", '"diverged": false', '"diverged": true'),
+        ("scenario.toml", "stop_time = 0.3", "stop_time = 0.4"),
+        ("provenance.json", '"divergence": null', '"divergence": "no"'),
+    ],
+)
+def test_a_file_that_was_edited_is_named(result: Result, folder: Path, name: str, old: str, new: str) -> None:
+    path = save_run(result, folder, figures=False) / name
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    with pytest.raises(UsageError) as refused:
+        load_run(folder)
+    assert str(refused.value) == f"{path}: has been changed since the run; expected it as it was written"
+
+
+@pytest.mark.parametrize("name", ["signals.parquet", "events.parquet"])
+def test_the_recording_of_another_run_is_refused_by_name(result: Result, folder: Path, name: str) -> None:
+    other = quadcosim.run(dataclasses.replace(cast(Scenario, result.asked), seed=5))
+    save_run(result, folder, figures=False)
+    save_run(other, folder.with_name("other"), figures=False)
+    (folder / name).write_bytes((folder.with_name("other") / name).read_bytes())
+    with pytest.raises(UsageError) as refused:
+        load_run(folder)
+    assert str(refused.value).startswith(f"{folder / name}: has been changed since the run")
