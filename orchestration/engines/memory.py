@@ -10,7 +10,7 @@ from orchestration.basics.simulator import Floats, Transfer
 from orchestration.engines import structures as c
 from orchestration.engines.channel import Channel, of_each
 from orchestration.engines.feeds import Feed
-from orchestration.fmi.native import Call, NativeInstance
+from orchestration.fmi.native import Call, NativeInstance, bounds_of
 from orchestration.system.model import Connection
 
 
@@ -89,7 +89,7 @@ class Memory:
     def _part(self, component: int, call: Call) -> c.Part:
         instance, part = self.instances[component], call.part
         kind = "boolean32" if part.type == "Boolean" and part.buffer.dtype != bool else part.buffer.dtype.name
-        bounds = np.iinfo(part.buffer.dtype) if part.buffer.dtype.kind in "iu" else None
+        low, high = bounds_of(part.buffer.dtype) if part.buffer.dtype.kind in "iu" else (0.0, 0.0)
         return c.Part(
             function=instance.address(call.function),
             fmu=instance.handle,
@@ -102,7 +102,7 @@ class Memory:
             size=len(part.asked),
             type=c.TYPES.index(kind),
             counts_values=instance.counts_values,
-            low=0.0 if bounds is None else float(bounds.min),
-            high=0.0 if bounds is None else float(bounds.max),
+            low=low,
+            high=high,
             component=component,
         )

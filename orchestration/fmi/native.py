@@ -392,7 +392,7 @@ class NativeInstance(Instance):
             return lambda values: values
         if dtype.kind == "b" or self.variable(names[0]).kind == "Boolean":
             return lambda values: values != 0.0
-        low, high = float(np.iinfo(dtype).min), float(np.iinfo(dtype).max)
+        low, high = bounds_of(dtype)
 
         def whole(values: Floats) -> Numbers:
             rounded = np.rint(values)
@@ -459,3 +459,10 @@ class NativeInstance(Instance):
         name, equals, _ = text.partition(" = ")
         vector = name.partition(".{")[0]
         return bool(equals) and any(given == name or given.startswith(f"{vector}.") for given in self._given)
+
+
+def bounds_of(dtype: np.dtype[Any]) -> tuple[float, float]:
+    """The smallest and the largest float that a type of whole numbers holds: the largest of 64 bits is no float."""
+    of = np.iinfo(dtype)
+    high = float(of.max)
+    return float(of.min), high if int(high) <= of.max else math.nextafter(high, 0.0)

@@ -180,6 +180,20 @@ class Arithmetic(Probe):
         self.put("y7", (n * n - n // 2) / 4)
 
 
+class Zeros(Slave):
+    """The smaller and the larger of two."""
+
+    a = Input("A number.")
+    b = Input("Another.")
+    small = Output("The smaller one.")
+    large = Output("The larger one.")
+
+    def step(self, t: float, h: float) -> None:
+        """The first of two that are equal."""
+        self.small = min(self.a, self.b)
+        self.large = max(self.a, self.b)
+
+
 # -- whole numbers -------------------------------------------------------------------------------------------------
 
 

@@ -49,6 +49,11 @@ class Refused(Slave):
         self._kept += x
         return x > 1.0
 
+    def _speaking(self, x):
+        if x > 1.0:
+            self.warn_once("large", "x is large")
+        return x > 1.0
+
     def step(self, t, h):
         a = self.real("a")
         {step}
@@ -88,6 +93,7 @@ IN_A_STEP = [
         "self.put('y', repeat(math.floor(a), lambda i, x: self._changing(x) * x, a))",
         "repeat: its body calls a method that changes what the slave keeps",
     ),
+    ("self.put('y', any(self._speaking(x) for x in (a, t)))", "any() of values of which a later one may fail"),
     ("self.put('y', all(self._changing(x) for x in (a, t)))", "all() of values of which a later one may fail"),
     ("self.put('y', any(1.0 / x > 2.0 for x in (a, t, h)))", "any() of values of which a later one may fail"),
 ]

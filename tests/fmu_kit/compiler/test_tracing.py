@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from fmu_kit.bundle import Target
 from fmu_kit.packaging import slave_class
 from tests.fmu_kit.compiler.compiled import compiler
-from tests.fmu_kit.compiler.probes import Pendulum
+from tests.fmu_kit.compiler.probes import Pendulum, Zeros
 from tests.fmu_kit.compiler.twins import InC, InPython, Values, answers, library
 
 PROBES = ("Branches", "Arithmetic", "Integers", "Choices", "Memory", "Kept", "Below", "Loops", "Words")
@@ -47,6 +47,17 @@ def test_a_slave_in_c_answers_as_in_python(probe: tuple[Target, Path]) -> None:
         assert answers(reset, given, steps) == expected
 
     answer_alike()
+
+
+def test_of_two_zeros_the_smaller_is_the_first_as_in_python(tmp_path: Path) -> None:
+    compiler("cc")
+    path = library(Target.parse("tests.fmu_kit.compiler.probes:Zeros"), tmp_path)
+    pairs = [{"a": a, "b": b} for a in (0.0, -0.0) for b in (0.0, -0.0)]
+    expected = answers(InPython(Zeros(instance_name="zeros")), {}, pairs)
+    assert answers(InC.made(Zeros, path), {}, pairs) == expected
+    assert [values[2:4] for values in expected[1:]] == [
+        tuple(x.hex() for x in (first, first)) for first in (0.0, 0.0, -0.0, -0.0)
+    ]
 
 
 def test_a_model_that_initialises_without_its_base_starts_from_its_initial_values(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import re
 import shutil
 import signal
 import threading
@@ -25,7 +26,7 @@ from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_here
 from orchestration.fmi.model import read_model
-from orchestration.fmi.native import NativeInstance
+from orchestration.fmi.native import NativeInstance, bounds_of
 from orchestration.recording.recording import InMemory
 from orchestration.runs import simulation
 from orchestration.runs.meant import RunInterrupted
@@ -191,16 +192,19 @@ def test_a_condition_ends_both_at_the_same_instant_with_the_same_words(condition
     assert (found.divergence is not None) == CONDITIONS[condition]
 
 
-def test_a_value_on_the_edge_is_left_to_python(fmu: Path, kept: Kept) -> None:
-    """The root of the sum of squares is less than Python's norm in its last digit here: what lies between is found."""
+@pytest.mark.parametrize(("sign", "diverges"), [(">", False), (">=", True)])
+def test_a_value_on_the_edge_is_decided_as_rows_have_it(sign: str, diverges: bool, fmu: Path, kept: Kept) -> None:
+    """By the root of the sum of squares: it is less than `math.hypot` in its last digit here."""
     free = ran(of(LOOP, fmu), "python", load=kept.load)
     y, z = free.signals["plant.y"], free.signals["plant.z"]
     less = [i for i in range(1, len(y)) if math.sqrt(y[i] * y[i] + z[i] * z[i]) < math.hypot(y[i], z[i])]
     assert less
     edge = float(np.sqrt(y[less[0]] ** 2 + z[less[0]] ** 2))
-    condition = f"abs(time - {float(free.signals['time'][less[0]])!r}) < 1e-5 and norm(plant.y, plant.z) > {edge!r}"
+    condition = (
+        f"abs(time - {float(free.signals['time'][less[0]])!r}) < 1e-5 and norm(plant.y, plant.z) {sign} {edge!r}"
+    )
     found = both(replace(of(LOOP, fmu), criterion=Criterion(diverged=condition)), load=kept.load)
-    assert found.divergence is not None
+    assert (found.divergence is not None) == diverges
 
 
 def test_messages_that_arrive_together_are_noted_as_they_were_sent(fmu: Path, kept: Kept) -> None:
@@ -233,7 +237,7 @@ def test_a_call_that_fails_is_told_in_the_same_words(fmu: Path) -> None:
 
 
 def test_a_number_that_an_input_does_not_hold_is_refused_in_the_same_words(tmp_path: Path) -> None:
-    path = small(tmp_path)
+    path = small(tmp_path, mode_is_input=True)
     parts = {name: Component(fmu=str(path), step=0.01) for name in ("first", "second")}
     # a count that is multiplied until no 32 bits hold it
     wire = Connection(name="0", start=("first.count",), end=("second.mode",), scale=1e9)
@@ -242,7 +246,35 @@ def test_a_number_that_an_input_does_not_hold_is_refused_in_the_same_words(tmp_p
         with pytest.raises(QuadcosimError) as caught:
             ran(System(stop_time=0.1, components=parts, connections=(wire,)), engine)
         said.append(str(caught.value))
-    assert said[0] == said[1]
+    assert said == ["second.mode = 3e+09: expected a number that int32 holds"] * 2
+
+
+@pytest.mark.parametrize(
+    ("value", "is_held"),
+    [(2147483647.0, True), (2147483648.0, False), (-2147483648.0, True), (-2147483649.0, False), (1e300, False)],
+)
+def test_the_largest_number_that_an_input_holds_is_the_last_that_is_written(
+    value: float, is_held: bool, tmp_path: Path
+) -> None:
+    path = small(tmp_path, mode_is_input=True)
+    parts = {name: Component(fmu=str(path), step=0.01) for name in ("first", "second")}
+    wire = Connection(name="0", start=("first.count",), end=("second.mode",), scale=1e-9, offset=value)
+    system = System(stop_time=0.03, components=parts, connections=(wire,))
+    for engine in ("python", "compiled"):
+        if is_held:
+            assert ran(system, engine).signals["second.mode"][-1] == value
+        else:
+            with pytest.raises(QuadcosimError, match=rf"{re.escape(f'{value:g}')}: expected a number that int32 holds"):
+                ran(system, engine)
+
+
+@pytest.mark.parametrize("dtype", ["int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64"])
+def test_the_bounds_of_a_type_are_the_last_floats_that_it_holds(dtype: str) -> None:
+    low, high = bounds_of(np.dtype(dtype))
+    of = np.iinfo(dtype)
+    assert int(low) == of.min
+    assert int(high) <= of.max
+    assert high >= of.max or int(math.nextafter(high, math.inf)) > of.max
 
 
 @pytest.mark.parametrize("name", FLIGHTS)

@@ -97,6 +97,8 @@ def test_where_one_signal_has_none_the_result_has_none(expression: str) -> None:
         ("integral(p.x ** 2 + p.v ** 2)", "+: p.x ** 2 is in m2, p.v ** 2 is in m2/s2; "),
         ("sin(p.x)", "sin of p.x, which is in m; expected 1 or rad, or a factor"),
         ("cos(p.degrees)", "cos of p.degrees, which is in deg; expected 1 or rad, or a factor"),
+        ("atan2(p.x, p.v)", "atan2: p.x is in m, p.v is in m/s; "),
+        ("atan2(p.ratio, p.x)", "atan2: p.ratio is in 1, p.x is in m; "),
         ("exp(time)", "exp of time, which is in s; expected 1 or rad, or a factor"),
         ("p.x ** p.ratio", "p.ratio is the exponent of p.x, which is in m; expected a number"),
     ],

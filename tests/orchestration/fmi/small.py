@@ -58,6 +58,10 @@ _FMI3 = """<fmiModelDescription fmiVersion="3.0" modelName="Small" instantiation
   </ModelStructure>
 </fmiModelDescription>"""
 
+_MODE = """<ScalarVariable name="mode" valueReference="6" causality="parameter" variability="fixed">
+      <Enumeration declaredType="Mode" start="1"/></ScalarVariable>"""
+_MODE_AS_INPUT = """<ScalarVariable name="mode" valueReference="6" causality="input" variability="discrete">
+      <Integer start="1"/></ScalarVariable>"""
 _ITEMS = '<Item name="forward" value="1"/><Item name="backward" value="2"/>'
 BINARY = '<Binary name="blob" valueReference="8" causality="input"/>'
 SIZE = '<UInt64 name="size" valueReference="9" causality="structuralParameter" start="2"/>'
@@ -73,8 +77,12 @@ def small(
     saves: bool = True,
     more: str = "",
     tolerance: float | None = None,
+    mode_is_input: bool = False,
 ) -> Path:
-    """The FMU with these habits (macros of `small.c`) in `folder`, which says of itself what it is told to."""
+    """The FMU with these habits (macros of `small.c`) in `folder`, which says of itself what it is told to.
+
+    `mode_is_input`: that of FMI 2.0 has `mode` as an Integer that others may feed, of any value.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     library = folder / f"Small{fmpy.sharedLibraryExtension}"
     macros = [f"-D{macro}" for macro in (*habits, *(["FMI3"] if fmi == 3 else []), f'KEPT="{uuid.uuid4().hex}"')]
@@ -96,6 +104,9 @@ def small(
     place = fmpy.platform_tuple if fmi == 3 else fmpy.platform
     path = folder / "small.fmu"
     with zipfile.ZipFile(path, "w") as archive:
+        if mode_is_input:
+            assert _MODE in text
+            text = text.replace(_MODE, _MODE_AS_INPUT)
         experiment = "" if tolerance is None else f'<DefaultExperiment tolerance="{tolerance}"/>'
         described = text.format(attributes=attributes, items=_ITEMS, more=more, experiment=experiment)
         archive.writestr("modelDescription.xml", described)
