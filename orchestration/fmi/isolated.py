@@ -30,6 +30,8 @@ Command = tuple[Any, ...]
 _HEADER = struct.Struct("<Q")
 _PATIENCE = 5.0
 """[s] in which a process that was told to end must have ended"""
+_ENDING = 60.0
+"""[s] for one that says no more, and so is about to end: why it did is asked for"""
 
 
 class IsolatedInstance(Instance):
@@ -164,7 +166,7 @@ class IsolatedInstance(Instance):
 
     def _ending(self) -> str:
         with contextlib.suppress(subprocess.TimeoutExpired):
-            return ended(self._process.wait(_PATIENCE))
+            return ended(self._process.wait(_ENDING))
         return "does not answer"
 
 

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
+from orchestration.processes.waiting import waited
+
 _MARK = "QUADCOSIM_CONFINED"
 """Variable that tells a confined process, and what it starts, from all others; children inherit it."""
 _KEPT = 16_384
@@ -27,7 +29,7 @@ class Limits:
     """What a process that handles a foreign file may take."""
 
     time: float = 60.0
-    """[s]"""
+    """[s], those apart in which it waits for a processor that others have; these are known on Linux"""
     memory: float = 2000.0
     """[MB] resident, of the process and what it starts together; enforced on Linux"""
     size: float = 1000.0
@@ -129,18 +131,20 @@ class _Output:
 
 def _watched(process: subprocess.Popen[bytes], output: _Output, limits: Limits, mark: str) -> str | None:
     """The limit that the process has reached; None if it has ended itself."""
-    started = time.monotonic()
+    started, lost = time.monotonic(), 0.0
     pause = 0.05
     while True:
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(pause)
             return None
-        if time.monotonic() - started > limits.time:
+        looked = time.monotonic()
+        family = list(_family(mark))
+        lost = max(lost, *map(waited, family), 0.0)
+        if time.monotonic() - started - lost > limits.time:
             return _late(limits)
         if output.count > limits.output * 1e6:
             return f"it writes more than the limit of {limits.output:g} MB to its standard output and error"
-        looked = time.monotonic()
-        if sum(map(_resident, _family(mark))) > limits.memory * 1e6:
+        if sum(map(_resident, family)) > limits.memory * 1e6:
             return f"it takes more memory than the limit of {limits.memory:g} MB"
         pause = max(0.05, 10.0 * (time.monotonic() - looked))
 

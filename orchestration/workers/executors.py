@@ -22,7 +22,9 @@ from orchestration.workers.task import Chunk, Outcome, Task
 
 Submit = Callable[[Task | Chunk], "Future[list[Outcome]]"]
 _PATIENCE = 10.0
-"""[s], for a scheduler that is there, and its workers"""
+"""[s], for a scheduler that is there"""
+_WORKERS_PATIENCE = 60.0
+"""[s], for the first of its workers, which may still be starting"""
 _ADDRESS = re.compile(r"(?:(?:tcp|tls|ws|wss)://)?(\[[0-9a-fA-F:.]+\]|[^\s:/\[\]]+):(\d{1,5})")
 
 
@@ -111,7 +113,7 @@ def run_on_dask(tasks: Iterable[Task | Chunk], package: Package, address: str) -
     with ExitStack() as stack:
         try:
             client: Any = stack.enter_context(distributed.Client(address, timeout=_PATIENCE, set_as_default=False))
-            client.wait_for_workers(1, timeout=_PATIENCE)
+            client.wait_for_workers(1, timeout=_WORKERS_PATIENCE)
         except (OSError, TimeoutError, asyncio.TimeoutError, ValueError) as error:  # two of a name before Python 3.11
             raise QuadcosimError(f"--dask {address}: expected a dask scheduler with workers there: {error}") from error
         # The files travel once, by the hash of their content.

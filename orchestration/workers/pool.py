@@ -26,7 +26,7 @@ from orchestration.workers.task import Broken, BrokenPlaceError, Chunk, Outcome,
 
 ATTEMPTS = 3
 """How often a run is flown, the later times first in a new process, before the death of its worker is its result."""
-_PATIENCE = 5.0
+_PATIENCE = 60.0
 """[s], for a process that has closed its pipe"""
 _FROM_OUTSIDE = {-getattr(signal, name) for name in ("SIGKILL", "SIGTERM", "SIGHUP") if hasattr(signal, name)}
 """Ends that no run brings upon its process, but a user, or a machine that is out of memory."""

@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from tests.patience import PATIENCE
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -15,7 +17,7 @@ def run(
 ) -> subprocess.CompletedProcess[str]:
     """A program to its end, whatever that is; `environment` is added to this process's own."""
     return subprocess.run(
-        arguments, cwd=cwd, env={**os.environ, **(environment or {})}, capture_output=True, text=True, timeout=120
+        arguments, cwd=cwd, env={**os.environ, **(environment or {})}, capture_output=True, text=True, timeout=PATIENCE
     )
 
 

@@ -24,7 +24,7 @@ from quadcosim import Scenario, UsageError, fly_until, load_run, load_scenario, 
 resource = pytest.importorskip("resource")  # and signals with a time, neither of which Windows has
 
 SECONDS = 20
-"""after which an example counts as hanging; each takes milliseconds"""
+"""of a processor, after which an example counts as hanging; each takes milliseconds"""
 MEGABYTES = 500
 """that all examples of a reader may add to the memory of the process"""
 
@@ -187,13 +187,13 @@ def bounded() -> Iterator[None]:
     def stop(number: int, frame: FrameType | None) -> None:
         raise AssertionError(f"still reading after {SECONDS} s")
 
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.alarm(SECONDS)
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, SECONDS)
     try:
         yield
     finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def is_read_or_refused(read: Callable[[], object]) -> None:

@@ -13,6 +13,7 @@ from orchestration.figures.style import STYLES
 from orchestration.tuning.tuning_file import load_tuning
 from quadcosim import Axis, QuadcosimError, Scenario, Study, Swept, UsageError
 from tests.orchestration.tuning.test_tuning import FILE
+from tests.patience import PATIENCE
 from tests.quadcosim.conftest import native
 
 PERIODS = Axis(name="timing.period", values=(0.01, 0.02))
@@ -96,7 +97,7 @@ def test_workers_need_no_guard_of_the_main_module_and_ctrl_c_keeps_what_was_flow
         while process.stdout.readline() != "done 1\n":
             assert process.poll() is None
         process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=100.0)
+        _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode != 0
     assert "of 200 runs done" in err.splitlines()[-1]
     assert (tmp_path / "study.sqlite").is_file()

@@ -3,7 +3,6 @@
 import functools
 import itertools
 import math
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,6 +12,7 @@ from orchestration.checks.validation.fmu import Fmu, Variable
 from orchestration.checks.validation.instance import Instance, RefusedError, Row, Value, Values, same
 from orchestration.checks.validation.variables import limits
 from orchestration.fmi.messages import Message
+from orchestration.processes.waiting import own_clock
 
 STEPS = 100
 """Communication steps of a run"""
@@ -162,13 +162,13 @@ class Bench:
     @functools.cached_property
     def first(self) -> FirstRun:
         """The first run, which tells how many steps there is time for; raises `RefusedError`."""
-        started = time.monotonic()
+        started = own_clock()
         points = self._points(PLAIN)
         with self.instance() as instance:
             self.begin(instance, PLAIN)
             done, goes_on = 0, True
             for t, h in points:
-                if done >= FEWEST and time.monotonic() - started > SHARE * self.budget:
+                if done >= FEWEST and own_clock() - started > SHARE * self.budget:
                     break
                 goes_on = instance.step(t, h)
                 done += 1
@@ -178,7 +178,7 @@ class Bench:
             return FirstRun(
                 steps=max(done, 1) if done < len(points) and goes_on else STEPS,
                 whole=done == len(points) or not goes_on,
-                seconds=time.monotonic() - started,
+                seconds=own_clock() - started,
                 messages=tuple(instance.messages),
             )
 

@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.fmu_kit.compiler.compiled import HERE, compiler
+from tests.patience import PATIENCE
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wdouble-promotion", "-O2", "-fno-math-errno")
 ARM, QEMU = "arm-none-eabi-gcc", "qemu-system-arm"
@@ -101,6 +102,6 @@ def _printed(command: list[str]) -> list[str]:
 
 
 def _succeeds(command: list[str]) -> str:
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout

@@ -21,7 +21,7 @@ from orchestration.fmi.fmi2 import Fmi2Instance
 from pathlib import Path
 fmu = Fmi2Instance(Path(sys.argv[1]), "plant")
 print("loaded", flush=True)
-time.sleep(60)
+time.sleep(6000)
 """
 
 

@@ -18,6 +18,7 @@ from orchestration.flight.names import FIGURES as FLIGHT
 from orchestration.processes import subprocesses
 from quadcosim import Scenario, Timing, load_run, run, save_run
 from tests.commands import Done, Main
+from tests.patience import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[3]
 SCRIPT = shutil.which("quadcosim", path=str(Path(sys.executable).parent))
@@ -64,7 +65,7 @@ def quadcosim(*arguments: str | Path, code: int = 0, environment: dict[str, str]
     assert SCRIPT is not None, "expected the script beside this Python: pip install -e ."
     done = subprocess.run(
         [SCRIPT, *map(str, arguments)],
-        capture_output=True, text=True, encoding="utf-8", timeout=120, check=False,
+        capture_output=True, text=True, encoding="utf-8", timeout=PATIENCE, check=False,
         env={**os.environ, "PYTHONIOENCODING": "utf-8", "COLUMNS": "200", "NO_COLOR": "1", **(environment or {})},
     )  # fmt: skip
     assert done.returncode == code, done.stdout + done.stderr

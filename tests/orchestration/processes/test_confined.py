@@ -1,19 +1,23 @@
 """A confined process is ended at its limits, with all that it started."""
 
 import os
+import subprocess
 import sys
 import time
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
 from orchestration.processes import confined
 from orchestration.processes.confined import Ending, Limits
+from tests.patience import PATIENCE
 
 linux_only = pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="no /proc")
 
 FORK = """
 import os, sys, time
+from tests.patience import PATIENCE
 if os.fork() == 0:
     os.setsid()
     with open(sys.argv[1], "w") as file:
@@ -31,7 +35,8 @@ def python(program: str, *arguments: object, **limits: float) -> Ending:
 
 def gone(pid: int) -> bool:
     """Whether a process has ended, perhaps only after a moment."""
-    for _ in range(100):
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
         try:
             state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
         except OSError:
@@ -98,3 +103,28 @@ def test_the_system_ends_a_process_that_nobody_watches_any_more() -> None:
     program = "import resource, time; time.sleep(0.2); print(*resource.getrlimit(resource.RLIMIT_CPU))"
     seconds = 2 * (os.cpu_count() or 1) + 1
     assert python(program, time=2.0).said == f"{seconds} {seconds}"
+
+
+BUSY = """
+import os, time
+os.sched_setaffinity(0, {sorted(os.sched_getaffinity(0))[0]})
+while time.process_time() < 0.5:
+    pass
+print("done")
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="the system does not say who waits")
+def test_the_time_in_which_a_process_waits_for_a_processor_is_not_its_own() -> None:
+    core = min(os.sched_getaffinity(0))
+    spin = f"import os\nos.sched_setaffinity(0, {{{core}}})\nwhile True: pass"
+    with ExitStack() as stack:
+        for _ in range(8):
+            other = subprocess.Popen([sys.executable, "-c", spin], start_new_session=True)
+            stack.callback(other.wait)
+            stack.callback(other.kill)
+        started = time.monotonic()
+        ending = python(BUSY, time=2.0)
+        took = time.monotonic() - started
+    assert (ending.said, ending.reached) == ("done", None)
+    assert took > 2.0, "expected it to have waited for longer than its limit"

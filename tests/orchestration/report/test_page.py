@@ -15,6 +15,7 @@ from orchestration.studies.sweep import sweep
 from quadcosim import Scenario, Timing
 from tests.native import NATIVE
 from tests.orchestration.studies.common import axis
+from tests.patience import PATIENCE
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 Show = Callable[[Path], Any]
@@ -41,6 +42,7 @@ def show(browser: Any) -> Iterator[Show]:
 
     def open_page(file: Path) -> Any:
         page = browser.new_page(viewport={"width": 1400, "height": 900})
+        page.set_default_timeout(1e3 * PATIENCE)
         page.on("console", lambda message: told.append(message.text))
         page.on("pageerror", lambda error: told.append(str(error)))
         page.on("request", lambda request: asked.append(request.url))

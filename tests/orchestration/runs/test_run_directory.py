@@ -248,7 +248,7 @@ from orchestration.runs import draw
 
 def wait(*_):
     print("writing", flush=True)
-    time.sleep(60)
+    time.sleep(6000)
 
 draw.draw = wait
 quadcosim.save_run(quadcosim.run(quadcosim.Scenario(stop_time=0.05)), sys.argv[1])

@@ -25,6 +25,7 @@ from orchestration.workers.row import Row
 from quadcosim import QuadcosimError, Scenario, Timing
 from tests.commands import Done
 from tests.native import NATIVE
+from tests.patience import PATIENCE
 
 SCRIPT = shutil.which("quadcosim", path=str(Path(sys.executable).parent))
 
@@ -151,7 +152,7 @@ def start(*arguments: str | Path, cwd: Path, temporary: Path | None = None) -> "
 
 def quadcosim(*arguments: str | Path, cwd: Path, code: int = 0) -> Done:
     with start(*arguments, cwd=cwd) as process:
-        out, err = process.communicate(timeout=120)
+        out, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == code, out + err
     return Done(arguments, process.returncode, out, err)
 
@@ -175,10 +176,10 @@ def one_line(error: BaseException | str) -> str:
 # -- processes --------------------------------------------------------------------------------------------
 
 
-def wait_until(condition: Callable[[], bool], seconds: float = 30.0) -> None:
-    end = time.monotonic() + seconds
+def wait_until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + PATIENCE
     while not condition():
-        assert time.monotonic() < end, "expected it within half a minute"
+        assert time.monotonic() < end, "expected it some time"
         time.sleep(0.005)
 
 

@@ -23,6 +23,7 @@ from tests.orchestration.studies.common import (
     wait_until,
     workers_of,
 )
+from tests.patience import PATIENCE
 
 TEMPORARY = "temporary"
 LONGEST = 1.5
@@ -61,11 +62,11 @@ def disturbed(folder: Path, reference: list[dict[str, Any]], *, workers: int, ki
             tally.compared += 1
             shutil.rmtree(folder / "results")
     with sweep_in(folder, workers) as coordinator:
-        out, err = coordinator.communicate(timeout=120)
+        out, err = coordinator.communicate(timeout=PATIENCE)
     assert coordinator.returncode == 0, out + err
     assert bits(folder / STORE) == reference
     tally.compared += 1
-    wait_until(lambda: processes_in(folder) == [], seconds=15.0)
+    wait_until(lambda: processes_in(folder) == [])
     assert list((folder / TEMPORARY).iterdir()) == []
     return tally
 
@@ -85,7 +86,7 @@ def one_start(folder: Path, workers: int, kills: int, draw: random.Random, tally
             elif what > 0.7:
                 coordinator.kill()
                 tally.coordinators += 1
-        coordinator.communicate(timeout=120)
+        coordinator.communicate(timeout=PATIENCE)
     if (folder / STORE).is_file():
         assert all(row["status"] == "done" for row in bits(folder / STORE)), "expected no failed row"
 

@@ -21,6 +21,7 @@ from tests.orchestration.studies.common import (
     study,
     wait_for_rows,
 )
+from tests.patience import PATIENCE
 
 
 @pytest.fixture
@@ -52,7 +53,7 @@ def test_the_death_of_a_dask_worker_loses_nothing(
         wait_for_rows(folder / STORE, 1)
         made.workers[0].kill()
         assert rows_in(folder / STORE) < RUNS
-        out, err = coordinator.communicate(timeout=60)
+        out, err = coordinator.communicate(timeout=PATIENCE)
     assert coordinator.returncode == 0, out + err
     assert bits(folder / STORE) == reference
 

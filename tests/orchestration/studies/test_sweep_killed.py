@@ -37,6 +37,7 @@ from tests.orchestration.studies.common import (
 )
 from tests.orchestration.studies.kills import disturbed
 from tests.orchestration.workers.sick import ABORTS, KILLED, SPENT, sick_plant
+from tests.patience import PATIENCE
 
 # -- killed -----------------------------------------------------------------------------------------------
 
@@ -65,7 +66,7 @@ def test_workers_end_when_the_coordinator_is_killed(folder: Path) -> None:
         workers = workers_of(coordinator.pid)
         coordinator.kill()
     assert len(workers) == 2
-    wait_until(lambda: not any(map(is_running, workers)), seconds=10.0)
+    wait_until(lambda: not any(map(is_running, workers)))
 
 
 def test_the_death_of_a_worker_loses_nothing(folder: Path, reference: list[dict[str, Any]]) -> None:
@@ -73,7 +74,7 @@ def test_the_death_of_a_worker_loses_nothing(folder: Path, reference: list[dict[
         wait_for_rows(folder / STORE, 1)
         kill(workers_of(coordinator.pid)[0])
         assert rows_in(folder / STORE) < RUNS
-        out, err = coordinator.communicate(timeout=60)
+        out, err = coordinator.communicate(timeout=PATIENCE)
     assert coordinator.returncode == 0, out + err
     assert bits(folder / STORE) == reference
 
@@ -106,7 +107,7 @@ def test_an_interrupt_is_one_line_that_says_how_far_the_sweep_is(
     with start("sweep", "study.toml", cwd=folder) as coordinator:
         wait_for_rows(folder / STORE, 1)
         os.kill(coordinator.pid if whom == "the coordinator" else workers_of(coordinator.pid)[0], signal.SIGINT)
-        out, err = coordinator.communicate(timeout=60)
+        out, err = coordinator.communicate(timeout=PATIENCE)
     assert (coordinator.returncode, out) == (130, "")
     assert err == f"quadcosim: interrupted with {rows_in(folder / STORE)} of {RUNS} runs done\n"
     assert all(row in reference for row in bits(folder / STORE))
@@ -147,7 +148,7 @@ def test_an_fmu_that_is_moved_away_meanwhile_changes_nothing(folder: Path, refer
         wait_for_rows(folder / STORE, 1)
         plant.unlink()
         kill(workers_of(coordinator.pid)[0])
-        out, err = coordinator.communicate(timeout=60)
+        out, err = coordinator.communicate(timeout=PATIENCE)
     assert coordinator.returncode == 0, out + err
     assert bits(folder / STORE) == reference
 
