@@ -58,7 +58,7 @@ class Starts:
 
     def starts_of(self, request: Any) -> tuple[Start, ...]:
         """The starts around the beginning of the trajectory of a `Scenario`, in the order of their indices."""
-        given = request.controller.parameters
+        given = request.resolved().controller.parameters
         trajectory = Trajectory(**{field: given[name] for name, field in TRAJECTORY.items() if name in given})
         return tuple(self._start(i, trajectory) for i in range(self.first, self.first + self.count))
 

@@ -556,6 +556,33 @@ def test_of_a_random_quantity_the_value_at_which_nine_in_ten_is_refuted_is_told_
     assert (passed.flew, passed.share) == (29, wilson(29, 29))
 
 
+def test_a_value_that_only_some_seeds_are_good_at_does_not_fly_above_the_limit(
+    stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def bound(self: StubPool, system: System) -> float:  # of the seeds one fails from .2 to .42, and all from .5 on
+        loss = at(system, "timing.loss")
+        return 1.0 if loss > 0.5 or (0.2 < loss < 0.42 and system.seed % 29 == 3) else 0.01
+
+    monkeypatch.setattr(stubbed, "bound", bound)
+    found = find(scenario_of(), "loss")
+    some = [one.value for one in found.tried if 0 < one.flew < one.runs == found.seeds]
+    assert found.large_signal_limit == pytest.approx(0.2, abs=0.01)
+    assert some
+    assert not {*some} & {*found.flies_above}
+    assert found.flies_above == tuple(one.value for one in found.tried if one.value > 0.42 and one.flew == 29)
+    assert found.flies_above
+
+
+def test_the_interval_of_a_share_is_at_the_confidence_that_was_asked_for(
+    stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stubbed, "bound", lambda self, system: 1.0 if at(system, "timing.loss") > 0.3 else 0.01)
+    found = find(scenario_of(), "loss", confidence=0.5)
+    shares = {one.share for one in found.tried if one.flew == found.seeds}
+    assert shares == {wilson(found.seeds, found.seeds, 0.5)}
+    assert wilson(found.seeds, found.seeds, 0.5) != wilson(found.seeds, found.seeds)
+
+
 def test_where_the_first_value_fails_for_some_seeds_it_may_still_fly_for_nine_in_ten(
     stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -7,6 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import quadcosim
+from orchestration.engines.engine import Engine
 from orchestration.flight.names import FIGURES as FLIGHT
 from orchestration.recording.recording import InMemory, thinned
 from orchestration.runs import draw as drawn
@@ -49,6 +50,21 @@ def test_what_is_on_disk_is_what_was_flown_chunk_by_chunk(whole: Result, tmp_pat
     expect_equal(found, whole)
     for chunk, after in zip(found.recording.chunks(), [*list(found.recording.chunks())[1:], None]):
         assert after is None or chunk.events[-1].time <= chunk.rows[-1, 0] * 1e9 < after.events[0].time
+
+
+@pytest.mark.parametrize("engine", ["python", "compiled"])
+def test_a_sample_at_the_last_row_of_a_chunk_is_in_that_chunk_and_counts_once(
+    engine: Engine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenario = Scenario(stop_time=0.3, timing=Timing(offset=0.009))  # at rows 9, 19, 29 and so on
+    monkeypatch.setattr("orchestration.engines.master.ROWS", 10**6)
+    whole = quadcosim.run(scenario, engine=engine)
+    monkeypatch.setattr("orchestration.engines.master.ROWS", 10)
+    found = quadcosim.run(scenario, engine=engine)
+    chunks = list(found.recording.chunks())
+    assert len(chunks) > 20
+    assert all(chunk.events[-1].time == round(chunk.rows[-1, 0] * 1e9) for chunk in chunks[:-1])
+    expect_equal(found, whole)
 
 
 def test_many_events_make_a_chunk_whole_too(whole: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

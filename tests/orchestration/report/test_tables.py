@@ -2,16 +2,22 @@
 
 import dataclasses
 from itertools import pairwise
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from orchestration.basics.statistics import wilson
 from orchestration.report.blobs import Blobs
+from orchestration.report.flights import Flight
+from orchestration.report.of_study import Stored, _difference, is_sample
 from orchestration.report.subset import LEAST_POINTS, MOST_POINTS, chosen, evenly, points_for
 from orchestration.report.tables import Way, share_of, shares_along, table_of
 from orchestration.results.quantities import quantity
+from orchestration.studies.axes import Axis
+from orchestration.studies.study import Study
 from tests.orchestration.report.test_blobs import read
+from tests.orchestration.studies.common import axis, study
 
 
 def row(index: int, good: bool, **settings: Any) -> dict[str, Any]:
@@ -51,6 +57,38 @@ def test_a_share_has_wilsons_interval_only_where_runs_are_drawn_by_chance() -> N
     assert (drawn.good, drawn.runs) == (6, 8)
     assert (drawn.low, drawn.high) == wilson(6, 8)
     assert (listed.low, listed.high) == (None, None)
+
+
+def flown_again(error: float) -> Flight:
+    flight: Any = SimpleNamespace(metrics={"outcome": "settled", "error": error})
+    return flight  # type: ignore[no-any-return]
+
+
+@pytest.mark.parametrize(("apart", "agrees"), [(0.0, True), (0.9e-6, True), (-0.9e-6, True), (1.1e-6, False)])
+def test_a_flight_flown_again_is_the_one_in_the_store_up_to_a_millionth(apart: float, agrees: bool) -> None:
+    note = _difference(flown_again(0.1 * (1.0 + apart)), ROWS[0], "error")
+    assert (note is None) is agrees
+    assert agrees or "flown again, error is 0.1" in str(note)
+
+
+SEEDS, PERIODS = axis("seed", 1, 2), axis("timing.period", 0.01, 0.02)
+DRAWN = Axis(name="mass", targets=("plant.mass",), low=1.0, high=2.0)
+
+
+@pytest.mark.parametrize(
+    ("chosen", "by_chance"),
+    [
+        (study(PERIODS), False),
+        (study(PERIODS, SEEDS), True),
+        (study(PERIODS, Axis(name="luck", targets=("seed",), values=(1, 2))), True),
+        (study(PERIODS, vary_seed=True), True),
+        (study(PERIODS, DRAWN, method="random", samples=2), True),
+    ],
+    ids=["a grid", "an axis of seeds", "by another name", "a seed for each", "a sampled axis"],
+)
+def test_runs_are_a_sample_where_axes_or_seeds_are_drawn(chosen: Study, by_chance: bool) -> None:
+    stored = Stored(rows=[], metrics=[], units={}, about={})
+    assert is_sample(stored, chosen) is by_chance
 
 
 def test_shares_are_by_value_or_by_part_of_the_range() -> None:

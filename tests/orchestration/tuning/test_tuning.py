@@ -171,6 +171,28 @@ def test_one_parameter_is_no_tuning(tuning):
         replace(tuning, parameters=tuning.parameters[:1])
 
 
+LOW = '"trajectory.start_z" = -10.0'
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        FILE.replace("[base.plant]", f"{LOW}\n[base.plant]"),
+        FILE.replace("[base]", "[base]\nvehicle = 'low_flier.toml'"),
+    ],
+    ids=["its own", "that of its vehicle"],
+)
+def test_starts_lie_around_the_trajectory_of_the_base(text, tmp_path):
+    (tmp_path / "low_flier.toml").write_text(f"[controller]\n{LOW}\n")
+    (tmp_path / "low.toml").write_text(text)
+    low = load_tuning(tmp_path / "low.toml")
+    for starts in (low.starts, low.judging()):
+        systems = low.systems(0.01, low.values([0.5, 0.5]), starts)
+        heights = [value_at(system, "components.plant.parameters.initial.position.z") for system in systems]
+        assert len(heights) == starts.count
+        assert all(abs(height + 10.0) <= low.starts.position for height in heights)
+
+
 def test_starts_that_are_judged_on_come_after_the_others(tuning):
     assert tuning.judging() == replace(tuning.starts, first=3, count=4)
     assert isinstance(tuning.starts, Starts)

@@ -181,6 +181,37 @@ def test_nested_systems_are_taken_apart_and_their_path_is_the_name(loaded: Loade
     }
 
 
+def linear(factor: float, offset: float) -> str:
+    return f'<ssc:LinearTransformation factor="{factor}" offset="{offset}"/>'
+
+
+def test_transformations_through_systems_are_applied_in_the_order_in_which_a_value_meets_them(loaded: Loaded) -> None:
+    inner = system(LAW, wire(".speed", "law.v", linear(10.0, 1.0)), name="box", connectors="in speed")
+    read = loaded(structure(system(PLANT + inner, wire("plant.v", "box.speed", linear(2.0, 3.0)))))
+    assert wires(read) == {"box_law.v": ("plant.v", 20.0, 31.0)}  # 10 (2 v + 3) + 1, and not 2 (10 v + 1) + 3
+
+
+def test_of_values_for_one_input_along_its_way_the_outermost_is_taken_with_all_that_it_passes(loaded: Loaded) -> None:
+    law = component("law", "in x:mm in v out u:N", values("v=1"))
+    inner = system(
+        law, wire(".speed", "law.v", linear(10.0, 1.0)), name="box", connectors="in speed", bindings=values("speed=2")
+    )
+    outer = wire(".wish", "box.speed", linear(2.0, 3.0))
+    within = loaded(structure(system(inner, outer, connectors="in wish")))
+    assert within.components["box_law"].parameters["v"] == 21.0  # of its own system: 10 · 2 + 1
+    both = loaded(structure(system(inner, outer, connectors="in wish", bindings=values("wish=5"))))
+    assert both.components["box_law"].parameters["v"] == 131.0  # 10 (2 · 5 + 3) + 1
+
+
+def test_an_input_that_a_source_feeds_has_no_value_of_the_ssp(loaded: Loaded) -> None:
+    law = component("law", "in x:mm in v out u:N", values("v=1 k=2"))
+    fed = '[sources.wish]\nto = ["law.v"]\nconstant = 7.0\n'
+    assert loaded(structure(system(law))).components["law"].parameters == {"v": 1.0, "k": 2.0}
+    read = loaded(structure(system(law)), fed)
+    assert read.components["law"].parameters == {"k": 2.0}
+    assert read.sources["wish"].constant == 7.0
+
+
 # -- parameters -------------------------------------------------------------------------------------------
 
 
