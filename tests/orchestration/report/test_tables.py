@@ -61,7 +61,7 @@ def test_a_share_has_wilsons_interval_only_where_runs_are_drawn_by_chance() -> N
 
 def flown_again(error: float) -> Flight:
     flight: Any = SimpleNamespace(metrics={"outcome": "settled", "error": error})
-    return flight  # type: ignore[no-any-return]
+    return flight
 
 
 @pytest.mark.parametrize(("apart", "agrees"), [(0.0, True), (0.9e-6, True), (-0.9e-6, True), (1.1e-6, False)])
