@@ -40,7 +40,7 @@ class Phase(enum.IntEnum):
 
 
 TIME_TOLERANCE = 1e-9
-"""Relative; masters add up times, or round them"""
+"""Relative, and of times below a second in seconds; masters add up times, or round them"""
 
 _Method = TypeVar("_Method", bound=Callable[..., Any])
 
@@ -397,7 +397,7 @@ class Slave(Values, Fmi2Slave):  # type: ignore[misc]
 
         What is not finite is not looked at here.
         """
-        slack = TIME_TOLERANCE * max(abs(t), h)
+        slack = TIME_TOLERANCE * max(1.0, abs(t), h)
         if self._reached is not None and abs(t - self._reached) > slack:
             raise FmuError(f"currentCommunicationPoint = {t}: expected {self._reached}, where the last step ended")
         if t + h - self._stop_time > slack:

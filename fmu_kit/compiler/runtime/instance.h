@@ -212,7 +212,7 @@ static Status exit_initialization(Instance *m)
 /* A step begins where the last one ended, and does not end past the stop time; as `_expect_in_time` has it. */
 static Status expect_in_time(Instance *m, double t, double h)
 {
-    const double slack = TIME_TOLERANCE * (h > q_fabs(t) ? h : q_fabs(t));
+    const double size = h > q_fabs(t) ? h : q_fabs(t), slack = TIME_TOLERANCE * (size > 1.0 ? size : 1.0);
     if (q_fabs(t - m->state.reached) > slack)
         return refuse_numbers(m, 2, (double[]){t, m->state.reached}, bad_time);
     if (t + h - m->state.stop > slack)

@@ -45,7 +45,7 @@ static void live(void)
     const unsigned known = AT_POSITION_X, unknown = AT_THRUST, with_time[3] = {0, TIME, 1};
     const double x = 1.5;
     void *c = instantiate(GUID), *state = NULL, *copy = NULL;
-    uint8_t bytes[sizeof(State)];
+    uint8_t bytes[sizeof(Serialised)];
     bool event, ends, early;
     double last, values[3], before;
     size_t size;

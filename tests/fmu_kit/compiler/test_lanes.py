@@ -99,10 +99,11 @@ def _fly(together: Together, alone: list[Alone], variables: list[Variable], rng:
     together.initialise(active, start)
     for lane in np.flatnonzero(active).tolist():
         alone[lane].initialise(start[lane])
-    for k in range(12):
+    t = start.copy()
+    for _ in range(12):
         _expect_alike(together, alone, active, before)
         active &= together.status == 0
-        t, h = start + period * k, period * rng.choice([0.5, 1.0, 1.0, 2.0], together.count)
+        h = period * rng.choice([0.5, 1.0, 1.0, 2.0], together.count)
         for lane in np.flatnonzero(active).tolist():
             given = dict(_given(rng, variables, "input", 0.5))
             together.put(lane, given)
@@ -110,6 +111,7 @@ def _fly(together: Together, alone: list[Alone], variables: list[Variable], rng:
             alone[lane].step(t[lane], h[lane])
         before = together.held()
         together.step(active, t, h)
+        t += h
     return list(map(int, together.status))
 
 
