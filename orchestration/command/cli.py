@@ -313,7 +313,7 @@ def _metrics(result: "Result") -> Answer:
     if result.divergence is not None:
         lines.append(f"diverged: {result.divergence}")
     if (missed := unmet(result.system, result.metrics, result.units)) is not None:
-        lines.append(f"not good: {missed}")
+        say(f"not good: {missed}")
     if result.termination is not None:
         lines.append(f"terminated: {result.termination}")
     return Answer(document=found, lines=lines)

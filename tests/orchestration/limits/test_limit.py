@@ -403,7 +403,13 @@ class StubPool:
             outcome = "settled" if bound < 0.05 else "bounded" if bound < math.inf else "diverged"
             divergence_time = 3.25 if outcome == "diverged" else None
             found.append(
-                {"outcome": outcome, "good": bound < 0.05, "divergence_time": divergence_time, "settling_time": 1.5}
+                {
+                    "outcome": outcome,
+                    "good": bound < 0.05,
+                    "divergence_time": divergence_time,
+                    "settling_time": 1.5,
+                    "ultimate_bound": bound,
+                }
             )
             hear(len(found))
             if stop(found[-1]):
@@ -668,6 +674,7 @@ def test_find_flies_the_scenario_and_its_result_is_json() -> None:
     assert 0.0 < fields["tried"][0].pop("measured") < 0.005
     assert fields["tried"][0] == {
         "value": 0.001, "outcome": "settled", "divergence_time": None, "flew": 1, "runs": 1, "share": None,
+        "unmet": None,
     }  # fmt: skip
 
 
