@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from orchestration.basics.extras import explained
 from orchestration.basics.progress import ShareHeard, of_share
@@ -38,21 +38,25 @@ class Tuned:
         return {one.period: one for one in best_by_period(self.searches)}
 
     def __repr__(self) -> str:
-        costs = ", ".join(f"{found.judged_cost:.4g} at {period:g} s" for period, found in self.best.items())
-        return f"<Tuned: {len(self.searches)} searches, costs on other starts {costs}>"
+        best = "; ".join(f"{period:g} s: {found.judgement}" for period, found in self.best.items())
+        return f"<Tuned: {len(self.searches)} searches; {best}>"
 
     def _repr_html_(self) -> str:
         """As notebooks show it: the best of each period."""
         rows = [
             (f"{name} at {period:g} s", html.number(value), "")
             for period, found in self.best.items()
-            for name, value in {**found.values, "cost on other starts": found.judged_cost}.items()
+            for name, value in {
+                **found.values,
+                f"survive, of {found.judged}": found.survives,
+                "cost of those": found.survivors_cost,
+            }.items()
         ]
         return html.card("A tuning", None, None, f"{len(self.searches)} searches", rows)
 
     @explained
     def to_pandas(self) -> "pd.DataFrame":
-        """A row for each search: its period [s] and seed, the tuned values, costs, and how many of other starts fly."""
+        """A row for each search: period [s], seed, tuned values, costs, how many other starts survive and are good."""
         import pandas as pd
 
         table = pd.DataFrame(
@@ -113,17 +117,14 @@ def searched(
     A search that is done, of the same tuning with the same software, is not done again.
     """
     record = folder / f"{_key(tuning, files)[:16]}.json"
-    done = [_found(each) for each in json.loads(record.read_text())] if record.is_file() else []
+    done = [Found(**each) for each in json.loads(record.read_text())] if record.is_file() else []
     searches = [(period, seed) for period in tuning.periods for seed in tuning.seeds]
     for i, (period, seed) in enumerate(searches):
         if any((one.period, one.seed) == (period, seed) for one in done):
             continue
         one = search(tuning, period, seed, fly, judge, _part(progress, i, len(searches)))
         done.append(one)
-        announce(
-            f"period {period:g} s, seed {seed}: cost {one.cost:.5g}, on other starts {one.judged_cost:.5g}, "
-            f"{one.flown} of {one.judged} fly"
-        )
+        announce(f"period {period:g} s, seed {seed}: cost {one.cost:.5g}; {one.judgement}")
         folder.mkdir(parents=True, exist_ok=True)
         record.write_text(json.dumps([dataclasses.asdict(each) for each in done], indent=2))
     return done
@@ -146,10 +147,6 @@ def _part(progress: Callable[[float], None], index: int, count: int) -> Callable
 def _key(tuning: Tuning, files: Files) -> str:
     """Of all that a search depends on."""
     asked = json.dumps(dataclasses.asdict(tuning), default=str)
-    content = [asked, sorted(files.hashes.items()), sorted(versions().items())]
+    told = [each.name for each in dataclasses.fields(Found)]
+    content = [asked, sorted(files.hashes.items()), sorted(versions().items()), told]
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()
-
-
-def _found(kept: dict[str, Any]) -> Found:
-    low, high = kept.pop("share")
-    return Found(**kept, share=(low, high))

@@ -42,9 +42,9 @@ class Tuning:
     parameters: tuple[Axis, ...]
     """What is tuned, each between its `low` and its `high`."""
     cost: str
-    """The cost of a flight that flies: an expression over the objectives of the base."""
+    """The cost of a run that survives: an expression over the objectives of the base."""
     bad: float
-    """The cost of a flight that does not fly."""
+    """The cost of a run that diverges, or whose cost has no value; no run costs more."""
     starts: Ensemble
     """The starts that it is tuned on; those that it is judged on come after them."""
     judged: int
@@ -119,13 +119,23 @@ class Tuning:
         """The starts that the outcome is judged on."""
         return self.starts.some(self.starts.first + self.starts.count, self.judged)
 
-    def mean_cost(self, flights: Sequence[dict[str, Any]]) -> float:
-        """Of flights by their metrics."""
-        return sum(self._cost(metrics) for metrics in flights) / len(flights)
+    def mean_cost(self, runs: Sequence[dict[str, Any]]) -> float:
+        """Of runs by their metrics, `bad` for each that diverges: what a search makes small."""
+        return sum(self._cost(metrics) for metrics in runs) / len(runs)
+
+    def survivors_cost(self, runs: Sequence[dict[str, Any]]) -> float | None:
+        """The mean cost of those that survive; None if none does."""
+        surviving = [metrics for metrics in runs if survives(metrics)]
+        return self.mean_cost(surviving) if surviving else None
 
     def _cost(self, metrics: dict[str, Any]) -> float:
         cost = metrics[COST]
-        return self.bad if cost is None or not is_good(metrics) else min(float(cost), self.bad)
+        return min(float(cost), self.bad) if survives(metrics) and cost is not None else self.bad
+
+
+def survives(metrics: Mapping[str, Any]) -> bool:
+    """Whether a run does not diverge by its horizon."""
+    return not metrics["diverged"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,15 +148,26 @@ class Found:
     values: dict[str, float]
     """of each target"""
     cost: float
-    """on the starts that it was tuned on"""
-    judged_cost: float
-    """on the others"""
-    flown: int
-    """of those on which it is judged"""
+    """the mean on the starts that it was tuned on, with those that diverge"""
     judged: int
-    share: tuple[float, float]
-    """Wilson interval of the share that flies, at 95 %"""
+    """how many other starts it is judged on"""
+    survives: int
+    """how many of these do not diverge by the horizon"""
+    good: int
+    """how many of these meet the criterion of the base"""
+    survivors_cost: float | None
+    """the mean of those that survive; None: none does"""
     evaluations: int
+
+    @property
+    def judgement(self) -> str:
+        """How it does on the other starts, in words."""
+        low, high = wilson(self.survives, self.judged)
+        cost = "" if self.survivors_cost is None else f" at a mean cost of {self.survivors_cost:.5g}"
+        return (
+            f"{self.survives} of {self.judged} other starts survive (a share of {low:.3f} to {high:.3f}, Wilson, 95 %)"
+            f"{cost}, {self.good} are good"
+        )
 
 
 def search(tuning: Tuning, period: float, seed: int, fly: Fly, judge: Fly, progress: Callable[[float], None]) -> Found:
@@ -171,16 +192,15 @@ def search(tuning: Tuning, period: float, seed: int, fly: Fly, judge: Fly, progr
         progress(min(1.0, count / tuning.budget))
     values = tuning.values(list(best))
     judged = judge(tuning.systems(period, values, tuning.judging()))
-    flown = sum(map(is_good, judged))
     return Found(
         period=period,
         seed=seed,
         values=values,
         cost=float(lowest),
-        judged_cost=tuning.mean_cost(judged),
-        flown=flown,
         judged=len(judged),
-        share=wilson(flown, len(judged)),
+        survives=sum(map(survives, judged)),
+        good=sum(map(is_good, judged)),
+        survivors_cost=tuning.survivors_cost(judged),
         evaluations=count,
     )
 

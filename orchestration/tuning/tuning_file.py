@@ -14,14 +14,14 @@ _FORBID: dict[str, str] = {"extra": "forbid"}
 
 @dataclass(frozen=True, kw_only=True)
 class CostTable:
-    """`[cost]`: of a flight that flies, by its objectives, and of one that does not."""
+    """`[cost]`: of a run that survives, by its objectives, and of one that diverges."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     of: str
-    """The cost of a flight that flies: an expression over its objectives."""
+    """The cost of a run that survives: an expression over its objectives."""
     bad: float
-    """The cost of one that does not; no flight costs more."""
+    """The cost of one that diverges, or whose cost has no value; no run costs more."""
 
 
 JUDGED = "judged"
@@ -104,14 +104,12 @@ def gains_text(tuning: Tuning, best: Found, all_found: Sequence[Found], command:
     import tomli_w
 
     others = [one for one in all_found if one.period == best.period]
-    low, high = best.share
     lines = [
         f"Tuned for a period of {best.period:g} s by: {command}",
-        f"{best.evaluations} evaluations of the mean of ({tuning.cost}), {tuning.bad:g} where it does not fly, over",
-        f"{tuning.starts.count} starts; of {len(others)} searches the one that costs least on these.",
-        f"Mean cost {best.cost:.5g}; on {best.judged} other starts {best.judged_cost:.5g}, and",
-        f"{best.flown} of them fly, a share of {low:.3f} to {high:.3f} (Wilson, 95 %).",
-        "The searches' costs on the other starts: " + ", ".join(f"{one.judged_cost:.5g}" for one in others),
+        f"{best.evaluations} evaluations of the mean of ({tuning.cost}), {tuning.bad:g} where it diverges, over",
+        f"{tuning.starts.count} starts and {tuning.origin.stop_time:g} s; of {len(others)} searches the one that costs",
+        f"least on these: {best.cost:.5g}.",
+        *(f"Search {one.seed}: {one.judgement}." for one in others),
     ]
     tables: dict[str, dict[str, float]] = {}
     for target, value in best.values.items():

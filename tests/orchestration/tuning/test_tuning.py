@@ -60,7 +60,7 @@ def bowl(systems):
     for system in systems:
         attitude, surface = (value_at(system, f"{GAINS}.{name}") for name in ("attitude", "surface"))
         cost = 1.0 + math.log(attitude / 10.0) ** 2 + (surface - 5.0) ** 2
-        found.append({"cost": cost, "good": cost < 50.0})
+        found.append({"cost": cost, "good": cost < 50.0, "diverged": cost > 60.0})
     return found
 
 
@@ -79,14 +79,31 @@ def test_the_same_seed_searches_the_same_way_and_another_another(tuning):
     assert one.values != other.values
 
 
-def test_what_does_not_fly_costs_what_is_said_and_nothing_costs_more(tuning):
-    flights = [
-        {"cost": 1.0, "good": True},
-        {"cost": 1.0, "good": False},
-        {"cost": None, "good": True},
-        {"cost": 99.0, "good": True},
-    ]
-    assert tuning.mean_cost(flights) == pytest.approx((1.0 + 10.0 + 10.0 + 10.0) / 4)
+def run(cost, *, good=True, diverged=False):
+    return {"cost": cost, "good": good, "diverged": diverged}
+
+
+def test_a_run_that_diverges_costs_what_is_said_and_one_that_survives_what_it_costs_and_no_more(tuning):
+    assert tuning.mean_cost([run(1.0), run(2.0, good=False)]) == pytest.approx(1.5)
+    assert tuning.mean_cost([run(1.0), run(1.0, good=False, diverged=True)]) == pytest.approx(5.5)
+    assert tuning.mean_cost([run(1.0), run(None), run(99.0)]) == pytest.approx(7.0)
+
+
+def test_survival_is_judged_apart_from_the_cost_of_those_that_survive(tuning):
+    def judge(systems):
+        return [run(1.0), run(2.0, good=False), run(3.0), run(0.5, good=False, diverged=True)]
+
+    found = search(tuning, 0.01, 1, bowl, judge, lambda share: None)
+    assert (found.judged, found.survives, found.good) == (4, 3, 2)
+    assert found.survivors_cost == pytest.approx(2.0)
+    assert found.judgement.startswith("3 of 4 other starts survive (a share of 0.301 to 0.954, Wilson, 95 %)")
+    assert found.judgement.endswith("at a mean cost of 2, 2 are good")
+
+
+def test_where_none_survives_there_is_no_cost(tuning):
+    found = search(tuning, 0.01, 1, bowl, lambda systems: [run(1.0, diverged=True)] * 4, lambda share: None)
+    assert (found.survives, found.survivors_cost) == (0, None)
+    assert "mean cost" not in found.judgement
 
 
 def test_no_start_is_both_tuned_on_and_judged_on(tuning):
@@ -112,7 +129,7 @@ def test_flights_have_the_period_that_is_tuned_for(tuning):
 
 def test_the_best_is_the_one_that_costs_least_where_it_was_tuned(tuning):
     one = search(tuning, 0.01, 1, bowl, bowl, lambda share: None)
-    worse = replace(one, seed=2, cost=one.cost + 1.0, judged_cost=0.0)
+    worse = replace(one, seed=2, cost=one.cost + 1.0, survivors_cost=0.0)
     assert list(best_by_period([worse, one])) == [one]
 
 
