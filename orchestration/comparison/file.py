@@ -1,7 +1,8 @@
 """Reads comparison files, and the files of parameters that they name."""
 
 import dataclasses
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -9,6 +10,8 @@ from typing import Any, ClassVar
 from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError, no_such_key
 from orchestration.comparison.design import FMU, Comparison, Condition, Controller, Craft, Front
+from orchestration.expressions.at_instant import compiled
+from orchestration.expressions.syntax import parse
 from orchestration.studies.axes import Value
 from orchestration.studies.linked_settings import Key
 from orchestration.studies.study_file import AxisTable, axis_of, load, loop_of
@@ -32,6 +35,8 @@ class ControllerTable:
     """A file with parameters in `[controller]`; {vehicle}, {value} and {milli}, 1000 · value, are filled in."""
     parameters: dict[str, Any] = field(default_factory=dict)
     """Parameters on top of those of the file."""
+    scheduled: dict[str, Any] = field(default_factory=dict)
+    """Parameters that follow the axis, on top of all others: expressions over its name, such as "0.9 / period"."""
     bandwidth: float | None = None
     """Its bandwidth [rad/s]; without it, the bandwidth is measured."""
 
@@ -117,7 +122,7 @@ def _comparison(file: ComparisonFile, path: Path) -> Comparison:
     return Comparison(
         name=file.name or path.stem,
         base=base.without_vehicle(),
-        controllers=tuple(_controller(table, keys, folder) for table in file.controllers),
+        controllers=tuple(_controller(table, axis.name, keys, folder) for table in file.controllers),
         vehicles=crafts,
         conditions=tuple(_condition(table) for table in file.conditions),
         axis=axis,
@@ -138,7 +143,7 @@ def _fields(table: Any, of: type) -> dict[str, Any]:
     return {f.name: getattr(table, f.name) for f in dataclasses.fields(of)}
 
 
-def _controller(table: ControllerTable, keys: list[tuple[str, Value]], folder: Path) -> Controller:
+def _controller(table: ControllerTable, axis: str, keys: list[tuple[str, Value]], folder: Path) -> Controller:
     place = f"controllers.{table.name}"
     sets: dict[str, Value] = {}
     if table.fmu is not None:
@@ -151,7 +156,31 @@ def _controller(table: ControllerTable, keys: list[tuple[str, Value]], folder: P
             tuned[vehicle, value] = {**_read(folder / name), **own}
     elif table.file is not None:
         sets |= _read(folder / table.file)
+    for target, text in parameters_in(table.scheduled, f"{place}.scheduled").items():
+        follows = _followed(text, axis, f"{place}.scheduled.{target}")
+        for vehicle, value in keys:
+            tuned[vehicle, value] = {**tuned.get((vehicle, value), {}), f"controller.{target}": follows(value)}
     return Controller(name=table.name, sets={**sets, **own}, tuned=tuned, bandwidth=table.bandwidth)
+
+
+def _followed(text: Value, axis: str, place: str) -> Callable[[Value], float]:
+    """What a parameter is at a value of the axis, by an expression over the axis's name."""
+    if not isinstance(text, str):
+        raise UsageError(f'{place} = {text}: expected an expression over {axis}, such as "0.9 / {axis}"')
+
+    def follows(value: Value) -> float:
+        if not _is_number(value):
+            raise UsageError(f"axis {axis}: expected numbers for {place} to follow")
+        found = at([float(value)])
+        if not math.isfinite(found):
+            raise UsageError(f"{place} = {text}: is {found} at {axis} = {value}; expected a number")
+        return found
+
+    try:
+        at = compiled(parse(text), {axis: 0})
+    except UsageError as error:
+        raise UsageError(f"{place} = {text}: {error}") from None
+    return follows
 
 
 def _filled(name: str, vehicle: str, value: Value) -> str:

@@ -148,6 +148,21 @@ def test_the_native_twins_are_taken_of_all_fmus(comparison: Comparison) -> None:
         assert all(fmu.startswith("native/") for fmu in system.fmus.values())
 
 
+SCHEDULED = 'scheduled = { gain.surface = "0.05 / period", gain.eta = "4 + period" }'
+"""Beside the files of gains, one of which it overrules"""
+
+
+def test_scheduled_parameters_follow_the_axis_on_top_of_all_others(file: Path) -> None:
+    file.write_text(FILE.replace("[[vehicles]]", f"{SCHEDULED}\n[[vehicles]]", 1))
+    for period in (0.01, 0.02, 0.04):
+        for system in systems(load_comparison(file), controller="tuned", value=period):
+            assert value_at(system, SURFACE) == 0.05 / period
+            assert value_at(system, "components.controller.parameters.gain.eta") == 4.0 + period
+            assert value_at(system, COUPLING) == 0.0
+    for system in systems(load_comparison(file), controller="plain"):
+        assert value_at(system, SURFACE) != 5.0
+
+
 @pytest.mark.parametrize(
     ("before", "after", "words"),
     [
@@ -164,6 +179,13 @@ def test_the_native_twins_are_taken_of_all_fmus(comparison: Comparison) -> None:
         ("count = 5", "number = 5", "starts.number: no such key; expected one of"),
         ("[axis]", '[front]\neffort = "torque"\n[axis]', "front.effort = torque: expected one of position_rmse"),
         ("[base]", "[bases]", "bases: no such key; expected one of"),
+        (
+            "[[vehicles]]",
+            "scheduled.gain.eta = 4.0\n[[vehicles]]",
+            "controllers.tuned.scheduled.gain.eta = 4.0: expected",
+        ),
+        ("[[vehicles]]", 'scheduled.gain.eta = "1 / perod"\n[[vehicles]]', "gain.eta = 1 / perod: there is no perod"),
+        ("[[vehicles]]", 'scheduled.gain.eta = "1 / (period - period)"\n[[vehicles]]', "at period = 0.01; expected a"),
     ],
 )
 def test_what_cannot_be_is_said_in_one_line_with_the_file(before: str, after: str, words: str, file: Path) -> None:
