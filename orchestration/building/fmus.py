@@ -127,9 +127,30 @@ def native_twin(fmu: str) -> str:
     return fmu
 
 
+def python_twin(fmu: str) -> str:
+    """What to look up for the same slave with Python inside; the FMU itself if it is no native one of a known slave."""
+    name = fmu.rpartition("/")[2]
+    if name in MODELS:
+        return name
+    path = Path(fmu)
+    packing, target = _slave_of(path) if path.suffix == ".fmu" else (IN_PYTHON, None)
+    if packing is IN_PYTHON or target is None:
+        return fmu
+    return str(path.parents[len(Path(packing.folder).parts)] / path.name)
+
+
 def native_twins(system: System) -> System:
     """`system` with the native twins of its FMUs."""
-    twins = {name: native_twin(fmu) for name, fmu in system.fmus.items()}
+    return _with_twins(system, native_twin)
+
+
+def python_twins(system: System) -> System:
+    """`system` with the twins of its FMUs that have Python inside."""
+    return _with_twins(system, python_twin)
+
+
+def _with_twins(system: System, twin: Callable[[str], str]) -> System:
+    twins = {name: twin(fmu) for name, fmu in system.fmus.items()}
     if twins == system.fmus:
         return system
     components = {name: replace(each, fmu=twins[name]) for name, each in system.components.items()}

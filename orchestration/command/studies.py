@@ -1,7 +1,6 @@
 """The commands of `quadcosim` that fly many runs."""
 
 import dataclasses
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -81,7 +80,7 @@ def status(study: StudyFile, out: Out = None) -> Answer:
         total = int(about.get(TOTAL, "0"))
     done, failed = counts.get("done", 0), counts.get("failed", 0)
     missing = total - done - failed
-    agreement = Agreement(**json.loads(about[AGREEMENT])) if AGREEMENT in about else None
+    agreement = Agreement.from_text(about[AGREEMENT]) if AGREEMENT in about else None
     lines = [f"{path}: {done + failed} of {total} runs, {failed} failed, {missing} missing"]
     if agreement is not None:
         lines.append(f"--engine batch: {agreement}")

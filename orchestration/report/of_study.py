@@ -276,5 +276,5 @@ def provenance_of(about: Mapping[str, str]) -> list[tuple[str, str]]:
     versions = {f"version of {name}": text for name, text in json.loads(about.get("versions", "{}")).items()}
     guids = {f"GUID of the {name}": text for name, text in json.loads(about.get("guids", "{}")).items()}
     machine = {"machine": str(place["machine"])} if "machine" in place else {}
-    agreement = {"lanes": str(Agreement(**json.loads(about[AGREEMENT])))} if AGREEMENT in about else {}
+    agreement = {"lanes": str(Agreement.from_text(about[AGREEMENT]))} if AGREEMENT in about else {}
     return [*versions.items(), *guids.items(), *machine.items(), *agreement.items()]

@@ -2,7 +2,7 @@
 
 import contextlib
 import json
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
@@ -21,17 +21,16 @@ from orchestration.studies.checks import described, expect_flyable
 from orchestration.studies.run_key import design_parts, difference, place_parts, run_key, study_parts
 from orchestration.studies.study import Study
 from orchestration.studies.swept import Swept
-from orchestration.workers.batching import Agreement, chunks, expect_lanes, sample
+from orchestration.studies.vouching import Fly, vouched
+from orchestration.workers.batching import chunks, expect_lanes
 from orchestration.workers.executors import expect_scheduler, run_locally, run_on_dask
 from orchestration.workers.pool import Package
 from orchestration.workers.provenance import versions
 from orchestration.workers.row import Row
-from orchestration.workers.task import Chunk, Outcome, Task
+from orchestration.workers.task import Outcome, Task
 
 Announce = Callable[[str], None]
 """Hears of a run that failed."""
-Fly = Callable[[Iterable[Task | Chunk]], Generator[list[Outcome], None, None]]
-"""The outcomes of tasks as they come."""
 
 TOTAL, STUDY_PARTS, DESIGN_PARTS, PLACE_PARTS, AXES = "total", "study", "design", "place", "axes"
 AGREEMENT = "agreement"
@@ -90,7 +89,10 @@ def sweep(
                     _keep(some, opened)
                     counted.add(some)
                     lanes |= {each.row.key: each.row for each in some if each.in_lanes}
-            agreement = _compared(lanes, study, files, fly, time_limit) if in_lanes else None
+            agreement = vouched(
+                lanes, files, lambda index: _task(study, index, files, None, time_limit),
+                lambda package: _flying(package, workers, dask),
+            )  # fmt: skip
         except KeyboardInterrupt:
             raise Interrupted(f"with {counted.done} of {counted.total} runs done") from None
         if agreement is not None:
@@ -114,17 +116,6 @@ def _flying(package: Package, workers: int, dask: str | None) -> Fly:
     if dask is not None:
         return lambda tasks: run_on_dask(tasks, package, dask)
     return lambda tasks: run_locally(tasks, package, workers)
-
-
-def _compared(
-    lanes: Mapping[str, Row], study: Study, files: Files, fly: Fly, time_limit: float | None
-) -> Agreement | None:
-    """A sample of the runs that were flown in lanes, beside the same flown by FMUs; None if there were none."""
-    chosen = sample(lanes)
-    tasks = [_task(study, lanes[key].index, files, None, time_limit) for key in sorted(chosen)]
-    alone = [outcome.row for some in fly(tasks) for outcome in some] if tasks else []
-    found = [(row.index, lanes[row.key].metrics or {}, row.metrics or {"status": row.message}) for row in alone]
-    return Agreement.of(found) if found else None
 
 
 def expect_current(opened: store.Store, study: Study) -> None:

@@ -53,6 +53,10 @@ def sample(keys: Iterable[str]) -> set[str]:
     return set(sorted(keys, key=lambda key: hashlib.sha256(f"sample {key}".encode()).digest())[:SAMPLE])
 
 
+Pair = tuple[int, Mapping[str, Any], Mapping[str, Any]]
+"""The index of a run, and its metrics flown in two ways, that in lanes first"""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Agreement:
     """How a sample of runs that were flown in lanes compares with the same runs flown by FMUs."""
@@ -63,18 +67,34 @@ class Agreement:
     metric: str | None
     index: int | None
     """where it is; None if there is none"""
+    python: "Agreement | None" = None
+    """the same of how they begin, by FMUs in Python, chaotic runs left aside; None: there are no such FMUs"""
 
     def __str__(self) -> str:
+        text = f"{self.runs} runs flown by FMUs too: largest relative difference {self._largest}"
+        if self.python is None:
+            return text
+        return f"{text}; the beginning of {self.python.runs} by FMUs in Python too: {self.python._largest}"
+
+    @property
+    def _largest(self) -> str:
         at = "" if self.metric is None else f" ({self.metric} of run {self.index})"
-        return f"{self.runs} runs flown by FMUs too: largest relative difference {self.difference:.1g}{at}"
+        return f"{self.difference:.1g}{at}"
 
     def as_text(self) -> str:
         """As a store keeps it."""
         return json.dumps(asdict(self))
 
     @classmethod
-    def of(cls, pairs: Iterable[tuple[int, Mapping[str, Any], Mapping[str, Any]]]) -> "Agreement":
-        """Of runs by their index: the metrics in lanes, and those of FMUs."""
+    def from_text(cls, text: str) -> "Agreement":
+        """As a store has kept it."""
+        kept = json.loads(text)
+        python = kept.pop("python", None)
+        return cls(**kept, python=None if python is None else cls(**python))
+
+    @classmethod
+    def of(cls, pairs: Iterable[Pair]) -> "Agreement":
+        """Of runs flown in two ways."""
         found = [
             (_difference(lanes.get(name), value), name, index)
             for index, lanes, alone in pairs
@@ -86,13 +106,15 @@ class Agreement:
             return cls(runs=runs, difference=0.0, metric=None, index=None)
         return cls(runs=runs, difference=largest, metric=name, index=index)
 
-    def expect(self) -> None:
+    def expect(self, by: str = "its FMUs") -> None:
         """Raise `QuadcosimError` naming run and metric if they differ by more than is tolerated."""
         if self.difference > TOLERATED:
             raise QuadcosimError(
-                f"run {self.index}: {self.metric} by --engine batch differs by {self.difference:.3g} from that by its "
-                f"FMUs; expected at most {TOLERATED:g}"
+                f"run {self.index}: {self.metric} by --engine batch differs by {self.difference:.3g} "
+                f"from that by {by}; expected at most {TOLERATED:g}"
             )
+        if self.python is not None:
+            self.python.expect("its FMUs in Python, at the beginning of the run")
 
 
 def _difference(one: Any, other: Any) -> float:

@@ -1,7 +1,6 @@
 """A sweep by lanes writes the rows that the FMUs of its runs would have written, and says how far they agree."""
 
 import dataclasses
-import json
 from pathlib import Path
 from typing import Any
 
@@ -51,9 +50,12 @@ def test_rows_are_those_of_the_fmus_in_a_store_of_the_same_runs(tmp_path: Path) 
     assert len(lanes) == RUNS
     assert_alike(lanes, alone)
     with open_for_reading(tmp_path / "lanes" / "study.sqlite") as opened:
-        agreement = Agreement(**json.loads(opened.about()[AGREEMENT]))
+        agreement = Agreement.from_text(opened.about()[AGREEMENT])
     assert agreement.runs == SAMPLE
     assert agreement.difference < 1e-12
+    assert agreement.python is not None
+    assert agreement.python.runs == SAMPLE
+    assert agreement.python.difference < 1e-9
 
 
 def test_a_sweep_goes_on_where_it_was_and_flies_nothing_twice(tmp_path: Path) -> None:

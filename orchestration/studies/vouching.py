@@ -1,0 +1,89 @@
+"""What vouches for runs in lanes: a sample of them flown by their FMUs too, and how these begin by FMUs in Python.
+
+Lanes and native FMUs are compiled of the same text: a mistake in that would agree with itself. It would not agree with
+Python. Where runs are chaotic the last bits of the mathematics are enough for other metrics: a twin tells, the same run
+in lanes with its parameters off by their last bit.
+"""
+
+import math
+from collections.abc import Callable, Generator, Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from orchestration.building.fmus import looked_up, python_twin, python_twins
+from orchestration.building.inputs import Files
+from orchestration.system.model import Component
+from orchestration.workers.batching import TOLERATED, Agreement, Pair, sample
+from orchestration.workers.pool import Package
+from orchestration.workers.row import Row
+from orchestration.workers.task import Chunk, Outcome, Task
+
+Fly = Callable[[Iterable[Task | Chunk]], Generator[list[Outcome], None, None]]
+"""The outcomes of tasks as they come."""
+BEGINNING, SHARE = 1.0, 0.05
+"""[s] that FMUs in Python fly, and the least of a run: whole, one of theirs costs as much as hundreds in lanes"""
+_BEGUN, _NUDGED, _PYTHON = "begun ", "nudged ", "in Python "
+"""before the key of a run: what of it is flown"""
+
+
+def vouched(
+    lanes: Mapping[str, Row], files: Files, task_of: Callable[[int], Task], flying: Callable[[Package], Fly]
+) -> Agreement | None:
+    """How a sample of the runs that were flown in lanes compares with other ways to fly them; None if there were none.
+
+    `lanes` are their rows by key; `task_of` makes the task of a run by its index, to be flown with `files`.
+    """
+    chosen = [task_of(lanes[key].index) for key in sorted(sample(lanes))]
+    if not chosen:
+        return None
+    paths = _in_python({fmu for task in chosen for fmu in task.system.fmus.values()})
+    begun = [_begun(task) for task in chosen if paths.keys() & python_twins(task.system).fmus.values()]
+    tasks: list[Task | Chunk] = [*chosen, *map(_in_python_too, begun)]
+    if begun:
+        tasks.append(Chunk(tasks=(*begun, *map(_nudged, begun))))
+    package = Package.of(Files(fmus={**files.fmus, **paths}, tables=files.tables))
+    rows = {outcome.row.key: outcome.row for some in flying(package)(tasks) for outcome in some}
+
+    def pairs(tasks: Iterable[Task], one: Mapping[str, Row], prefix: str) -> list[Pair]:
+        return [(task.index, _told(one[task.key]), _told(rows[prefix + task.key])) for task in tasks]
+
+    steady = [one for one in begun if Agreement.of(pairs([one], rows, _NUDGED)).difference <= TOLERATED]
+    python = Agreement.of(pairs(steady, rows, _PYTHON)) if steady else None
+    return replace(Agreement.of(pairs(chosen, lanes, "")), python=python)
+
+
+def _told(row: Row) -> Mapping[str, Any]:
+    return row.metrics or {"status": row.message}
+
+
+def _in_python(natives: set[str]) -> dict[str, Path]:
+    """The FMUs in Python of native ones, where there are such, by what systems call them; built if need be."""
+    twins = {python_twin(fmu) for fmu in natives} - natives
+    return {twin: path for twin in twins if (path := looked_up(twin)) is not None}
+
+
+def _begun(task: Task) -> Task:
+    """The beginning of a run."""
+    horizon = task.system.stop_time
+    system = replace(task.system, stop_time=min(horizon, max(BEGINNING, SHARE * horizon)))
+    return replace(task, key=_BEGUN + task.key, system=system, keep_signals=False)
+
+
+def _in_python_too(task: Task) -> Task:
+    """The same by FMUs in Python."""
+    return replace(task, key=_PYTHON + task.key, system=python_twins(task.system))
+
+
+def _nudged(task: Task) -> Task:
+    """The same with each parameter that is set off by its last bit."""
+    components = {name: _off(component) for name, component in task.system.components.items()}
+    return replace(task, key=_NUDGED + task.key, system=replace(task.system, components=components))
+
+
+def _off(component: Component) -> Component:
+    parameters = {
+        name: math.nextafter(value, 0.0) if isinstance(value, float) else value
+        for name, value in component.parameters.items()
+    }
+    return replace(component, parameters=parameters)

@@ -1,0 +1,93 @@
+"""What vouches for lanes: FMUs flown alone, and FMUs in Python for the beginning of the same runs."""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+
+import pytest
+
+from orchestration.basics.errors import QuadcosimError
+from orchestration.studies.study import Study
+from orchestration.studies.vouching import vouched
+from orchestration.workers.batching import Agreement
+from orchestration.workers.pool import Package
+from orchestration.workers.row import Row
+from orchestration.workers.task import Chunk, Outcome, Task
+from tests.orchestration.fmi.small import needs_compiler
+from tests.orchestration.studies.common import axis, study
+
+pytestmark = needs_compiler
+LENGTH = 5.0
+Error = Callable[[Task, bool], float]
+"""Of a task, in a chunk or alone, by which its metric is off"""
+
+
+@pytest.fixture
+def chosen() -> Study:
+    base = study(axis("timing.period", 0.01, 0.02)).base.with_changes(stop_time=LENGTH, parameters={"plant.mass": 1.1})
+    return replace(study(axis("timing.period", 0.01, 0.02)), base=base, native=True)
+
+
+def agreement(chosen: Study, error: Error) -> Agreement | None:
+    """What two runs are vouched for by, if each way to fly is off by so much."""
+    files = chosen.files()
+
+    def row(task: Task, chunk: bool) -> Row:
+        metrics = {"x": 1.0 + error(task, chunk)}
+        return Row(index=task.index, key=task.key, settings={}, seed=0, metrics=metrics, message=None, duration=0.0)
+
+    def task(index: int) -> Task:
+        return Task(index=index, key=str(index), settings={}, system=chosen.system(index, {}), keep_signals=False)
+
+    def flying(package: Package) -> Callable[[Iterable[Task | Chunk]], Iterator[list[Outcome]]]:
+        def fly(tasks: Iterable[Task | Chunk]) -> Iterator[list[Outcome]]:
+            for each in tasks:
+                for one in each.tasks if isinstance(each, Chunk) else (each,):
+                    assert package.contents.keys() >= {*one.system.fmus.values()}
+                    yield [Outcome(row=row(one, isinstance(each, Chunk)))]
+
+        return fly
+
+    return vouched({str(i): row(task(i), True) for i in range(2)}, files, task, flying)  # type: ignore[arg-type]
+
+
+def in_python(task: Task) -> bool:
+    return not any(fmu.startswith("native/") for fmu in task.system.fmus.values())
+
+
+def test_whole_runs_are_compared_with_native_fmus_and_their_beginning_with_python(chosen: Study) -> None:
+    seen: list[tuple[bool, bool, float]] = []
+
+    def error(task: Task, chunk: bool) -> float:
+        seen.append((in_python(task), chunk, task.system.stop_time))
+        return 0.0
+
+    found = agreement(chosen, error)
+    assert found is not None
+    assert found.python is not None
+    assert (found.runs, found.python.runs) == (2, 2)
+    assert {*seen} == {(False, True, LENGTH), (False, False, LENGTH), (False, True, 1.0), (True, False, 1.0)}
+    assert "2 runs flown by FMUs too" in str(found)
+    assert "the beginning of 2 by FMUs in Python too" in str(found)
+    assert Agreement.from_text(found.as_text()) == found
+
+
+def test_what_was_compiled_wrongly_contradicts_python(chosen: Study) -> None:
+    found = agreement(chosen, lambda task, chunk: 1e-6 * in_python(task))
+    assert found is not None
+    assert found.difference == 0.0
+    with pytest.raises(QuadcosimError, match="differs by 1e-06 from that by its FMUs in Python, at the beginning"):
+        found.expect()
+
+
+def test_a_chaotic_run_which_its_own_last_bits_change_contradicts_nothing(chosen: Study) -> None:
+    masses = {run.components["plant"].parameters["mass"] for run in (chosen.system(0, {}),)}
+
+    def error(task: Task, chunk: bool) -> float:
+        nudged = task.system.components["plant"].parameters["mass"] not in masses
+        return 1e-6 * (in_python(task) + 2.0 * nudged) * (task.index == 0)
+
+    found = agreement(chosen, error)
+    assert found is not None
+    assert found.python is not None
+    assert found.python.runs == 1
+    found.expect()
