@@ -49,10 +49,10 @@ def plot(
     from orchestration.figures.style import save
     from orchestration.runs.draw import draw
     from orchestration.runs.run_directory import load_run
-    from orchestration.runs.run_labels import told_apart
+    from orchestration.runs.run_labels import labels_of_runs
 
     results = [load_run(one) for one in directory]
-    names = told_apart(results, [str(one) for one in directory])
+    names = labels_of_runs(results, [str(one) for one in directory])
     made = draw(results, figure, names=names, window=_window(results, start, end), style=look.chosen)
     place = out or (directory[0] if len(directory) == 1 else _beside(directory))
     return of_files(save(made, place, look.chosen))

@@ -31,7 +31,7 @@ def is_random(system: System) -> bool:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tried:
+class Evaluation:
     """One value that was run, with one seed or many."""
 
     value: float
@@ -51,7 +51,7 @@ class Tried:
     """what of the criterion that seed did not meet, in words; None: it did, or diverged"""
 
 
-class Trials:
+class Evaluator:
     """Runs values of a quantity, each with all seeds, and keeps what became of them."""
 
     def __init__(
@@ -70,7 +70,7 @@ class Trials:
         self._units = units
         self._done = self._left = 0
         self.tolerance = span.tolerance
-        self.tried: dict[float, Tried] = {}
+        self.tried: dict[float, Evaluation] = {}
 
     def expect(self, left: int) -> None:
         """Hear how many values may come after the next one: the progress is a share of all of them."""
@@ -86,7 +86,7 @@ class Trials:
         found = self._run(value, stop=lambda metrics: False)
         return self._confidence is not None and refutes(found.flew, found.runs, RELIABILITY, self._confidence)
 
-    def _run(self, value: float, stop: Callable[[Any], bool]) -> Tried:
+    def _run(self, value: float, stop: Callable[[Any], bool]) -> Evaluation:
         system = self._varied.at(value)
         runs = [replace(system, seed=system.seed + i) for i in range(self._seeds)]
         all_values = self._done + 1 + self._left
@@ -98,7 +98,7 @@ class Trials:
         flew = sum(map(is_good, metrics))
         measured = metrics[0 if down is None else metrics.index(down)].get(judged(system) or "")
         known = self._confidence is not None and len(metrics) == self._seeds
-        found = self.tried[value] = Tried(
+        found = self.tried[value] = Evaluation(
             value=value,
             outcome=system.criterion.outcomes[0] if down is None else down["outcome"],
             divergence_time=None if down is None else down["divergence_time"],
@@ -112,7 +112,7 @@ class Trials:
         return found
 
 
-def said(tried: Tried) -> str:
+def said(tried: Evaluation) -> str:
     """What became of a value, in words."""
     if tried.share is not None:
         low, high = tried.share

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from orchestration.basics.errors import UsageError
 from orchestration.figures.palette import BLUE, GREY, ORANGE, RED
 from orchestration.figures.style import SCREEN, Style
-from orchestration.limits.evaluation import RELIABILITY, Tried
+from orchestration.limits.evaluation import RELIABILITY, Evaluation
 from orchestration.limits.found import Found
 from orchestration.results import display_names as labels
 from orchestration.results import quantities
@@ -87,7 +87,9 @@ def _shares(axes: Axes, found: Found, across: Quantity) -> None:
     axes.set(ylabel=f"share of {found.seeds} seeds that are good", ylim=(-0.05, 1.08))
 
 
-def _drawn(axes: Axes, tried: "list[Tried] | tuple[Tried, ...]", heights: list[float], across: Quantity) -> None:
+def _drawn(
+    axes: Axes, tried: "list[Evaluation] | tuple[Evaluation, ...]", heights: list[float], across: Quantity
+) -> None:
     """A mark a value: dots where all runs were good, crosses where not."""
     for good, mark, color, label in ((True, "o", BLUE, "good"), (False, "X", RED, "not good")):
         chosen = [i for i, one in enumerate(tried) if is_good(one) is good]
@@ -95,7 +97,7 @@ def _drawn(axes: Axes, tried: "list[Tried] | tuple[Tried, ...]", heights: list[f
         axes.plot(x, y, mark, color=color, markersize=6, label=label if chosen else None)
 
 
-def is_good(tried: Tried) -> bool:
+def is_good(tried: Evaluation) -> bool:
     """Whether all runs at a value were."""
     return tried.flew == tried.runs
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from orchestration.limits.evaluation import Tried
+from orchestration.limits.evaluation import Evaluation
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +61,7 @@ class Found:
     """Values tried above the limit that fly again."""
     continuous: Continuous | None
     """The same flight near continuous time; None: it was not asked for."""
-    tried: tuple[Tried, ...]
+    tried: tuple[Evaluation, ...]
     """All values that were flown, upward."""
     note: str
     """What the figures mean together, in a sentence."""

@@ -13,7 +13,7 @@ from orchestration.basics.terminal import say
 from orchestration.building.inputs import Files, files_of
 from orchestration.engines.engine import Engine
 from orchestration.engines.wiring import checked
-from orchestration.limits.evaluation import RELIABILITY, Trials, is_random, said
+from orchestration.limits.evaluation import RELIABILITY, Evaluator, is_random, said
 from orchestration.limits.found import Continuous, Found
 from orchestration.requests.ranges import Varied, range_asked_for
 from orchestration.results import html
@@ -118,7 +118,7 @@ def find(
     local = local_limits(varied, span)
     with of_share(progress, "longest search") as hear, Pool(files, workers, engine) as pool:
         tell = announce or (lambda line: None)
-        trials = Trials(varied, span, seeds, confidence if random else None, units[0], pool, tell, hear)
+        trials = Evaluator(varied, span, seeds, confidence if random else None, units[0], pool, tell, hear)
         values = span.values()
         bracket = first_failure(
             trials.fails, values, span.tolerance, parts=FINER, left=lambda left: trials.expect(left + BEYOND)
@@ -168,7 +168,7 @@ def as_text(found: Limit) -> dict[str, str]:
     return shown
 
 
-def _refuted(trials: Trials, bracket: Bracket | None, above: list[float]) -> float | None:
+def _refuted(trials: Evaluator, bracket: Bracket | None, above: list[float]) -> float | None:
     """The lowest value found at which it is refuted that `RELIABILITY` of the seeds fly."""
     if bracket is None:
         return None
@@ -189,7 +189,7 @@ def _flown(near: Request, pool: Pool) -> Continuous:
     return Continuous(period=CONTINUOUS, outcome=metrics["outcome"], settling_time=metrics["settling_time"])
 
 
-def _note(span: Range, bracket: Bracket | None, trials: Trials, refuted: float | None, found: Local) -> list[str]:
+def _note(span: Range, bracket: Bracket | None, trials: Evaluator, refuted: float | None, found: Local) -> list[str]:
     local = found.limit
     if bracket is None:
         parts = [f"good throughout the range, to {span.last:g}{span.unit}"]

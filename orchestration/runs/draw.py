@@ -11,7 +11,7 @@ from orchestration.figures.style import SCREEN, Style, style_named
 from orchestration.figures.views import VIEWS, view_of
 from orchestration.recording.recording import thinned
 from orchestration.runs.ran import Ran
-from orchestration.runs.run_labels import told_apart
+from orchestration.runs.run_labels import labels_of_runs
 
 MOST = 2**16
 """Rows that are drawn of the whole of a longer run, beside all in the window"""
@@ -42,7 +42,7 @@ def draw(
         if not any(name in each.names for each in VIEWS.values()):
             raise UsageError(f"--figure {name}: expected one of {', '.join(view.names)}")
     drawing = view.load()
-    told = names or told_apart(listed, [f"run {i + 1}" for i in range(len(listed))])
+    told = names or labels_of_runs(listed, [f"run {i + 1}" for i in range(len(listed))])
     runs = runs_of(listed, told, drawing.columns, window)
     with style.applied():
         made = {name: drawing.makers[name](runs, style) for name in view.names if which is None or name in which}
@@ -52,7 +52,7 @@ def draw(
 def figures_of(results: Sequence[Ran], which: Collection[str] | None, *, window: Window | None, style: str) -> Figures:
     """The figures of runs laid over each other; raises `UsageError` for a name of a figure or a style that is none."""
     chosen = style_named(style)
-    names = told_apart(results, [f"run {i + 1}" for i in range(len(results))])
+    names = labels_of_runs(results, [f"run {i + 1}" for i in range(len(results))])
     return Figures(draw(results, which, names=names, window=window, style=chosen), chosen)
 
 

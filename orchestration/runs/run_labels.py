@@ -19,7 +19,7 @@ MOST = 3
 _ABSENT = object()
 
 
-def told_apart(results: Sequence[Ran], otherwise: Sequence[str]) -> list[str]:
+def labels_of_runs(results: Sequence[Ran], otherwise: Sequence[str]) -> list[str]:
     """A name for each run, as in "period 10 ms, κ 0"; the names `otherwise` where settings do not tell them apart."""
     settings = [_settings(result) for result in results]
     paths = [path for path in dict.fromkeys(path for one in settings for path in one) if _differs(path, settings)]

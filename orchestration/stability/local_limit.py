@@ -10,7 +10,7 @@ from orchestration.requests.ranges import Varied
 from orchestration.stability.known_loops import LOOPS, Local
 from orchestration.stability.linearised_component import PULSE
 from orchestration.stability.monodromy import growth_of_loop
-from orchestration.stability.operating_point import NotAtRest
+from orchestration.stability.operating_point import NotAnEquilibriumError
 from orchestration.stability.perturbed_runs import growth_of
 from orchestration.system.model import System
 
@@ -43,7 +43,7 @@ def about_rest(at: Callable[[float], System], span: Range) -> Local:
     instances = Instances()
     try:
         return _through_saved_states(at, span, instances)
-    except NotAtRest as error:
+    except NotAnEquilibriumError as error:
         return Local(reason=f"no local limit: {error}")
     except (UsageError, SimulatorError) as error:
         why = str(error)

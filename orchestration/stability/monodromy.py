@@ -26,7 +26,7 @@ from orchestration.runs.simulation import Simulation, prepared
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
 from orchestration.stability.linearised_component import PULSE, Rest, Tangent
-from orchestration.stability.operating_point import calmed, common_period, exchanged, expect_rest, latest_offset
+from orchestration.stability.operating_point import common_period, deterministic, exchanged, expect_rest, latest_offset
 from orchestration.system.model import Component, Criterion, System, component_of, variable_of
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 
@@ -49,7 +49,7 @@ def growth_of_loop(system: System, instances: Instances, pulse: float = PULSE) -
 
     Raises `UsageError` where the system does not rest there, or cannot be put into a linear loop, saying why.
     """
-    calm = calmed(system)
+    calm = deterministic(system)
     period = _expect_period(calm)
     delay = max((exact_nanoseconds(x.delay) for x in calm.connections), default=Fraction(0))
     begin = latest_offset(calm) + (math.ceil(delay / period) + HELD) * period

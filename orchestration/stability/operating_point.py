@@ -19,11 +19,11 @@ TOGETHER = 20
 """longest periods, after which sampled components are due together again at the latest"""
 
 
-class NotAtRest(UsageError):
+class NotAnEquilibriumError(UsageError):
     """The operating point is none, whatever the method."""
 
 
-def calmed(system: System) -> System:
+def deterministic(system: System) -> System:
     """`system` at its operating point, punctual and without loss, noise, quantisation and objectives."""
     chosen = changed(system, system.operating_point)
     return replace(
@@ -91,8 +91,10 @@ def exchanged(system: System) -> Sequence[str]:
 
 
 def expect_rest(system: System, calm: Floats) -> None:
-    """Raise `NotAtRest` for a signal of `exchanged` that moves; rows a period apart, shape (n, signals)."""
+    """Raise `NotAnEquilibriumError` for a signal of `exchanged` that moves; rows a period apart, shape (n, signals)."""
     moved = np.abs(calm - calm[0]).max(axis=0) / np.maximum(1.0, np.abs(calm[0]))
     worst = int(moved.argmax())
     if moved[worst] > AT_REST:
-        raise NotAtRest(f"the operating point is not at rest: {exchanged(system)[worst]} moves by {moved[worst]:.2g}")
+        raise NotAnEquilibriumError(
+            f"the operating point is not at rest: {exchanged(system)[worst]} moves by {moved[worst]:.2g}"
+        )

@@ -23,8 +23,8 @@ from orchestration.fmi.instance import Instance, Loader
 from orchestration.fmi.reuse import Instances
 from orchestration.runs.simulation import prepared
 from orchestration.stability.operating_point import (
-    calmed,
     common_period,
+    deterministic,
     exchanged,
     expect_rest,
     latest_offset,
@@ -61,7 +61,7 @@ class Growth:
 
 def growth_of(system: System, instances: Instances) -> Growth:
     """The growth about the operating point of `system`; raises `UsageError` where the system does not rest there."""
-    nominal = calmed(system)
+    nominal = deterministic(system)
     period = common_period(nominal) or longest_period(nominal)
     horizon = max(exact_nanoseconds(nominal.stop_time), FEWEST * period)
     nominal = replace(nominal, stop_time=float(horizon) / NANOSECONDS)
@@ -135,12 +135,12 @@ def _striking(instances: Instances) -> Loader:
     @contextmanager
     def load(path: Path, instance_name: str) -> Iterator[Instance]:
         with instances.load(path, instance_name) as fmu:
-            yield cast(Instance, Struck(fmu))
+            yield cast(Instance, Pulsed(fmu))
 
     return load
 
 
-class Struck:
+class Pulsed:
     """An FMU whose Real inputs get a pulse on top until its first step is done."""
 
     def __init__(self, fmu: Instance) -> None:

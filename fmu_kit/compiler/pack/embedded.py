@@ -15,7 +15,7 @@ from fmu_kit import packaging
 from fmu_kit.bundle import PackagingError, Target
 from fmu_kit.compiler.emit.c_code import c_name, c_string
 from fmu_kit.compiler.emit.embedded_code import GROUPS, Words, comment, described, fields, functions, single_number
-from fmu_kit.compiler.emit.excerpt import excerpt
+from fmu_kit.compiler.emit.inlined_header import inlined_header
 from fmu_kit.compiler.emit.tables import start_of
 from fmu_kit.compiler.pack.building import modules_of
 from fmu_kit.compiler.passes.precomputing import precomputed
@@ -96,7 +96,7 @@ def files(program: Program, *, single: bool) -> tuple[str, str]:
     }
     source = {
         "includes": _INCLUDES[single],
-        "mathematics": excerpt(f"{model_functions} q_isfinite Q_ONE", single=single),
+        "mathematics": inlined_header(f"{model_functions} q_isfinite Q_ONE", single=single),
         "functions": model_functions,
         "inputs": inputs,
         "starts": _starts(program, single),

@@ -20,7 +20,7 @@ from orchestration.flight.names import FIGURES as FLIGHT
 from orchestration.flight.phase import surface
 from orchestration.flight.spectrum import welch
 from orchestration.runs.draw import draw
-from orchestration.runs.run_labels import told_apart
+from orchestration.runs.run_labels import labels_of_runs
 from quadcosim import Result, Scenario, UsageError
 
 TANK = Path(__file__).parents[3] / "examples" / "water_tank" / "system.toml"
@@ -87,9 +87,9 @@ def test_signals_of_any_fmus_have_their_descriptions_and_units(tank: Result) -> 
 
 def test_a_legend_tells_what_differs_between_runs(flight: Result, slow: Result) -> None:
     heavy = replace(flight, asked=flight.asked.with_changes(parameters={"plant.mass": 1.2}))  # type: ignore[attr-defined]
-    assert told_apart([flight, slow], ["a", "b"]) == ["period 10 ms", "period 30 ms"]
-    assert told_apart([flight, heavy], ["a", "b"]) == ["mass 1 kg", "mass 1.2 kg"]
-    assert told_apart([flight, flight], ["a", "b"]) == ["a", "b"]
+    assert labels_of_runs([flight, slow], ["a", "b"]) == ["period 10 ms", "period 30 ms"]
+    assert labels_of_runs([flight, heavy], ["a", "b"]) == ["mass 1 kg", "mass 1.2 kg"]
+    assert labels_of_runs([flight, flight], ["a", "b"]) == ["a", "b"]
     for name, figure in draw([flight, slow]).items():
         told = [[text.get_text() for text in legend.get_texts()] for legend in figure.legends]
         assert ["period 10 ms", "period 30 ms"] in told, name

@@ -15,7 +15,7 @@ from matplotlib.patches import Rectangle
 from orchestration.basics.statistics import wilson
 from orchestration.figures import cells
 from orchestration.limits import figure as limit_figure
-from orchestration.limits.evaluation import Tried
+from orchestration.limits.evaluation import Evaluation
 from orchestration.limits.figure import draw_limit
 from orchestration.limits.limit import Limit
 from orchestration.report.of_study import read, ways_of
@@ -267,7 +267,7 @@ def test_the_spectral_radius_is_drawn_with_the_limits_that_there_are(
 
 def limit(of: str, **others: Any) -> Limit:
     tried = tuple(
-        Tried(
+        Evaluation(
             value=value, outcome="settled", divergence_time=None, flew=int(value < 0.06), runs=1, share=None,
             measured=value if value < 0.09 else None,
         )
@@ -317,7 +317,7 @@ def test_a_limit_shows_each_value_that_was_tried_where_it_was_measured() -> None
 
 def test_a_limit_of_many_seeds_shows_their_share_and_how_well_it_is_known() -> None:
     tried = tuple(
-        Tried(value=v, outcome="settled", divergence_time=None, flew=n, runs=29, share=wilson(n, 29, 0.95))
+        Evaluation(value=v, outcome="settled", divergence_time=None, flew=n, runs=29, share=wilson(n, 29, 0.95))
         for v, n in ((0.1, 29), (0.2, 20))
     )
     figure = limit_figure.measured(limit("loss", unit=None, confidence=0.95, seeds=29, tried=tried))

@@ -13,7 +13,7 @@ from orchestration.workers.pool import Package
 from orchestration.workers.row import Row
 from orchestration.workers.task import Chunk, Outcome, Task
 from tests.orchestration.fmi.small import needs_compiler
-from tests.orchestration.studies.common import axis, study
+from tests.orchestration.studies.common import axis, short, study
 
 pytestmark = needs_compiler
 LENGTH = 5.0
@@ -23,8 +23,8 @@ Error = Callable[[Task, bool], float]
 
 @pytest.fixture
 def chosen() -> Study:
-    base = study(axis("timing.period", 0.01, 0.02)).base.with_changes(stop_time=LENGTH, parameters={"plant.mass": 1.1})
-    return replace(study(axis("timing.period", 0.01, 0.02)), base=base, native=True)
+    base = replace(short(), stop_time=LENGTH).with_changes(parameters={"plant.mass": 1.1})
+    return replace(study(axis("timing.period", 0.01, 0.02), base=base), native=True)
 
 
 def agreement(chosen: Study, error: Error) -> Agreement | None:

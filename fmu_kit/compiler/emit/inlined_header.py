@@ -29,7 +29,7 @@ class _Part:
     needs: frozenset[str]
 
 
-def excerpt(text: str, *, single: bool = False) -> str:
+def inlined_header(text: str, *, single: bool = False) -> str:
     """What the code in `text` uses, in the order of the headers, which is that of C; includes are left to the reader.
 
     `single`: in single precision, by the functions of libm.
