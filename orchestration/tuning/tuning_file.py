@@ -106,10 +106,10 @@ def gains_text(tuning: Tuning, best: Found, all_found: Sequence[Found], command:
     others = [one for one in all_found if one.period == best.period]
     lines = [
         f"Tuned for a period of {best.period:g} s by: {command}",
-        f"{best.evaluations} evaluations of the mean of ({tuning.cost}), {tuning.bad:g} where it diverges, over",
-        f"{tuning.starts.count} starts and {tuning.origin.stop_time:g} s; of {len(others)} searches the one that costs",
-        f"least on these: {best.cost:.5g}.",
-        *(f"Search {one.seed}: {one.judgement}." for one in others),
+        f"{best.evaluations} evaluations of the mean of ({tuning.cost}), {tuning.bad:g} where it diverges,",
+        f"over {tuning.starts.count} starts and {tuning.origin.stop_time:g} s.",
+        f"Of {len(others)} searches that of seed {best.seed} is taken: it costs least on these, {best.cost:.5g}.",
+        *(f"Seed {one.seed}: {one.judgement}." for one in others),
     ]
     tables: dict[str, dict[str, float]] = {}
     for target, value in best.values.items():
