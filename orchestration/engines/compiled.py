@@ -13,14 +13,14 @@ import numpy as np
 
 from orchestration.basics.errors import QuadcosimError, SimulatorError
 from orchestration.basics.simulator import Floats, Integers, Simulator
-from orchestration.engines import structures as c
 from orchestration.engines.board import Board
 from orchestration.engines.condition import Step
-from orchestration.engines.loop import library
+from orchestration.engines.loop import Operation, library
 from orchestration.engines.master import Diverged, Master, Terminated
 from orchestration.engines.memory import Memory
 from orchestration.engines.room import EVENTS, ROWS, Room, loop_in, private
 from orchestration.engines.sources import Values
+from orchestration.engines.structures import address, structures
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.fmi3 import Fmi3Instance
 from orchestration.fmi.native import NativeInstance
@@ -29,10 +29,11 @@ from orchestration.schedule.schedule import Schedule
 from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS
 
+c = structures(1)
+"""What C has of one run"""
 SLICE = 0.05
 """[s] that C may be away for, about"""
-AT_END, FULL, PAUSED, FAILED, REFUSED, STOPPED, OVER, NOT_FINITE, DIVERGED = range(9)
-"""Why it comes back"""
+_Look, _Stopped, _Collect = (dict(c.Loop._fields_)[name] for name in ("look", "stopped", "collect"))
 _EXACT = 2**53
 """Up to here a float holds every whole number"""
 
@@ -87,30 +88,30 @@ class CompiledMaster(Master):
         self._channel_table = (c.Channel * len(self._channels))(*map(self._channel_of, range(len(self._channels))))
         self._components = (c.Component * len(self._names))(*map(self._component_of, range(len(self._names))))
         begun: dict[str, Any] = {
-            "components": self._components,
-            "channels": self._channel_table,
-            "feeds": self._feed_table,
+            "components": ctypes.addressof(self._components),
+            "channels": ctypes.addressof(self._channel_table),
+            "feeds": ctypes.addressof(self._feed_table),
             "tasks": memory.indices(list(self._tasks)),
             "some_by_themselves": self._some_by_themselves,
             "settles": self._settling,
             "stop": self._stop,
-            "row": c.address(self.board.row),
-            "rows": c.address(self._row_table),
+            "row": address(self.board.row),
+            "rows": address(self._row_table),
             "width": len(self.board.columns),
             "stride": len(self.columns),
             "row_limit": len(self._row_table),
             "event_limit": self._most_events,
-            "look": c.Look(self._look_for_c),
-            "stopped": c.Stopped(self._stopped_for_c),
-            "collect": c.Collect(lambda index: memory.instances[index].collect_warnings()),
+            "look": _Look(self._look_for_c),
+            "stopped": _Stopped(self._stopped_for_c),
+            "collect": _Collect(lambda index: memory.instances[index].collect_warnings()),
             "calling": -1,
         }
         self._loop = loop_in(room)
         for name, value in begun.items():
             setattr(self._loop, name, value)
         if program is not None:
-            self._loop.condition = (c.Operation * len(program))(*(c.Operation(*step) for step in program))
-            self._loop.condition_length = len(program)
+            self._program = (Operation * len(program))(*(Operation(*step) for step in program))
+            self._loop.condition, self._loop.condition_length = ctypes.addressof(self._program), len(program)
 
     # -- a run ---------------------------------------------------------------------------------------------------
 
@@ -135,15 +136,15 @@ class CompiledMaster(Master):
         """Go through what is left of a schedule; whether the run is over if it stops before."""
         while self._position.at < len(schedule):
             code = self._slice(schedule)
-            if code == FULL:
+            if code == c.FULL:
                 self._hand_over()
-            elif code not in (AT_END, PAUSED):
+            elif code not in (c.AT_END, c.PAUSED):
                 self._fail(code)
             if self._interrupted() and self.now < self._stop:
                 self.interrupted_at = self.now
                 self._drop_later_events()
                 return True
-            if code == PAUSED:
+            if code == c.PAUSED:
                 return False
             if progress is not None:
                 progress(self.now / self._stop)
@@ -169,15 +170,15 @@ class CompiledMaster(Master):
     def _fail(self, code: int) -> None:
         """Raise what C has come back with."""
         index, part = self._loop.component, self._loop.failed
-        if code in (FAILED, REFUSED):
-            function, transfer = self._memory.calls[ctypes.addressof(part.contents)]
-            if code == FAILED:
+        if code in (c.FAILED, c.REFUSED):
+            function, transfer = self._memory.calls[part]
+            if code == c.FAILED:
                 raise self._memory.instances[index].failure(function)
             transfer()
-        elif code == NOT_FINITE:
+        elif code == c.NOT_FINITE:
             worked = self._bodies[index] if index in self._bodies else self._tasks[index]
             worked.expect_finite(self.now / NANOSECONDS)
-        elif code == OVER:
+        elif code == c.OVER:
             raise Terminated(self.termination)
         elif self._failure is not None:  # of what C has called in Python
             raise self._failure
@@ -231,7 +232,7 @@ class CompiledMaster(Master):
         table = np.frombuffer(rows, dtype=np.float64).reshape(-1, len(self.board.columns))
         self._row_table = self._new_row_table()
         self._row_table[: len(table), : table.shape[1]] = table
-        self._loop.rows, self._loop.row_count = c.address(self._row_table), len(table)
+        self._loop.rows, self._loop.row_count = address(self._row_table), len(table)
 
     def _keep_events(self, events: Integers) -> None:
         if len(events) > len(self._event_table):
@@ -248,8 +249,8 @@ class CompiledMaster(Master):
     def _share(self, schedule: Schedule) -> None:
         """All that a schedule needs goes to where C has it, from the next instant on."""
         loop, loop.at = self._loop, self._position.at
-        for name in c.SCHEDULE:
-            setattr(loop.schedule, name, c.address(getattr(schedule, name)))
+        for name, _ in c.Schedule._fields_:
+            setattr(loop.schedule, name, address(getattr(schedule, name)))
         self._make_room(schedule)
         self._share_sources(schedule.times[:-1] / NANOSECONDS)
         for index, body in self._bodies.items():
@@ -278,19 +279,19 @@ class CompiledMaster(Master):
             table[:count] = self._event_table[:count]
             self._event_table = table
         self._arrived_table: Integers = np.empty((most, 4), dtype=np.int64)
-        loop.events, loop.arrived = c.address(self._event_table), c.address(self._arrived_table)
+        loop.events, loop.arrived = address(self._event_table), address(self._arrived_table)
 
     def _share_sources(self, t: Floats) -> None:
         self._fed = [np.ascontiguousarray(feed.each(t), dtype=np.float64) for feed in self._feeds]
         for place, values in enumerate(self._fed):
-            self._feed_table[place].values = c.address(values)
+            self._feed_table[place].values = address(values)
         if self._watched:
             self._seen = np.ascontiguousarray(np.column_stack([values.over(t) for values in self._watched]))
-            self._loop.watched, self._loop.watched_size = c.address(self._seen), self._seen.shape[1]
+            self._loop.watched, self._loop.watched_size = address(self._seen), self._seen.shape[1]
 
     # -- how it is made ------------------------------------------------------------------------------------------
 
-    def _channel_of(self, index: int) -> c.Channel:
+    def _channel_of(self, index: int) -> Any:
         x = self._system.connections[index]
         places = [self.board.place[start] for start in x.start]
         receiver = self._names.index(x.receiver)
@@ -298,7 +299,7 @@ class CompiledMaster(Master):
         made.read_ahead = index in self._read_ahead
         return made
 
-    def _component_of(self, index: int) -> c.Component:
+    def _component_of(self, index: int) -> Any:
         name, memory = self._names[index], self._memory
         body, task = self._bodies.get(index), self._tasks.get(index)
         worked = body or task
@@ -310,37 +311,37 @@ class CompiledMaster(Master):
             made.ahead = memory.indices([self._channels.index(channel) for channel in body.ahead])
             made.behind = memory.indices([self._channels.index(channel) for channel in body.behind])
         if task is not None:
-            made.ratio, made.by_itself = task.ratio, task.by_itself
+            made.ratio, made.by_itself = memory.address(np.array([task.ratio])), task.by_itself
         return made
 
 
 class _OnTheirWay:
     """Messages and noise of one connection while C has them."""
 
-    def __init__(self, channel: Any, into: c.Channel, count: int, keys: list[int]) -> None:
+    def __init__(self, channel: Any, into: Any, count: int, keys: list[int]) -> None:
         """`count` messages take values, of which those with `keys` are kept until they arrive."""
         self._channel, self._into, self._size = channel, into, into.size
         self._keys = [*channel.in_flight, *keys]
         self._flight: Floats = np.empty((len(self._keys), self._size))
         for i, value in enumerate(channel.in_flight.values()):
             self._flight[i] = value
-        into.flight, into.first, into.last = c.address(self._flight), 0, len(channel.in_flight)
+        into.flight, into.first[0], into.last[0] = address(self._flight), 0, len(channel.in_flight)
         self._applied: Floats = np.zeros((2, self._size))
-        into.applied, into.applied_count = c.address(self._applied), len(channel.applied)
+        into.applied, into.applied_count[0] = address(self._applied), len(channel.applied)
         for i, (time, value) in enumerate(channel.applied):
             self._applied[i], into.applied_time[i] = value, time
         self._before = channel.stream.bit_generator.state if into.noisy else None
         self._noise: Floats = channel.stream.standard_normal((count if into.noisy else 0, self._size))
-        into.noise = c.address(self._noise)
+        into.noise[0] = address(self._noise)
 
     def take_back(self) -> None:
         """As if Python had done it."""
         channel, into = self._channel, self._into
-        channel.in_flight = {self._keys[i]: self._flight[i].copy() for i in range(into.first, into.last)}
+        channel.in_flight = {self._keys[i]: self._flight[i].copy() for i in range(into.first[0], into.last[0])}
         if into.extrapolates:
-            channel.applied = [(into.applied_time[i], self._applied[i].copy()) for i in range(into.applied_count)]
+            channel.applied = [(into.applied_time[i], self._applied[i].copy()) for i in range(into.applied_count[0])]
         if self._before is not None:
-            used = (into.noise - c.address(self._noise)) // (self._noise.itemsize * self._size)
+            used = (into.noise[0] - address(self._noise)) // (self._noise.itemsize * self._size)
             if used < len(self._noise):
                 channel.stream.bit_generator.state = self._before
                 channel.stream.standard_normal((used, self._size))

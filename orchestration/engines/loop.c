@@ -1,133 +1,27 @@
 /* The master's loop over instants, as orchestration/engines/master.py has it, to the bit: it steps FMUs through the
    arrays of a schedule and records rows and events. All memory is Python's, which also begins and ends a run, and says
-   what has failed in its own words. Structures are those of structures.py, field by field. */
+   what has failed in its own words. Structures are those of structures.h. */
 
 #include <fenv.h>
 #include <math.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
+
+#define QUADCOSIM_LANES 1
+#include "structures.h"
 
 #include "condition.h"
 
 #define NANOSECONDS 1e9
 #define WARNING 1 /* the worst status of a call that was done */
 
-enum { AT_END, FULL, PAUSED, FAILED, REFUSED, STOPPED, OVER, NOT_FINITE, DIVERGED };
 enum { SAMPLED, SENT, ARRIVED, LOST };
-enum { FLOAT64, FLOAT32, INT8, UINT8, INT16, UINT16, INT32, UINT32, INT64, UINT64, BOOLEAN8, BOOLEAN32 };
-
-typedef struct { /* one call that moves values of one type between an FMU and a buffer */
-    void *function, *fmu;
-    const uint32_t *references;
-    size_t count;
-    void *buffer;
-    size_t values;
-    const int64_t *asked, *places; /* NULL: the buffer is the array itself */
-    int64_t size;
-    int32_t type, counts_values;
-    double low, high; /* of a whole number */
-    int64_t component;
-} Part;
-
-typedef struct { /* the calls that move the values of one array */
-    const Part *parts;
-    int64_t count;
-    double *array;
-} Transfer;
-
-typedef struct {
-    const int64_t *items;
-    int64_t count;
-} List;
-
-typedef struct {
-    void *fmu, *step;
-    int32_t version, by_itself;
-    int32_t foreign, moved; /* whether it may change how numbers are rounded, and whether it has */
-    bool *event, *ends, *early; /* what an FMU of FMI 3 says of a step */
-    double *reached;
-    const int64_t *heard; /* how many messages of it wait */
-    Transfer read;
-    const double *outputs; /* connected ones, in the row */
-    int64_t connected;
-    List feeds, held, ahead, behind;
-    double ratio;
-    int64_t now; /* [ns] */
-} Component;
-
-typedef struct { /* a source at work on inputs of one component */
-    Transfer write;
-    const double *values; /* at each instant of the schedule */
-    int64_t size;
-} Feed;
-
-typedef struct {
-    Transfer write; /* its array is what the receiver has been told */
-    const double *row;
-    const int64_t *places; /* of what is sent, in the row */
-    int64_t size;
-    int32_t noisy, rounds, converts, extrapolates, read_ahead, unused;
-    const double *sigma, *noise; /* what is drawn, message by message */
-    const double *quantum;       /* 0: not rounded */
-    double scale, offset;
-    double *flight; /* messages on their way, in the order of sending, which is that of arrival */
-    int64_t first, last;
-    double *applied; /* the last two, of a first-order hold */
-    int64_t applied_count, applied_time[2];
-    double *value;
-} Channel;
-
-typedef struct {
-    int64_t connection, k, sent, arrival; /* arrival -1: lost */
-} Message;
-
-typedef struct {
-    int64_t component, next_time, received, sent, end; /* where its messages begin */
-} Due;
-
-typedef struct {
-    const int64_t *times; /* one more than there are instants */
-    const int64_t *halts_at, *halts, *posted_at, *measured_at, *arrivals_at, *dues_at;
-    const Message *posted, *measured, *arrivals, *exchanged;
-    const Due *dues;
-} Schedule;
-
-typedef struct {
-    Component *components;
-    Channel *channels;
-    const Feed *feeds;
-    List tasks; /* sampled components in the order of an instant */
-    int64_t some_by_themselves, settles;
-    Schedule schedule;
-    int64_t stop, pause_at; /* [ns] */
-    double *row, *rows;
-    int64_t width, stride, row_count, row_limit; /* in numbers; after the width come sources, which Python adds */
-    int64_t *events, *arrived; /* of `arrived` those of this instant, noted after what was sent at it */
-    int64_t event_count, event_limit, arrived_count;
-    int64_t at; /* the instant that comes next */
-    int64_t steps, now;
-    const Part *failed;
-    int64_t component; /* that failed, or whose output is not finite */
-    double end;        /* of its step [s] */
-    int64_t is_over;   /* with this instant: an FMU ends the run */
-    int (*look)(double t);
-    int (*stopped)(int status, int64_t until); /* whether a step that was not simply done leaves the instant undone */
-    void (*collect)(int64_t component);
-    const Operation *condition; /* NULL: ask `look` each time */
-    int64_t condition_length;
-    const double *watched; /* sources of the condition at each instant */
-    int64_t watched_size;
-    int64_t calling; /* the component whose FMU is called; -1: none */
-    int64_t mode;    /* how numbers are rounded in this run */
-    const fenv_t *environment;
-} Loop;
 
 typedef int Access(void *, const uint32_t *, size_t, void *);
 typedef int CountedAccess(void *, const uint32_t *, size_t, void *, size_t);
 typedef int Step2(void *, double, double, int);
 typedef int Step3(void *, double, double, bool, bool *, bool *, bool *, double *);
+
+EXPORT const Size sizes[] = {SIZES, SIZE_OF(Operation), {0}};
 
 /* -- what FMUs have in common --------------------------------------------------------------------------------------- */
 
@@ -163,7 +57,7 @@ static double from(const Part *part, int64_t i) {
     case UINT32: return ((const uint32_t *)b)[i];
     case INT64: return (double)((const int64_t *)b)[i];
     case UINT64: return (double)((const uint64_t *)b)[i];
-    case BOOLEAN8: return ((const bool *)b)[i];
+    case BOOL: return ((const bool *)b)[i];
     default: return ((const double *)b)[i];
     }
 }
@@ -180,7 +74,7 @@ static void into(const Part *part, int64_t i, double x) {
     case UINT32: ((uint32_t *)b)[i] = (uint32_t)x; break;
     case INT64: ((int64_t *)b)[i] = (int64_t)x; break;
     case UINT64: ((uint64_t *)b)[i] = (uint64_t)x; break;
-    case BOOLEAN8: ((bool *)b)[i] = x != 0.0; break;
+    case BOOL: ((bool *)b)[i] = x != 0.0; break;
     case BOOLEAN32: ((int32_t *)b)[i] = x != 0.0; break;
     default: ((double *)b)[i] = x;
     }
@@ -237,20 +131,20 @@ static int write_all(Loop *loop, const Transfer *transfer) {
 static void convert(const Channel *channel, double *value) {
     if (!channel->converts) return;
     for (int64_t i = 0; i < channel->size; i++) {
-        value[i] *= channel->scale;
-        value[i] += channel->offset;
+        value[i] *= *channel->scale;
+        value[i] += *channel->offset;
     }
 }
 
 static void skip(Channel *channel) {
-    if (channel->noisy) channel->noise += channel->size;
+    if (channel->noisy) channel->noise[0] += channel->size;
 }
 
 static void take(Channel *channel, double *value) {
-    for (int64_t i = 0; i < channel->size; i++) value[i] = channel->row[channel->places[i]];
+    for (int64_t i = 0; i < channel->size; i++) value[i] = channel->sender[channel->places[i]];
     if (channel->noisy)
         for (int64_t i = 0; i < channel->size; i++) {
-            double noise = channel->noise[i] * channel->sigma[i];
+            double noise = channel->noise[0][i] * channel->sigma[i];
             value[i] += noise;
         }
     skip(channel);
@@ -262,7 +156,7 @@ static void take(Channel *channel, double *value) {
 
 static int pass_on(Loop *loop, Channel *channel) {
     double *received = channel->write.array;
-    for (int64_t i = 0; i < channel->size; i++) received[i] = channel->row[channel->places[i]];
+    for (int64_t i = 0; i < channel->size; i++) received[i] = channel->sender[channel->places[i]];
     convert(channel, received);
     return write_all(loop, &channel->write);
 }
@@ -271,7 +165,7 @@ static int apply(Loop *loop, Channel *channel, const double *value, int64_t time
     int64_t n = channel->size;
     size_t bytes = (size_t)n * sizeof(double);
     if (channel->extrapolates) { /* of those before this time the last one stays */
-        int64_t count = channel->applied_count;
+        int64_t count = channel->applied_count[0];
         while (count > 0 && channel->applied_time[count - 1] >= time) count--;
         if (count > 1) {
             memmove(channel->applied, channel->applied + n, bytes);
@@ -280,14 +174,14 @@ static int apply(Loop *loop, Channel *channel, const double *value, int64_t time
         }
         memcpy(channel->applied + count * n, value, bytes);
         channel->applied_time[count] = time;
-        channel->applied_count = count + 1;
+        channel->applied_count[0] = count + 1;
     }
     memcpy(channel->write.array, value, bytes);
     return write_all(loop, &channel->write);
 }
 
 static int extrapolate(Loop *loop, Channel *channel, int64_t time) {
-    if (channel->applied_count < 2) return 0;
+    if (channel->applied_count[0] < 2) return 0;
     int64_t t0 = channel->applied_time[0], t1 = channel->applied_time[1], n = channel->size;
     if (t0 == t1 || time == t1) return 0;
     double share = (double)(time - t1) / (double)(t1 - t0);
@@ -312,11 +206,11 @@ static void dispatch(Channel *channel, int lost) {
     if (lost)
         skip(channel);
     else
-        take(channel, channel->flight + channel->size * channel->last++);
+        take(channel, channel->flight + channel->size * channel->last[0]++);
 }
 
 static int deliver(Loop *loop, Channel *channel, int64_t time) {
-    return apply(loop, channel, channel->flight + channel->size * channel->first++, time);
+    return apply(loop, channel, channel->flight + channel->size * channel->first[0]++, time);
 }
 
 static int extrapolate_each(Loop *loop, const List *held, int64_t time) {
@@ -424,7 +318,7 @@ static int step_task(Loop *loop, int64_t index, int64_t time, int64_t end) {
     Component *task = &loop->components[index];
     int64_t until = end < loop->stop ? end : loop->stop;
     double start = (double)time / NANOSECONDS, length = (double)(until - time) / NANOSECONDS;
-    int code = step(loop, index, task->ratio * start, task->ratio * length, until);
+    int code = step(loop, index, *task->ratio * start, *task->ratio * length, until);
     return code ? code : read_outputs(loop, index);
 }
 
@@ -536,7 +430,7 @@ static void record(Loop *loop, int64_t time) {
 }
 
 /* Pass through instants of the schedule up to `until`; the code says why it ended. */
-__attribute__((visibility("default"))) int fly(Loop *loop, int64_t until) {
+EXPORT int fly(Loop *loop, int64_t until) {
     fenv_t environment;
     fegetenv(&environment);
     loop->environment = &environment, loop->mode = mode(), loop->calling = -1;

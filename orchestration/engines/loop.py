@@ -8,9 +8,12 @@ from typing import Any
 from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
 from orchestration.basics.errors import QuadcosimError
 from orchestration.basics.libraries import kept
+from orchestration.engines.structures import HEADER, declared, expect_same_sizes, shared
 
-FILES = tuple(Path(__file__).with_name(name) for name in ("loop.c", "condition.h"))
+FILES = (*(Path(__file__).with_name(name) for name in ("loop.c", "condition.h")), HEADER)
 """What it is made of"""
+Operation: Any = declared(FILES[1].read_text(encoding="utf-8"))["Operation"]
+"""One step of a condition"""
 
 
 @functools.cache
@@ -19,9 +22,11 @@ def library() -> Any:
     sources = {path.name: path.read_bytes() for path in FILES}
     path = kept("loop", sources, OPTIONS, lambda: compiled_here(sources, "loop.c", mathematics="libm"))
     try:
-        fly = ctypes.CDLL(str(path)).fly
+        made = ctypes.CDLL(str(path))
     except OSError as error:
         raise QuadcosimError(str(error)) from error
+    expect_same_sizes(made, {**shared(1), "Operation": Operation})
+    fly = made.fly
     fly.restype = ctypes.c_int
     fly.argtypes = (ctypes.c_void_p, ctypes.c_int64)
     return fly

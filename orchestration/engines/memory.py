@@ -7,11 +7,14 @@ from typing import Any
 import numpy as np
 
 from orchestration.basics.simulator import Floats, Transfer
-from orchestration.engines import structures as c
 from orchestration.engines.channel import Channel, of_each
 from orchestration.engines.feeds import Feed
+from orchestration.engines.structures import address, structures
 from orchestration.fmi.native import Call, NativeInstance, bounds_of
 from orchestration.system.model import Connection
+
+c = structures(1)
+"""What C has of one run"""
 
 
 class Memory:
@@ -26,22 +29,22 @@ class Memory:
     def address(self, array: Any) -> int:
         """Where the values of an array are; it is kept."""
         self._kept.append(array)
-        return c.address(array)
+        return address(array)
 
-    def indices(self, items: Sequence[int]) -> c.List:
+    def indices(self, items: Sequence[int]) -> Any:
         """Indices for C."""
         return c.List(items=self.address(np.array(items, dtype=np.int64)), count=len(items))
 
-    def transfer(self, component: int, transfer: Transfer, array: Floats) -> c.Transfer:
+    def transfer(self, component: int, transfer: Transfer, array: Floats) -> Any:
         """The calls of a transfer between a component and an array."""
         calls = self.instances[component].calls_of(transfer)
         parts = (c.Part * len(calls))(*(self._part(component, call) for call in calls))
         self._kept.append(parts)
         for part, call in zip(parts, calls):
             self.calls[ctypes.addressof(part)] = (call.function, transfer)
-        return c.Transfer(parts=parts, count=len(calls), array=self.address(array))
+        return c.Transfer(parts=ctypes.addressof(parts), count=len(calls), array=self.address(array))
 
-    def component(self, index: int, read: Transfer, values: Floats, connected: int) -> c.Component:
+    def component(self, index: int, read: Transfer, values: Floats, connected: int) -> Any:
         """A component, but for what its place in the system says."""
         instance = self.instances[index]
         version = instance.model.version
@@ -60,15 +63,14 @@ class Memory:
             ends=ends,
             early=early,
             reached=reached,
-            ratio=1.0,
         )
 
-    def channel(self, x: Connection, channel: Channel, receiver: int, row: Floats, places: Sequence[int]) -> c.Channel:
+    def channel(self, x: Connection, channel: Channel, receiver: int, row: Floats, places: Sequence[int]) -> Any:
         """A connection, but for what is on its way."""
         sigma, quantum = of_each(x, x.noise), of_each(x, x.quantisation)
         return c.Channel(
             write=self.transfer(receiver, channel.write, channel.received),
-            row=self.address(row),
+            sender=self.address(row),
             places=self.address(np.array(places, dtype=np.int64)),
             size=len(places),
             noisy=bool(sigma.any()),
@@ -77,16 +79,16 @@ class Memory:
             extrapolates=x.hold == "first",
             sigma=self.address(sigma),
             quantum=self.address(quantum),
-            scale=x.scale,
-            offset=x.offset,
+            scale=self.address(np.array([x.scale])),
+            offset=self.address(np.array([x.offset])),
             value=self.address(np.zeros(len(places))),
         )
 
-    def feed(self, component: int, feed: Feed) -> c.Feed:
+    def feed(self, component: int, feed: Feed) -> Any:
         """A source at work."""
         return c.Feed(write=self.transfer(component, feed.transfer, feed.into), size=feed.size)
 
-    def _part(self, component: int, call: Call) -> c.Part:
+    def _part(self, component: int, call: Call) -> Any:
         instance, part = self.instances[component], call.part
         kind = "boolean32" if part.type == "Boolean" and part.buffer.dtype != bool else part.buffer.dtype.name
         low, high = bounds_of(part.buffer.dtype) if part.buffer.dtype.kind in "iu" else (0.0, 0.0)
@@ -100,7 +102,7 @@ class Memory:
             asked=None if call.in_place else self.address(part.asked.astype(np.int64)),
             places=None if call.in_place else self.address(part.places.astype(np.int64)),
             size=len(part.asked),
-            type=c.TYPES.index(kind),
+            type=getattr(c, kind.upper()),
             counts_values=instance.counts_values,
             low=low,
             high=high,

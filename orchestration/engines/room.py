@@ -4,13 +4,16 @@ import ctypes
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from orchestration.basics.simulator import Floats, Integers
-from orchestration.engines import structures as c
+from orchestration.engines.structures import structures
 
+c = structures(1)
+"""What C has of one run"""
 LOOP, ROWS, EVENTS = "loop", "rows", "events"
 Bytes = npt.NDArray[np.uint8]
 Room = Callable[[str, int], Bytes]
@@ -66,7 +69,7 @@ def left_in(folder: Path, columns: Sequence[str]) -> Left | None:
     )
 
 
-def loop_in(room: Room) -> c.Loop:
+def loop_in(room: Room) -> Any:
     """The structure of a run, in room of its own."""
     memory = room(LOOP, ctypes.sizeof(c.Loop))
     memory[:] = 0

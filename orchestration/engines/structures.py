@@ -1,10 +1,29 @@
-"""The structures of loop.c, field by field."""
+"""The structures that C and Python share: as structures.h declares them, which is read here."""
 
 import ctypes
-from ctypes import POINTER, Structure, c_double, c_int32, c_int64, c_size_t, c_void_p
-from typing import Any, ClassVar
+import functools
+import math
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy.typing as npt
+
+from orchestration.basics.errors import QuadcosimError
+
+HEADER = Path(__file__).with_name("structures.h")
+_SCALARS: Mapping[str, Any] = {
+    "int": ctypes.c_int, "int32_t": ctypes.c_int32, "int64_t": ctypes.c_int64, "uint64_t": ctypes.c_uint64,
+    "size_t": ctypes.c_size_t, "double": ctypes.c_double, "Lanes": ctypes.c_uint64, "void": None,
+}  # fmt: skip
+_STRUCTURE = re.compile(r"typedef struct \{(.*?)\} (\w+);", re.DOTALL)
+_CONSTANTS = re.compile(r"enum \{(.*?)\};", re.DOTALL)
+_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+_FUNCTION = re.compile(r"(\w+) \(\*(\w+)\)\((.*)\)")
+_FIELDS = re.compile(r"(?:const )?(\w+) (.*)", re.DOTALL)
+_FIELD = re.compile(r"(\**)(\w+)(?:\[(.*)\])?")
 
 
 def address(array: npt.NDArray[Any]) -> int:
@@ -12,101 +31,62 @@ def address(array: npt.NDArray[Any]) -> int:
     return int(array.ctypes.data)
 
 
-class Part(Structure):
-    """One call that moves values of one type between an FMU and a buffer."""
-
-    _fields_: ClassVar = [
-        *((name, c_void_p) for name in ("function", "fmu", "references")),
-        ("count", c_size_t), ("buffer", c_void_p), ("values", c_size_t), ("asked", c_void_p), ("places", c_void_p),
-        ("size", c_int64), ("type", c_int32), ("counts_values", c_int32), ("low", c_double), ("high", c_double),
-        ("component", c_int64),
-    ]  # fmt: skip
+@functools.cache
+def structures(lanes: int) -> Any:
+    """The structures and constants of structures.h for so many lanes, by name."""
+    return SimpleNamespace(**constants(HEADER.read_text(encoding="utf-8")), **shared(lanes))
 
 
-class Transfer(Structure):
-    """The calls that move the values of one array."""
-
-    _fields_: ClassVar = [("parts", POINTER(Part)), ("count", c_int64), ("array", c_void_p)]
-
-
-class List(Structure):
-    """Indices."""
-
-    _fields_: ClassVar = [("items", c_void_p), ("count", c_int64)]
+@functools.cache
+def shared(lanes: int) -> Mapping[str, Any]:
+    """The structures alone."""
+    return declared(HEADER.read_text(encoding="utf-8"), lanes)
 
 
-class Component(Structure):
-    """A component at work."""
-
-    _fields_: ClassVar = [
-        ("fmu", c_void_p), ("step", c_void_p), ("version", c_int32), ("by_itself", c_int32),
-        ("foreign", c_int32), ("moved", c_int32),
-        *((name, c_void_p) for name in ("event", "ends", "early", "reached", "heard")),
-        ("read", Transfer), ("outputs", c_void_p), ("connected", c_int64),
-        *((name, List) for name in ("feeds", "held", "ahead", "behind")),
-        ("ratio", c_double), ("now", c_int64),
-    ]  # fmt: skip
+def constants(text: str) -> dict[str, int]:
+    """What the enumerations in a text of C count, by name."""
+    found = (enumeration.split(",") for enumeration in _CONSTANTS.findall(_COMMENT.sub("", text)))
+    return {name.strip(): i for names in found for i, name in enumerate(names)}
 
 
-class Feed(Structure):
-    """A source at work on inputs of one component."""
-
-    _fields_: ClassVar = [("write", Transfer), ("values", c_void_p), ("size", c_int64)]
-
-
-class Channel(Structure):
-    """A connection at work."""
-
-    _fields_: ClassVar = [
-        ("write", Transfer), ("row", c_void_p), ("places", c_void_p), ("size", c_int64),
-        *((name, c_int32) for name in ("noisy", "rounds", "converts", "extrapolates", "read_ahead", "unused")),
-        *((name, c_void_p) for name in ("sigma", "noise", "quantum")),
-        ("scale", c_double), ("offset", c_double), ("flight", c_void_p), ("first", c_int64), ("last", c_int64),
-        ("applied", c_void_p), ("applied_count", c_int64), ("applied_time", c_int64 * 2), ("value", c_void_p),
-    ]  # fmt: skip
+def declared(text: str, lanes: int = 1) -> dict[str, Any]:
+    """The structures in a text of C, by name; those that it names in others stand above them."""
+    found: dict[str, Any] = {}
+    for body, name in _STRUCTURE.findall(_COMMENT.sub("", text)):
+        declarations = [part.strip() for part in body.split(";") if part.strip()]
+        fields = [field for declaration in declarations for field in _fields(declaration, found, lanes)]
+        found[name] = type(name, (ctypes.Structure,), {"_fields_": fields})
+    return found
 
 
-SCHEDULE = (
-    "times", "halts_at", "halts", "posted_at", "measured_at", "arrivals_at", "dues_at", "posted", "measured",
-    "arrivals", "exchanged", "dues",
-)  # fmt: skip
-"""Arrays of a `Schedule`, as loop.c has them in order"""
+def _fields(declaration: str, known: Mapping[str, Any], lanes: int) -> Iterator[tuple[str, Any]]:
+    """Names and types of what a declaration declares; a pointer is an address, whatever is there."""
+    types = {**_SCALARS, **known}
+    if function := _FUNCTION.fullmatch(declaration):
+        result, name, arguments = function.groups()
+        yield name, ctypes.CFUNCTYPE(types[result], *(types[each.strip()] for each in arguments.split(",")))
+        return
+    declarators = _FIELDS.fullmatch(declaration)
+    assert declarators is not None, declaration
+    for each in declarators[2].split(","):
+        field = _FIELD.fullmatch(each.strip())
+        assert field is not None, declaration
+        stars, name, count = field.groups()
+        kind = ctypes.c_void_p if stars else types[declarators[1]]
+        sizes = [lanes if size == "L" else int(size) for size in count.split(" * ")] if count else []
+        yield name, kind * math.prod(sizes) if sizes else kind
 
 
-class Schedule(Structure):
-    """What happens when."""
-
-    _fields_: ClassVar = [(name, c_void_p) for name in SCHEDULE]
-
-
-class Operation(Structure):
-    """One step of a condition."""
-
-    _fields_: ClassVar = [("code", c_int64), ("operands", c_int64), ("number", c_double)]
-
-
-Look: Any = ctypes.CFUNCTYPE(ctypes.c_int, c_double)
-Stopped: Any = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_int, c_int64)
-Collect: Any = ctypes.CFUNCTYPE(None, c_int64)
-
-
-class Loop(Structure):
-    """A run."""
-
-    _fields_: ClassVar = [
-        ("components", POINTER(Component)), ("channels", POINTER(Channel)), ("feeds", POINTER(Feed)), ("tasks", List),
-        ("some_by_themselves", c_int64), ("settles", c_int64), ("schedule", Schedule), ("stop", c_int64),
-        ("pause_at", c_int64), ("row", c_void_p), ("rows", c_void_p), ("width", c_int64), ("stride", c_int64),
-        ("row_count", c_int64), ("row_limit", c_int64), ("events", c_void_p), ("arrived", c_void_p),
-        ("event_count", c_int64), ("event_limit", c_int64), ("arrived_count", c_int64), ("at", c_int64),
-        ("steps", c_int64), ("now", c_int64), ("failed", POINTER(Part)), ("component", c_int64), ("end", c_double),
-        ("is_over", c_int64), ("look", Look), ("stopped", Stopped), ("collect", Collect),
-        ("condition", POINTER(Operation)), ("condition_length", c_int64), ("watched", c_void_p),
-        ("watched_size", c_int64), ("calling", c_int64), ("mode", c_int64), ("environment", c_void_p),
-    ]  # fmt: skip
-
-
-TYPES = (
-    "float64", "float32", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "bool", "boolean32",
-)  # fmt: skip
-"""What a buffer holds, as loop.c counts them"""
+def expect_same_sizes(library: ctypes.CDLL, types: Mapping[str, Any]) -> None:
+    """Raise `QuadcosimError` naming the first of `types` that a library has with another size, or does not have."""
+    size = structures(1).Size
+    found, place = {}, ctypes.addressof(size.in_dll(library, "sizes"))
+    while (each := size.from_address(place)).name:
+        found[ctypes.string_at(each.name).decode()] = each.size
+        place += ctypes.sizeof(size)
+    for name, structure in types.items():
+        if found.get(name) != ctypes.sizeof(structure):
+            raise QuadcosimError(
+                f"structures.h: {name} has {found.get(name, 'no')} bytes in C: expected {ctypes.sizeof(structure)}, as "
+                "in Python"
+            )

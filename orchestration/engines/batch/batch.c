@@ -8,108 +8,14 @@
 #include <stdlib.h>
 
 #include "sizes.h"
+#include "structures.h"
 
-#define L QUADCOSIM_LANES
-#define FULL (L == 64 ? ~(uint64_t)0 : (((uint64_t)1 << (L & 63)) - 1))
+#define EVERY (L == 64 ? ~(uint64_t)0 : (((uint64_t)1 << (L & 63)) - 1))
 #define NANOSECONDS 1e9
-#define EXPORT __attribute__((visibility("default")))
-
-typedef uint64_t Lanes; /* a bit for each */
-enum { ALL_ENDED, NEXT_WINDOW, NO_MEMORY };
-enum { FLYING, STATUS, NOT_FINITE, DIVERGED, REFUSED }; /* what has become of a run */
-enum { REAL, TRUTH, WHOLE };
-
-typedef struct {
-    const int64_t *items;
-    int64_t count;
-} List;
-
-typedef struct {
-    int64_t source, place;
-} Fed;
 
 typedef void Step(double *, const uint64_t *, const double *, const double *, int32_t *);
 
-typedef struct {
-    Step *step;
-    double *memory;
-    const int64_t *outputs; /* places of those that are connected */
-    int64_t connected;
-    const Fed *fed;
-    int64_t fed_count;
-    List held, ahead, behind;
-    const double *ratio; /* of the lanes */
-    int64_t by_itself, settles;
-} Component;
-
-typedef struct {
-    const double *sender;
-    double *receiver;
-    const int64_t *from, *to; /* places */
-    int64_t size;
-    const int64_t *kinds; /* of what is received */
-    const double *low, *high;
-    int32_t noisy, rounds, converts, extrapolates, read_ahead, plain, as_they_are, unused; /* the last but one: into Reals */
-    const double *sigma, *quantum, *scale, *offset; /* of each lane, the first two of each variable too */
-    const double *noise[L];                         /* what is drawn, message by message */
-    double *value;                                  /* of the message at hand */
-    double *flight;                                 /* messages on their way, a ring */
-    int64_t capacity, first[L], last[L];
-    double *applied; /* the last two, of a first-order hold */
-    int64_t applied_count[L], applied_time[2 * L];
-} Channel;
-
-typedef struct {
-    int64_t connection, k, sent, arrival; /* arrival -1: lost */
-} Message;
-
-typedef struct {
-    int64_t component, next_time, received, sent, end;
-} Due;
-
-typedef struct {
-    const int64_t *times;
-    const int64_t *halts_at, *halts, *posted_at, *measured_at, *arrivals_at, *dues_at;
-    const Message *posted, *measured, *arrivals, *exchanged;
-    const Due *dues;
-} Schedule;
-
-typedef struct {
-    Schedule schedule;
-    int64_t count, at, last_window; /* instants of this window, the next of them, whether it is the last one */
-    Lanes lanes;
-    int64_t stop;            /* [ns] */
-    int64_t *now;            /* [ns] of each component */
-    const double *seen[L];   /* sources as objectives see them, and as inputs get them, at each instant */
-    const double *given[L];
-    int64_t one_for_all, unused; /* whether these are the same for all lanes */
-} Track;
-
-typedef struct {
-    double *values;
-    int64_t count, capacity;
-} Kept;
-
-typedef struct {
-    Component *components;
-    int64_t component_count;
-    Channel *channels;
-    int64_t channel_count;
-    List bodies, tasks; /* in the order of an instant */
-    Track *tracks;
-    int64_t track_count, track;
-    Lanes alive, full;
-    int64_t seen_count, given_count;
-    double *seen, *given, *state, *constants, *numbers;
-    Lanes doubtful; /* in which a value was not a number */
-    Kept *kept;
-    int64_t fate[L], fate_component[L], fate_time[L], steps[L];
-    int32_t *status;
-    int64_t recorded_count, record_limit; /* columns that are kept row by row, for who wants to see them */
-    const double **recorded;
-    double *records[L];
-    int64_t record_counts[L];
-} Batch;
+EXPORT const Size sizes[] = {SIZES, {0}};
 
 /* What one instant is to some lanes, gathered from the tracks that pass through one now. */
 typedef struct {
@@ -200,7 +106,7 @@ static void skip(Channel *c, Lanes lanes) {
 
 static void take(Channel *c, Lanes lanes) {
     for (int64_t i = 0; i < c->size; i++) {
-        q_real x = READ(c->sender, c->from[i]);
+        q_real x = READ(c->sender, c->places[i]);
         if (c->noisy) {
             q_real noise = q_all(0.0);
             EACH(lane, lanes) noise[lane] = c->noise[lane][i];
@@ -218,27 +124,27 @@ static void take(Channel *c, Lanes lanes) {
 
 /* Set the receiver's inputs; a value that it cannot be set to is for the FMU itself to refuse. */
 static void set(Batch *b, Channel *c, Lanes lanes, const double *value, const int64_t *time) {
-    if (lanes == FULL && c->as_they_are) {
-        for (int64_t i = 0; i < c->size; i++) AT(c->receiver, c->to[i]) = READ(value, i);
+    if (lanes == EVERY && c->into.as_they_are) {
+        for (int64_t i = 0; i < c->size; i++) AT(c->into.memory, c->into.places[i]) = READ(value, i);
         return;
     }
     q_mask mask = mask_of(lanes), wrong = q_known(0);
     for (int64_t i = 0; i < c->size; i++) {
         q_real x = READ(value, i);
-        if (c->kinds[i] == TRUTH) x = TRUE(q_ne(x, 0.0));
-        if (c->kinds[i] == WHOLE) {
+        if (c->into.kinds[i] == TRUTH) x = TRUE(q_ne(x, 0.0));
+        if (c->into.kinds[i] == WHOLE) {
             x = q_round(x);
-            wrong |= q_not(q_ge(x, c->low[i]) & q_le(x, c->high[i]));
-        } else if (!c->plain)
+            wrong |= q_not(q_ge(x, c->into.low[i]) & q_le(x, c->into.high[i]));
+        } else if (!c->into.plain)
             wrong |= q_not(q_isfinite(x));
-        AT(c->receiver, c->to[i]) = q_select(mask, x, READ(c->receiver, c->to[i]));
+        AT(c->into.memory, c->into.places[i]) = q_select(mask, x, READ(c->into.memory, c->into.places[i]));
     }
     wrong &= mask;
     if (q_any(wrong)) end_some(b, lanes_of(wrong), REFUSED, 0, time);
 }
 
 static void pass_on(Batch *b, Channel *c, Lanes lanes, const int64_t *time) {
-    for (int64_t i = 0; i < c->size; i++) AT(c->value, i) = converted(c, READ(c->sender, c->from[i]));
+    for (int64_t i = 0; i < c->size; i++) AT(c->value, i) = converted(c, READ(c->sender, c->places[i]));
     set(b, c, lanes, c->value, time);
 }
 
@@ -277,7 +183,7 @@ static void extrapolate(Batch *b, Channel *c, Lanes lanes, const int64_t *time) 
 
 static int dispatch(Channel *c, Lanes lanes) {
     int64_t some = __builtin_ctzll(lanes), slot = c->last[some];
-    int together = lanes == FULL;
+    int together = lanes == EVERY;
     take(c, lanes);
     EACH(lane, lanes) {
         if (c->last[lane] - c->first[lane] == c->capacity && !grow(c)) return 0;
@@ -296,7 +202,7 @@ static int dispatch(Channel *c, Lanes lanes) {
 static void deliver(Batch *b, Channel *c, Lanes lanes, const int64_t *time) {
     if (!lanes) return;
     int64_t slot = c->first[__builtin_ctzll(lanes)];
-    int together = lanes == FULL;
+    int together = lanes == EVERY;
     EACH(lane, lanes) together &= c->first[lane]++ == slot;
     if (together) {
         apply(b, c, lanes, c->flight + (slot & (c->capacity - 1)) * c->size * L, time);
@@ -313,7 +219,7 @@ static void deliver(Batch *b, Channel *c, Lanes lanes, const int64_t *time) {
 static void expect_finite(Batch *b, int64_t index, Lanes lanes, const int64_t *time) {
     const Component *c = &b->components[index];
     const double *memory = c->memory;
-    const int64_t *outputs = c->outputs, count = c->connected;
+    const int64_t *outputs = c->places, count = c->connected;
     q_real none = q_all(0.0), other = q_all(0.0), third = q_all(0.0);
     int64_t i = 0;
     for (; i + 2 < count; i += 3) { /* three sums at once take a third of the time */
@@ -332,12 +238,12 @@ static void advance(Batch *b, int64_t index, Lanes lanes, q_real start, q_real l
     const Component *c = &b->components[index];
     q_bits active = bits_of(lanes);
     int32_t any = 0;
-    c->step(c->memory, (const uint64_t *)&active, (const double *)&start, (const double *)&length, b->status);
+    ((Step *)c->step)(c->memory, (const uint64_t *)&active, (const double *)&start, (const double *)&length, b->status);
     for (int lane = 0; lane < L; lane++) any |= b->status[lane];
     if (any) {
         Lanes failed = 0;
         EACH(lane, lanes) failed |= (Lanes)(b->status[lane] != 0) << lane;
-        end_some(b, failed, STATUS, index, time);
+        end_some(b, failed, FAILED, index, time);
         memset(b->status, 0, L * sizeof *b->status);
     }
     expect_finite(b, index, lanes & b->alive, time);
@@ -378,7 +284,7 @@ static void gather(Batch *b, Instant *now, Lanes moving) {
         Lanes lanes = track->lanes & b->alive;
         now->lanes |= lanes;
         now->t = q_select(mask_of(lanes), q_all((double)time / NANOSECONDS), now->t);
-        if (lanes == FULL)
+        if (lanes == EVERY)
             for (int lane = 0; lane < L; lane++) now->time[lane] = time;
         else
             EACH(lane, lanes) now->time[lane] = time;
@@ -650,7 +556,7 @@ EXPORT int fly(Batch *b) {
             setting_out |= (Lanes)(time_of(track) == 0) << i;
             sampling |= (Lanes)samples_next(track) << i;
         }
-        if (!flying) return ALL_ENDED;
+        if (!flying) return AT_END;
         Lanes moving = setting_out ? setting_out : flying & ~sampling ? flying & ~sampling : flying;
         if (!pass(b, &now, moving)) return NO_MEMORY;
         TRACKS(track, moving) track->at++;

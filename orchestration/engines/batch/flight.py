@@ -10,10 +10,10 @@ import numpy.typing as npt
 
 from orchestration.basics.errors import QuadcosimError
 from orchestration.basics.simulator import Floats
-from orchestration.engines.batch import structures as c
 from orchestration.engines.batch.shape import Ends, Shape, changes_of, ends_of
 from orchestration.engines.master import CONVERGED, SWEEPS
 from orchestration.engines.sources import Values
+from orchestration.engines.structures import address, structures
 from orchestration.engines.wiring import source_values
 from orchestration.expressions.recorded import STOP_TIME
 from orchestration.expressions.syntax import Call
@@ -28,9 +28,6 @@ from orchestration.system.times import NANOSECONDS, nanoseconds
 
 Integers = npt.NDArray[np.int64]
 Lanes = npt.NDArray[np.bool_]
-ALL_ENDED, NEXT_WINDOW, NO_MEMORY = range(3)
-FLYING, STATUS, NOT_FINITE, DIVERGED, REFUSED = range(5)
-"""What has become of a run"""
 _SAID = 64
 """Windows for which values of sources are kept"""
 
@@ -99,31 +96,30 @@ class Batch:
         self.memories = [self._array(kernel.lanes.places) for kernel in kernels]
         """of the components, shape (places, lanes)"""
         self._ends: list[Ends] = [ends_of(shape, x) for x in shape.system.connections]
-        self._channel_type = c.channel_of(self._lanes)
-        self._track_type = c.track_of(self._lanes)
+        self._c = c = structures(self._lanes)
         connections = shape.system.connections
         self._of_channels = [self._arrays_of(len(x.start)) for x in connections]
-        self._channels = (self._channel_type * max(1, len(connections)))(*map(self._channel, range(len(connections))))
+        self._channels = (c.Channel * max(1, len(connections)))(*map(self._channel, range(len(connections))))
         self._ratios = [self._array(1) for _ in kernels]
         self._begins: list[Floats] = [np.zeros(self._lanes) for _ in kernels]
         self._components = (c.Component * len(kernels))(*map(self._component, range(len(kernels))))
-        self._tracks = (self._track_type * self._lanes)()
+        self._tracks = (c.Track * self._lanes)()
         seen, fed = sum(map(len, shape.seen.values())), sum(len(s.to) for s in shape.system.sources.values())
         self._given_count = fed if shape.fed_changes else 0
         self._state = self._array(len(self._written.states))
         self._numbers = self._array(len(shape.numbers) + 1 + len(shape.inner))
         self._status = np.zeros(self._lanes, dtype=np.int32)
         self._kept = (c.Kept * max(1, len(self._written.folds.kept)))()
-        self._batch: Any = c.batch_of(self._lanes, self._channel_type, self._track_type)(
-            components=self._components, component_count=len(kernels), channels=self._channels,
-            channel_count=len(connections),
+        self._batch: Any = c.Batch(
+            components=ctypes.addressof(self._components), component_count=len(kernels),
+            channels=ctypes.addressof(self._channels), channel_count=len(connections),
             bodies=self._indices([shape.names.index(name) for name in shape.plan.continuous]),
             tasks=self._indices([shape.names.index(name) for name in shape.plan.sampled]),
-            tracks=self._tracks, seen_count=seen, given_count=self._given_count,
-            seen=c.address(self._array(seen)), given=c.address(self._array(self._given_count)),
-            state=c.address(self._state), constants=c.address(self._array(len(self._written.folds.writer.constants))),
-            numbers=c.address(self._numbers), kept=self._kept,
-            status=c.address(self._status),
+            tracks=ctypes.addressof(self._tracks), seen_count=seen, given_count=self._given_count,
+            seen=address(self._array(seen)), given=address(self._array(self._given_count)),
+            state=address(self._state), constants=address(self._array(len(self._written.folds.writer.constants))),
+            numbers=address(self._numbers), kept=ctypes.addressof(self._kept),
+            status=address(self._status),
         )  # fmt: skip
 
     def __del__(self) -> None:
@@ -158,7 +154,7 @@ class Batch:
         self._put_values(systems, known)
         wrong = self._initialise(runs)
         for lane in np.flatnonzero(wrong[:count]).tolist():
-            batch.fate[lane] = REFUSED
+            batch.fate[lane] = self._c.REFUSED
             batch.alive &= ~(1 << lane)
         tracks = self._tracks_of(runs, timings)
         recorded = self._record(record, tracks)
@@ -170,9 +166,9 @@ class Batch:
         batch.track_count = len(tracks)
         for i in range(len(tracks)):
             self._next_window(i, tracks[i], runs)
-        while (code := self._library.fly(ctypes.addressof(batch))) == NEXT_WINDOW:
+        while (code := self._library.fly(ctypes.addressof(batch))) == self._c.NEXT_WINDOW:
             self._next_window(batch.track, tracks[batch.track], runs)
-        if code == NO_MEMORY:
+        if code == self._c.NO_MEMORY:
             raise QuadcosimError("a batch of runs: expected memory for the messages that are on their way")
 
     def _landed(self, systems: Sequence[System], recorded: Sequence[Floats]) -> Landed:
@@ -201,7 +197,7 @@ class Batch:
         floor, none = combined(call.arguments[1], values, numbers, count)
         floors, found = self._array(1), self._array(1)
         floors[0, :count] = np.where(none, np.nan, floor)
-        self._library.grown(ctypes.addressof(batch), folds.kept[own], c.address(floors), c.address(found))
+        self._library.grown(ctypes.addressof(batch), folds.kept[own], address(floors), address(found))
         steps = self._state[folds.steps[own], :count]
         share: Floats = np.where((steps > 0) & ~none, found[0, :count] / np.where(steps > 0, steps, np.nan), np.nan)
         return share
@@ -252,7 +248,7 @@ class Batch:
         shape = self._shape
         for index, (name, kernel) in enumerate(shape.kernels.items()):
             memory, variables = self.memories[index], shape.models[name].variables
-            kernel.lanes.begin(c.address(memory))
+            kernel.lanes.begin(address(memory))
             for lane, system in enumerate(systems):
                 component = system.components[name]
                 for parameter, value in component.parameters.items():
@@ -354,7 +350,7 @@ class Batch:
         status = np.zeros(self._lanes, dtype=np.int32)
         kernel = self._shape.kernels[self._shape.names[index]]
         kernel.lanes.initialise(
-            c.address(self.memories[index]), c.address(active), c.address(start), c.address(status)
+            address(self.memories[index]), address(active), address(start), address(status)
         )  # fmt: skip
         failed: Lanes = status != 0
         return failed
@@ -389,7 +385,7 @@ class Batch:
         into = self._tracks[number]
         if track.window is None:
             track.now = np.zeros(len(self._shape.names), dtype=np.int64)
-            into.now, into.lanes = c.address(track.now), sum(1 << lane for lane in track.lanes)
+            into.now, into.lanes = address(track.now), sum(1 << lane for lane in track.lanes)
             into.stop = nanoseconds(runs[track.lanes[0]].system.stop_time)
         window = track.window = track.ahead
         into.at, into.last_window = 0, 0
@@ -398,14 +394,14 @@ class Batch:
             return
         track.ahead = next(track.windows, None)
         into.count, into.last_window = len(window), track.ahead is None
-        for name in c.SCHEDULE:
-            setattr(into.schedule, name, c.address(getattr(window, name)))
+        for name, _ in self._c.Schedule._fields_:
+            setattr(into.schedule, name, address(getattr(window, name)))
         t = window.times[:-1] / NANOSECONDS
         into.one_for_all = track.alike
         for lane in track.lanes[:1] if track.alike else track.lanes:
             run = runs[lane]
             run.arrays = list(self._values_over(run, t, track, window))
-            into.seen[lane], into.given[lane] = map(c.address, run.arrays)
+            into.seen[lane], into.given[lane] = map(address, run.arrays)
         for lane in track.lanes:
             self._draw_noise(lane, runs[lane], window)
 
@@ -426,7 +422,7 @@ class Batch:
             count, _ = window.of(i, self._table(i))
             noise = stream.standard_normal((count, len(self._ends[i].start)))
             run.arrays.append(noise)
-            self._channels[i].noise[lane] = c.address(noise)
+            self._channels[i].noise[lane] = address(noise)
 
     def _table(self, index: int) -> str:
         """Where a schedule has the messages of a connection, each when it takes its values."""
@@ -442,12 +438,12 @@ class Batch:
             return []
         places = [self._shape.place(column) for column in columns]
         self._recorded = np.array(
-            [c.address(self.memories[i]) + 8 * self._lanes * place for i, place in places], dtype=np.int64
+            [address(self.memories[i]) + 8 * self._lanes * place for i, place in places], dtype=np.int64
         )
-        batch.recorded, batch.record_limit = c.address(self._recorded), 2**20
+        batch.recorded, batch.record_limit = address(self._recorded), 2**20
         rows = [np.empty((2**20, len(columns) + 1)) for _ in range(sum(len(track.lanes) for track in tracks))]
         for lane, table in enumerate(rows):
-            batch.records[lane] = c.address(table)
+            batch.records[lane] = address(table)
         return rows
 
     # -- how it is made --------------------------------------------------------------------------------------------
@@ -459,10 +455,10 @@ class Batch:
         self._kept_arrays.append(whole)
         return whole[first : first + max(count, 1) * self._lanes].reshape(-1, self._lanes)[: max(count, 1)]
 
-    def _indices(self, indices: Sequence[int]) -> c.List:
+    def _indices(self, indices: Sequence[int]) -> Any:
         array = np.array(indices, dtype=np.int64)
         self._kept_arrays.append(array)
-        return c.List(items=c.address(array), count=len(array))
+        return self._c.List(items=address(array), count=len(array))
 
     def _arrays_of(self, size: int) -> dict[str, Floats]:
         found = {name: self._array(size) for name in ("sigma", "quantum", "value")}
@@ -472,25 +468,27 @@ class Batch:
         x, ends, arrays = self._shape.system.connections[i], self._ends[i], self._of_channels[i]
         sigma, quantum = changes_of(x)
         names, converts = self._shape.names, x.converts
-        return self._channel_type(
-            sender=c.address(self.memories[names.index(x.sender)]),
-            receiver=c.address(self.memories[names.index(x.receiver)]),
-            from_=c.address(ends.start), to=c.address(ends.end), size=len(ends.start), kinds=c.address(ends.kinds),
-            low=c.address(ends.low), high=c.address(ends.high), noisy=bool(sigma.any()), rounds=bool(quantum.any()),
+        return self._c.Channel(
+            sender=address(self.memories[names.index(x.sender)]),
+            into=self._c.Inputs(
+                memory=address(self.memories[names.index(x.receiver)]), places=address(ends.end),
+                kinds=address(ends.kinds), low=address(ends.low), high=address(ends.high),
+                plain=not converts and x.hold == "zero",
+                as_they_are=not converts and x.hold == "zero" and not ends.kinds.any(),
+            ),
+            places=address(ends.start), size=len(ends.start), noisy=bool(sigma.any()), rounds=bool(quantum.any()),
             converts=converts, extrapolates=x.hold == "first", read_ahead=i in self._shape.plan.read_ahead,
-            plain=not converts and x.hold == "zero",
-            as_they_are=not converts and x.hold == "zero" and not ends.kinds.any(),
-            **{name: c.address(arrays[name]) for name in ("sigma", "quantum", "scale", "offset", "value", "applied")},
+            **{name: address(arrays[name]) for name in ("sigma", "quantum", "scale", "offset", "value", "applied")},
         )  # fmt: skip
 
-    def _component(self, index: int) -> c.Component:
+    def _component(self, index: int) -> Any:
         shape, name = self._shape, self._shape.names[index]
         connections, plan = shape.system.connections, shape.plan
         outputs = [shape.place(f"{name}.{output}")[1] for output in shape.board.outputs[name]]
         outputs = outputs[: shape.board.connected[name]]
         places = np.array(outputs, dtype=np.int64)
         changing = shape.fed[name] if shape.fed_changes else []
-        fed = (c.Fed * max(1, len(changing)))(*(c.Fed(source=s, place=p) for s, p in changing))
+        fed = (self._c.Fed * max(1, len(changing)))(*(self._c.Fed(source=s, place=p) for s, p in changing))
         wires = [i for i in plan.wires if connections[i].receiver == name]
         order = list(plan.continuous)
         ahead = [
@@ -501,9 +499,9 @@ class Batch:
         behind = [i for i in wires if i not in ahead]
         sampling = shape.system.components[name].sampling
         self._kept_arrays += [places, fed]
-        return c.Component(
-            step=shape.kernels[name].step, memory=c.address(self.memories[index]), outputs=c.address(places),
+        return self._c.Component(
+            step=shape.kernels[name].step, memory=address(self.memories[index]), places=address(places),
             connected=len(places), fed=ctypes.addressof(fed), fed_count=len(changing), held=self._indices(held),
-            ahead=self._indices(ahead), behind=self._indices(behind), ratio=c.address(self._ratios[index]),
+            ahead=self._indices(ahead), behind=self._indices(behind), ratio=address(self._ratios[index]),
             by_itself=sampling is not None and sampling.clock == "fmu", settles=bool(held or behind or changing),
         )  # fmt: skip

@@ -8,9 +8,10 @@ import numpy as np
 
 from orchestration.basics.simulator import Floats
 from orchestration.engines.batch.combining import combined
-from orchestration.engines.batch.flight import DIVERGED, FLYING, Batch, Landed
+from orchestration.engines.batch.flight import Batch, Landed
 from orchestration.engines.batch.kernels import lanes_here
 from orchestration.engines.batch.shape import Shape, outline
+from orchestration.engines.structures import structures
 from orchestration.engines.watch import watch
 from orchestration.engines.wiring import checked, source_values
 from orchestration.fmi.model import read_model
@@ -89,13 +90,13 @@ def _groups(indices: Sequence[int], timings: Mapping[int, Hashable], lanes: int)
 
 
 def _told(shape: Shape, batch: Batch, landed: Landed, systems: Sequence[System]) -> Iterator[Flown | None]:
-    count = len(systems)
+    count, c = len(systems), structures(shape.lanes)
     numbers = batch.numbers(systems)
     values = {name: combined(node, landed.reductions, numbers, count) for name, node in shape.nodes.items()}
     found = {name: (np.isfinite(value) & ~none, value.tolist()) for name, (value, none) in values.items()}
     for lane, system in enumerate(systems):
         steps = int(landed.steps[lane])
-        if landed.fate[lane] == FLYING and not landed.doubtful[lane]:
+        if landed.fate[lane] == c.RUNNING and not landed.doubtful[lane]:
             end = nanoseconds(system.stop_time) / NANOSECONDS
             metrics = {name: value[lane] if there[lane] else None for name, (there, value) in found.items()}
             yield Flown(
@@ -104,7 +105,7 @@ def _told(shape: Shape, batch: Batch, landed: Landed, systems: Sequence[System])
                 ),
                 message=None,
             )
-        elif landed.fate[lane] == DIVERGED:
+        elif landed.fate[lane] == c.DIVERGED:
             time = int(landed.time[lane]) / NANOSECONDS
             message = _complaint(shape, batch, system, lane, time)
             metrics = told(shape.system, None, end=time, stop_time=system.stop_time, divergence_time=time, steps=steps)

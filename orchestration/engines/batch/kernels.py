@@ -15,9 +15,10 @@ from fmu_kit.compiler.pack.lanes import lanes_here as lanes_of_fmus
 from fmu_kit.compiler.runtime import FOLDER
 from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.basics.libraries import kept
+from orchestration.engines.structures import HEADER, expect_same_sizes, shared
 from orchestration.fmi.model import Model
 
-FILES = (Path(__file__).with_name("batch.c"),)
+FILES = (Path(__file__).with_name("batch.c"), HEADER)
 """What it is made of, beside what is written for a system and headers of native FMUs"""
 _HEADERS = ("lanes.h", "mathematics.h")
 _SOURCES = "sources/"
@@ -78,6 +79,7 @@ def batch(sizes: str, expressions: str, lanes: int) -> Any:
     options = (*FOR_THIS_PROCESSOR, f"-DQUADCOSIM_LANES={lanes}", "-Wno-psabi")
     compile_ = lambda: compiled_here(sources, "batch.c", options=options)  # noqa: E731
     library = ctypes.CDLL(str(kept("batch", sources, (OPTIONS, options), compile_)))
+    expect_same_sizes(library, shared(lanes))
     for name in ("fly", "clear", "land"):
         getattr(library, name).argtypes = (ctypes.c_void_p,)
     library.grown.argtypes = (ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)

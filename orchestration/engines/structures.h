@@ -1,0 +1,201 @@
+/* What a run has that C and Python share. Structures are declared here alone: structures.py reads them. Of fields whose
+   number is that of the lanes, L is 1 where FMUs are called; those of the other kind of components are 0 then. */
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define L QUADCOSIM_LANES
+
+typedef uint64_t Lanes; /* a bit for each */
+
+/* What has become of a run, or why C comes back from one that goes on. */
+enum { RUNNING, FAILED, REFUSED, STOPPED, OVER, NOT_FINITE, DIVERGED, AT_END, FULL, PAUSED, NEXT_WINDOW, NO_MEMORY };
+
+/* What a buffer of an FMU holds, and what an input of a kernel takes. */
+enum { FLOAT64, FLOAT32, INT8, UINT8, INT16, UINT16, INT32, UINT32, INT64, UINT64, BOOL, BOOLEAN32 };
+enum { REAL, TRUTH, WHOLE };
+
+/* -- what happens when, as orchestration/schedule/schedule.py has it ----------------------------------------------- */
+
+typedef struct {
+    int64_t connection, k, sent, arrival; /* arrival -1: lost */
+} Message;
+
+typedef struct {
+    int64_t component, next_time, received, sent, end; /* where its messages begin */
+} Due;
+
+typedef struct {
+    const int64_t *times; /* one more than there are instants */
+    const int64_t *halts_at, *halts, *posted_at, *measured_at, *arrivals_at, *dues_at;
+    const Message *posted, *measured, *arrivals, *exchanged;
+    const Due *dues;
+} Schedule;
+
+/* -- values of FMUs ------------------------------------------------------------------------------------------------ */
+
+typedef struct { /* one call that moves values of one type between an FMU and a buffer */
+    void *function, *fmu;
+    const uint32_t *references;
+    size_t count;
+    void *buffer;
+    size_t values;
+    const int64_t *asked, *places; /* NULL: the buffer is the array itself */
+    int64_t size;
+    int32_t type, counts_values;
+    double low, high; /* of a whole number */
+    int64_t component;
+} Part;
+
+typedef struct { /* the calls that move the values of one array */
+    const Part *parts;
+    int64_t count;
+    double *array;
+} Transfer;
+
+typedef struct { /* a source at work on inputs of one component */
+    Transfer write;
+    const double *values; /* at each instant of the schedule */
+    int64_t size;
+} Feed;
+
+/* -- values of kernels --------------------------------------------------------------------------------------------- */
+
+typedef struct { /* inputs of a component in its memory, and what they take */
+    double *memory;
+    const int64_t *places, *kinds;
+    const double *low, *high;
+    int32_t plain, as_they_are; /* whether nothing has to be checked, and whether they are Reals beside */
+} Inputs;
+
+typedef struct { /* a value of a source, and the place of the input that gets it */
+    int64_t source, place;
+} Fed;
+
+typedef struct { /* values that are kept row by row */
+    double *values;
+    int64_t count, capacity;
+} Kept;
+
+/* -- a system at work ---------------------------------------------------------------------------------------------- */
+
+typedef struct {
+    const int64_t *items;
+    int64_t count;
+} List;
+
+typedef struct {
+    List held, ahead, behind; /* connections into it */
+    const double *ratio;      /* of the lanes */
+    int64_t by_itself;
+    int64_t now; /* [ns] */
+    /* of FMUs */
+    void *fmu, *step;
+    int32_t version, unused;
+    int32_t foreign, moved;     /* whether it may change how numbers are rounded, and whether it has */
+    bool *event, *ends, *early; /* what an FMU of FMI 3 says of a step */
+    double *reached;
+    const int64_t *heard; /* how many messages of it wait */
+    Transfer read;
+    const double *outputs; /* connected ones, in the row */
+    int64_t connected;
+    List feeds;
+    /* of kernels */
+    double *memory;
+    const int64_t *places; /* of the connected outputs in it */
+    const Fed *fed;
+    int64_t fed_count, settles;
+} Component;
+
+typedef struct {
+    const double *sender;
+    const int64_t *places; /* of what is sent */
+    int64_t size;
+    int32_t noisy, rounds, converts, extrapolates, read_ahead, unused;
+    const double *sigma, *quantum, *scale, *offset; /* of each lane, the first two of each variable too */
+    const double *noise[L];                         /* what is drawn, message by message */
+    double *value;                                  /* of the message at hand */
+    double *flight;                                 /* messages on their way, in the order of sending */
+    int64_t capacity, first[L], last[L];
+    double *applied; /* the last two, of a first-order hold */
+    int64_t applied_count[L], applied_time[2 * L];
+    Transfer write; /* of FMUs: its array is what the receiver has been told */
+    Inputs into;    /* of kernels */
+} Channel;
+
+typedef struct { /* runs that share a schedule */
+    Schedule schedule;
+    int64_t count, at, last_window; /* instants of this window, the next of them, whether it is the last one */
+    Lanes lanes;
+    int64_t stop;            /* [ns] */
+    int64_t *now;            /* [ns] of each component */
+    const double *seen[L];   /* sources as objectives see them, and as inputs get them, at each instant */
+    const double *given[L];
+    int64_t one_for_all, unused; /* whether these are the same for all lanes */
+} Track;
+
+typedef struct { /* one run of FMUs */
+    Component *components;
+    Channel *channels;
+    const Feed *feeds;
+    List tasks; /* sampled components in the order of an instant */
+    int64_t some_by_themselves, settles;
+    Schedule schedule;
+    int64_t stop, pause_at; /* [ns] */
+    double *row, *rows;
+    int64_t width, stride, row_count, row_limit; /* in numbers; after the width come sources, which Python adds */
+    int64_t *events, *arrived; /* of `arrived` those of this instant, noted after what was sent at it */
+    int64_t event_count, event_limit, arrived_count;
+    int64_t at; /* the instant that comes next */
+    int64_t steps, now;
+    const Part *failed;
+    int64_t component; /* that failed, or whose output is not finite */
+    double end;        /* of its step [s] */
+    int64_t is_over;   /* with this instant: an FMU ends the run */
+    int (*look)(double);
+    int (*stopped)(int, int64_t); /* whether a step that was not simply done leaves the instant undone */
+    void (*collect)(int64_t);
+    const void *condition; /* steps of condition.h; NULL: ask `look` each time */
+    int64_t condition_length;
+    const double *watched; /* sources of the condition at each instant */
+    int64_t watched_size;
+    int64_t calling; /* the component whose FMU is called; -1: none */
+    int64_t mode;    /* how numbers are rounded in this run */
+    const void *environment;
+} Loop;
+
+typedef struct { /* runs of kernels in lanes */
+    Component *components;
+    int64_t component_count;
+    Channel *channels;
+    int64_t channel_count;
+    List bodies, tasks; /* in the order of an instant */
+    Track *tracks;
+    int64_t track_count, track;
+    Lanes alive, full;
+    int64_t seen_count, given_count;
+    double *seen, *given, *state, *constants, *numbers;
+    Lanes doubtful; /* in which a value was not a number */
+    Kept *kept;
+    int64_t fate[L], fate_component[L], fate_time[L], steps[L];
+    int32_t *status;
+    int64_t recorded_count, record_limit; /* columns that are kept row by row, for who wants to see them */
+    const double **recorded;
+    double *records[L];
+    int64_t record_counts[L];
+} Batch;
+
+/* -- that Python has the same -------------------------------------------------------------------------------------- */
+
+typedef struct {
+    const char *name;
+    int64_t size;
+} Size;
+
+#define SIZE_OF(structure) {#structure, sizeof(structure)}
+#define SIZES \
+    SIZE_OF(Message), SIZE_OF(Due), SIZE_OF(Schedule), SIZE_OF(Part), SIZE_OF(Transfer), SIZE_OF(Feed), SIZE_OF(Inputs), \
+    SIZE_OF(Fed), SIZE_OF(Kept), SIZE_OF(List), SIZE_OF(Component), SIZE_OF(Channel), SIZE_OF(Track), SIZE_OF(Loop), \
+    SIZE_OF(Batch), SIZE_OF(Size)
+#define EXPORT __attribute__((visibility("default")))
