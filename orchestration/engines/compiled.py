@@ -258,7 +258,7 @@ class CompiledMaster(Master):
         loop.now, loop.steps = self.now, self.steps
         rest = schedule.part(loop.at)
         self._shared = [
-            _OnTheirWay(channel, self._channel_table[i], *rest.of(i, self._table(i)))
+            _OnTheirWay(channel, self._channel_table[i], *rest.of(i, self._wires.table(i)))
             for i, channel in enumerate(self._channels)
         ]
 

@@ -1,9 +1,19 @@
 """In which order outputs reach inputs before a run begins: that of what depends on what at initialisation."""
 
 from collections.abc import Callable, Collection, Sequence
+from typing import Any, TypeAlias
 
+import numpy as np
+import numpy.typing as npt
+
+from orchestration.basics.simulator import Floats
 from orchestration.system.model import Connection, variable_of
 
+ITERATIONS, CONVERGED = 100, 1e-12
+"""How often values go around a loop, until they change by less, relative to what they are"""
+Marks: TypeAlias = npt.NDArray[np.bool_]
+PassOn = Callable[[int, Marks], tuple[Floats, Floats]]
+"""Carries out a connection in the runs that are open; gives what its receiver had before, and has now"""
 Dependencies = Callable[[str, str], Collection[str] | None]
 """The inputs of a component that one of its outputs depends on at initialisation; None: on all of them"""
 
@@ -15,6 +25,23 @@ def groups(connections: Sequence[Connection], dependencies: Dependencies) -> tup
         for i, x in enumerate(connections)
     }
     return _components(before)
+
+
+def exchange(group: Sequence[int], pass_on: PassOn, runs: tuple[int, ...] = ()) -> Marks:
+    """Pass on what the connections of a group carry; again and again until it stays, if they form a loop.
+
+    `runs` is the shape of the runs that go on together. Gives those in which no values were found.
+    """
+    open_: Any = np.ones(runs, dtype=np.bool_)
+    for _ in range(ITERATIONS):
+        settled: Any = np.ones(runs, dtype=np.bool_)
+        for index in group:
+            before, after = pass_on(index, open_)
+            settled &= (np.abs(after - before) <= CONVERGED * np.maximum(1.0, np.abs(after))).all(axis=0)
+        open_ = open_ & ~settled
+        if len(group) == 1 or not open_.any():
+            return np.zeros(runs, dtype=np.bool_)
+    return np.asarray(open_)
 
 
 def is_loop(group: Sequence[int], connections: Sequence[Connection], dependencies: Dependencies) -> bool:

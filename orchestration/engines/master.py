@@ -14,10 +14,13 @@ import numpy as np
 
 from orchestration.basics.errors import SimulatorError, StoppedStepError
 from orchestration.basics.simulator import Floats, Integers, Simulator, Transfer
+from orchestration.engines import initial
 from orchestration.engines.board import Board
 from orchestration.engines.channel import Channel
 from orchestration.engines.feeds import Feed
+from orchestration.engines.initial import Marks
 from orchestration.engines.sources import Values
+from orchestration.engines.wires import Wires, clock_of
 from orchestration.recording.recording import (
     ARRIVED,
     BYTES,
@@ -31,7 +34,6 @@ from orchestration.recording.recording import (
     Recorder,
 )
 from orchestration.schedule.cursor import Position
-from orchestration.schedule.plan import Plan
 from orchestration.schedule.schedule import Due, Message, Schedule
 from orchestration.schedule.streams import NOISE, Streams
 from orchestration.schedule.timetable import Timetable
@@ -40,8 +42,6 @@ from orchestration.system.times import NANOSECONDS
 
 ROWS_PENDING = "rows"
 """Beside the names of the components in `Master.saved`"""
-SWEEPS, CONVERGED = 100, 1e-12
-"""How often values go around a loop at initialisation, until they change by less, relative to what they are"""
 
 Watch = Callable[[float], str | None]
 """At t [s], says how the values of the row have diverged, or None"""
@@ -114,7 +114,8 @@ class Master:
 
         Other sampled components, unless they have a clock of their own, begin at their first sample.
         """
-        self.board = board = Board(system, recorded)
+        self._wires = wires = Wires(system, recorded)
+        self.board = board = wires.board
         self._events: list[int] = []  # a table of `Events`, row after row: no object an event, for the collector to see
         self._arrived: list[int] = []  # of this instant: noted after what was sent at it
         self.interrupted_at: int | None = None
@@ -126,9 +127,8 @@ class Master:
         self._system, self._simulators, self._stop = system, simulators, timetable.stop
         self._position = Position(timetable)
         self._instants = self._position.instants()
-        self._plan = plan = Plan(system)
-        self._read_ahead = plan.read_ahead
-        self._names = names = list(system.components)
+        self._read_ahead = wires.plan.read_ahead
+        self._names = names = wires.names
         self._sources, self._interrupted, self.recorder = list(sources), interrupted, recorder
         self.columns = (*board.columns, *(signal for signals, _ in self._sources for signal in signals))
         """of every row: those of the board, then the signals of the sources"""
@@ -145,8 +145,8 @@ class Master:
         self._first_exchange = [(i,) for i in range(len(self._channels))] if first_exchange is None else first_exchange
         self._first_samples, self._waiting = timetable.first_samples, waiting
         self._readers = {name: simulators[name].reader(board.outputs[name], self._outputs(name)) for name in names}
-        self._bodies = {names.index(name): self._body(name) for name in plan.continuous}
-        self._tasks = {names.index(name): self._task(name) for name in plan.sampled}
+        self._bodies = {index: self._body(names[index]) for index in wires.continuous}
+        self._tasks = {index: self._task(names[index]) for index in wires.sampled}
         self._settling = any(body.held or body.behind or body.feeds for body in self._bodies.values())
         self._some_by_themselves = any(task.by_itself for task in self._tasks.values())
 
@@ -456,23 +456,17 @@ class Master:
         for index, body in self._bodies.items():
             body.now = max(body.now, int(reached[schedule.halts == index].max(initial=0)))
         for index, channel in enumerate(self._channels):
-            taken, _ = schedule.of(index, self._table(index))
+            taken, _ = schedule.of(index, self._wires.table(index))
             channel.skip(taken)
-
-    def _table(self, index: int) -> str:
-        """Where a schedule has the messages of a connection, each when it takes its values."""
-        if index in self._plan.posted:
-            return "posted"
-        return "measured" if index in self._read_ahead else "exchanged"
 
     # -- initialisation ------------------------------------------------------------------------------------------
 
     def _exchange_first(self) -> None:
         stop = self._stop / NANOSECONDS
         for name in self._names:
-            ratio, first = self._clock_of(name)
-            begin = 0 if name in self._waiting else first
-            self._simulators[name].enter_initialization(ratio * (begin / NANOSECONDS), ratio * stop)
+            ratio, first = clock_of(self._system, name, self._first_samples)
+            begin = 0.0 if name in self._waiting else first
+            self._simulators[name].enter_initialization(ratio * begin, ratio * stop)
         for feed in self._feeds:
             feed.write(0.0)
         for group in self._first_exchange:
@@ -483,39 +477,26 @@ class Master:
         for channel in self._channels:
             channel.start()
         for name in self._names:
-            outputs = self._outputs(name)[: self.board.connected[name]].tolist()
-            _expect_finite([f"{name}.{output}" for output in self.board.outputs[name]], outputs, 0.0)
+            _expect_finite(self._wires.connected(name), self._outputs(name).tolist(), 0.0)
         for name in self._waiting:
-            ratio, first = self._clock_of(name)
+            ratio, first = clock_of(self._system, name, self._first_samples)
             if first > 0:
-                self._simulators[name].step(0.0, ratio * (first / NANOSECONDS))
+                self._simulators[name].step(0.0, ratio * first)
         self._look(0.0)
 
-    def _clock_of(self, name: str) -> tuple[float, int]:
-        """How fast a component's own time passes, and its first sample [ns]; 0 for one that is stepped from the start.
-
-        FMI has the first step begin where initialisation was, and so do those that hold to it.
-        """
-        sampling = self._system.components[name].sampling
-        if sampling is None or sampling.clock == "fmu":
-            return 1.0, 0
-        return sampling.clock_ratio, self._first_samples.get(name, 0)
-
     def _exchange(self, group: Sequence[int]) -> None:
-        """Pass on what the connections of a group carry; again and again until it stays, if they form a loop."""
-        connections = [self._system.connections[i] for i in group]
-        for _ in range(SWEEPS):
-            settled = True
-            for index, x in zip(group, connections):
-                self._readers[x.sender]()
-                before = self._channels[index].received.copy()
-                self._channels[index].pass_on()
-                after = self._channels[index].received
-                settled &= bool(np.all(np.abs(after - before) <= CONVERGED * np.maximum(1.0, np.abs(after))))
-            if settled or len(group) == 1:
-                return
-        ends = "; ".join(f"{', '.join(x.start)} -> {', '.join(x.end)}" for x in connections)
-        raise SimulatorError(f"initialisation: no values found around the loop {ends} after {SWEEPS} exchanges")
+        def pass_on(index: int, open_: Marks) -> tuple[Floats, Floats]:
+            self._readers[self._system.connections[index].sender]()
+            before = self._channels[index].received.copy()
+            self._channels[index].pass_on()
+            return before, self._channels[index].received
+
+        if initial.exchange(group, pass_on).any():
+            connections = [self._system.connections[i] for i in group]
+            ends = "; ".join(f"{', '.join(x.start)} -> {', '.join(x.end)}" for x in connections)
+            raise SimulatorError(
+                f"initialisation: no values found around the loop {ends} after {initial.ITERATIONS} exchanges"
+            )
 
     # -- how it is made ------------------------------------------------------------------------------------------
 
@@ -537,33 +518,27 @@ class Master:
         )
 
     def _body(self, name: str) -> _Body:
-        order, connections = list(self._plan.continuous), self._system.connections
-        wires = [i for i in self._plan.wires if connections[i].receiver == name]
-        ahead = [
-            i
-            for i in wires
-            if connections[i].order == "gauss-seidel" and order.index(connections[i].sender) < order.index(name)
-        ]
+        into = self._wires.into(name)
         return _Body(
             **self._worked(name),
-            ahead=[self._channels[i] for i in ahead],
-            behind=[self._channels[i] for i in wires if i not in ahead],
+            ahead=[self._channels[i] for i in into.ahead],
+            behind=[self._channels[i] for i in into.behind],
         )
 
     def _task(self, name: str) -> _Task:
         sampling = self._system.components[name].sampling
         assert sampling is not None
-        return _Task(**self._worked(name), ratio=sampling.clock_ratio, by_itself=sampling.clock == "fmu")
+        return _Task(**self._worked(name), ratio=sampling.clock_ratio, by_itself=self._wires.is_by_itself(name))
 
     def _worked(self, name: str) -> dict[str, Any]:
-        connections, count = self._system.connections, self.board.connected[name]
+        names = self._wires.connected(name)
         return {
             "step": self._simulators[name].step,
             "read": self._readers[name],
-            "outputs": self._outputs(name)[:count],
-            "names": tuple(f"{name}.{output}" for output in self.board.outputs[name][:count]),
+            "outputs": self._outputs(name)[: len(names)],
+            "names": names,
             "feeds": [feed for feed in self._feeds if feed.feeds(name)],
-            "held": [self._channels[i] for i, x in enumerate(connections) if x.receiver == name and x.hold == "first"],
+            "held": [self._channels[i] for i in self._wires.into(name).held],
         }
 
 

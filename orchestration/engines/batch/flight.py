@@ -10,10 +10,11 @@ import numpy.typing as npt
 
 from orchestration.basics.errors import QuadcosimError
 from orchestration.basics.simulator import Floats
+from orchestration.engines import initial
 from orchestration.engines.batch.shape import Ends, Shape, changes_of, ends_of
-from orchestration.engines.master import CONVERGED, SWEEPS
 from orchestration.engines.sources import Values
 from orchestration.engines.structures import address, structures
+from orchestration.engines.wires import clock_of
 from orchestration.engines.wiring import source_values
 from orchestration.expressions.recorded import STOP_TIME
 from orchestration.expressions.syntax import Call
@@ -113,8 +114,7 @@ class Batch:
         self._batch: Any = c.Batch(
             components=ctypes.addressof(self._components), component_count=len(kernels),
             channels=ctypes.addressof(self._channels), channel_count=len(connections),
-            bodies=self._indices([shape.names.index(name) for name in shape.plan.continuous]),
-            tasks=self._indices([shape.names.index(name) for name in shape.plan.sampled]),
+            bodies=self._indices(shape.wires.continuous), tasks=self._indices(shape.wires.sampled),
             tracks=ctypes.addressof(self._tracks), seen_count=seen, given_count=self._given_count,
             seen=address(self._array(seen)), given=address(self._array(self._given_count)),
             state=address(self._state), constants=address(self._array(len(self._written.folds.writer.constants))),
@@ -287,9 +287,7 @@ class Batch:
             wrong |= self._exchange(group, received)
         for index, name in enumerate(shape.names):
             wrong |= self._compute(index)
-            connected = [shape.place(f"{name}.{output}")[1] for output in shape.board.outputs[name]]
-            connected = connected[: shape.board.connected[name]]
-            wrong |= ~np.isfinite(self.memories[index][connected]).all(axis=0)
+            wrong |= ~np.isfinite(self.memories[index][shape.connected(name)]).all(axis=0)
         for i, first in enumerate(received):
             if self._channels[i].extrapolates:
                 self._of_channels[i]["applied"][: len(first)] = first
@@ -298,27 +296,19 @@ class Batch:
         return wrong
 
     def _exchange(self, group: Sequence[int], received: Sequence[Floats]) -> Lanes:
-        connections = [self._shape.system.connections[i] for i in group]
-        open_, wrong = np.ones(self._lanes, dtype=np.bool_), np.zeros(self._lanes, dtype=np.bool_)
-        for _ in range(SWEEPS):
-            settled = np.ones(self._lanes, dtype=np.bool_)
-            for i, x in zip(group, connections):
-                sender, receiver = (self._shape.names.index(name) for name in (x.sender, x.receiver))
-                wrong |= self._compute(sender)
-                before = received[i].copy()
-                after = self._passed(i, self.memories[sender])
-                received[i][:, open_] = after[:, open_]
-                self.memories[receiver][self._ends[i].end[:, None], np.flatnonzero(open_)] = self._taken(i, after)[
-                    :, open_
-                ]
-                change = np.abs(received[i] - before) <= CONVERGED * np.maximum(1.0, np.abs(received[i]))
-                settled &= change.all(axis=0)
-            if len(group) == 1:
-                return wrong
-            open_ &= ~settled
-            if not open_.any():
-                return wrong
-        return wrong | open_
+        connections, names = self._shape.system.connections, self._shape.names
+        wrong = np.zeros(self._lanes, dtype=np.bool_)
+
+        def pass_on(i: int, open_: Lanes) -> tuple[Floats, Floats]:
+            sender, receiver = (names.index(name) for name in (connections[i].sender, connections[i].receiver))
+            wrong[:] |= self._compute(sender)
+            before, after = received[i].copy(), self._passed(i, self.memories[sender])
+            received[i][:, open_] = after[:, open_]
+            taken = self._taken(i, after)[:, open_]
+            self.memories[receiver][self._ends[i].end[:, None], np.flatnonzero(open_)] = taken
+            return before, received[i]
+
+        return wrong | initial.exchange(group, pass_on, (self._lanes,))
 
     def _passed(self, i: int, sender: Floats) -> Floats:
         values, arrays = sender[self._ends[i].start], self._of_channels[i]
@@ -333,16 +323,12 @@ class Batch:
 
     def _begin(self, lane: int, system: System) -> None:
         """When the own time of each component begins, as `Master` has it: 0 unless it begins with a later sample."""
-        names, late = self._shape.names, {}
-        for name, component in system.components.items():
-            sampling, waits = component.sampling, self._shape.models[name].waits
-            if sampling is None or sampling.clock == "fmu" or waits:
-                continue
-            if sampling.offset or sampling.jitter:
-                late[name] = sampling.clock_ratio
-        first = Timetable(system, Streams(system.seed, system.streams)).first_samples if late else {}
-        for index, name in enumerate(names):
-            self._begins[index][lane] = late.get(name, 0.0) * (first.get(name, 0) / NANOSECONDS)
+        samplings = [component.sampling for component in system.components.values()]
+        is_late = any(sampling is not None and (sampling.offset or sampling.jitter) for sampling in samplings)
+        first = Timetable(system, Streams(system.seed, system.streams)).first_samples if is_late else {}
+        for index, name in enumerate(self._shape.names):
+            ratio, sample = clock_of(system, name, first)
+            self._begins[index][lane] = 0.0 if self._shape.models[name].waits else ratio * sample
 
     def _compute(self, index: int) -> Lanes:
         """The outputs of a component in initialisation mode; lanes in which that fails."""
@@ -419,16 +405,10 @@ class Batch:
 
     def _draw_noise(self, lane: int, run: _Run, window: Schedule) -> None:
         for i, stream in run.noise.items():
-            count, _ = window.of(i, self._table(i))
+            count, _ = window.of(i, self._shape.wires.table(i))
             noise = stream.standard_normal((count, len(self._ends[i].start)))
             run.arrays.append(noise)
             self._channels[i].noise[lane] = address(noise)
-
-    def _table(self, index: int) -> str:
-        """Where a schedule has the messages of a connection, each when it takes its values."""
-        if index in self._shape.plan.posted:
-            return "posted"
-        return "measured" if index in self._shape.plan.read_ahead else "exchanged"
 
     def _record(self, columns: Sequence[str], tracks: Sequence[_Track]) -> list[Floats]:
         """Room for the rows of some columns."""
@@ -477,31 +457,19 @@ class Batch:
                 as_they_are=not converts and x.hold == "zero" and not ends.kinds.any(),
             ),
             places=address(ends.start), size=len(ends.start), noisy=bool(sigma.any()), rounds=bool(quantum.any()),
-            converts=converts, extrapolates=x.hold == "first", read_ahead=i in self._shape.plan.read_ahead,
+            converts=converts, extrapolates=x.hold == "first", read_ahead=i in self._shape.wires.plan.read_ahead,
             **{name: address(arrays[name]) for name in ("sigma", "quantum", "scale", "offset", "value", "applied")},
         )  # fmt: skip
 
     def _component(self, index: int) -> Any:
         shape, name = self._shape, self._shape.names[index]
-        connections, plan = shape.system.connections, shape.plan
-        outputs = [shape.place(f"{name}.{output}")[1] for output in shape.board.outputs[name]]
-        outputs = outputs[: shape.board.connected[name]]
-        places = np.array(outputs, dtype=np.int64)
+        into, places = shape.wires.into(name), shape.connected(name)
         changing = shape.fed[name] if shape.fed_changes else []
         fed = (self._c.Fed * max(1, len(changing)))(*(self._c.Fed(source=s, place=p) for s, p in changing))
-        wires = [i for i in plan.wires if connections[i].receiver == name]
-        order = list(plan.continuous)
-        ahead = [
-            i for i in wires
-            if connections[i].order == "gauss-seidel" and order.index(connections[i].sender) < order.index(name)
-        ]  # fmt: skip
-        held = [i for i, x in enumerate(connections) if x.receiver == name and x.hold == "first"]
-        behind = [i for i in wires if i not in ahead]
-        sampling = shape.system.components[name].sampling
         self._kept_arrays += [places, fed]
         return self._c.Component(
             step=shape.kernels[name].step, memory=address(self.memories[index]), places=address(places),
-            connected=len(places), fed=ctypes.addressof(fed), fed_count=len(changing), held=self._indices(held),
-            ahead=self._indices(ahead), behind=self._indices(behind), ratio=address(self._ratios[index]),
-            by_itself=sampling is not None and sampling.clock == "fmu", settles=bool(held or behind or changing),
+            connected=len(places), fed=ctypes.addressof(fed), fed_count=len(changing), held=self._indices(into.held),
+            ahead=self._indices(into.ahead), behind=self._indices(into.behind), ratio=address(self._ratios[index]),
+            by_itself=shape.wires.is_by_itself(name), settles=bool(into.held or into.behind or changing),
         )  # fmt: skip

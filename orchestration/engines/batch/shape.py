@@ -14,12 +14,13 @@ from orchestration.engines.batch.kernels import Kernel, batch, component
 from orchestration.engines.batch.writing import Kind, Leaf, scalars
 from orchestration.engines.board import Board
 from orchestration.engines.channel import of_each
+from orchestration.engines.wires import Wires
 from orchestration.expressions.over_run import inlined, reductions
 from orchestration.expressions.recorded import STOP_TIME, TIME, vectors
 from orchestration.expressions.syntax import Call, Node, names, parse
 from orchestration.fmi.model import Model, Variable
 from orchestration.results.objectives import GOOD
-from orchestration.schedule.plan import Plan, is_plain
+from orchestration.schedule.plan import is_plain
 from orchestration.system.check import recorded
 from orchestration.system.model import Connection, Source, System, component_of, variable_of
 
@@ -67,19 +68,19 @@ class Shape:
         return {name: component(name, model, self.lanes) for name, model in self.models.items()}
 
     @cached_property
-    def plan(self) -> Plan:
-        """How connections are carried out."""
-        return Plan(self.system)
+    def wires(self) -> Wires:
+        """What reaches what, and what is read of the components."""
+        return Wires(self.system, recorded(self.system, self.models))
 
-    @cached_property
+    @property
     def board(self) -> Board:
         """What is read of the components."""
-        return Board(self.system, recorded(self.system, self.models))
+        return self.wires.board
 
-    @cached_property
+    @property
     def names(self) -> tuple[str, ...]:
         """Of the components."""
-        return tuple(self.system.components)
+        return self.wires.names
 
     def variable(self, end: str) -> Variable:
         """The variable of COMPONENT.VARIABLE."""
@@ -104,6 +105,10 @@ class Shape:
                 found[component_of(end)].append((number, self.place(end)[1]))
                 number += 1
         return found
+
+    def connected(self, name: str) -> Places:
+        """The places of a component's connected outputs in its memory."""
+        return np.array([self.place(output)[1] for output in self.wires.connected(name)], dtype=np.int64)
 
     @property
     def fed_changes(self) -> bool:
