@@ -2,14 +2,14 @@
 
 import logging
 from collections.abc import Mapping
+from functools import partial
 from typing import Any, Literal, cast, get_args
 
 from orchestration.basics.errors import QuadcosimError, UsageError, expected_name
 from orchestration.basics.simulator import Simulator
-from orchestration.engines.compiled import CompiledMaster, Condition, obstacle
+from orchestration.engines.compiled import CompiledLoop, Condition, obstacle
 from orchestration.engines.master import Master
 from orchestration.engines.room import Room, private
-from orchestration.fmi.native import NativeInstance
 from orchestration.system.model import System
 from orchestration.system.times import nanoseconds
 
@@ -46,6 +46,4 @@ def master(
         return Master(system, simulators, **others)
     if hindered:
         raise QuadcosimError(f"--engine compiled cannot be had: {hindered}")
-    return CompiledMaster(
-        system, cast(Mapping[str, NativeInstance], simulators), condition=condition, room=room, **others
-    )
+    return Master(system, simulators, loop=partial(CompiledLoop, condition=condition, room=room), **others)

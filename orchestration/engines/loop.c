@@ -1,4 +1,4 @@
-/* The master's loop over instants, as orchestration/engines/master.py has it, to the bit: it steps FMUs through the
+/* The master's loop over instants, as orchestration/engines/instants.py has it, to the bit: it steps FMUs through the
    arrays of a schedule and records rows and events. All memory is Python's, which also begins and ends a run, and says
    what has failed in its own words. Structures are those of structures.h. */
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 from orchestration.basics import scratch
 from orchestration.basics.interrupt import Interrupt, interrupts_held_back
+from orchestration.engines.backlog import in_order
 from orchestration.engines.engine import Engine
-from orchestration.engines.master import in_order
 from orchestration.engines.room import Left, left_in
 from orchestration.fmi.isolated import receive, send
 from orchestration.processes import subprocesses

@@ -1,5 +1,5 @@
 /* Runs of systems of one structure, in lockstep: lane l of every vector is run l. What happens, and in which order, is
-   what orchestration/engines/master.py has, to the bit; what it comes to is summed up row by row by expressions.h, which
+   what orchestration/engines/instants.py has, to the bit; what it comes to is summed up row by row by expressions.h, which
    is written for the system. Runs of one timing are a track: they share a schedule and pass through it together. */
 
 #include "lanes.h"

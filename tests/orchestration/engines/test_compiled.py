@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 
 from orchestration.basics.errors import QuadcosimError, SimulatorError
 from orchestration.engines import loop
-from orchestration.engines.compiled import CompiledMaster
+from orchestration.engines.shared_tables import SharedTables
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_here
@@ -330,7 +330,7 @@ def test_a_run_may_be_stopped_and_go_on_in_the_same_process(fmu: Path) -> None:
 def test_chunks_are_whole_at_the_same_rows_and_events(fmu: Path, kept: Kept, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, most in (("ROWS", 16), ("EVENTS", 30)):
         with monkeypatch.context() as patch:
-            patch.setattr(f"orchestration.engines.master.{name}", most)
+            patch.setattr(f"orchestration.engines.backlog.{name}", most)
             sizes = []
             for engine in ("python", "compiled"):
                 recorder = InMemory()
@@ -344,12 +344,12 @@ def test_rows_that_are_wide_are_handed_over_before_they_fill_the_memory(
     fmu: Path, kept: Kept, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Room is made for a chunk of them at once."""
-    monkeypatch.setattr("orchestration.engines.master.BYTES", 1000)
+    monkeypatch.setattr("orchestration.engines.backlog.BYTES", 1000)
     for engine in ("python", "compiled"):
         recorder = InMemory()
         with prepared(of(LOOP, fmu), engine=engine, load=kept.load, recorder=recorder) as run:
-            if isinstance(run.master, CompiledMaster):
-                assert run.master._row_table.nbytes <= 1000
+            if isinstance(run.master.backlog.tables, SharedTables):
+                assert run.master.backlog.tables.content.nbytes <= 1000
             run.master.initialise()
             run.master.run()
         sizes = {chunk.rows.nbytes for chunk in recorder.chunks()}
@@ -411,7 +411,7 @@ def test_an_instance_that_does_more_than_call_its_fmu_is_stepped_in_python(fmu: 
 
 def test_it_is_the_default_where_it_can_be_had(fmu: Path) -> None:
     with prepared(of(LOOP, fmu)) as run:
-        assert isinstance(run.master, CompiledMaster)
+        assert run.master.engine == "compiled"
         run.master.initialise()
         run.master.run()
         assert run.result().provenance["engine"] == "compiled"

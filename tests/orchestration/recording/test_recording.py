@@ -28,7 +28,7 @@ def whole() -> Result:
 @pytest.fixture(autouse=True)
 def _few_rows(whole: Result, monkeypatch: pytest.MonkeyPatch) -> None:
     """In each chunk, once the flight to compare with is over."""
-    monkeypatch.setattr("orchestration.engines.master.ROWS", 64)
+    monkeypatch.setattr("orchestration.engines.backlog.ROWS", 64)
 
 
 def expect_equal(found: Result, whole: Result) -> None:
@@ -57,9 +57,9 @@ def test_a_sample_at_the_last_row_of_a_chunk_is_in_that_chunk_and_counts_once(
     engine: Engine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scenario = Scenario(stop_time=0.3, timing=Timing(offset=0.009))  # at rows 9, 19, 29 and so on
-    monkeypatch.setattr("orchestration.engines.master.ROWS", 10**6)
+    monkeypatch.setattr("orchestration.engines.backlog.ROWS", 10**6)
     whole = quadcosim.run(scenario, engine=engine)
-    monkeypatch.setattr("orchestration.engines.master.ROWS", 10)
+    monkeypatch.setattr("orchestration.engines.backlog.ROWS", 10)
     found = quadcosim.run(scenario, engine=engine)
     chunks = list(found.recording.chunks())
     assert len(chunks) > 20
@@ -68,8 +68,8 @@ def test_a_sample_at_the_last_row_of_a_chunk_is_in_that_chunk_and_counts_once(
 
 
 def test_many_events_make_a_chunk_whole_too(whole: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("orchestration.engines.master.ROWS", 10**6)
-    monkeypatch.setattr("orchestration.engines.master.EVENTS", 20)
+    monkeypatch.setattr("orchestration.engines.backlog.ROWS", 10**6)
+    monkeypatch.setattr("orchestration.engines.backlog.EVENTS", 20)
     keep_flight(tmp_path / "run", lambda to: quadcosim.run(SCENARIO, recorder=to), figures=False)
     found = load_run(tmp_path / "run")
     sizes = [len(chunk.events) for chunk in found.recording.chunks()]
@@ -102,7 +102,7 @@ def test_a_pause_between_chunks_changes_nothing(at: float, whole: Result, tmp_pa
 def test_a_diverged_run_is_the_same_in_chunks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scenario = Scenario(stop_time=3.0, timing=Timing(period=0.3, order="jacobi"))
     chunks = quadcosim.run(scenario)
-    monkeypatch.setattr("orchestration.engines.master.ROWS", 10**6)
+    monkeypatch.setattr("orchestration.engines.backlog.ROWS", 10**6)
     expect_equal(chunks, quadcosim.run(scenario))
 
 

@@ -1,0 +1,193 @@
+"""What happens at an instant, in Python: the text that the loops in C follow.
+
+In this order: components in continuous time have reached it; messages that arrive are delivered; sampled components
+that are due read what they have received, step and send, and what arrives without delay is delivered; the row is
+recorded. So a row is the value just after its instant, and at the end nothing samples.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import ClassVar
+
+from orchestration.basics.errors import SimulatorError
+from orchestration.engines.at_work import AtWork, SampledComponent, Terminated
+from orchestration.engines.backlog import Backlog, Listed, events_of_a_chunk, rows_of_a_chunk
+from orchestration.recording.recording import ARRIVED, LOST, SAMPLED, SENT, Recorder
+from orchestration.schedule.schedule import Due, Message
+from orchestration.system.times import NANOSECONDS
+
+
+class PythonLoop:
+    """Passes through the instants of a run."""
+
+    engine: ClassVar[str] = "python"
+    """By what it does"""
+
+    def __init__(self, work: AtWork, recorder: Recorder) -> None:
+        tables = Listed(work)
+        self._work, self.backlog = work, Backlog(work, tables, recorder)
+        self._events, self._rows = tables.noted, tables.content
+        self._arrived: list[int] = []  # of this instant: noted after what was sent at it
+        self._instants = work.cursor.instants()
+        self._channels, self._continuous, self._sampled = work.channels, work.continuous, work.sampled
+        self._read_ahead, self._stop = work.wires.plan.read_ahead, work.stop
+        self._row = work.board.row.data.cast("B")
+        self._chunk, self._most_events = rows_of_a_chunk(work) * work.board.row.nbytes, events_of_a_chunk()
+
+    def run(self, pause_at: int | None, progress: Callable[[float], None] | None) -> bool:
+        """Go on to the end, an interruption, or the first instant from `pause_at` [ns]; whether the run is over."""
+        work, stop = self._work, self._stop
+        for count, (time, next_time, halts, arrivals, posted, measured, dues) in enumerate(self._instants, 1):
+            work.now = time
+            if halts:
+                self._step_continuous(time, halts)
+            if arrivals:  # before what is sent now, which is delivered last if it arrives at once
+                self._arrive(arrivals, time)
+            if posted:
+                self._post(posted, time)
+            if measured:
+                self._measure(measured)
+            if work.some_by_themselves:
+                self._sample_in_turn(dues, time, next_time)
+            else:
+                for due in dues:
+                    self._sample(due, time, due.next_time)
+            if work.settles:
+                self._settle(time, halts)
+            self._record(time)
+            if work.termination is not None:
+                raise Terminated(work.termination)
+            if work.interrupted() and time < stop:
+                work.interrupted_at = time
+                return True
+            if pause_at is not None and pause_at <= time < stop:
+                return False
+            if progress is not None and count % 512 == 0:
+                progress(time / stop)
+        return True
+
+    def _step_continuous(self, time: int, halts: Sequence[int]) -> None:
+        """Components in continuous time reach `time`; divergence is noticed before any value is passed on."""
+        moved = False
+        t = time / NANOSECONDS
+        for index in halts:
+            component = self._continuous[index]
+            start = component.now
+            if time == start:
+                continue
+            for channel in component.ahead:
+                channel.pass_on()
+            component.now = time
+            try:
+                component.step(start / NANOSECONDS, (time - start) / NANOSECONDS)
+            except SimulatorError as error:
+                self._work.stopped(error, time)
+            self._work.steps += 1
+            component.read()
+            component.expect_finite(t)
+            moved = True
+        if moved:
+            self._work.look(t)
+
+    def _post(self, messages: Sequence[Message], time: int) -> None:
+        for message in messages:
+            self._note_sending(message)
+            index, k, _, arrival = message
+            self._channels[index].send(k, lost=arrival < 0)
+            if arrival == time:
+                self._deliver(index, k, time)
+
+    def _measure(self, messages: Sequence[Message]) -> None:
+        """Values for samples to come."""
+        for index, k, _, arrival in messages:
+            self._channels[index].send(k, lost=arrival < 0)
+
+    def _arrive(self, messages: Sequence[Message], time: int) -> None:
+        for index, k, _, _ in messages:
+            self._deliver(index, k, time)
+
+    def _deliver(self, index: int, k: int, time: int) -> None:
+        self._arrived += (time, ARRIVED, index, k)
+        self._channels[index].deliver(k, time)
+
+    def _sample_in_turn(self, dues: Sequence[Due], time: int, next_time: int) -> None:
+        """The samples; who has a clock of its own is stepped to the next instant, and also if it does not sample."""
+        samples = {due.component: due for due in dues}
+        for index, task in self._sampled.items():
+            if index in samples:
+                due = samples[index]
+                self._sample(due, time, next_time if task.by_itself else due.next_time)
+            elif task.by_itself and time < self._stop:
+                for channel in task.held:
+                    channel.extrapolate(time)
+                self._step_task(task, time, next_time)
+
+    def _sample(self, due: Due, time: int, end: int) -> None:
+        """A component reads, steps to `end` [ns], and sends."""
+        task = self._sampled[due.component]
+        self._sense(due.received, time)
+        for channel in task.held:
+            channel.extrapolate(time)
+        for feed in task.feeds:
+            feed.write(time / NANOSECONDS)
+        self._step_task(task, time, end)
+        self._send(due.sent, time)
+
+    def _step_task(self, task: SampledComponent, time: int, end: int) -> None:
+        start, until = time / NANOSECONDS, min(end, self._stop)
+        try:
+            task.step(task.ratio * start, task.ratio * ((until - time) / NANOSECONDS))
+        except SimulatorError as error:
+            self._work.stopped(error, until)
+        task.read()
+        task.expect_finite(start)
+
+    def _sense(self, messages: Sequence[Message], time: int) -> None:
+        """The sample reads what it measures itself."""
+        for index, k, measured, arrival in messages:
+            channel = self._channels[index]
+            self._events += (measured, SAMPLED, index, k)
+            if arrival < 0:
+                self._events += (measured, LOST, index, k)
+            if index not in self._read_ahead:
+                channel.hand_over(time, lost=arrival < 0)
+            elif arrival >= 0:
+                channel.deliver(k, time)
+
+    def _send(self, messages: Sequence[Message], time: int) -> None:
+        """What it sends are its outputs, which no arrival changes."""
+        for message in messages:
+            self._note_sending(message)
+            index, k, _, arrival = message
+            if arrival == time:
+                self._arrived += (time, ARRIVED, index, k)
+                self._channels[index].hand_over(time, lost=False)
+            else:
+                self._channels[index].send(k, lost=arrival < 0)
+
+    def _note_sending(self, message: Message) -> None:
+        index, k, sent, arrival = message
+        if sent > self._stop:
+            return
+        self._events += (sent, SENT, index, k)
+        if arrival < 0:
+            self._events += (sent, LOST, index, k)
+
+    def _settle(self, time: int, halts: Sequence[int]) -> None:
+        """What components in continuous time hold over the step that begins now."""
+        for index in halts:
+            component = self._continuous[index]
+            for channel in component.held:
+                channel.extrapolate(time)
+            for channel in component.behind:
+                channel.pass_on()
+            for feed in component.feeds:
+                feed.write(time / NANOSECONDS)
+
+    def _record(self, time: int) -> None:
+        if self._arrived:
+            self._events += self._arrived
+            self._arrived.clear()
+        self._work.board.row[0] = time / NANOSECONDS
+        self._rows += self._row
+        if len(self._rows) >= self._chunk or len(self._events) >= 4 * self._most_events:
+            self.backlog.hand_over()
