@@ -22,6 +22,7 @@ _KEPT = 16_384
 """Bytes of what the process says that are kept, of the end"""
 _ROUNDS = 50
 """How often what still lives is killed: it may go on to start processes meanwhile"""
+_OUT_OF_PROCESSOR = "it takes more time of a processor than the system gives it (ulimit -t)"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +137,7 @@ def _watched(process: subprocess.Popen[bytes], output: _Output, limits: Limits, 
     while True:
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(pause)
-            return None
+            return _OUT_OF_PROCESSOR if sys.platform == "linux" and process.returncode == -signal.SIGXCPU else None
         looked = time.monotonic()
         family = list(_family(mark))
         lost = max(lost, *map(waited, family), 0.0)
@@ -150,13 +151,19 @@ def _watched(process: subprocess.Popen[bytes], output: _Output, limits: Limits, 
 
 
 def _limit_processor_time(process: subprocess.Popen[bytes], limits: Limits) -> None:
-    """Let the system end it, and each process that it starts, where nobody watches any more: we may be killed too."""
+    """Let the system end it, and each process that it starts, where nobody watches any more: we may be killed too.
+
+    A limit that there is (`ulimit -t`) holds for them, and is left a second before its end: by SIGXCPU, which tells.
+    """
     if sys.platform == "linux":
         import resource
 
         seconds = math.ceil(limits.time * (os.cpu_count() or 1)) + 1  # its threads may use all cores until time is up
+        there = [math.inf if one == resource.RLIM_INFINITY else one for one in resource.getrlimit(resource.RLIMIT_CPU)]
+        hard = int(min(seconds + 1, there[1]))
+        soft = int(max(1, min(seconds, there[0], hard - 1)))
         with contextlib.suppress(ProcessLookupError):
-            resource.prlimit(process.pid, resource.RLIMIT_CPU, (seconds, seconds))
+            resource.prlimit(process.pid, resource.RLIMIT_CPU, (soft, hard))
 
 
 def _late(limits: Limits) -> str:

@@ -102,7 +102,36 @@ def test_no_file_may_grow_beyond_its_limit(tmp_path: Path) -> None:
 def test_the_system_ends_a_process_that_nobody_watches_any_more() -> None:
     program = "import resource, time; time.sleep(0.2); print(*resource.getrlimit(resource.RLIMIT_CPU))"
     seconds = 2 * (os.cpu_count() or 1) + 1
-    assert python(program, time=2.0).said == f"{seconds} {seconds}"
+    assert python(program, time=2.0).said == f"{seconds} {seconds + 1}"
+
+
+UNDER_A_LIMIT = """
+import os, resource, sys
+from orchestration.processes import confined
+resource.setrlimit(resource.RLIMIT_CPU, ({soft}, {hard}))
+ending = confined.run([sys.executable, "-c", sys.argv[1]], os.environ, confined.Limits())
+print(ending.code, ending.reached, ending.said, sep="|")
+"""
+
+
+def under_a_limit(program: str, *, soft: int, hard: int) -> list[str]:
+    """Code, limit reached and last words of a program confined by a process with a limit of processor time."""
+    command = [sys.executable, "-c", UNDER_A_LIMIT.format(soft=soft, hard=hard), program]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
+    return done.stdout.strip().split("|")
+
+
+@linux_only
+@pytest.mark.parametrize(("soft", "hard", "left"), [(40, 40, "39 40"), (30, 50, "30 50")])
+def test_a_limit_of_processor_time_that_there_is_holds_for_a_confined_process(soft: int, hard: int, left: str) -> None:
+    program = "import resource, time; time.sleep(0.2); print(*resource.getrlimit(resource.RLIMIT_CPU))"
+    assert under_a_limit(program, soft=soft, hard=hard) == ["0", "None", left]
+
+
+@linux_only
+def test_a_process_ended_by_a_limit_of_processor_time_that_there_is_says_so() -> None:
+    reached = "it takes more time of a processor than the system gives it (ulimit -t)"
+    assert under_a_limit("while True: pass", soft=3, hard=3) == ["None", reached, ""]
 
 
 BUSY = """
