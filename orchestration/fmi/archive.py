@@ -20,6 +20,10 @@ class UnreadableFmuError(QuadcosimError):
     """The file is so damaged that there is nothing to look at; the text, without its path, says what was expected."""
 
 
+class OtherVersionError(UnreadableFmuError):
+    """It is an FMU, of a version of FMI that is not looked at."""
+
+
 @dataclass(frozen=True, slots=True)
 class Archive:
     """The content of an .fmu file."""
@@ -90,14 +94,14 @@ def expect_honest_size(path: Path) -> None:
 
 
 def read_root(archive: Archive) -> Element:
-    """The description of an FMU; raises `UnreadableFmuError` if it is no XML or not of FMI 2.0."""
+    """The description of an FMU; raises `UnreadableFmuError` if it is no XML, `OtherVersionError` if not FMI 2.0."""
     try:
         root = ElementTree.fromstring(archive.files[DESCRIPTION])
     except ElementTree.ParseError as error:
         raise UnreadableFmuError(f"{DESCRIPTION}: expected well-formed XML: {error}") from error
     version = root.get("fmiVersion")
     if version != "2.0":
-        raise UnreadableFmuError(
+        raise OtherVersionError(
             f"fmiVersion = {version}: expected 2.0; an FMU of FMI {version} is not checked here; "
             "fmpy validate checks its description"
         )

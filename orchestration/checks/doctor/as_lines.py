@@ -7,7 +7,7 @@ from orchestration.checks.doctor.dependencies import PYTHON_DLL, missing_version
 from orchestration.checks.doctor.fmu import PLATFORMS, Fmu, PlatformBinary
 from orchestration.checks.doctor.machine import Library, Machine
 from orchestration.checks.doctor.report import Report
-from orchestration.checks.doctor.verdict import Host, Verdict
+from orchestration.checks.doctor.verdict import Host, Unjudged, Verdict
 
 _WIDTH = 12
 
@@ -18,8 +18,14 @@ Row = tuple[str, str, bool]
 def as_text(report: Report) -> str:
     """A block of lines for the machine and one for each FMU; what is wrong is marked with an exclamation mark."""
     blocks = [_block("this machine", _machine_rows(report.machine))]
-    blocks += [_block(str(verdict.fmu.path), _fmu_rows(verdict, report.machine)) for verdict in report.verdicts]
+    blocks += [_verdict_block(verdict, report.machine) for verdict in report.verdicts]
     return "\n\n".join(blocks)
+
+
+def _verdict_block(verdict: Verdict | Unjudged, machine: Machine) -> str:
+    if isinstance(verdict, Unjudged):
+        return _block(str(verdict.path), [("file", verdict.failure, True)])
+    return _block(str(verdict.fmu.path), _fmu_rows(verdict, machine))
 
 
 def _block(title: str, rows: Iterable[Row]) -> str:

@@ -15,7 +15,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.checks.doctor.fmu import CO_SIMULATION, Fmu, read_fmu
-from orchestration.fmi.archive import UnreadableFmuError
+from orchestration.fmi.archive import OtherVersionError, UnreadableFmuError
 from orchestration.processes import confined, subprocesses
 from orchestration.processes.confined import Ending, Limits, restrict
 
@@ -36,7 +36,9 @@ class Trial:
 
 
 def attempt(path: Path, limits: Limits) -> Trial:
-    """Read, load and initialise an FMU in this Python; raises `UsageError` if it is no FMI 2.0 FMU.
+    """Read, load and initialise an FMU in this Python.
+
+    Raises `UsageError` if it is none, `OtherVersionError` if it is not of FMI 2.0.
 
     Where variables of the environment may mislead Python, it is tried without them first.
     """
@@ -73,6 +75,8 @@ def _content(path: Path) -> dict[str, object]:
 
 
 def _read(path: Path, content: dict[str, object], ending: Ending) -> Fmu:
+    if "other version" in content:
+        raise OtherVersionError(str(content["other version"]))
     if "error" in content:
         raise UsageError(f"{path}: {content['error']}")
     try:
@@ -96,6 +100,9 @@ def main(path: Path, folder: Path, size_limit: float) -> None:
     restrict(size_limit)
     try:
         fmu = read_fmu(path, size_limit)
+    except OtherVersionError as error:
+        _write(folder / _READ, **{"other version": str(error)})
+        return
     except UnreadableFmuError as error:
         _write(folder / _READ, error=str(error))
         return

@@ -8,9 +8,10 @@ from typing import Any
 
 from orchestration.checks.doctor.binaries import newest
 from orchestration.checks.doctor.dependencies import part_for
-from orchestration.checks.doctor.loading import attempt
+from orchestration.checks.doctor.loading import Trial, attempt
 from orchestration.checks.doctor.machine import Library, Machine, this_machine
-from orchestration.checks.doctor.verdict import Verdict, judge
+from orchestration.checks.doctor.verdict import Unjudged, Verdict, judge
+from orchestration.fmi.archive import OtherVersionError
 from orchestration.processes.confined import Limits
 
 
@@ -19,7 +20,7 @@ class Report:
     """A machine, and what came of each FMU on it."""
 
     machine: Machine
-    verdicts: tuple[Verdict, ...]
+    verdicts: tuple[Verdict | Unjudged, ...]
 
     @property
     def good(self) -> bool:
@@ -28,10 +29,21 @@ class Report:
 
 
 def examine(paths: Iterable[Path], limits: Limits) -> Report:
-    """Read the FMUs and try them within `limits`, look at this machine; `UsageError` for what is no FMI 2.0 FMU."""
-    trials = [attempt(path, limits) for path in paths]
-    machine = this_machine([trial.fmu for trial in trials])
-    return Report(machine=machine, verdicts=tuple(judge(trial.fmu, machine, trial.failure) for trial in trials))
+    """Read the FMUs and try them within `limits`, look at this machine; `UsageError` for what is no FMU."""
+    trials = [_trial(path, limits) for path in paths]
+    machine = this_machine([trial.fmu for trial in trials if isinstance(trial, Trial)])
+    return Report(machine=machine, verdicts=tuple(_verdict(trial, machine) for trial in trials))
+
+
+def _trial(path: Path, limits: Limits) -> Trial | Unjudged:
+    try:
+        return attempt(path, limits)
+    except OtherVersionError as error:
+        return Unjudged(path=path, failure=str(error))
+
+
+def _verdict(trial: Trial | Unjudged, machine: Machine) -> Verdict | Unjudged:
+    return trial if isinstance(trial, Unjudged) else judge(trial.fmu, machine, trial.failure)
 
 
 def as_tables(report: Report) -> dict[str, Any]:
@@ -43,7 +55,9 @@ def as_tables(report: Report) -> dict[str, Any]:
     }
 
 
-def _verdict_table(verdict: Verdict, machine: Machine) -> dict[str, Any]:
+def _verdict_table(verdict: Verdict | Unjudged, machine: Machine) -> dict[str, Any]:
+    if isinstance(verdict, Unjudged):
+        return {**_plain(verdict), "loads": False, "good": False}
     part = part_for(verdict.fmu, machine)
     hosts = {"python": verdict.python_host, "other": verdict.other_host}
     return {

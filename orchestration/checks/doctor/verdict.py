@@ -1,6 +1,7 @@
 """What an FMU needs against what a machine has: pure functions of the two."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from packaging.specifiers import InvalidSpecifier, SpecifierSet
 
@@ -70,6 +71,20 @@ class Verdict:
     def _of_parts(self, *, here: bool) -> list[str]:
         parts = [part for part in self.fmu.platforms if (part.platform == self.platform) == here]
         return [f"{part.platform}: {part.problem}" for part in parts if part.problem is not None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unjudged:
+    """An FMU that is not looked at."""
+
+    path: Path
+    failure: str
+    """Why"""
+
+    @property
+    def good(self) -> bool:
+        """It is not known to load."""
+        return False
 
 
 def judge(fmu: Fmu, machine: Machine, failure: str | None) -> Verdict:
