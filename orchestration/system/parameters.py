@@ -9,17 +9,20 @@ from orchestration.system.model import Parameter
 
 def parameters_in(table: Mapping[str, Any], place: str) -> dict[str, Parameter]:
     """The values of a table by dotted names; raises `UsageError`, naming the `place`, for what is no value."""
-    found = dict(_flattened(table))
+    found = dict(flattened(table))
     for name, value in found.items():
         if not isinstance(value, (int, float, str)):
             raise UsageError(f"{place}.{name} = {shown(repr(value))}: expected a number, true, false or a text")
     return found
 
 
-def _flattened(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Nested tables as dotted names: `gain.eta = 15` and `"gain.eta" = 15` mean the same."""
+def flattened(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Nested tables as dotted names: `gain.eta = 15` and `"gain.eta" = 15` mean the same.
+
+    A table with nothing in it stands where a value was expected, and is left for whoever expects one to refuse.
+    """
     for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _flattened(value, f"{prefix}{key}.")
+        if isinstance(value, Mapping) and value:
+            yield from flattened(value, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", value

@@ -24,6 +24,7 @@ from orchestration.system.model import (
     Source,
     System,
 )
+from orchestration.system.parameters import flattened, parameters_in
 from orchestration.system.paths import changed, for_each
 from orchestration.system.requirements import require
 
@@ -227,7 +228,7 @@ def system_from_tables(tables: Mapping[str, Any], folder: Path) -> System:
         optional=table.optional,
         criterion=_made("criterion", Criterion, table.criterion.model_dump()),
         streams=table.streams,
-        operating_point=dict(_flattened(table.operating_point)),
+        operating_point=dict(flattened(table.operating_point)),
     )
     for name in system.optional:
         known = ", ".join(system.objectives) or "no objectives"
@@ -241,10 +242,7 @@ def system_from_tables(tables: Mapping[str, Any], folder: Path) -> System:
 
 def _component(name: str, table: ComponentTable, folder: Path) -> Component:
     place = f"components.{name}"
-    parameters = dict(_flattened(table.parameters))
-    for key, value in parameters.items():
-        if not isinstance(value, (int, float, str)):
-            raise UsageError(f"{place}.parameters.{key} = {value!r}: expected a number, true, false or a text")
+    parameters = parameters_in(table.parameters, f"{place}.parameters")
     sampling = None if table.sampling is None else _made(f"{place}.sampling", Sampling, table.sampling.model_dump())
     fmu = str(folder / table.fmu) if table.fmu.endswith(".fmu") else table.fmu
     rest = {key: getattr(table, key) for key in ("step", "tolerance", "align", "record")}
@@ -279,14 +277,6 @@ def _made(place: str, kind: type[Made], keys: Mapping[str, Any]) -> Made:
         return kind(**keys)
     except UsageError as error:
         raise UsageError(f"{place}.{error}") from error
-
-
-def _flattened(table: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
-    """Nested tables as dotted names: `gain.eta = 15` and `"gain.eta" = 15` mean the same."""
-    found: list[tuple[str, Any]] = []
-    for key, value in table.items():
-        found += _flattened(value, f"{prefix}{key}.") if isinstance(value, Mapping) else [(f"{prefix}{key}", value)]
-    return found
 
 
 def _first_problem(error: Exception, tables: Mapping[str, Any]) -> str:

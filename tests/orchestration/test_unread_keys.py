@@ -176,3 +176,24 @@ def test_a_misspelt_key_is_refused_with_the_one_that_was_meant(
 def test_a_key_that_says_nothing_beside_another_is_refused(given: str, written: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=said):
         load("study", tmp_path, given, written)
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "written", "key"),
+    [
+        ("scenario", "gain.eta = 15.0", "gain.eta = {}", "controller.gain.eta"),
+        ("scenario", "gain.eta = 15.0", "gain = {}", "controller.gain"),
+        ("scenario", "stop_time = 1.0", 'stop_time = 1.0\nvehicle = "vehicle.toml"', "plant.mass"),
+        ("system", "step = 0.01", "step = 0.01\nparameters = { mass = {} }", "plant.parameters.mass"),
+        ("system", "mass = 1.0", "mass = {}", "components.plant.parameters.mass"),
+        ("comparison", "mass = 2.0", "mass = {}", "vehicles.heavy.plant.mass"),
+        ("comparison", '"timing.delay" = 0.001', '"timing.delay" = {}', "conditions.nominal.sets.timing.delay"),
+        ("gains", "14.0", "{}", "controller.gain.eta"),
+    ],
+)  # fmt: skip
+def test_an_empty_table_is_no_value(kind: str, given: str, written: str, key: str, tmp_path: Path) -> None:
+    (tmp_path / "vehicle.toml").write_text("[plant]\nmass = {}\n", encoding="utf-8")
+    with pytest.raises(UsageError) as refused:
+        load(kind, tmp_path, given, written)
+    assert f"{key} = {{}}: expected a number, true, false or a text" in str(refused.value)
+    assert "\n" not in str(refused.value)
