@@ -12,6 +12,7 @@ from fmu_kit.trajectory import Trajectory
 from orchestration.basics.constructors import strict
 from orchestration.basics.errors import UsageError, no_such_key
 from orchestration.basics.simulator import Floats
+from orchestration.engines.wiring import source_values
 from orchestration.fmi.kit import TRAJECTORY
 from orchestration.schedule.streams import Streams
 from orchestration.system.request import Start
@@ -57,19 +58,18 @@ class Starts:
         return dataclasses.replace(self, first=first, count=count)
 
     def starts_of(self, request: Any) -> tuple[Start, ...]:
-        """The starts around the beginning of the trajectory of a `Scenario`, in the order of their indices."""
-        given = request.resolved().controller.parameters
-        trajectory = Trajectory(**{field: given[name] for name, field in TRAJECTORY.items() if name in given})
-        return tuple(self._start(i, trajectory) for i in range(self.first, self.first + self.count))
+        """The starts around the beginning of what a `Scenario` follows, in the order of their indices."""
+        position, velocity = _beginning(request)
+        return tuple(self._start(i, position, velocity) for i in range(self.first, self.first + self.count))
 
-    def _start(self, index: int, trajectory: Trajectory) -> Start:
-        size, reference = 1.0 - _van_der_corput(index), trajectory.at(0.0)
+    def _start(self, index: int, position: Floats, velocity: Floats) -> Start:
+        size = 1.0 - _van_der_corput(index)
         generator = Streams(self.seed).of(f"starts.{index}", "direction")
         place, motion, axis, spin = (_direction(generator) for _ in range(4))
         half = 0.5 * size * self.angle
         found = {
-            "plant.initial.position": np.array([*reference.position]) + size * self.position * place,
-            "plant.initial.velocity": np.array([*reference.velocity]) + size * self.velocity * motion,
+            "plant.initial.position": position + size * self.position * place,
+            "plant.initial.velocity": velocity + size * self.velocity * motion,
             "plant.initial.quaternion": np.array([*(math.sin(half) * axis), math.cos(half)]),
             "plant.initial.angular_velocity": size * self.rate * spin,
         }
@@ -84,6 +84,17 @@ def starts_in(table: Mapping[str, Any], beside: Sequence[str] = ()) -> Starts:
         if key not in names:
             raise UsageError(no_such_key("starts.", key, [*names, *beside]))
     return Starts(**table)
+
+
+def _beginning(request: Any) -> tuple[Floats, Floats]:
+    """P_d(0) [m] and V_d(0) [m/s] of the reference of a `Scenario`, be it built in, a motion or a file."""
+    scenario = request.resolved()
+    if scenario.reference.name is not None or scenario.reference.file is not None:
+        values = np.array(source_values(scenario.as_system(), "reference", {}, Streams(scenario.seed)).at(0.0))
+        return values[:3], values[3:6]  # in the order of REFERENCE
+    given = scenario.controller.parameters
+    reference = Trajectory(**{field: given[name] for name, field in TRAJECTORY.items() if name in given}).at(0.0)
+    return np.array([*reference.position]), np.array([*reference.velocity])
 
 
 def _to(highest: float) -> str:
