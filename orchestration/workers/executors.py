@@ -145,6 +145,7 @@ def fly_on_cluster(task: Task | Chunk, package: Package) -> list[Outcome]:
     with _CREWS_LOCK:
         if package.digest not in _CREWS:
             _CREWS[package.digest] = crew = Crew(package)
+            atexit.register(crew.remove)  # last
             atexit.register(crew.close)
     return _CREWS[package.digest].fly(task)
 
@@ -155,9 +156,10 @@ _CREWS_LOCK = threading.Lock()
 
 def _local_submit(stack: ExitStack, package: Package, workers: int) -> Submit:
     """Submits to threads that each wait for a worker process, until `stack` is closed."""
+    crew = Crew(package)
+    stack.callback(crew.remove)  # last: a thread may still have been starting a process
     executor = ThreadPoolExecutor(workers)
     stack.callback(executor.shutdown, cancel_futures=True)
-    crew = Crew(package)
     stack.callback(crew.close)  # first: it ends what the threads wait for
     stack.callback(executor.shutdown, wait=False, cancel_futures=True)
     return lambda task: executor.submit(crew.fly, task)

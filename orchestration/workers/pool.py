@@ -250,17 +250,22 @@ class Crew:
         self._scratch = scratch.temporary()
         self._root = self._scratch.path
         self._package = package
-        self._paths = {name: self._unpack(i, name) for i, name in enumerate(package.contents)}
         self._idle: queue.SimpleQueue[Pilot] = queue.SimpleQueue()
+        self._lock = threading.Lock()
+        self._closed = False
         self._pilots: list[Pilot] = []
+        try:
+            self._paths = {name: self._unpack(i, name) for i, name in enumerate(package.contents)}
+        except BaseException:
+            self._scratch.remove()
+            raise
 
     def fly(self, task: Task | Chunk) -> list[Outcome]:
-        """The outcomes of runs; called from any number of threads, each of which gets a process of its own."""
-        try:
-            pilot = self._idle.get_nowait()
-        except queue.Empty:
-            pilot = Pilot(self._root, self._package)
-            self._pilots.append(pilot)
+        """The outcomes of runs; called from any number of threads, each of which gets a process of its own.
+
+        Raises `QuadcosimError` once it is closed.
+        """
+        pilot = self._pilot()
         try:
             if isinstance(task, Chunk):
                 systems = all_with_files([each.system for each in task.tasks], self._paths)
@@ -271,12 +276,31 @@ class Crew:
             self._idle.put(pilot)
 
     def close(self) -> None:
-        """End all processes and remove what they left."""
+        """End all processes, and let none begin."""
+        with self._lock:
+            self._closed = True
         for pilot in self._pilots:
             pilot.close()
+
+    def remove(self) -> None:
+        """Remove what they left, once nobody is in `fly` any more who could still leave something."""
         self._scratch.remove()
+
+    def _pilot(self) -> Pilot:
+        """One that has nothing to do, or a new one."""
+        with self._lock:
+            if self._closed:
+                raise QuadcosimError("the sweep has ended")
+            try:
+                return self._idle.get_nowait()
+            except queue.Empty:
+                self._pilots.append(Pilot(self._root, self._package))
+                return self._pilots[-1]
 
     def _unpack(self, number: int, name: str) -> Path:
         path = self._root / f"{number}-{Path(name).stem}{'.csv' if Path(name).suffix == '.csv' else '.fmu'}"
-        path.write_bytes(self._package.contents[name])
+        try:
+            path.write_bytes(self._package.contents[name])
+        except OSError as error:
+            raise QuadcosimError(f"{path}: expected to be written, for the workers: {error.strerror}") from error
         return path

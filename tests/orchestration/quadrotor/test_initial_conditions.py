@@ -35,29 +35,30 @@ def test_every_error_is_its_share_of_the_largest():
         assert 2.0 * math.acos(quaternion[3]) == pytest.approx(2.0 * start.size)
 
 
-BEGINNING = [7.0, -8.0, 9.0, 0.5, -0.25, 0.125]
+TABLE = [7.0, -8.0, 9.0, 0.5, -0.25, 0.125]
 FOLLOWED = {
-    "circle": ({"name": "circle", "parameters": {"radius": 3.0, "x": 50.0, "y": 1.0, "z": -2.0}}, [50.0, 1.0, -2.0]),
-    "paper": ({"name": "paper", "parameters": {"start_z": -10.0}}, [0.0, 0.0, -10.0]),
-    "points": ({"file": "points.csv"}, [1.0, 2.0, 3.0]),
-    "table": ({"file": "table.csv"}, BEGINNING[:3]),
-}
-VELOCITIES = {"paper": [*TRAJECTORY.at(0.0).velocity], "table": BEGINNING[3:]}
+    "circle": (
+        ReferenceChoice(name="circle", parameters={"radius": 3.0, "x": 50.0, "y": 1.0, "z": -2.0}),
+        [50.0, 1.0, -2.0], [0.0] * 3,
+    ),
+    "paper": (
+        ReferenceChoice(name="paper", parameters={"start_z": -10.0}), [0.0, 0.0, -10.0], TRAJECTORY.at(0.0).velocity
+    ),
+    "points": (ReferenceChoice(file="points.csv"), [1.0, 2.0, 3.0], [0.0] * 3),
+    "table": (ReferenceChoice(file="table.csv"), TABLE[:3], TABLE[3:]),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", FOLLOWED)
-def test_starts_lie_around_the_beginning_of_what_is_followed(kind, tmp_path, monkeypatch):
+@pytest.mark.parametrize(("reference", "position", "velocity"), FOLLOWED.values(), ids=FOLLOWED)
+def test_starts_lie_around_the_beginning_of_what_is_followed(reference, position, velocity, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "points.csv").write_text("time,x,y,z\n0,1,2,3\n4,5,2,3\n8,5,6,3\n")
-    rows = [["time", *REFERENCE], [0.0, *BEGINNING, *[0.0] * 9], [30.0, *[0.0] * 15]]
-    (tmp_path / "table.csv").write_text("\n".join(",".join(map(str, row)) for row in rows))
-    reference, position = FOLLOWED[kind]
-    velocity = VELOCITIES.get(kind, [0.0] * 3)
-    for start in Starts(count=8, position=4.0, velocity=2.0).starts_of(
-        Scenario(reference=ReferenceChoice(**reference))
-    ):
+    rows = [[0.0, *TABLE, *[0.0] * 9], [30.0, *[0.0] * 15]]
+    lines = [",".join(["time", *REFERENCE]), *(",".join(map(str, row)) for row in rows)]
+    (tmp_path / "table.csv").write_text("\n".join(lines))
+    for start in Starts(count=8, position=4.0, velocity=2.0).starts_of(Scenario(reference=reference)):
         assert np.linalg.norm(vector(start, "position") - position) == pytest.approx(4.0 * start.size)
-        assert np.linalg.norm(vector(start, "velocity") - velocity) == pytest.approx(2.0 * start.size)
+        assert np.linalg.norm(vector(start, "velocity") - [*velocity]) == pytest.approx(2.0 * start.size)
 
 
 def test_directions_are_those_of_a_sphere():

@@ -1,0 +1,114 @@
+"""A crew of worker processes leaves nothing behind, whatever ends its sweep."""
+
+import tempfile
+import threading
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from orchestration.studies.axes import Axis
+from orchestration.studies.study import Study
+from orchestration.studies.sweep import sweep
+from orchestration.system.model import Component, System
+from orchestration.workers import pool
+from orchestration.workers.executors import _local_submit
+from orchestration.workers.pool import Crew, Package
+from orchestration.workers.task import Task
+from quadcosim import QuadcosimError, UsageError
+from tests.orchestration.fmi.small import needs_compiler, small
+
+GAIN = "components.it.parameters.gain"
+
+
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder for temporary files, of this process and of its children."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    monkeypatch.setenv("TMPDIR", str(folder))
+    return folder
+
+
+def package(**contents: bytes) -> Package:
+    return Package(contents={f"{name}.fmu": content for name, content in contents.items()}, versions={})
+
+
+def task() -> Task:
+    system = System(stop_time=1.0, components={"it": Component(fmu="a.fmu", step=0.1)})
+    return Task(index=0, key="", settings={}, system=system, keep_signals=False)
+
+
+def study(folder: Path, *habits: str, objective: str = "max(it.y)") -> Study:
+    system = System(
+        stop_time=0.1,
+        components={"it": Component(fmu=str(small(folder, *habits)), step=0.01)},
+        objectives={"last": objective},
+    )
+    return Study(name="fails", base=system, axes=(Axis(name=GAIN, targets=(GAIN,), values=(1.0, 2.0, 3.0)),))
+
+
+@needs_compiler
+def test_a_sweep_with_a_wrong_expression_leaves_nothing(temporary: Path, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"there is no it\.z"):
+        sweep(study(tmp_path, objective="max(it.z)"), folder=tmp_path / "out", progress=None, announce=None)
+    assert not list(temporary.iterdir())
+
+
+@needs_compiler
+def test_a_sweep_whose_fmu_does_not_start_leaves_nothing(temporary: Path, tmp_path: Path) -> None:
+    wrong = study(tmp_path, "EXITS_AT_START")
+    assert sweep(wrong, folder=tmp_path / "out", workers=2, progress=None, announce=None).failed == 3
+    assert not list(temporary.iterdir())
+
+
+@needs_compiler
+def test_an_interrupted_sweep_leaves_nothing(temporary: Path, tmp_path: Path) -> None:
+    def interrupt(done: int, total: int) -> None:
+        if done:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        sweep(study(tmp_path), folder=tmp_path / "out", workers=2, progress=interrupt, announce=None)
+    assert not list(temporary.iterdir())
+
+
+def test_fmus_that_cannot_be_written_are_one_line_and_leave_nothing(temporary: Path) -> None:
+    with pytest.raises(QuadcosimError, match=r"expected to be written, for the workers: .*too long") as caught:
+        Crew(package(**{"a": b"first", "x" * 250: b"second"}))  # with a number before it too long for a file
+    assert str(temporary) in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1
+    assert not list(temporary.iterdir())
+
+
+def test_a_crew_that_is_closed_starts_no_process_any_more(temporary: Path) -> None:
+    crew = Crew(package(a=b"content"))
+    crew.close()
+    with pytest.raises(QuadcosimError, match="the sweep has ended"):
+        crew.fly(task())
+    crew.remove()
+    assert not list(temporary.iterdir())
+
+
+def test_what_workers_leave_is_removed_after_the_last_thread_that_could_leave_more(
+    temporary: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, closed = threading.Event(), threading.Event()
+
+    class Slow(pool.Pilot):
+        def fly(self, task: Task) -> pool.Outcome:
+            begun.set()
+            closed.wait()
+            (self._root / "late").mkdir(parents=True)
+            raise QuadcosimError("the sweep has ended")
+
+        def close(self) -> None:
+            closed.set()
+
+    monkeypatch.setattr(pool, "Pilot", Slow)
+    with ExitStack() as stack:
+        flown = _local_submit(stack, package(a=b"content"), 1)(task())
+        begun.wait()
+    assert isinstance(flown.exception(), QuadcosimError)
+    assert not list(temporary.iterdir())
