@@ -183,3 +183,32 @@ def test_the_bandwidth_is_on_the_inertia_of_the_plant_and_not_on_how_slowly_a_re
     at = crossover(scenario)
     assert crossover(scenario.with_changes(parameters={"plant.inertia.xx": 4.0})) < 0.6 * at
     assert crossover(scenario.with_changes(timing={"period": 0.05})) == at
+
+
+LONG = """
+name = "long"
+[base.timing]
+plant_interval = 0.01
+[[controllers]]
+name = "unified"
+bandwidth = 10.0
+[axis]
+name = "flight"
+sets = ["stop_time"]
+values = [0.1, 5000.0]
+[starts]
+count = 1
+position = 0.1
+"""
+
+
+def test_a_run_that_takes_longer_than_the_time_limit_is_a_failed_row_that_says_so(tmp_path: Path, main: Main) -> None:
+    (tmp_path / "long.toml").write_text(LONG)
+    limited = ("compare", tmp_path / "long.toml", "--out", tmp_path / "out", "--no-figures", "--time-limit")
+    done = main(*limited, "4", code=1)
+    assert "1 runs failed: runs.csv shows why" in done.stderr
+    runs = pd.read_csv(tmp_path / "out" / "runs.csv")
+    assert [*runs["status"]] == ["done", "failed"]
+    assert runs["message"][1] == "it was ended: it takes more than the time limit of 4 s"
+    done = main(*limited, "0", code=2)
+    assert done.stderr == "quadcosim: --time-limit 0: expected a positive number of seconds\n"

@@ -6,8 +6,13 @@ from typing import Any
 
 import pytest
 
+from orchestration.studies.axes import Axis
+from orchestration.studies.store import open_for_reading
+from orchestration.studies.study import Study
 from orchestration.studies.sweep import sweep
+from orchestration.system.model import Component, System
 from quadcosim import QuadcosimError
+from tests.orchestration.fmi.small import needs_compiler, small
 from tests.orchestration.studies.common import (
     PERIODS,
     RUNS,
@@ -56,6 +61,22 @@ def test_the_death_of_a_dask_worker_loses_nothing(
         out, err = coordinator.communicate(timeout=PATIENCE)
     assert coordinator.returncode == 0, out + err
     assert bits(folder / STORE) == reference
+
+
+@needs_compiler
+def test_a_run_that_hangs_in_a_dask_worker_is_a_failed_row_that_says_so(
+    tmp_path: Path, cluster: Callable[[int], Cluster]
+) -> None:
+    fmu = small(tmp_path, "ENDS=if (m->s.gain == 3.0) for (;;)")
+    gain = "components.it.parameters.gain"
+    system = System(stop_time=0.1, components={"it": Component(fmu=str(fmu), step=0.01)})
+    hangs = Study(name="hangs", base=system, axes=(Axis(name=gain, targets=(gain,), values=(1.0, 3.0)),))
+    out = tmp_path / "out"
+    found = sweep(hangs, folder=out, dask=cluster(1).address, time_limit=2.0, progress=None, announce=None)
+    assert (found.total, found.failed) == (2, 1)
+    with open_for_reading(found.path) as store:
+        rows = {row["design_index"]: row["message"] for row in store.rows()}
+    assert rows == {0: None, 1: "it was ended: it takes more than the time limit of 2 s"}
 
 
 @pytest.fixture
