@@ -1,4 +1,4 @@
-"""Figures of `findings.md` that no command draws."""
+"""Figures of `findings/` that no command draws."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Figures of the comparisons in `findings.md`, from what `docs/data` keeps of them."""
+"""Figures of the comparisons in `findings/`, from what `docs/data` keeps of them."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""Flies the comparisons of `findings.md` in lanes, and keeps what their cells come to beside the page.
+"""Flies the comparisons of `findings/` in lanes, and keeps what their cells come to beside the page.
 
 `quadcosim compare studies/comparisons/NAME.toml` flies the same runs one store after the other; here a run leaves no
 row, only the cell that it belongs to: `docs/data/NAME.json`.

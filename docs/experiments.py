@@ -1,4 +1,4 @@
-"""The ensembles of `findings.md` that no study file holds, and what is concluded from what became of them."""
+"""The ensembles of `findings/` that no study file holds, and what is concluded from what became of them."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Flies what is behind `docs/findings.md`, draws its figures and prints its numbers: run as `make findings`.
+"""Flies what is behind `docs/findings`, draws its figures and prints its numbers: run as `make findings`.
 
 `python -m docs.make_findings NAME …` does some sections only, by the names of their functions. It continues where it
 was if it is stopped. What it has flown is in `results/findings`.

@@ -1,4 +1,4 @@
-"""The experiments of `findings.md` that stand beside theory: how an error decays, what sets the limit, which delays."""
+"""The experiments of `findings/` that stand beside theory: how an error decays, what sets the limit, which delays."""
 
 from dataclasses import dataclass
 from typing import Any

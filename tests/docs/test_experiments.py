@@ -15,7 +15,9 @@ from orchestration.quadrotor.scenario import Scenario
 from orchestration.runs.in_lanes import fly
 from orchestration.workers.batching import Agreement
 
-PAGE = (Path(__file__).parents[2] / "docs" / "findings.md").read_text(encoding="utf-8")
+PAGES = "\n".join(
+    page.read_text(encoding="utf-8") for page in sorted((Path(__file__).parents[2] / "docs" / "findings").glob("*.md"))
+)
 DECIMAL = re.compile(r"-?\d+\.?\d*")
 
 
@@ -25,7 +27,7 @@ def flown(scenarios: list[Scenario]) -> list[str]:
 
 def rows(section: str) -> dict[str, list[str]]:
     """The first table of a section: cells of each row by its first one."""
-    text = PAGE[PAGE.index(f"\n## {section}") :]
+    text = PAGES[PAGES.index(f"\n## {section}") :]
     (table, *_) = re.findall(r"(?:^\|.*\|\n)+", text, re.M)
     return {first: rest for first, *rest in (line.strip("| ").split(" | ") for line in table.splitlines()[2:])}
 
