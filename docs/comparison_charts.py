@@ -43,7 +43,7 @@ COLORS = {
 def basins(cells: Rows, factors: Mapping[str, float]) -> Figure:
     """Share that survives over size of the initial error and period, a panel for each controller; white: half.
 
-    `factors` are those on the periods, by controller: 1 unless told.
+    `factors` are those on the periods, by controller: default: 1.
     """
     names = list(dict.fromkeys(cell["controller"] for cell in cells))
     columns = 4

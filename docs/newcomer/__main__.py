@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[2]
 def main() -> None:
     """Follow the pages; say at the end what was not run, and why."""
     parser = argparse.ArgumentParser(prog="python -m docs.newcomer", description=__doc__)
-    parser.add_argument("pages", nargs="*", type=Path, help="only these; all unless told")
+    parser.add_argument("pages", nargs="*", type=Path, help="only these; default: all")
     parser.add_argument("--folder", type=Path, help="a copy in which the pages before these were followed already")
     parser.add_argument("--go-on", action="store_true", help="do not end where a block fails; tell all that fail")
     given = parser.parse_args()

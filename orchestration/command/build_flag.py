@@ -19,8 +19,7 @@ class BuildFlag:
         bool,
         typer.Option(
             "--build",
-            help="FMUs may be built of modules beside a system file that are not of this project, which runs them; it "
-            "is remembered of their folder.",
+            help="Allow building FMUs from foreign modules beside a system file (it runs them); remembered.",
             show_default=False,
         ),
     ] = False

@@ -69,7 +69,7 @@ def quadcosim(
     version: Annotated[
         bool,
         typer.Option(
-            "--version", metavar="", help="Print the version and stop; with -v also those of what it stands on."
+            "--version", metavar="", help="Print the version and stop; with -v also those of its dependencies."
         ),
     ] = False,
     *,
@@ -95,11 +95,11 @@ def build(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", help="Folder for the FMUs; FOLDER, or fmus/ for this project's, unless told."),
+        typer.Option("--out", help="Folder for the FMUs; default: FOLDER, or fmus/ for this project's."),
     ] = None,
     native: Annotated[
         bool,
-        typer.Option("--native", help="Without Python inside, by a C compiler; in the folder native/ unless told."),
+        typer.Option("--native", help="Without Python inside, by a C compiler; default folder: native/."),
     ] = False,
     target: Annotated[
         str | None,
@@ -165,17 +165,20 @@ def run(
     ] = None,
     figures: Annotated[bool, typer.Option(help="Draw the figures into the directory.")] = True,
     pause_at: Annotated[
-        float | None, typer.Option("--pause-at", help="Stop here, the state in --out DIR.", metavar="SECONDS")
+        float | None, typer.Option("--pause-at", help="Pause here; the state is saved in --out DIR.", metavar="SECONDS")
     ] = None,
     resume: Annotated[
-        Path | None, typer.Option("--resume", help="Go on with the run paused in DIR, to the same bits.", metavar="DIR")
+        Path | None,
+        typer.Option(
+            "--resume", help="Resume the run paused in DIR; the results are the same to the bit.", metavar="DIR"
+        ),
     ] = None,
     engine: EngineFlag = None,
     *,
     flags: FlightFlags,
     process: ProcessFlags,
 ) -> Answer:
-    """Fly a scenario and print its metrics. FMUs that are missing or out of date are built first."""
+    """Run a scenario or a system and print its metrics. FMUs that are missing or out of date are built first."""
     from orchestration.engines.engine import engine_named
     from orchestration.runs.simulation import run as fly  # what reads and writes files is loaded where there are any
 
@@ -251,7 +254,7 @@ def doctor(
     *,
     limits: LimitFlags,
 ) -> Answer:
-    """Say what FMUs need to load, what of it this machine has, and try; exit code 1 if anything is missing."""
+    """List what FMUs require and what this machine lacks, and load them; exit code 1 if anything is missing."""
     from orchestration.building import fmus
     from orchestration.building.models import MODELS
     from orchestration.checks.doctor.as_lines import as_text
@@ -269,9 +272,7 @@ def ssp(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out", help="The file; QuadrotorLoop.ssp in fmus/, or NAME.ssp here, unless told.", metavar="FILE"
-        ),
+        typer.Option("--out", help="The file; default: QuadrotorLoop.ssp in fmus/, or NAME.ssp here.", metavar="FILE"),
     ] = None,
     *,
     flags: FlightFlags,

@@ -19,13 +19,13 @@ class FigureFlags:
     format: Annotated[
         list[str] | None,
         typer.Option(
-            "--format", help="Of the files, png unless told; may be given several times.", metavar="|".join(FORMATS),
+            "--format", help="Of the files; default: png; may be repeated.", metavar="|".join(FORMATS),
             show_default=False,
         ),
     ] = None  # fmt: skip
     style: Annotated[
         str,
-        typer.Option("--style", help="Fonts and lines, and the size unless told.", metavar="|".join(STYLES)),
+        typer.Option("--style", help="Fonts, lines and the default size.", metavar="|".join(STYLES)),
     ] = STYLES[0]
     width: Annotated[
         str | None,

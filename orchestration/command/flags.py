@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from orchestration.system.model import Parameter, System
     from orchestration.system.request import Request
 
-TIMING, EFFECTS, MODEL = "Timing", "What goes wrong", "What flies"
+TIMING, EFFECTS, MODEL = "Timing", "Disturbances of the loop", "Model"
 
 
 def _option(*names: str, panel: str, text: str, metavar: str = "SECONDS", **options: Any) -> Any:
@@ -31,13 +31,11 @@ def _option(*names: str, panel: str, text: str, metavar: str = "SECONDS", **opti
 class FlightFlags:
     """What was given on the command line; None: not given, the scenario decides."""
 
-    period: Annotated[float | None, _option("--period", panel=TIMING, text="Controller period; 0.01 unless told.")] = (
-        None
-    )
+    period: Annotated[float | None, _option("--period", panel=TIMING, text="Controller period; default: 0.01.")] = None
     offset: Annotated[float | None, _option("--offset", panel=TIMING, text="Time of the first sample.")] = None
     plant_interval: Annotated[
         float | None,
-        _option("--plant-interval", panel=TIMING, text="Plant's communication interval; 0.001 unless told."),
+        _option("--plant-interval", panel=TIMING, text="Plant's communication interval; default: 0.001."),
     ] = None
     preset: Annotated[
         str | None,
@@ -45,7 +43,7 @@ class FlightFlags:
             "--preset",
             panel=TIMING,
             metavar="px4|crazyflie|betaflight",
-            text="Sampling period and delay of a real flight stack; flags given beside it win over it.",
+            text="Sampling period and delay of a real flight stack; other flags override it.",
             autocompletion=completion.presets,
         ),
     ] = None
@@ -55,7 +53,7 @@ class FlightFlags:
             "--order",
             panel=TIMING,
             metavar="gauss-seidel|jacobi",
-            text="Whether a command is there at its sample, or at the next one.",
+            text="Whether a command is available at its sample or at the next one.",
         ),
     ] = None
     hold: Annotated[
@@ -115,9 +113,7 @@ class FlightFlags:
         _option("--quantisation", panel=EFFECTS, metavar="NAME=Q", text="Rounding of a measurement; may be repeated."),
     ] = None
     seed: Annotated[int | None, _option("--seed", panel=EFFECTS, metavar="N", text="Of all random numbers.")] = None
-    stop_time: Annotated[float | None, _option("--stop-time", panel=MODEL, text="End of the run; 30 unless told.")] = (
-        None
-    )
+    stop_time: Annotated[float | None, _option("--stop-time", panel=MODEL, text="End of the run; default: 30.")] = None
     model_mismatch: Annotated[
         bool | None,
         _option(
@@ -133,7 +129,7 @@ class FlightFlags:
             "--controller",
             panel=MODEL,
             metavar="NAME|PATH",
-            text="The controller's FMU, anybody's that has its variables; UnifiedController unless told.",
+            text="The controller: any FMU with its variables; default: UnifiedController.",
             autocompletion=completion.controllers,
         ),
     ] = None
@@ -143,7 +139,7 @@ class FlightFlags:
             "--plant",
             panel=MODEL,
             metavar="NAME|PATH",
-            text="The plant's FMU, anybody's that has its variables; QuadrotorPlant unless told.",
+            text="The plant: any FMU with its variables; default: QuadrotorPlant.",
             autocompletion=completion.plants,
         ),
     ] = None
@@ -181,7 +177,7 @@ class FlightFlags:
             "--native",
             panel=MODEL,
             metavar="",
-            text="FMUs without Python inside, of this project and of slaves beside a system file; built if need be.",
+            text="Native twins (no Python inside) of FMUs built from sources here; built if need be.",
         ),
     ] = None
     set: Annotated[
@@ -255,7 +251,7 @@ EngineFlag = Annotated[
     str | None,
     typer.Option(
         "--engine",
-        help="What passes through the instants, to the same result; compiled where it can be had.",
+        help="Simulation loop, with the same results; default: compiled where possible.",
         metavar="python|compiled",
         autocompletion=completion.among("python", "compiled"),
         show_default=False,
@@ -264,7 +260,7 @@ EngineFlag = Annotated[
 
 Timing = Annotated[
     Path | None,
-    typer.Argument(help="Of an SSP: the file with the timing that SSP has no words for.", show_default=False),
+    typer.Argument(help="Of an SSP: the file with its timing, which SSP cannot express.", show_default=False),
 ]
 
 _BY_MEASUREMENT = ("noise", "quantisation")

@@ -1,4 +1,4 @@
-"""The command that compares this project's master with other people's."""
+"""The command that compares this project's master with third-party masters."""
 
 from pathlib import Path
 from typing import Annotated
@@ -35,7 +35,7 @@ def interop(
     *,
     flags: FlightFlags,
 ) -> Answer:
-    """Fly a system in other people's masters and compare every signal with this one's.
+    """Run a system in third-party masters and compare every signal with this one's.
 
     Exit code 1 if a tool is farther than 1e-9 in a state, its own first inputs given to this master too.
     """

@@ -40,7 +40,7 @@ TimeLimit = Annotated[
     float | None,
     typer.Option(
         "--time-limit",
-        help="Of the processor, that a run may take, waiting for nothing too; none unless told.",
+        help="Limit on the processor time of a run, idle waiting included; default: none.",
         metavar="SECONDS",
         show_default=False,
     ),
@@ -55,13 +55,13 @@ class ProcessFlags:
         bool,
         typer.Option(
             "--in-process",
-            help="Without a process of its own for FMUs that quadcosim has not built: if one ends it, all ends.",
+            help="Load foreign FMUs into this process: if one crashes, everything ends.",
             show_default=False,
         ),
     ] = False
     time_limit: TimeLimit = None
     memory_limit: Annotated[
-        float, typer.Option("--memory-limit", help="Of the process of a run, and what it starts (Linux).", metavar="MB")
+        float, typer.Option("--memory-limit", help="Memory of a run's process and its children (Linux).", metavar="MB")
     ] = Limits.memory
 
     def __post_init__(self) -> None:

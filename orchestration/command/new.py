@@ -17,7 +17,7 @@ def new(
     kind: Annotated[str, typer.Argument(help="What to write.", metavar="controller|plant|filter", show_default=False)],
     name: Annotated[str, typer.Argument(help="Of the folder and its FMU, as hover_pd.", show_default=False)],
     author: Annotated[
-        str | None, typer.Option("--author", help="Whose it is; unless told, git's user.name.", show_default=False)
+        str | None, typer.Option("--author", help="Author; default: git's user.name.", show_default=False)
     ] = None,
     license: Annotated[str, typer.Option("--license", help="Under which it is given to others.", metavar="TEXT")] = "",
 ) -> Answer:

@@ -22,10 +22,10 @@ class Manners:
     as_json: Annotated[
         bool, _option("--json", text="Print the result as one JSON document; all else goes to standard error.")
     ] = False
-    quiet: Annotated[bool, _option("--quiet", "-q", text="Say nothing but the result, warnings and errors.")] = False
-    verbose: Annotated[bool, _option("--verbose", "-v", text="Say also what is done, step by step.")] = False
+    quiet: Annotated[bool, _option("--quiet", "-q", text="Print only the result, warnings and errors.")] = False
+    verbose: Annotated[bool, _option("--verbose", "-v", text="Also report each step.")] = False
     log: Annotated[
-        Path | None, _option("--log", metavar="FILE", text="Append all that is said and done to FILE, with times.")
+        Path | None, _option("--log", metavar="FILE", text="Append all output and steps to FILE, with times.")
     ] = None
     debug: Annotated[bool, _option("--debug", text="Show where in the program an error came from.")] = False
 

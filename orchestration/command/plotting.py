@@ -32,13 +32,13 @@ def plot(
     figure: Annotated[
         list[str] | None,
         typer.Option(
-            "--figure", help=f"One of {', '.join(FIGURES)}; all unless told.", metavar="NAME", show_default=False
+            "--figure", help=f"One of {', '.join(FIGURES)}; default: all.", metavar="NAME", show_default=False
         ),
     ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", help=f"Folder of the figures; that of the run, or {TOGETHER}/ beside several, unless told.",
+            "--out", help=f"Folder of the figures; default: that of the run, or {TOGETHER}/ beside several.",
             metavar="DIR", show_default=False,
         ),
     ] = None,

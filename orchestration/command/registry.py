@@ -12,7 +12,7 @@ from orchestration.command.answer import Answer
 from orchestration.command.output_options import Manners
 from orchestration.command.shared_flags import takes
 
-FLY, STUDY, FMUS, TOOLS = "Fly", "Study", "FMUs", "Other tools"
+FLY, STUDY, FMUS, TOOLS = "Run", "Study", "FMUs", "Other tools"
 """Groups of commands in the help"""
 
 arguments: Sequence[str] = ()

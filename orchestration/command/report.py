@@ -22,25 +22,25 @@ def report(
         ),
     ],
     out: Annotated[
-        Path | None, typer.Option("--out", help="The file; report_NAME.html here unless told.", metavar="FILE.html")
+        Path | None, typer.Option("--out", help="The file; default: report_NAME.html here.", metavar="FILE.html")
     ] = None,
     store: Annotated[
         Path | None,
-        typer.Option("--store", help="Folder of the study's store; results/NAME unless told.", metavar="DIR"),
+        typer.Option("--store", help="Folder of the study's store; default: results/NAME.", metavar="DIR"),
     ] = None,
     flights: Annotated[
         int | None,
         typer.Option(
             "--flights",
             min=0,
-            help="How many runs of a study get their flights into it; 1000 unless told.",
+            help="How many runs of a study are embedded with their signals; default: 1000.",
             metavar="N",
             show_default=False,
         ),
     ] = None,
     run: Annotated[
         list[int] | None,
-        typer.Option("--run", help="A run of the study whose flight is to be in it; as often as wanted.", metavar="K"),
+        typer.Option("--run", help="A run of the study to embed; may be repeated.", metavar="K"),
     ] = None,
 ) -> Answer:
     """Write runs, a study or a comparison as one HTML file: replay, plots, maps; it needs no network."""

@@ -21,15 +21,13 @@ if TYPE_CHECKING:
     from orchestration.engines.engine import Engine
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file.", metavar="STUDY.toml", show_default=False)]
-Out = Annotated[
-    Path | None, typer.Option("--out", help="Folder of the store; results/NAME unless told.", metavar="DIR")
-]
+Out = Annotated[Path | None, typer.Option("--out", help="Folder of the store; default: results/NAME.", metavar="DIR")]
 
 BatchFlag = Annotated[
     str | None,
     typer.Option(
         "--engine",
-        help="What flies them; batch: many at once, as lanes of native FMUs, a sample of them by FMUs too.",
+        help="Simulation loop; batch: native FMUs, several runs at once in a SIMD batch.",
         metavar="python|compiled|batch",
         autocompletion=completion.among("python", "compiled", "batch"),
         show_default=False,
@@ -45,11 +43,11 @@ def sweep(
     dask: Annotated[
         str | None, typer.Option("--dask", help="A dask scheduler instead, e.g. tcp://host:8786.", metavar="URL")
     ] = None,
-    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Fly failed runs again.")] = False,
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Repeat failed runs.")] = False,
     engine: BatchFlag = None,
     time_limit: TimeLimit = None,
 ) -> Answer:
-    """Fly the runs of a study that are missing; kill it and start it again as you like."""
+    """Run what is missing of a study; it may be stopped and started again at any time."""
     from orchestration.studies.study_file import load_study
     from orchestration.studies.sweep import sweep as fly
 
@@ -66,7 +64,7 @@ def sweep(
 
 
 def status(study: StudyFile, out: Out = None) -> Answer:
-    """Tell how far a study is, also while it runs in another process."""
+    """Show the progress of a study, also while it runs in another process."""
     from orchestration.studies.store import open_for_reading, store_path
     from orchestration.studies.study_file import load_study
     from orchestration.studies.sweep import AGREEMENT, TOTAL, expect_current
@@ -96,14 +94,14 @@ def export(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", help="Folder of the study's store, results/NAME unless told; of a run, where the files go, DIR "
-            "unless told.", metavar="DIR", show_default=False,
+            "--out", help="Folder of the study's store, default: results/NAME; of a run, of the files, default: DIR.",
+            metavar="DIR", show_default=False,
         ),
     ] = None,
     formats: Annotated[
         list[str] | None,
         typer.Option(
-            "--format", help="Of a study parquet and csv unless told; of a run csv. Again for a second one.",
+            "--format", help="Default: parquet and csv of a study, csv of a run; may be repeated.",
             metavar="csv|mat|parquet", autocompletion=completion.among("csv", "mat", "parquet"), show_default=False,
         ),
     ] = None,
@@ -123,7 +121,7 @@ def draw(
     study: StudyFile,
     out: Out = None,
     metric: Annotated[
-        str | None, typer.Option("--metric", help="What to draw; what the criterion is about unless told.")
+        str | None, typer.Option("--metric", help="What to draw; default: the objective of the criterion.")
     ] = None,
     *,
     look: FigureFlags,
@@ -147,7 +145,7 @@ def tune(
     workers: Annotated[int, typer.Option("--workers", help="Processes on this machine.", metavar="N")] = 1,
     engine: BatchFlag = None,
 ) -> Answer:
-    """Tune a controller on an ensemble of starts, and judge it on others; goes on where it was stopped."""
+    """Tune a controller on some initial conditions and judge it on others; it resumes where it was stopped."""
     from orchestration.tuning.tune import tune as search_all
     from orchestration.tuning.tuning_file import load_tuning
 
@@ -171,17 +169,17 @@ def compare(
     time_limit: TimeLimit = None,
     cell: Annotated[
         int | None,
-        typer.Option("--cell", help="Fly this cell again, and nothing else.", metavar="K", show_default=False),
+        typer.Option("--cell", help="Run only this cell again.", metavar="K", show_default=False),
     ] = None,
     start: Annotated[
         int | None,
-        typer.Option("--start", help="Of that cell one flight, kept in --out DIR.", metavar="I", show_default=False),
+        typer.Option("--start", help="One run of that cell, kept in --out DIR.", metavar="I", show_default=False),
     ] = None,
     figures: Annotated[bool, typer.Option(help="Draw the pictures beside the tables.")] = True,
     *,
     look: FigureFlags,
 ) -> Answer:
-    """Fly controllers against each other from the same starts: who flies, how far, how well, at what effort."""
+    """Compare controllers from the same initial conditions: survival, settling, limits, error and effort."""
     from orchestration.command import comparison as command
     from orchestration.comparison.file import load_comparison
     from orchestration.engines.engine import engine_named
@@ -223,25 +221,36 @@ def limit(
     ] = None,
     last: Annotated[float | None, typer.Option("--to", help="Where it ends.", metavar="B", show_default=False)] = None,
     tolerance: Annotated[
-        float | None, typer.Option("--tolerance", help="Width of the last bracket.", show_default=False)
+        float | None,
+        typer.Option(
+            "--tolerance",
+            help="Width of the last bracket; default of a PATH: a fiftieth of --scan.",
+            show_default=False,
+        ),
     ] = None,
     scan: Annotated[
-        float | None, typer.Option("--scan", help="Step of the scan upward.", metavar="STEP", show_default=False)
+        float | None,
+        typer.Option(
+            "--scan",
+            help="Step of the scan upward; default of a PATH: a twentieth of the range.",
+            metavar="STEP",
+            show_default=False,
+        ),
     ] = None,
     confidence: Annotated[
         float,
         typer.Option(
             "--confidence",
-            help="When chance plays a part: how sure (0 to 1) it must be that at least nine flights in ten are good.",
+            help="With random effects: confidence (0 to 1) that at least nine runs in ten are good.",
         ),
     ] = 0.95,
     continuous: Annotated[
-        bool, typer.Option("--continuous", help="Fly near continuous time too (as long as ten flights at 1 ms).")
+        bool, typer.Option("--continuous", help="Run near continuous time too (takes as long as ten runs at 1 ms).")
     ] = False,
     workers: Annotated[int, typer.Option("--workers", help="Processes for the seeds.", metavar="N")] = 1,
     engine: EngineFlag = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for the figure; beside the file unless told.", metavar="DIR")
+        Path | None, typer.Option("--out", help="Folder for the figure; default: beside the file.", metavar="DIR")
     ] = None,
     figures: Annotated[bool, typer.Option(help="Draw what was measured, with both limits.")] = True,
     *,
@@ -273,7 +282,7 @@ def margin(
     *,
     flags: FlightFlags,
 ) -> Answer:
-    """Tell what delay the loop about hover stands: a constant one exactly, one that varies by bounds from theory."""
+    """Delays that the loop about hover tolerates: constant ones exactly, varying ones by bounds from theory."""
     from orchestration.flight.margin import margin_of
     from orchestration.quadrotor.scenario import Scenario
 

@@ -29,7 +29,7 @@ def schema() -> Answer:
 def connect(
     fmu: Annotated[list[str], typer.Argument(help="FMUs: paths, or names of this project's.", show_default=False)],
     out: Annotated[
-        Path | None, typer.Option("--out", help="The system file; printed unless told.", metavar="SYSTEM.toml")
+        Path | None, typer.Option("--out", help="The system file; default: printed.", metavar="SYSTEM.toml")
     ] = None,
 ) -> Answer:
     """Propose a system file for FMUs: outputs to inputs by name, type and unit; what is open is said in it."""

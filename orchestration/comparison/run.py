@@ -96,7 +96,7 @@ def compare(
 
     `folder`, `workers`, `time_limit`, `progress` and `announce` are those of `sweep`, which raises what this does. By
     the engine `batch` the native twins of its FMUs are flown as lanes; pictures are left out unless `figures`, drawn
-    in a `style`, for a screen unless told.
+    in a `style`, by default for a screen.
     """
     comparison = replace(comparison, native=True) if engine == "batch" else comparison
     summary = sweep(

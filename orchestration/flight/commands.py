@@ -23,7 +23,7 @@ AT_LIMIT = "a limit of the plant is active"
 
 
 def commands(runs: Sequence[Run], style: Style) -> Figure:
-    """The whole run, and a window of it: the first second unless told. In a narrow figure the window alone, if any."""
+    """The whole run, and a window of it: by default the first second. In a narrow figure the window alone, if any."""
     end = max(float(run.rows[-1, 0]) for run in runs)
     told = runs[0].window
     zoom = told or (0.0, min(1.0, end))

@@ -83,7 +83,7 @@ def report_of(
     """The report of a store; of a `study` that is known, runs are flown again for their signals.
 
     `wanted` are runs that are among them in any case, `most` is how many, which `choose` picks. `ways` are the axes,
-    those of the study unless told. Raises `UsageError` for a run that the study does not have.
+    default: those of the study. Raises `UsageError` for a run that the study does not have.
     """
     blobs = Blobs()
     tracks = Tracks(blobs)

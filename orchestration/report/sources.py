@@ -26,7 +26,7 @@ def report_of(
 ) -> Report:
     """The report of what is at these paths; raises `UsageError` for what none can be made of.
 
-    `store` is the folder of the store of a study or a comparison, `results/NAME` unless told. `wanted` and `most` are
+    `store` is the folder of the store of a study or a comparison, default `results/NAME`. `wanted` and `most` are
     for studies: runs whose flights are in it, and how many.
     """
     if not what:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 MOST = 1000
-"""runs whose signals are in a report, unless told"""
+"""default number of runs whose signals are in a report"""
 ALONE = 60
 """likewise where each is flown by its FMUs, one after the other"""
 BYTES = 8_000_000

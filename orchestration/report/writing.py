@@ -25,8 +25,8 @@ def report(
 ) -> Path:
     """Write one HTML file of results or directories of runs, or of a study, its store or a comparison; its path.
 
-    It holds all that it needs and loads nothing. `out` is `report_NAME.html` unless told. Of a study, whose store is
-    in the folder `store`, `results/NAME` unless told, so many `flights` are flown again for their signals, those of
+    It holds all that it needs and loads nothing. `out` is by default `report_NAME.html`. Of a study, whose store is
+    in the folder `store`, default `results/NAME`, so many `flights` are flown again for their signals, those of
     the runs with the numbers `runs` among them. Raises `UsageError` for what no report can be made of,
     `QuadcosimError` without the plotting library.
     """

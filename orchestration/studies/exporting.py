@@ -11,7 +11,7 @@ OF_RUNS = ("csv", "mat")
 
 
 def of_run(folder: Path, out: Path, formats: Sequence[str]) -> list[Path]:
-    """Write the signals and events of a run as CSV unless told, or all of it as MAT; the paths.
+    """Write the signals and events of a run as CSV (default), or all of it as MAT; the paths.
 
     Raises `UsageError` for a format that there is not, and for a folder that is no directory of a run.
     """
@@ -24,7 +24,7 @@ def of_run(folder: Path, out: Path, formats: Sequence[str]) -> list[Path]:
 
 
 def of_study(store: Path, formats: Sequence[str]) -> list[Path]:
-    """Write the rows of a store beside it, as Parquet and CSV unless told; the paths."""
+    """Write the rows of a store beside it, default: as Parquet and CSV; the paths."""
     for kind in formats:
         _expect(kind, FORMATS)
     return export(store, store.parent, formats or FORMATS[:2])

@@ -54,7 +54,7 @@ def sweep(
 ) -> Swept:
     """Fly the runs of a study that its store does not have, writing each row as it comes.
 
-    The store is in `folder`, `results/NAME` unless told: what is there is not flown again, so that a sweep may be
+    The store is in `folder`, default `results/NAME`: what is there is not flown again, so that a sweep may be
     stopped and called again. Runs are flown by `workers` processes of this machine, which need no guard of the main
     module and work from a notebook, or by those of a `dask` scheduler at that address; by the engine `batch` they are
     flown as lanes of native FMUs, and some of them by the FMUs too, to compare. A run that takes more than `time_limit`

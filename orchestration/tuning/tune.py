@@ -84,7 +84,7 @@ def tune(
     """Tune the parameters of a controller on an ensemble of starts, and judge them on others.
 
     For each period of the tuning a file of parameters is written into `out`; it says that it was made by `command`.
-    What each search has found is kept in `folder`, `results/NAME` unless told, so that no search is done twice. Runs
+    What each search has found is kept in `folder`, default `results/NAME`, so that no search is done twice. Runs
     are flown by `workers` processes, by the engine `batch` many at once as lanes of native FMUs. `progress` hears the
     share that is done, `announce` a line for each search; None for silence.
 

@@ -45,7 +45,7 @@ def test_every_command_has_the_same_manners_and_a_group_in_the_help(command: str
     of_it = GROUP.commands[command]
     flags = {name for parameter in of_it.params for name in parameter.opts}
     assert {"--json", "--quiet", "-q", "--verbose", "-v", "--log", "--debug"} <= flags
-    assert of_it.rich_help_panel in {"Fly", "Study", "FMUs", "Other tools"}
+    assert of_it.rich_help_panel in {"Run", "Study", "FMUs", "Other tools"}
     assert inspect.unwrap(of_it.callback).__annotations__["return"] in (Answer, "Answer")
 
 
