@@ -1,5 +1,6 @@
 """The store: rows to the bit, one writer, many readers, and no damage whatever happens."""
 
+import ast
 import contextlib
 import dataclasses
 import functools
@@ -27,7 +28,7 @@ from orchestration.quadrotor.wiring import DEFAULT_PLANT
 from orchestration.studies import store as stores
 from orchestration.studies.run_key import run_key
 from orchestration.studies.store import TEXTS, Place, open_for_reading, open_for_writing
-from orchestration.workers.provenance import flight_sources, sources_hash, versions
+from orchestration.workers.provenance import flight_sources, imported, sources_hash, versions
 from orchestration.workers.row import Row
 from quadcosim import QuadcosimError, Scenario, UsageError
 from tests.orchestration.studies.common import METRICS, OBJECTIVES, files_in, one_line, row
@@ -515,6 +516,17 @@ def test_an_edited_source_on_the_path_of_the_flight_is_other_software(module: st
     edited = tmp_path / "edited.py"
     edited.write_bytes(sources[module].read_bytes() + b"\n")
     assert sources_hash({**sources, module: edited}) != sources_hash(sources) == versions()["sources"]
+
+
+def test_every_import_of_the_flights_sources_is_seen() -> None:
+    for path in flight_sources().values():
+        if path.suffix == ".py":
+            text = path.read_text(encoding="utf-8")
+            nodes = [*ast.walk(ast.parse(text))]
+            froms = [node for node in nodes if isinstance(node, ast.ImportFrom) and node.module]
+            names = {f"{node.module}.{alias.name}" for node in froms for alias in node.names}
+            names |= {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+            assert {*imported(text)} >= names | {str(node.module) for node in froms}, path
 
 
 def test_sources_that_only_show_or_keep_results_are_not_on_the_path_of_the_flight() -> None:
