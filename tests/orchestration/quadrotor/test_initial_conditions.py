@@ -44,8 +44,8 @@ FOLLOWED = {
     "paper": (
         ReferenceChoice(name="paper", parameters={"start_z": -10.0}), [0.0, 0.0, -10.0], TRAJECTORY.at(0.0).velocity
     ),
-    "points": (ReferenceChoice(file="points.csv"), [1.0, 2.0, 3.0], [0.0] * 3),
-    "table": (ReferenceChoice(file="table.csv"), TABLE[:3], TABLE[3:]),
+    "points": (ReferenceChoice(file=Path("points.csv")), [1.0, 2.0, 3.0], [0.0] * 3),
+    "table": (ReferenceChoice(file=Path("table.csv")), TABLE[:3], TABLE[3:]),
 }  # fmt: skip
 
 

@@ -161,9 +161,9 @@ def test_a_tuning_goes_on_where_it_was_stopped(tuning, tmp_path):
     assert searched(tuning, files, tmp_path / "kept", fail, fail, **how) == done
     gains = read_toml(written[0], "gains")["controller"]
     assert set(gains) == {"gain.attitude", "gain.theta", "gain.surface"}
-    told = written[0].read_text()
-    assert re.search(r"# Of 2 searches that of seed [12] is taken", told)
-    assert told.count("other starts survive (a share of ") == 2
+    comments = written[0].read_text()
+    assert re.search(r"# Of 2 searches that of seed [12] is taken", comments)
+    assert comments.count("other starts survive (a share of ") == 2
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from orchestration.system.model import Component, System
 from orchestration.workers import pool
 from orchestration.workers.executors import _local_submit
 from orchestration.workers.pool import Crew, Package
-from orchestration.workers.task import Task
+from orchestration.workers.task import Outcome, Task
 from quadcosim import QuadcosimError, UsageError
 from tests.orchestration.fmi.small import needs_compiler, small
 
@@ -97,7 +97,7 @@ def test_what_workers_leave_is_removed_after_the_last_thread_that_could_leave_mo
     begun, closed = threading.Event(), threading.Event()
 
     class Slow(pool.Pilot):
-        def fly(self, task: Task) -> pool.Outcome:
+        def fly(self, task: Task) -> Outcome:
             begun.set()
             closed.wait()
             (self._root / "late").mkdir(parents=True)
