@@ -1,28 +1,127 @@
-"""Tables of a document as a dataclass of their shape: the first key or type that is wrong is said in one line."""
+"""Tables of files, shaped as the records that are made of them: the first key or type that is wrong is one line."""
 
 import dataclasses
 import json
+import types
 import typing
-from collections.abc import Mapping
-from typing import Any, TypeVar
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, TypeVar
 
 import pydantic
 
+from orchestration.basics.attribute_docs import attribute_docs
 from orchestration.basics.errors import UsageError, no_such_key, shown
+from orchestration.basics.records import default_of
 
 Shape = TypeVar("Shape")
+
+
+def _explained(schema: dict[str, Any], table: type["Table"]) -> None:
+    """Says in a JSON schema of each key what the source says of it; that is read where a schema is asked for."""
+    for key, said in docs_of_keys(table).items():
+        schema["properties"][key]["description"] = said
+
+
+class Table(pydantic.BaseModel):
+    """A table of a file: keys that are not named here are refused."""
+
+    model_config = pydantic.ConfigDict(
+        extra="forbid",
+        strict=True,
+        populate_by_name=True,
+        frozen=True,
+        protected_namespaces=(),
+        json_schema_extra=_explained,
+    )
+    declared_by: ClassVar[type]
+
+
+def table_of(
+    record: type,
+    *,
+    without: Sequence[str] = (),
+    called: Mapping[str, str] | None = None,
+    within: Sequence[Any] = (),
+    **other: tuple[Any, Any],
+) -> Any:
+    """The table of a file that says a record, with the keys, types and defaults that the record declares.
+
+    `without` are fields that no file says, `called` keys by another name, `within` the tables that stand for records in
+    it, and `other` the types and defaults of keys that a file says in other ways than the constructor takes them.
+    """
+    tables = {each.declared_by: each for each in within}
+    hints = typing.get_type_hints(record, include_extras=True)
+    fields: dict[str, Any] = {}
+    for field in dataclasses.fields(record):
+        if field.name not in without:
+            hint, default = other.get(field.name, (_in_file(hints[field.name], tables), default_of(field)))
+            default = tables[type(default)]() if type(default) in tables else default
+            default = ... if default is dataclasses.MISSING else default
+            fields[field.name] = (hint, pydantic.Field(default, alias=(called or {}).get(field.name)))
+    made = pydantic.create_model(f"{record.__name__}Table", __base__=Table, __doc__=record.__doc__, **fields)
+    made.declared_by = record
+    return made
+
+
+def _in_file(hint: Any, tables: Mapping[Any, Any]) -> Any:
+    """A type with the tables in it that stand for records."""
+    origin, parts = typing.get_origin(hint), typing.get_args(hint)
+    if hint in tables:
+        return tables[hint]
+    if origin in (None, typing.Literal, typing.Annotated):
+        return hint
+    within = tuple(_in_file(part, tables) for part in parts)
+    return typing.Union[within] if origin in (typing.Union, types.UnionType) else origin[within]  # noqa: UP007
+
+
+def fields_of(shape: Any) -> dict[str, Any]:
+    """The fields of a table or a record by the keys of its file, as pydantic knows them; none of another type."""
+    return {field.alias or name: field for name, field in _fields(shape).items()}
+
+
+def _fields(shape: Any) -> dict[str, Any]:
+    found: dict[str, Any] = getattr(shape, "model_fields", None) or getattr(shape, "__pydantic_fields__", {})
+    return found
+
+
+def docs_of_keys(shape: Any) -> dict[str, str]:
+    """What the source says of each key of a table or a record."""
+    classes = (getattr(shape, "declared_by", shape), shape)
+    said = {name: each.text for one in classes for name, each in attribute_docs(one.__module__, one.__name__).items()}
+    return {field.alias or name: said[name] for name, field in _fields(shape).items() if name in said}
+
+
+def keys_at(shape: Any, place: Sequence[Any]) -> list[str]:
+    """The keys of the table at a place of a document of a shape."""
+    parts = iter(place)
+    for part in parts:
+        shape, one_of_many = _table_in(fields_of(shape)[part].annotation)
+        if one_of_many:
+            next(parts)
+    return [*fields_of(shape), *getattr(shape, "SHORTHANDS", ())]
+
+
+def _table_in(hint: Any) -> tuple[Any, bool]:
+    """The table that a value of this type is or has in it, and whether it has several."""
+    if fields_of(hint):
+        return hint, False
+    origin = typing.get_origin(hint)
+    found = (_table_in(part) for part in typing.get_args(hint))
+    shape, one_of_many = next((each for each in found if each[0] is not None), (None, False))
+    return shape, one_of_many or origin not in (typing.Union, types.UnionType)
 
 
 def parsed(tables: Mapping[str, Any], shape: type[Shape]) -> Shape:
     """The typed form of a TOML document; raises `UsageError` in one line for the first thing wrong."""
     try:
-        return pydantic.TypeAdapter(shape).validate_json(json.dumps(tables, default=str), strict=True)
+        return pydantic.TypeAdapter(shape).validate_json(json.dumps(tables, default=str))
     except pydantic.ValidationError as error:
         raise UsageError(_first_problem(error, shape)) from error
 
 
 _MISSING = ("missing", "missing_argument", "missing_keyword_only_argument")
-_UNREAD = ("unexpected_keyword_argument", "extra_forbidden")
+UNREAD = ("unexpected_keyword_argument", "extra_forbidden")
+"""What pydantic calls a key that nobody reads"""
 
 
 def telling(error: pydantic.ValidationError) -> Any:
@@ -31,7 +130,7 @@ def telling(error: pydantic.ValidationError) -> Any:
     first = problems[0]
     if first["type"] not in _MISSING:
         return first
-    beside = [each for each in problems if each["type"] in _UNREAD and each["loc"][:-1] == first["loc"][:-1]]
+    beside = [each for each in problems if each["type"] in UNREAD and each["loc"][:-1] == first["loc"][:-1]]
     return next(iter(beside), first)
 
 
@@ -39,15 +138,9 @@ def _first_problem(error: pydantic.ValidationError, file: type) -> str:
     """The first thing wrong with a document of the shape `file`, in one line that says what is valid."""
     problem = telling(error)
     place = ".".join(str(part) for part in problem["loc"])
-    if problem["type"] == "unexpected_keyword_argument":
-        table: Any = file
-        for part in problem["loc"][:-1]:
-            if isinstance(part, str):
-                hint = next(f.type for f in dataclasses.fields(table) if f.name == part)
-                table = typing.get_args(hint)[0] if typing.get_origin(hint) is list else hint
-        names = [*(f.name for f in dataclasses.fields(table)), *getattr(table, "SHORTHANDS", ())]
+    if problem["type"] in UNREAD:
         key = str(problem["loc"][-1])
-        return no_such_key(place.removesuffix(key), key, names)
+        return no_such_key(place.removesuffix(key), key, keys_at(file, problem["loc"][:-1]))
     if problem["type"] in _MISSING:
         return f"{place}: expected a value"
     value = problem["input"]

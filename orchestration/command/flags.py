@@ -3,15 +3,16 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
+from orchestration.basics.attribute_docs import Said, attribute_docs
 from orchestration.basics.errors import UsageError
 from orchestration.command import completion
 from orchestration.command.build_flag import builds
 from orchestration.command.shared_flags import Command, takes
-from orchestration.quadrotor.timing import TIMING_KEYS
+from orchestration.system.choices import Clock, Distribution, Hold, Order
 
 if TYPE_CHECKING:
     from orchestration.quadrotor.scenario import Scenario
@@ -27,16 +28,30 @@ def _option(*names: str, panel: str, text: str, metavar: str = "SECONDS", **opti
     return typer.Option(*names, help=text, metavar=metavar, rich_help_panel=panel, show_default=False, **options)
 
 
+def _of_timing(key: str, *, panel: str = EFFECTS, **options: Any) -> Any:
+    """The flag of a key of `[timing]`, in the words of the record."""
+    return _of_record("timing", "Timing", key, panel=panel, **options)
+
+
+def _of_record(
+    module: str, name: str, key: str, *, words: Any = None, tells_default: bool = False, repeated: bool = False,
+    **options: Any,
+) -> Any:  # fmt: skip
+    said = attribute_docs(f"orchestration.quadrotor.{module}", name).get(key, Said("", ""))
+    text = f"{said.text[:-1]}; default: {said.default}." if tells_default else said.text
+    if words is not None:
+        options["metavar"] = "|".join(get_args(words))
+    flag = f"--{key.replace('_', '-')}"
+    return _option(flag, text=f"{text[:-1]}; may be repeated." if repeated else text, **options)
+
+
 @dataclass(frozen=True, kw_only=True)
 class FlightFlags:
     """What was given on the command line; None: not given, the scenario decides."""
 
-    period: Annotated[float | None, _option("--period", panel=TIMING, text="Controller period; default: 0.01.")] = None
-    offset: Annotated[float | None, _option("--offset", panel=TIMING, text="Time of the first sample.")] = None
-    plant_interval: Annotated[
-        float | None,
-        _option("--plant-interval", panel=TIMING, text="Plant's communication interval; default: 0.001."),
-    ] = None
+    period: Annotated[float | None, _of_timing("period", panel=TIMING, tells_default=True)] = None
+    offset: Annotated[float | None, _of_timing("offset", panel=TIMING)] = None
+    plant_interval: Annotated[float | None, _of_timing("plant_interval", panel=TIMING, tells_default=True)] = None
     preset: Annotated[
         str | None,
         _option(
@@ -47,81 +62,26 @@ class FlightFlags:
             autocompletion=completion.presets,
         ),
     ] = None
-    order: Annotated[
-        str | None,
-        _option(
-            "--order",
-            panel=TIMING,
-            metavar="gauss-seidel|jacobi",
-            text="Whether a command is available at its sample or at the next one.",
-        ),
-    ] = None
-    hold: Annotated[
-        str | None, _option("--hold", panel=TIMING, metavar="zero|first", text="Hold of the command between arrivals.")
-    ] = None
-    clock: Annotated[
-        str | None,
-        _option("--clock", panel=TIMING, metavar="master|fmu", text="Who decides when the controller samples."),
-    ] = None
-    delay: Annotated[
-        float | None,
-        _option("--delay", panel=EFFECTS, text="From sample to application of its command; may exceed the period."),
-    ] = None
-    delay_jitter: Annotated[
-        float | None, _option("--delay-jitter", panel=EFFECTS, text="Largest random addition to the delay.")
-    ] = None
-    jitter: Annotated[
-        float | None, _option("--jitter", panel=EFFECTS, text="Largest lateness of a sampling instant.")
-    ] = None
-    jitter_distribution: Annotated[
-        str | None, _option("--jitter-distribution", panel=EFFECTS, metavar="uniform|normal", text="Of both jitters.")
-    ] = None
-    measurement_loss: Annotated[
-        float | None,
-        _option("--measurement-loss", panel=EFFECTS, metavar="P", text="Probability that a measurement is lost."),
-    ] = None
-    command_loss: Annotated[
-        float | None, _option("--command-loss", panel=EFFECTS, metavar="P", text="Probability that a command is lost.")
-    ] = None
+    order: Annotated[str | None, _of_timing("order", panel=TIMING, words=Order)] = None
+    hold: Annotated[str | None, _of_timing("hold", panel=TIMING, words=Hold)] = None
+    clock: Annotated[str | None, _of_timing("clock", panel=TIMING, words=Clock)] = None
+    delay: Annotated[float | None, _of_timing("delay")] = None
+    delay_jitter: Annotated[float | None, _of_timing("delay_jitter")] = None
+    jitter: Annotated[float | None, _of_timing("jitter")] = None
+    jitter_distribution: Annotated[str | None, _of_timing("jitter_distribution", words=Distribution)] = None
+    measurement_loss: Annotated[float | None, _of_timing("measurement_loss", metavar="P")] = None
+    command_loss: Annotated[float | None, _of_timing("command_loss", metavar="P")] = None
     loss: Annotated[float | None, _option("--loss", panel=EFFECTS, metavar="P", text="Both losses at once.")] = None
-    burst_length: Annotated[
-        float | None,
-        _option(
-            "--burst-length",
-            panel=EFFECTS,
-            metavar="N",
-            text="Mean number of losses in a row; independent unless given.",
-        ),
+    burst_length: Annotated[float | None, _of_timing("burst_length", metavar="N")] = None
+    clock_ratio: Annotated[float | None, _of_timing("clock_ratio", metavar="R")] = None
+    noise: Annotated[list[str] | None, _of_timing("noise", metavar="NAME=SIGMA", repeated=True)] = None
+    quantisation: Annotated[list[str] | None, _of_timing("quantisation", metavar="NAME=Q", repeated=True)] = None
+    seed: Annotated[int | None, _of_record("scenario", "Scenario", "seed", panel=EFFECTS, metavar="N")] = None
+    stop_time: Annotated[
+        float | None, _of_record("scenario", "Scenario", "stop_time", panel=MODEL, tells_default=True)
     ] = None
-    clock_ratio: Annotated[
-        float | None,
-        _option(
-            "--clock-ratio",
-            panel=EFFECTS,
-            metavar="R",
-            text="Seconds that the controller believes pass per true second.",
-        ),
-    ] = None
-    noise: Annotated[
-        list[str] | None,
-        _option(
-            "--noise", panel=EFFECTS, metavar="NAME=SIGMA", text="Gaussian noise on a measurement; may be repeated."
-        ),
-    ] = None
-    quantisation: Annotated[
-        list[str] | None,
-        _option("--quantisation", panel=EFFECTS, metavar="NAME=Q", text="Rounding of a measurement; may be repeated."),
-    ] = None
-    seed: Annotated[int | None, _option("--seed", panel=EFFECTS, metavar="N", text="Of all random numbers.")] = None
-    stop_time: Annotated[float | None, _option("--stop-time", panel=MODEL, text="End of the run; default: 30.")] = None
     model_mismatch: Annotated[
-        bool | None,
-        _option(
-            "--model-mismatch",
-            panel=MODEL,
-            metavar="",
-            text="The controller's nominal mass or inertia is not the plant's on purpose: no warning.",
-        ),
+        bool | None, _of_record("scenario", "Scenario", "model_mismatch", panel=MODEL, metavar="")
     ] = None
     controller: Annotated[
         str | None,
@@ -195,10 +155,12 @@ class FlightFlags:
         from orchestration.building.fmus import native_twin
         from orchestration.quadrotor.presets import preset_timing
         from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice, chosen
+        from orchestration.quadrotor.timing import TIMING_KEYS
         from orchestration.quadrotor.vehicle import load_vehicle
 
         timing: dict[str, Any] = {} if self.preset is None else preset_timing(self.preset)
-        timing |= {name: getattr(self, name) for name in _TIMING_FLAGS if getattr(self, name) is not None}
+        single = (key for key in TIMING_KEYS if key not in _BY_MEASUREMENT)
+        timing |= {key: getattr(self, key) for key in single if getattr(self, key) is not None}
         if self.loss is not None:
             timing.setdefault("measurement_loss", self.loss)
             timing.setdefault("command_loss", self.loss)
@@ -264,7 +226,6 @@ Timing = Annotated[
 ]
 
 _BY_MEASUREMENT = ("noise", "quantisation")
-_TIMING_FLAGS = tuple(key for key in TIMING_KEYS if key not in _BY_MEASUREMENT)
 
 
 def flies(command: Command) -> Command:

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from orchestration.basics.constructors import strict
 from orchestration.basics.errors import UsageError
+from orchestration.basics.records import record
 from orchestration.building import fmus
 from orchestration.studies.axes import Axis, Value
 from orchestration.studies.linked_settings import Key, Together
@@ -18,8 +18,7 @@ VEHICLE, CONDITION, CONTROLLER, START = "vehicle", "condition", "controller", "s
 FMU = "controller.fmu"
 
 
-@strict()
-@dataclass(frozen=True, kw_only=True)
+@record()
 class Controller:
     """One that is compared: an FMU with parameters."""
 
@@ -31,8 +30,7 @@ class Controller:
     """of its attitude loop [rad/s]; None: that of the FMU about hover"""
 
 
-@strict()
-@dataclass(frozen=True, kw_only=True)
+@record()
 class Craft:
     """A vehicle that they fly."""
 
@@ -41,8 +39,7 @@ class Craft:
     """what it is; None: the plant of the base"""
 
 
-@strict()
-@dataclass(frozen=True, kw_only=True)
+@record()
 class Condition:
     """What differs from what a controller believes, or goes wrong: mass, lag, wind, losses."""
 
@@ -51,8 +48,7 @@ class Condition:
     multiplies: Mapping[str, float] = field(default_factory=dict)
 
 
-@strict("front.")
-@dataclass(frozen=True, kw_only=True)
+@record("front.")
 class Front:
     """What is weighed against each other, both the less the better."""
 
@@ -73,8 +69,7 @@ class Cell:
     value: Value
 
 
-@strict()
-@dataclass(frozen=True, kw_only=True)
+@record()
 class Comparison:
     """Controllers on vehicles under conditions over an axis, each from all starts; raises `UsageError`."""
 

@@ -3,12 +3,13 @@
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError, no_such_key
+from orchestration.basics.records import record
 from orchestration.comparison.design import FMU, Comparison, Condition, Controller, Craft, Front
 from orchestration.expressions.at_instant import compiled
 from orchestration.expressions.syntax import parse
@@ -18,14 +19,10 @@ from orchestration.studies.study_file import AxisTable, axis_of, load, loop_of
 from orchestration.system.parameters import parameters_in
 from orchestration.system.request import ControlLoop
 
-_FORBID: dict[str, str] = {"extra": "forbid"}
 
-
-@dataclass(frozen=True, kw_only=True)
+@record()
 class ControllerTable:
     """`[[controllers]]`: an FMU, a file of parameters, and parameters on top of that."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     name: str
     """What tables and pictures call it."""
@@ -41,11 +38,9 @@ class ControllerTable:
     """Its bandwidth [rad/s]; without it, the bandwidth is measured."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@record()
 class VehicleTable:
     """`[[vehicles]]`: one by its name or its file, and parameters on top of that."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     name: str
     """What tables and pictures call it."""
@@ -57,11 +52,9 @@ class VehicleTable:
     """Parameters of every controller on top of those of the vehicle."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@record()
 class ConditionTable:
     """`[[conditions]]`: what is set, and what is multiplied, by the names of axes of studies."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     name: str
     """What tables and pictures call it."""
@@ -71,18 +64,14 @@ class ConditionTable:
     """Factors by path, on the value that is there by then."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@record()
 class FrontTable(Front):
     """`[front]`: the objectives that are weighed against each other."""
 
-    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
-
-@dataclass(frozen=True, kw_only=True)
+@record()
 class ComparisonFile:
     """The file: a scenario, or the path of one, and what is compared on it."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     controllers: list[ControllerTable]
     """The controllers; pairs are made with the first."""

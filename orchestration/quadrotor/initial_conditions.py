@@ -3,14 +3,13 @@
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fmu_kit.trajectory import Trajectory
-from orchestration.basics.constructors import strict
 from orchestration.basics.errors import UsageError, no_such_key
+from orchestration.basics.records import record
 from orchestration.basics.simulator import Floats
 from orchestration.engines.wiring import source_values
 from orchestration.fmi.kit import TRAJECTORY
@@ -18,8 +17,7 @@ from orchestration.schedule.streams import Streams
 from orchestration.system.request import Start
 
 
-@strict("starts.")
-@dataclass(frozen=True, kw_only=True)
+@record("starts.")
 class Starts:
     """Initial errors in position, velocity, attitude and angular velocity, each in a direction of its own.
 

@@ -2,13 +2,13 @@
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, ClassVar
 
 from orchestration.basics.bisection import Range
-from orchestration.basics.constructors import strict
 from orchestration.basics.errors import UsageError, no_such_key, shown
+from orchestration.basics.records import record
 from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.quadrotor.initial_conditions import Starts, starts_in
 from orchestration.quadrotor.nominal_model import mismatch
@@ -37,8 +37,7 @@ from orchestration.system.paths import changed
 from orchestration.system.requirements import is_finite
 
 
-@strict()
-@dataclass(frozen=True, kw_only=True)
+@record()
 class FmuChoice:
     """An FMU, by the name of one of this project's or a path, and the parameters to set."""
 
@@ -49,12 +48,9 @@ class FmuChoice:
     """The parameters to set, by their names in the FMU and in the units that it declares."""
 
 
-@strict("record.")
-@dataclass(frozen=True, kw_only=True)
+@record("record.")
 class Record:
     """Variables to record beside what is exchanged; None: all outputs and locals."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
     plant: tuple[str, ...] | None = None
     """The variables of the plant to record; None: all outputs and locals."""
@@ -62,8 +58,7 @@ class Record:
     """The variables of the controller to record; None: all outputs and locals."""
 
 
-@strict()
-@dataclass(frozen=True, kw_only=True)
+@record()
 class Scenario:
     """One run; the defaults are the paper's scenario (section V) at a 10 ms period.
 
@@ -71,27 +66,31 @@ class Scenario:
     """
 
     stop_time: float = 30.0
-    """The end of the flight [s]."""
+    """The end of the flight."""
     seed: int = 0
     """The seed of all random numbers of the flight."""
     model_mismatch: bool = False
     """Whether it is meant if the controller's nominal mass or inertia is not the plant's; it only silences a
     warning."""
     vehicle: Vehicle | None = None
-    """The vehicle whose parameters hold where `controller` and `plant` say nothing else; `load_vehicle` has some by
-    name."""
+    """The vehicle whose parameters hold where `controller` and `plant` say nothing else, of `load_vehicle`; in a file
+    its name, or the path of its own file."""
     controller: FmuChoice = field(default_factory=lambda: FmuChoice(fmu=DEFAULT_CONTROLLER))
-    """The FMU of the controller, and its parameters."""
+    """The FMU of the controller and its parameters: in a file `fmu`, its name or path, and parameters by their names in
+    the FMU."""
     plant: FmuChoice = field(default_factory=lambda: FmuChoice(fmu=DEFAULT_PLANT))
-    """The FMU of the vehicle, and its parameters."""
+    """Likewise of the plant."""
     timing: Timing = field(default_factory=Timing)
-    """How the digital loop is clocked."""
+    """The digital clock between them; in a file `loss` sets both losses, `preset` the rate and latency of a real
+    stack."""
     reference: ReferenceChoice = field(default_factory=ReferenceChoice)
-    """What the vehicle is to follow."""
+    """What is followed: in a file `name` of a motion or `file` of way-points, and its parameters; without it, the
+    trajectory that the controller has built in."""
     disturbance: DisturbanceChoice = field(default_factory=DisturbanceChoice)
-    """What pushes the vehicle beside the built-in wind."""
+    """What pushes it beside the built-in wind: in a file `name` of gusts or `file`, `drag`, `interpolation`, and
+    parameters of the gusts."""
     record: Record = field(default_factory=Record)
-    """What is recorded beside what plant and controller exchange."""
+    """What is recorded beside what the two FMUs exchange."""
 
     def __post_init__(self) -> None:
         if not (is_finite(self.stop_time) and self.stop_time > 0.0):

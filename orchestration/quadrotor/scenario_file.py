@@ -1,48 +1,29 @@
 """Reads scenario files: keys and types are checked here, values where they mean something."""
 
 import dataclasses
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import Any, TypeVar
 
 from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError, no_such_key, shown
-from orchestration.basics.typed_tables import parsed
+from orchestration.basics.typed_tables import parsed, table_of
 from orchestration.quadrotor.presets import preset_timing
-from orchestration.quadrotor.scenario import FmuChoice, Record, Scenario
+from orchestration.quadrotor.scenario import FmuChoice, Scenario
 from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.vehicle import load_vehicle
 from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
 from orchestration.system.parameters import parameters_in
 
-
-@dataclass(frozen=True, kw_only=True)
-class ScenarioFile:
-    """The tables of a scenario file; parameters of the FMUs are still as the file nests them."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
-
-    stop_time: float = Scenario.stop_time
-    """The end of the run."""
-    seed: int = Scenario.seed
-    """The seed of all random numbers."""
-    model_mismatch: bool = Scenario.model_mismatch
-    """Whether a controller that believes in another mass or inertia than the plant's is meant: no warning then."""
-    vehicle: str | None = None
-    """A vehicle by name, or the path of its file: its parameters hold where the scenario says nothing else."""
-    controller: dict[str, Any] = field(default_factory=dict)
-    """Parameters by their names in the FMU, and `fmu`, its name or path."""
-    plant: dict[str, Any] = field(default_factory=dict)
-    """Likewise of the plant."""
-    timing: Timing = field(default_factory=Timing)
-    """The digital clock between them; `loss` sets both losses, `preset` the rate and latency of a real stack."""
-    reference: dict[str, Any] = field(default_factory=dict)
-    """What is followed: `name` of a motion or `file` of way-points, and its parameters; else the built-in one."""
-    disturbance: dict[str, Any] = field(default_factory=dict)
-    """What pushes it: `name` of gusts or `file`, `drag`, `interpolation`, and parameters of the gusts."""
-    record: Record = field(default_factory=Record)
-    """What is recorded beside what the two FMUs exchange."""
+ScenarioFile = table_of(
+    Scenario,
+    vehicle=(str | None, None),
+    controller=(dict[str, Any], {}),
+    plant=(dict[str, Any], {}),
+    reference=(dict[str, Any], {}),
+    disturbance=(dict[str, Any], {}),
+)
+"""The tables of a scenario file; parameters of the FMUs are still as the file nests them"""
 
 
 def load_scenario(path: str | Path) -> Scenario:

@@ -1,21 +1,20 @@
 """What a flight is told from outside: the reference that it follows, and what disturbs it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, Literal
 
-from orchestration.basics.constructors import strict
 from orchestration.basics.errors import UsageError
-from orchestration.system.requirements import is_finite, require, require_choice
+from orchestration.basics.records import record
+from orchestration.system.requirements import is_finite, require
 
 Between = Literal["linear", "previous"]
 DRAG = 0.1
 """[N·s/m] by which a wind becomes a force where nobody says another: an assumption, not a measured figure"""
 
 
-@strict("reference.")
-@dataclass(frozen=True, kw_only=True)
+@record("reference.")
 class ReferenceChoice:
     """What the vehicle is to follow: the controller's built-in trajectory unless a motion or a file is named.
 
@@ -40,8 +39,7 @@ class ReferenceChoice:
             _expect_signal("reference", None, self.parameters)
 
 
-@strict("disturbance.")
-@dataclass(frozen=True, kw_only=True)
+@record("disturbance.")
 class DisturbanceChoice:
     """What pushes the vehicle beside the built-in wind: nothing unless gusts or a file are named.
 
@@ -62,7 +60,6 @@ class DisturbanceChoice:
 
     def __post_init__(self) -> None:
         _expect_one(self, "disturbance")
-        require_choice(self, place="disturbance.", interpolation=Between)
         of_file = self.file is not None or self.interpolation == "linear"
         require(of_file, "disturbance.interpolation", self.interpolation, "none without a file")
         fits = self.drag is None or (is_finite(self.drag) and self.drag >= 0.0)

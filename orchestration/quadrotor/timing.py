@@ -1,29 +1,26 @@
 """How the digital loop is clocked: the timing of a run as one frozen value, and time in integer nanoseconds."""
 
-from dataclasses import dataclass, field, fields
-from fractions import Fraction
+from dataclasses import field, fields
 from typing import ClassVar
 
-from orchestration.basics.constructors import strict
 from orchestration.basics.errors import shown
-from orchestration.system.model import Clock, Distribution, Hold, Order
+from orchestration.basics.records import record
+from orchestration.system.choices import Clock, Distribution, Hold, Order
 from orchestration.system.requirements import (
     is_finite,
     require,
     require_bursts,
-    require_choice,
     require_not_negative,
     require_own_clock,
     require_positive,
     require_share,
 )
-from orchestration.system.times import exact_nanoseconds
+from orchestration.system.times import is_at_least
 
 _PLACE = "timing."
 
 
-@strict("timing.")
-@dataclass(frozen=True, kw_only=True)
+@record("timing.")
 class Timing:
     """How the digital loop is clocked; times in seconds.
 
@@ -31,16 +28,15 @@ class Timing:
     probabilities outside [0, 1].
     """
 
-    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
     SHORTHANDS: ClassVar[tuple[str, ...]] = ("loss", "preset")
     """Keys of `[timing]` in a file that stand for others"""
 
     period: float = 0.01
-    """The sampling period T of the controller [s], in its own time: sample k is at offset + kT."""
+    """The sampling period T of the controller, in its own time: sample k is at offset + kT."""
     offset: float = 0.0
-    """The time of the first sample [s]."""
+    """The time of the first sample."""
     plant_interval: float = 0.001
-    """The distance of the plant's own communication points [s], each of which is recorded."""
+    """The distance of the plant's own communication points, each of which is recorded."""
     order: Order = "gauss-seidel"
     """Whether a command can be applied at the instant of its sample (gauss-seidel) or at the next one (jacobi)."""
     hold: Hold = "zero"
@@ -48,11 +44,11 @@ class Timing:
     clock: Clock = "master"
     """Who decides when the controller samples: the master, or the FMU by its own sample_period."""
     delay: float = 0.0
-    """The time d from a sample to the application of its command [s]; it may exceed the period."""
+    """The time d from a sample to the application of its command; it may exceed the period."""
     delay_jitter: float = 0.0
-    """The largest random addition J_d to the delay [s], drawn for each command."""
+    """The largest random addition J_d to the delay, drawn for each command."""
     jitter: float = 0.0
-    """The largest lateness J of a sampling instant [s], drawn for each; it is less than the period."""
+    """The largest lateness J of a sampling instant, drawn for each; it is less than the period."""
     jitter_distribution: Distribution = "uniform"
     """How both are drawn over [0, J]; normal is centred at J/2 with standard deviation J/6, cut to the range."""
     measurement_loss: float = 0.0
@@ -60,7 +56,7 @@ class Timing:
     command_loss: float = 0.0
     """The probability that a command is lost."""
     burst_length: float | None = None
-    """The mean number of losses in a row (Gilbert-Elliott); None: losses are independent."""
+    """The mean number of losses in a row (Gilbert-Elliott); without it, losses are independent."""
     clock_ratio: float = 1.0
     """The seconds r that the controller believes pass per true second."""
     noise: dict[str, float] = field(default_factory=dict)
@@ -70,12 +66,10 @@ class Timing:
     """The step to which a measurement is rounded, in its unit, by its name, likewise."""
 
     def __post_init__(self) -> None:
-        require_choice(self, place=_PLACE, order=Order, hold=Hold, clock=Clock, jitter_distribution=Distribution)
         require_positive(self, "period", "plant_interval", "clock_ratio", place=_PLACE)
         for name, ratio in (("period", self.clock_ratio), ("plant_interval", 1.0)):
             value = getattr(self, name)
-            least = Fraction(repr(float(ratio)))
-            require(exact_nanoseconds(value) >= least, _PLACE + name, value, "at least a nanosecond")
+            require(is_at_least(value, ratio), _PLACE + name, value, "at least a nanosecond")
         require_not_negative(self, "offset", "delay", "delay_jitter", "jitter", place=_PLACE)
         require_share(self, "measurement_loss", "command_loss", place=_PLACE)
         for what in ("noise", "quantisation"):

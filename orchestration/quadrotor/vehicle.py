@@ -1,13 +1,13 @@
 """Vehicles: what a plant is made of and what its controllers are told of it, from files of their own."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path, PurePath
 from typing import Any
 
-from orchestration.basics.constructors import strict
 from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError, did_you_mean, expected_name
+from orchestration.basics.records import record
 from orchestration.building.models import MODELS
 from orchestration.quadrotor.wiring import DEFAULT_PLANT
 from orchestration.system.model import Parameter
@@ -22,8 +22,7 @@ TABLES = ("plant", "controller", "controllers")
 """of a vehicle file"""
 
 
-@strict()
-@dataclass(frozen=True, kw_only=True)
+@record()
 class Vehicle:
     """Parameters of the plant, of every controller, and of single controllers by the names of their FMUs.
 

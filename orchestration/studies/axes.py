@@ -2,17 +2,16 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal, overload
 
 import numpy as np
 
-from orchestration.basics.constructors import strict
 from orchestration.basics.errors import UsageError
+from orchestration.basics.records import Scalar, record
 from orchestration.basics.simulator import Floats
 from orchestration.studies import sensitivity
 
-Value = float | int | bool | str
+Value = Scalar
 Scale = Literal["linear", "logarithmic"]
 Method = Literal["random", "latin-hypercube", "sobol", "morris", "saltelli"]
 """How sampled axes are: the last two for sensitivity (Morris screening, Sobol indices)."""
@@ -23,8 +22,7 @@ MOST_POINTS = 1_000_000
 _BY_NAME = ("axis.name",)
 
 
-@strict()
-@dataclass(frozen=True, kw_only=True)
+@record()
 class Axis:
     """One quantity that a study varies.
 

@@ -4,12 +4,11 @@ import hashlib
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from orchestration.basics.constructors import strict
 from orchestration.basics.errors import UsageError
+from orchestration.basics.records import record
 from orchestration.building.fmus import native_twin, native_twins
 from orchestration.building.inputs import Files, files_of
 from orchestration.requests.ranges import paths_in
@@ -21,8 +20,7 @@ from orchestration.system.paths import changed, names_table, value_at
 from orchestration.system.request import Request, in_its_own_words, system_meant
 
 
-@strict()
-@dataclass(frozen=True, kw_only=True)
+@record()
 class Study:
     """Runs of a base system, or a scenario of the quadrotor, over axes."""
 

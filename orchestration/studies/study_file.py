@@ -1,12 +1,13 @@
 """Reads study files."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError
+from orchestration.basics.records import record
 from orchestration.basics.typed_tables import parsed
 from orchestration.requests.request import load_request, request_from_tables
 from orchestration.studies.axes import Axis, Method, Scale, Value, span
@@ -14,14 +15,10 @@ from orchestration.studies.study import Study, names_fmu
 from orchestration.system.paths import names_table
 from orchestration.system.request import ControlLoop, Request
 
-_FORBID: dict[str, str] = {"extra": "forbid"}
 
-
-@dataclass(frozen=True, kw_only=True)
+@record()
 class AxisTable:
     """`[[axes]]`: a target or several, and a list, a range with a number, or a range to sample."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     name: str
     """The name of the axis: a column of the table of runs."""
@@ -41,11 +38,9 @@ class AxisTable:
     """Whether the range has equal steps or equal ratios."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@record()
 class DesignTable:
     """`[design]`: how axes without values are sampled."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     method: Method = "sobol"
     """How the axes without values are sampled; `morris` and `saltelli` are for sensitivity."""
@@ -57,11 +52,9 @@ class DesignTable:
     """Whether each run has random numbers of its own; else all have those of the base."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@record()
 class StudyFile:
     """The file: the base as the tables of a system or a scenario, or the path of one; axes, design."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     name: str | None = None
     """The name of the study and of its folder in `results/`; without it, that of the file."""

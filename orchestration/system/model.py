@@ -2,38 +2,31 @@
 
 import functools
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
-from orchestration.basics.constructors import strict
 from orchestration.basics.errors import UsageError
+from orchestration.basics.records import Scalar, record
 from orchestration.expressions.syntax import is_number, parse
 from orchestration.signals import WINDS
+from orchestration.system.choices import Align, Clock, Distribution, Hold, Interpolation, Order
 from orchestration.system.requirements import (
     is_finite,
     require,
     require_bursts,
-    require_choice,
     require_not_negative,
     require_own_clock,
     require_positive,
     require_share,
 )
-from orchestration.system.times import exact_nanoseconds
+from orchestration.system.times import is_at_least
 from orchestration.system.written import tables_of
 
-Order = Literal["gauss-seidel", "jacobi"]
-Hold = Literal["zero", "first"]
-Clock = Literal["master", "fmu"]
-Distribution = Literal["uniform", "normal"]
-Align = Literal["exact", "next"]
-Interpolation = Literal["linear", "previous", "spline"]
-Parameter = float | bool | str
+Parameter = Scalar
 
 
-@strict()
-@dataclass(frozen=True, kw_only=True)
+@record()
 class Sampling:
     """When a digital task runs; times in seconds of the true clock, but for `period` and `offset` (its own)."""
 
@@ -53,61 +46,59 @@ class Sampling:
     def __post_init__(self) -> None:
         require_positive(self, "period", "clock_ratio")
         require_not_negative(self, "offset", "jitter")
-        require_choice(self, jitter_distribution=Distribution, clock=Clock)
-        require(exact_nanoseconds(self.period) >= self.clock_ratio, "period", self.period, "at least a nanosecond")
+        require(is_at_least(self.period, self.clock_ratio), "period", self.period, "at least a nanosecond")
         longest = self.period / self.clock_ratio
         require(self.jitter < longest, "jitter", self.jitter, f"less than the period of {longest:g} s")
         if self.clock == "fmu":
             require_own_clock(self)
 
 
-@strict()
-@dataclass(frozen=True, kw_only=True)
+@record()
 class Component:
     """An FMU, its parameters, and how it is stepped: at sampling instants if it has `sampling`, else continuously."""
 
     fmu: str
-    """The name of one of this project's FMUs, or the path of an .fmu file."""
+    """The name of one of this project's FMUs, or the path of an .fmu file; in a file, relative to its folder."""
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
     """The parameters to set, by their names in the FMU and in the units that it declares."""
     step: float | None = None
-    """The distance of the communication points [s] of a component in continuous time; None: it has `sampling`."""
+    """The distance of the communication points [s] of a component in continuous time; a component has either this or
+    `sampling`."""
     sampling: Sampling | None = None
-    """When a digital task runs; None: it is in continuous time and has a `step`."""
+    """When a digital task runs; a component has either this or `step`."""
     tolerance: float | None = None
-    """The relative tolerance of the FMU's own solver; None: that of the experiment that the FMU declares, if any."""
+    """The relative tolerance of the FMU's own solver; without it, that of the experiment that the FMU declares,
+    if any."""
     align: Align = "exact"
     """What becomes of an instant between two points of a component that takes its own fixed step only: an error
     (exact), or it moves to the next point (next)."""
     record: tuple[str, ...] | None = None
-    """The variables to record beside what is exchanged; None: all outputs and local Reals."""
+    """The variables to record beside what is exchanged; without it, all outputs and local Reals."""
 
     def __post_init__(self) -> None:
-        require_choice(self, align=Align)
         if self.tolerance is not None:
             require_positive(self, "tolerance")
         if self.sampling is None:
             require(self.step is not None, "step", "none", "step (continuous time) or sampling (a digital task)")
             require_positive(self, "step")
-            require(exact_nanoseconds(self.step or 0.0) >= 1, "step", self.step, "at least a nanosecond")
+            require(is_at_least(self.step or 0.0, 1.0), "step", self.step, "at least a nanosecond")
         else:
             require(self.step is None, "step", self.step, "none beside sampling, whose period it follows")
 
 
-@strict()
-@dataclass(frozen=True, kw_only=True)
+@record()
 class Connection:
     """One message from a component to another: its signals travel together; times in seconds."""
 
     name: str
-    """The name by which paths and events call it; in files without one, its index."""
+    """The name by which paths and events call it; in a file without one, its index."""
     start: tuple[str, ...]
-    """The outputs that it carries, as COMPONENT.VARIABLE, of one component; `from` in files."""
+    """The outputs that it carries, as COMPONENT.VARIABLE, of one component (`from` in files)."""
     end: tuple[str, ...]
-    """As many inputs of one component, in the same order; `to` in files."""
+    """As many inputs of one component, in the same order (`to` in files)."""
     order: Order = "gauss-seidel"
     """Whether a message can be there at the instant at which it was sent (gauss-seidel), or at the next one of its
-    sender (jacobi)."""
+    sender (jacobi); in a file without it, what `order` at the top says."""
     delay: float = 0.0
     """The time d from sending to arrival [s]; it may exceed a period."""
     delay_jitter: float = 0.0
@@ -117,21 +108,21 @@ class Connection:
     loss: float = 0.0
     """The probability that a message is lost."""
     burst_length: float | None = None
-    """The mean number of losses in a row (Gilbert-Elliott); None: losses are independent."""
+    """The mean number of losses in a row (Gilbert-Elliott); without it, losses are independent."""
     hold: Hold = "zero"
     """What the receiver gets between arrivals: the last value (zero), or the line through the last two (first)."""
     noise: Mapping[str, float] = field(default_factory=dict)
     """The standard deviation of normal noise by variable of the sender, in its unit; a vector's name stands for its
-    components."""
+    components. In a file, one number is for all of them."""
     quantisation: Mapping[str, float] = field(default_factory=dict)
     """The step to which a value is rounded, in its unit, by variable of the sender, likewise."""
     scale: float = 1.0
-    """The factor in scale · value + offset, which is what arrives."""
+    """The factor in scale · value + offset, which is what arrives; without either of them, units must be the same."""
     offset: float = 0.0
     """What is added after the scale, in the unit of the receiver."""
     stated: bool = False
-    """Whether scale and offset are meant as they are even if they change nothing: then units may differ. In files they
-    are where one of them is given."""
+    """Whether scale and offset are meant as they are even if they change nothing: then units may differ. In a file
+    they are where one of them is given."""
 
     @property
     def converts(self) -> bool:
@@ -139,7 +130,6 @@ class Connection:
         return self.scale != 1.0 or self.offset != 0.0
 
     def __post_init__(self) -> None:
-        require_choice(self, order=Order, hold=Hold, jitter_distribution=Distribution)
         require_not_negative(self, "delay", "delay_jitter")
         require_share(self, "loss")
         for what, values in (("noise", self.noise), ("quantisation", self.quantisation)):
@@ -179,8 +169,7 @@ class Connection:
         return component_of(self.end[0])
 
 
-@strict()
-@dataclass(frozen=True, kw_only=True)
+@record()
 class Source:
     """What drives inputs from outside: a constant, a file, white noise, a signal by name or the built-in trajectory.
 
@@ -194,14 +183,14 @@ class Source:
     constant: float | None = None
     """A constant value, in the unit of the inputs."""
     file: Path | None = None
-    """A CSV file with `time` [s] and one column for each input, named as the input without its component; linear
-    between rows."""
+    """The path of a CSV file with `time` [s] and one column for each input, named as the input without its component,
+    or with way-points; in a file, relative to its folder."""
     interpolation: Interpolation = "linear"
     """What holds between the rows of a file: the line (linear), the row before (previous), or a smooth curve (spline)
     whose rows are way-points, columns x, y, z [m] and `time` [s], or else `hold` [s] and `speed` [m/s] where they are
     told."""
     columns: tuple[str, ...] | None = None
-    """The columns of the file in the order of the inputs, where they are not named as these; None: they are."""
+    """The columns of the file in the order of the inputs, where they are not named as these."""
     noise: float | None = None
     """The intensity [unit² s] of white noise: normal values with variance noise / period, each held over `period`."""
     period: float | None = None
@@ -248,7 +237,7 @@ class Source:
             require_not_negative(self, "noise")
             require(self.period is not None, "period", "none", "how long each value is held, in seconds")
             require_positive(self, "period")
-            require(exact_nanoseconds(self.period or 0.0) >= 1, "period", self.period, "at least a nanosecond")
+            require(is_at_least(self.period or 0.0, 1.0), "period", self.period, "at least a nanosecond")
         else:
             nobody = self.trajectory is None or not self.to
             require(nobody, "to", ", ".join(self.to), "none: a trajectory is for objectives")
@@ -258,7 +247,6 @@ class Source:
         self._expect_signal()
 
     def _expect_file(self) -> None:
-        require_choice(self, interpolation=Interpolation)
         is_file, is_table = self.file is not None, self.file is not None and self.interpolation != "spline"
         require(is_file or self.interpolation == "linear", "interpolation", self.interpolation, "none without a file")
         if self.columns is not None:
@@ -292,15 +280,14 @@ DIVERGED, TERMINATED = "diverged", "terminated"
 """What a run is called, whatever its criterion is, that left the region that counts, or that an FMU has ended"""
 
 
-@strict()
-@dataclass(frozen=True, kw_only=True)
+@record()
 class Criterion:
-    """What a good run is, as expressions; None: not asked."""
+    """What a good run is, as expressions."""
 
     good: str | None = None
-    """The condition over objectives, at the end, by which a run is good; None: it is not asked."""
+    """The condition over objectives, at the end, by which a run is good; without it, that is not asked."""
     diverged: str | None = None
-    """The condition over signals that ends a run at the first instant at which it holds; None: none does."""
+    """The condition over signals that ends a run at the first instant at which it holds; without it, none does."""
     outcomes: tuple[str, str] = ("good", "bad")
     """What a run is called that is good, and one that is not; one that diverged, or was terminated, is called so."""
 
@@ -310,8 +297,7 @@ class Criterion:
         require(two, "outcomes", ascii(given), f"two names, and neither is {DIVERGED} or {TERMINATED}")
 
 
-@strict()
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record()
 class System:
     """Components and what connects and drives them, what a run comes to and when it is good.
 
@@ -396,7 +382,7 @@ class System:
 
     def __post_init__(self) -> None:
         require_positive(self, "stop_time")
-        require(exact_nanoseconds(self.stop_time) >= 1, "stop_time", self.stop_time, "at least a nanosecond")
+        require(is_at_least(self.stop_time, 1.0), "stop_time", self.stop_time, "at least a nanosecond")
         whole = isinstance(self.seed, int) and not isinstance(self.seed, bool)
         require(whole and 0 <= self.seed < 2**63, "seed", self.seed, "a whole number from 0 to 2^63 - 1")
         if "rows" in self.components:

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 
 from orchestration.basics.bisection import Range
-from orchestration.basics.constructors import called
 from orchestration.basics.errors import UsageError
+from orchestration.basics.records import called
 from orchestration.system.model import Parameter, System
 
 Self = TypeVar("Self", bound="ControlLoop")

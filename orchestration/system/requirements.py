@@ -1,7 +1,7 @@
 """What a value of a system or of a timing must be, told in one line: `UsageError` for what cannot be."""
 
 import math
-from typing import Any, TypeGuard, get_args
+from typing import Any, TypeGuard
 
 from orchestration.basics.errors import UsageError, shown
 from orchestration.system.times import exact_nanoseconds
@@ -44,13 +44,6 @@ def require_share(of: object, *names: str, place: str = "") -> None:
     for name in names:
         value = getattr(of, name)
         require(is_number(value) and 0.0 <= value <= 1.0, place + name, value, "a probability in [0, 1]")
-
-
-def require_choice(of: object, *, place: str = "", **choices: Any) -> None:
-    """The fields that `choices` names are among what their `Literal` allows."""
-    for name, kind in choices.items():
-        value = getattr(of, name)
-        require(value in get_args(kind), place + name, value, f"one of {', '.join(get_args(kind))}")
 
 
 def require_bursts(of: object, length: float | None, *losses: str, place: str = "") -> None:

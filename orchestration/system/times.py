@@ -23,6 +23,14 @@ def nanoseconds(seconds: float) -> int:
     return round(exact_nanoseconds(seconds))
 
 
+def is_at_least(seconds: float, nanoseconds: float) -> bool:
+    """Whether a time is no shorter than so many nanoseconds, by what the decimal forms of both mean."""
+    about = seconds * NANOSECONDS
+    if abs(about - nanoseconds) > 1e-9 * nanoseconds:
+        return about > nanoseconds
+    return exact_nanoseconds(seconds) >= Fraction(repr(float(nanoseconds)))
+
+
 class Grid:
     """The instants round(offset + k·period), k = 0, 1, …, in nanoseconds; from exact rationals, never accumulated."""
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.basics.constructors import strict
 from orchestration.basics.errors import UsageError
+from orchestration.basics.records import record
 from orchestration.basics.simulator import Floats
 from orchestration.basics.statistics import wilson
 from orchestration.building.fmus import native_twins
@@ -30,8 +30,7 @@ _WIDTH = 0.25
 _PERIOD = "timing.period"
 
 
-@strict()
-@dataclass(frozen=True, kw_only=True)
+@record()
 class Tuning:
     """What is tuned, on what, and with how much effort; raises `UsageError` for what cannot be."""
 

@@ -1,22 +1,19 @@
 """Reads files that say what is tuned, and writes what was found."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from orchestration.basics.errors import UsageError
+from orchestration.basics.records import record
 from orchestration.studies.study_file import AxisTable, axis_of, load, loop_of
 from orchestration.tuning.tuning import Found, Tuning
 
-_FORBID: dict[str, str] = {"extra": "forbid"}
 
-
-@dataclass(frozen=True, kw_only=True)
+@record()
 class CostTable:
     """`[cost]`: of a run that survives, by its objectives, and of one that diverges."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     of: str
     """The cost of a run that survives: an expression over its objectives."""
@@ -30,11 +27,9 @@ USUALLY_JUDGED = 200
 """of them, unless told"""
 
 
-@dataclass(frozen=True, kw_only=True)
+@record()
 class SearchTable:
     """`[search]`: the effort."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     periods: list[float]
     """The periods [s] that are tuned for, each by itself."""
@@ -44,11 +39,9 @@ class SearchTable:
     """Seeds of the optimiser: a search each."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@record()
 class TuningFile:
     """The file: a scenario, or the path of one, and what of it is tuned."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = _FORBID
 
     cost: CostTable
     """What is made small."""

@@ -14,7 +14,7 @@ from orchestration.basics.errors import SimulatorError
 from orchestration.engines.sources import Constant
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.wiring import MEASUREMENT
-from orchestration.system.model import Hold
+from orchestration.system.choices import Hold
 from orchestration.system.times import nanoseconds
 from tests.orchestration.quadrotor.strategies import timings
 from tests.orchestration.quadrotor.stubs import Call, Counting, Feedback, Flown, Plant, Still, Straying

@@ -18,7 +18,7 @@ from orchestration.quadrotor.wiring import COMMAND, POSITION
 from orchestration.recording.recording import Chunk, Event, Events, InMemory
 from orchestration.results import objectives
 from orchestration.results.objectives import Metrics
-from orchestration.system.model import Hold
+from orchestration.system.choices import Hold
 from orchestration.system.paths import changed
 from plant_fmu.actuators import Channels, Motors
 

@@ -84,10 +84,10 @@ def refusal(folder: Path, text: str) -> str:
     [
         ("align =", "aling =", "components.tank.aling: no such key; expected one of fmu, parameters, step, sampling, "),
         ("jitter =", "jiter =", "components.controller.sampling.jiter: no such key; expected one of period, offset, "),
-        ("delay =", "delai =", "connections.1.delai: no such key; expected one of from, to, name, order, delay, "),
+        ("delay =", "delai =", "connections.1.delai: no such key; expected one of name, from, to, order, delay, "),
         ("noise = 0.1", "nois = 0.1", "sources.rain.nois: no such key; expected one of to, constant, file, interp"),
         ("good =", "god =", "criterion.god: no such key; expected one of good, diverged, outcomes"),
-        ("seed = 3", "sead = 3", "sead: no such key; expected one of stop_time, seed, order, components, "),
+        ("seed = 3", "sead = 3", "sead: no such key; expected one of stop_time, seed, components, "),
         ("step = 0.01", 'step = "fast"', "components.tank.step = fast: expected a valid number"),
         ("step = 0.01", "step = -1.0", "components.tank.step = -1.0: expected a positive number"),
         (

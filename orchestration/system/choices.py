@@ -1,0 +1,10 @@
+"""The words that a key can have, where it has only some; the command line lists them, and loads no record for it."""
+
+from typing import Literal
+
+Order = Literal["gauss-seidel", "jacobi"]
+Hold = Literal["zero", "first"]
+Clock = Literal["master", "fmu"]
+Distribution = Literal["uniform", "normal"]
+Align = Literal["exact", "next"]
+Interpolation = Literal["linear", "previous", "spline"]
