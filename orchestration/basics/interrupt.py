@@ -2,7 +2,7 @@
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
@@ -16,12 +16,25 @@ class Interrupt:
 
     def __init__(self) -> None:
         self.requested = False
+        self._hear: Callable[[], None] | None = None
+
+    def tell(self, hear: Callable[[], None]) -> None:
+        """Have it heard elsewhere too, once: now, if it was heard before."""
+        self._hear = hear
+        if self.requested:
+            self._pass_on()
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """Hear the signal."""
         if self.requested:
             raise KeyboardInterrupt
         self.requested = True
+        self._pass_on()
+
+    def _pass_on(self) -> None:
+        hear, self._hear = self._hear, None
+        if hear is not None:
+            hear()
 
 
 @contextmanager

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from orchestration.basics.errors import UsageError
-from orchestration.processes.confined import Limits
+from orchestration.processes.limits import Limits
 
 
 @dataclass(frozen=True, kw_only=True)

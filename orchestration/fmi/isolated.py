@@ -1,18 +1,12 @@
 """An instance of an FMU in a process of its own, for what cannot be in one process twice.
 
-Both sides exchange frames over the child's standard streams: a list of commands there, what came of them back.
-What is written waits for the next step and goes with it, and the values of all readers come back with its answer,
-so that a step of the master costs one round trip.
+A list of commands goes there, what came of them comes back. What is written waits for the next step and goes with it,
+and the values of all readers come back with its answer, so that a step of the master costs one round trip.
 """
 
-import contextlib
-import pickle
-import struct
-import subprocess
-import weakref
 from collections.abc import Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,16 +16,13 @@ from orchestration.fmi.instance import Instance
 from orchestration.fmi.model import read_model
 from orchestration.fmi.values import Value
 from orchestration.processes import subprocesses
-from orchestration.processes.confined import ended
+from orchestration.processes.child import Child, Died
 
 Command = tuple[Any, ...]
 """`("write", index, bytes)`, `("reader" or "writer", names)`, `("read",)` or the name of a method and its arguments"""
 
-_HEADER = struct.Struct("<Q")
 _PATIENCE = 5.0
-"""[s] in which a process that was told to end must have ended"""
-_ENDING = 60.0
-"""[s] for one that says no more, and so is about to end: why it did is asked for"""
+"""[s] in which a process that is asked no more must have ended"""
 
 
 class IsolatedInstance(Instance):
@@ -47,12 +38,7 @@ class IsolatedInstance(Instance):
         self._values: list[Floats] = []  # of each reader
         self._fresh = False  # whether these are the values of now
         self._writers = 0
-        self._process = subprocess.Popen(
-            subprocesses.command("orchestration.fmi.isolated_process", path.absolute(), instance_name),
-            env=subprocesses.environment(), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            start_new_session=True,  # Ctrl-C is for the master, which ends the process when it is done
-        )  # fmt: skip
-        self._end = weakref.finalize(self, _ended, self._process)
+        self._child = Child(subprocesses.command("orchestration.fmi.isolated_process", path.absolute(), instance_name))
         try:
             self._ask()
         except Exception:
@@ -102,7 +88,7 @@ class IsolatedInstance(Instance):
     def close(self) -> None:
         """End the process."""
         self.failed = True
-        self._end()
+        self._child.close(_PATIENCE)
 
     # -- values --------------------------------------------------------------------------------------------------
 
@@ -147,15 +133,12 @@ class IsolatedInstance(Instance):
         if self.failed:
             raise SimulatorError(f"{self.name}: the FMU has failed and is not called again")
         commands, self._waiting = [*self._waiting, *commands], []
-        requests, answers = self._process.stdin, self._process.stdout
-        assert requests is not None
-        assert answers is not None
         try:
-            send(requests, commands)
-            result, error, self.failed, self.warnings = receive(answers)
-        except (EOFError, OSError):
+            self._child.say(commands)
+            result, error, self.failed, self.warnings = self._child.hear()
+        except Died as death:
             self.failed = True
-            raise SimulatorError(f"{self.name} ({self.model.name}): its process {self._ending()}") from None
+            raise SimulatorError(f"{self.name} ({self.model.name}): its process {death}") from None
         except BaseException:  # whose answer this would be is no longer known
             self.failed = True
             raise
@@ -163,37 +146,3 @@ class IsolatedInstance(Instance):
             self.stopped |= isinstance(error, StoppedStepError)
             raise error
         return result
-
-    def _ending(self) -> str:
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            return ended(self._process.wait(_ENDING))
-        return "does not answer"
-
-
-def send(stream: IO[bytes], content: object) -> None:
-    """A frame."""
-    data = pickle.dumps(content, pickle.HIGHEST_PROTOCOL)
-    stream.write(_HEADER.pack(len(data)) + data)
-    stream.flush()
-
-
-def receive(stream: IO[bytes]) -> Any:
-    """The next frame; raises `EOFError` if there is none."""
-    header = stream.read(_HEADER.size)
-    if len(header) < _HEADER.size:
-        raise EOFError
-    return pickle.loads(stream.read(*_HEADER.unpack(header)))
-
-
-def _ended(process: subprocess.Popen[bytes]) -> None:
-    """Let the process end as its requests do, or end it."""
-    assert process.stdin is not None
-    assert process.stdout is not None
-    with contextlib.suppress(OSError):
-        process.stdin.close()
-    try:
-        process.wait(_PATIENCE)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
-    process.stdout.close()

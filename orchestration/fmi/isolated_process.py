@@ -1,10 +1,8 @@
 """The process of an isolated instance.
 
-`python -m orchestration.fmi.isolated_process FMU NAME` answers commands on its standard input until that ends; what
-the FMU itself prints goes to standard error.
+`python -m orchestration.fmi.isolated_process FMU NAME` answers commands until there are no more.
 """
 
-import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -14,9 +12,9 @@ import numpy as np
 
 from orchestration.basics.simulator import Floats, Transfer
 from orchestration.fmi.instances import open_here
-from orchestration.fmi.isolated import Command, receive, send
+from orchestration.fmi.isolated import Command
 from orchestration.fmi.native import NativeInstance
-from orchestration.processes import subprocesses
+from orchestration.processes.channel import Parent
 
 
 class _Served:
@@ -61,24 +59,15 @@ class _Served:
 
 def main(path: Path, name: str) -> None:
     """Serve one instance."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it comes here nevertheless
-    subprocesses.end_with_parent()
-    requests, answers = subprocesses.private_pipes()
-    served = _Served(path, name)
-    while True:
-        try:
-            commands = receive(requests)
-        except EOFError:
-            break
+    parent, served = Parent(), _Served(path, name)
+    for commands in parent:
         result = error = None
         try:
             result = served.answer(commands)
         except Exception as raised:
             error = raised
         instance = served.instance
-        send(
-            answers, (result, error, instance is None or instance.failed, [] if instance is None else instance.warnings)
-        )
+        parent.say((result, error, instance is None or instance.failed, [] if instance is None else instance.warnings))
     if served.instance is not None:
         served.instance.close()
 

@@ -16,12 +16,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from orchestration.fmi.model import read_model
-from orchestration.processes import confined, subprocesses
-from orchestration.processes.confined import Limits
+from orchestration.processes import subprocesses
+from orchestration.processes.child import Child
+from orchestration.processes.limits import Limits
 
 _RULES = "2"
 """Of how it is shown; another number shows all anew"""
-RESULT = "result.json"
 MANNERS = ("moving", "held", "fine")
 """Of the run that is compared, until one of them works: inputs that move; that keep their start values; with a short
 step"""
@@ -83,27 +83,18 @@ def _shown(content: str, path: Path) -> Repeatability:
     read_model(path)
     found = Repeatability()
     for manner in MANNERS:
-        with tempfile.TemporaryDirectory(prefix="quadcosim-") as name:
-            folder = Path(name)
-            command = subprocesses.command("orchestration.fmi.repeatability_process", path.absolute(), folder, manner)
-            ending = confined.run(command, {**subprocesses.environment(), "TMPDIR": name}, Limits())
-            result = _result(folder / RESULT)
+        shown: dict[str, bool] = {}
+        with tempfile.TemporaryDirectory(prefix="quadcosim-", ignore_cleanup_errors=True) as folder:
+            command = subprocesses.command("orchestration.fmi.repeatability_process", path.absolute(), manner)
+            with Child(command, environment=subprocesses.environment(TMPDIR=folder), limits=Limits()) as child:
+                ending = child.heard_by(shown.update)
         if ending.reached is not None:
             return Repeatability()
-        if "fresh" in result:
-            found = Repeatability(
-                reset=result.get("reset") is True, second_instance=result.get("second_instance") is True
-            )
+        if shown.pop("fresh", False):
+            found = Repeatability(**shown)
             break
     _keep(_place(content), found)
     return found
-
-
-def _result(path: Path) -> dict[str, object]:
-    try:
-        return dict(json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError):
-        return {}
 
 
 def _keep(path: Path, found: Repeatability) -> None:

@@ -1,11 +1,10 @@
 """The confined process that shows whether a run of an FMU is the same again.
 
-`python -m orchestration.fmi.repeatability_process FMU FOLDER MANNER` runs a fresh instance first, in `MANNER` (see
+`python -m orchestration.fmi.repeatability_process FMU MANNER` runs a fresh instance first, in `MANNER` (see
 `repeatability.MANNERS`), and then the same run after others: each time with other parameters, other inputs and
-longer. After each comparison it writes what has been shown so far.
+longer. After each comparison it says what it has shown.
 """
 
-import json
 import math
 import sys
 from collections.abc import Callable, Sequence
@@ -18,9 +17,9 @@ from orchestration.basics.errors import QuadcosimError
 from orchestration.fmi.instances import open_here
 from orchestration.fmi.model import Variable
 from orchestration.fmi.native import NativeInstance
-from orchestration.fmi.repeatability import RESULT
 from orchestration.fmi.values import Value, number_of
-from orchestration.processes.confined import Limits, restrict
+from orchestration.processes.channel import Parent
+from orchestration.processes.limits import Limits, restrict
 
 _STEPS = 25
 _PARAMETERS = 200
@@ -86,22 +85,16 @@ class _Runs:
         return [_moving(v, k, phase + i) if moves else _start(v) for i, v in enumerate(self._inputs)]
 
 
-def main(path: Path, folder: Path, manner: str) -> None:
+def main(path: Path, manner: str, say: Callable[[dict[str, bool]], None]) -> None:
     """Show what can be shown."""
     restrict(Limits().size)
-    found: dict[str, bool] = {}
-
-    def shown(name: str, value: bool) -> None:
-        found[name] = value
-        (folder / RESULT).write_text(json.dumps(found), encoding="utf-8")
-
     runs = _Runs(path, manner)
     expected = runs.compared(runs.fresh)
-    shown("fresh", True)
+    say({"fresh": True})
     used = _used(runs)
-    shown("reset", used is not None and _is_same(runs, used, expected))
+    say({"reset": used is not None and _is_same(runs, used, expected)})
     if not runs.model.once_per_process:
-        shown("second_instance", used is not None and _further_is_same(runs, expected))
+        say({"second_instance": used is not None and _further_is_same(runs, expected)})
 
 
 def _used(runs: _Runs) -> NativeInstance | None:
@@ -206,4 +199,4 @@ def _within(variable: Variable, value: float) -> float:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3])
+    main(Path(sys.argv[1]), sys.argv[2], Parent().say)

@@ -66,7 +66,7 @@ def agreements(
         versions = {tool.name: tool.versions() for tool in tools}
         flights = Flights(asked, Path(folder), announce)
         tools = _able(tools, flights.loop.converted, announce)
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
+        with ThreadPoolExecutor(os.cpu_count()) as pool, flights:
             seen = [pool.submit(flights.seen, tool) for tool in tools]
             flown = [pool.submit(flights.flown, tool) for tool in tools]
             _wait([*seen, *flown], progress)

@@ -1,6 +1,5 @@
 """The flights of one system: by tools, in processes of their own, and by this project's master."""
 
-import subprocess
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from orchestration.interop.catalogue import Tool
 from orchestration.interop.copies import expect_traceable, traced_copy
 from orchestration.interop.trace import Trace, read_trace
 from orchestration.processes import subprocesses
+from orchestration.processes.child import Child
 from orchestration.requests.ssp import writing
 from orchestration.requests.ssp.carried import Part, carried, has_clock, wholly_carried
 from orchestration.runs.simulation import prepared
@@ -33,7 +33,7 @@ Start = dict[str, tuple[tuple[float, ...], tuple[float, ...]]]
 
 
 class Flights:
-    """One system, flown by whom it is asked of; raises as `compare.agreements` does."""
+    """One system, flown by whom it is asked of until the block ends; raises as `compare.agreements` does."""
 
     def __init__(self, asked: Request, folder: Path, announce: Callable[[str], None] | None) -> None:
         self._folder = folder
@@ -51,7 +51,15 @@ class Flights:
                 expect_traceable(fmu)
         self.steps = round(system.stop_time / self.step)
         self._own: dict[tuple[str, str], Floats] = {}
+        self._flying: list[Child] = []
         np.save(folder / "recorded.npy", self.rows_of_master("gauss-seidel", {})[:-1])
+
+    def __enter__(self) -> "Flights":
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        for child in self._flying:
+            child.close()
 
     def flown(self, tool: Tool) -> Floats:
         """A tool's rows, from the FMUs as they are."""
@@ -85,15 +93,16 @@ class Flights:
             folder=folder,
         )
         (folder / "job.json").write_text(job.to_json(), encoding="utf-8")
-        done = subprocess.run(
+        child = Child(
             tool.command(folder / "job.json", folder / "rows.npy"),
-            capture_output=True, text=True, errors="replace", check=False,
-            env=subprocesses.environment(**dict.fromkeys(_TEMPORARY, str(folder))),
-            cwd=folder,  # not this process's: fmpy changes that while it loads an FMU, in another thread
-        )  # fmt: skip
-        if done.returncode != 0:
-            lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
-            raise QuadcosimError(f"{tool.name}: {lines[-1]}")
+            environment=subprocesses.environment(**dict.fromkeys(_TEMPORARY, str(folder))),
+            folder=folder,  # not this process's: fmpy changes that while it loads an FMU, in another thread
+            talks=False,
+        )
+        self._flying.append(child)
+        ending = child.ending()
+        if ending.code != 0:
+            raise QuadcosimError(f"{tool.name}: {ending.said or ending.described.removeprefix('ended with ')}")
         return np.asarray(np.load(folder / "rows.npy"))
 
     def rows_of_master(self, order: str, start: Start) -> Floats:

@@ -1,1 +1,1 @@
-"""Child processes: how they are started, and held to limits of time and memory."""
+"""Child processes: what they and this one say to each other, how they are limited, and how their end is told."""

@@ -2,10 +2,7 @@
 
 import os
 import sys
-import threading
-import time
 from pathlib import Path
-from typing import BinaryIO
 
 ROOT = str(Path(__file__).resolve().parents[2])
 """The folder in which the packages of the project lie"""
@@ -33,27 +30,3 @@ def undisturbed_environment() -> dict[str, str]:
     """`environment` without them."""
     kept = {name: value for name, value in os.environ.items() if name not in _MISLEADING}
     return {**kept, "PYTHONPATH": ROOT}
-
-
-def private_pipes() -> tuple[BinaryIO, BinaryIO]:
-    """Called in a child: its standard input and output, kept from whatever reads and prints there.
-
-    What an FMU prints goes to standard error.
-    """
-    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)
-    os.close(nothing)
-    os.dup2(2, 1)
-    return requests, answers
-
-
-def end_with_parent() -> None:
-    """Called in a child: it ends when the process that started it does, whatever it is doing then."""
-    threading.Thread(target=_end_after, args=(os.getppid(),), daemon=True).start()
-
-
-def _end_after(parent: int) -> None:
-    while os.getppid() == parent:
-        time.sleep(0.5)
-    os._exit(1)

@@ -1,25 +1,19 @@
 """A run in a process of its own: however that ends, the run ends in words, and what it had recorded stays."""
 
 import logging
-import pickle
-import signal
-import subprocess
-import sys
 import time
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from orchestration.basics import scratch
-from orchestration.basics.interrupt import Interrupt, interrupts_held_back
+from orchestration.basics.interrupt import interrupts_held_back
 from orchestration.engines.backlog import in_order
 from orchestration.engines.engine import Engine
 from orchestration.engines.room import Left, left_in
-from orchestration.fmi.isolated import receive, send
 from orchestration.processes import subprocesses
-from orchestration.processes.confined import ended
-from orchestration.processes.guard import Guard
+from orchestration.processes.child import Child, Died
+from orchestration.processes.limits import UNLIMITED
 from orchestration.recording.recording import Chunk, Events, Recorder
 from orchestration.runs.meant import Course, Flown, Meant, Progress, RunLost, result_of
 from orchestration.runs.result import Result
@@ -58,9 +52,17 @@ def flown(
     try:
         with interrupts_held_back() as interrupt:
             order = Order(asked=meant.asked, course=course, engine=engine, level=_MESSAGES.getEffectiveLevel())
-            with _Process(order, room.path, interrupt, time_limit, memory_limit) as process:
-                heard = _Heard(recorder, progress)
-                why = process.heard_by(heard)
+            with Child(
+                subprocesses.command("orchestration.runs.apart_process", room.path),
+                limits=replace(UNLIMITED, memory=memory_limit),
+            ) as child:
+
+                def begin() -> None:
+                    child.allow(time_limit)
+                    interrupt.tell(child.interrupt)
+
+                heard = _Heard(recorder, progress, begin)
+                why = heard.all_of(child, order)
             found = heard.flown
             if found is None:
                 raise _lost(meant, heard, room.path, why or "ended", started)
@@ -76,7 +78,8 @@ def flown(
 class _Heard:
     """What the process says, passed on to who is to hear it."""
 
-    def __init__(self, recorder: Recorder, progress: Progress | None) -> None:
+    def __init__(self, recorder: Recorder, progress: Progress | None, begun: Callable[[], None]) -> None:
+        """`begun`: it is at the run itself. What it loads before is not limited in time, and hears of no Ctrl-C."""
         self.flown: Flown | None = None
         self.over = False
         """whether the run is"""
@@ -87,7 +90,21 @@ class _Heard:
         self.columns: tuple[str, ...] = ()
         self.recorded_until = -1.0
         """[s]"""
-        self.recorder, self._progress = recorder, progress
+        self.recorder, self._progress, self._begun = recorder, progress, begun
+
+    def all_of(self, child: Child, order: Order) -> str | None:
+        """All that comes of an order; how the process ended if that was before its last word."""
+        try:
+            child.say(order)
+            while True:
+                name, *content = child.hear()
+                if name == "end":
+                    child.close(_PATIENCE)
+                    return None
+                getattr(self, name)(*content)
+        except Died as death:
+            reached = death.ending.reached
+            return str(death) if reached is None else f"was ended: {reached}"
 
     def describe(self, about: dict[str, dict[str, str]]) -> None:
         self.recorder.describe(about)
@@ -109,6 +126,8 @@ class _Heard:
         _MESSAGES.log(level, "%s", text)
 
     def stage(self, doing: str, components: Sequence[str]) -> None:
+        if not self.doing:
+            self._begun()
         self.doing, self.components = doing, components
 
     def come_to(self, over: bool, flown: Flown) -> None:
@@ -116,72 +135,6 @@ class _Heard:
 
     def error(self, error: BaseException) -> None:
         raise error
-
-
-class _Process:
-    """The process, which ends with the block."""
-
-    def __init__(
-        self, order: Order, room: Path, interrupt: Interrupt, time_limit: float | None, memory_limit: float
-    ) -> None:
-        self._interrupt, self._told = interrupt, False
-        self._begun = False
-        """whether it is at the run itself: what it loads before is not limited in time, and hears of no Ctrl-C"""
-        self._process = subprocess.Popen(
-            subprocesses.command("orchestration.runs.apart_process", room),
-            env=subprocesses.environment(), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            start_new_session=True,  # Ctrl-C is passed on from here
-        )  # fmt: skip
-        self._guard = Guard(
-            self._process, time_limit=time_limit, memory_limit=memory_limit, each=self._pass_on_interrupt
-        )
-        assert self._process.stdin is not None
-        with suppress(OSError):  # it has ended: that is heard next
-            send(self._process.stdin, order)
-
-    def heard_by(self, heard: _Heard) -> str | None:
-        """Pass on all that it says; how it ended if that was before its last word."""
-        assert self._process.stdout is not None
-        while True:
-            try:
-                name, *content = receive(self._process.stdout)
-            except (EOFError, OSError, ValueError, pickle.UnpicklingError):
-                return self._ending()
-            if name == "stage" and not self._begun:
-                self._begun = True
-                self._guard.begin()
-            if name == "end":
-                with suppress(subprocess.TimeoutExpired):
-                    self._process.wait(_PATIENCE)
-                return None
-            getattr(heard, name)(*content)
-
-    def _ending(self) -> str:
-        with suppress(subprocess.TimeoutExpired):
-            code = self._process.wait(_PATIENCE)
-            if self._guard.reached is not None:
-                return f"was ended: {self._guard.reached}"
-            return ended(code)
-        return "does not answer"
-
-    def _pass_on_interrupt(self) -> None:
-        """Ctrl-C ends the run at its next instant; the second one, heard here, ends the process."""
-        if self._interrupt.requested and self._begun and not self._told:
-            self._told = True
-            with suppress(OSError):
-                self._process.send_signal(signal.SIGINT if sys.platform != "win32" else signal.SIGTERM)
-
-    def __enter__(self) -> "_Process":
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self._guard.close()
-        self._process.kill()
-        self._process.wait()
-        for pipe in (self._process.stdin, self._process.stdout):
-            with suppress(OSError):
-                if pipe is not None:
-                    pipe.close()
 
 
 def _lost(meant: Meant, heard: _Heard, room: Path, why: str, started: float) -> RunLost:

@@ -1,7 +1,6 @@
 """The process of a run.
 
-`python -m orchestration.runs.apart_process ROOM` takes one order on its standard input, and says what comes of it; what
-FMUs print goes to standard error.
+`python -m orchestration.runs.apart_process ROOM` takes one order, and says what comes of it.
 """
 
 import logging
@@ -10,13 +9,12 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from orchestration.engines.room import Shared
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_instance
-from orchestration.fmi.isolated import receive, send
-from orchestration.processes import subprocesses
+from orchestration.processes.channel import Parent
 from orchestration.recording.recording import About, Chunk, InMemory, Recording
 from orchestration.runs.apart import Order
 from orchestration.runs.simulation import looked_after, prepared
@@ -27,15 +25,15 @@ _MESSAGES = logging.getLogger("quadcosim")
 class _Said(logging.Handler):
     """Says what is said in this process, and takes what it records, where the run is waited for."""
 
-    def __init__(self, answers: BinaryIO) -> None:
+    def __init__(self, parent: Parent) -> None:
         super().__init__()
-        self._answers = answers
+        self._parent = parent
         self.is_over = False
         """whether it has been said what has come of the run"""
 
     def say(self, name: str, *content: Any) -> None:
         """One frame, by the name of what hears it."""
-        send(self._answers, (name, *content))
+        self._parent.say((name, *content))
 
     def emit(self, record: logging.LogRecord) -> None:
         """As any handler."""
@@ -67,11 +65,9 @@ class _Said(logging.Handler):
 
 def main(room: Path) -> None:
     """Fly what is ordered."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # whatever was inherited
-    subprocesses.end_with_parent()
-    requests, answers = subprocesses.private_pipes()
-    order: Order = receive(requests)
-    said = _Said(answers)
+    parent = Parent(interrupt=signal.default_int_handler)
+    order: Order = parent.hear()
+    said = _Said(parent)
     _MESSAGES.handlers[:] = [said]
     _MESSAGES.setLevel(order.level)
     try:

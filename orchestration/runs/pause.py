@@ -10,7 +10,7 @@ import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.engines.engine import Engine
-from orchestration.processes.confined import Limits
+from orchestration.processes.limits import Limits
 from orchestration.recording.recording import InMemory, Recorder
 from orchestration.recording.tables import InFolder, ToFolder
 from orchestration.requests.request import load_request

@@ -29,7 +29,7 @@ from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.fmi.model import Model
 from orchestration.fmi.native import NativeInstance
 from orchestration.fmi.surroundings import FOLDER, sentence
-from orchestration.processes.confined import Limits
+from orchestration.processes.limits import Limits
 from orchestration.recording.recording import InMemory, Recorder
 from orchestration.requests.request import usual
 from orchestration.runs import apart

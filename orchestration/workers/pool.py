@@ -5,11 +5,9 @@ import os
 import pickle
 import queue
 import signal
-import subprocess
 import tempfile
 import threading
 from collections.abc import Mapping
-from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -19,15 +17,12 @@ from orchestration.basics import scratch
 from orchestration.basics.errors import QuadcosimError
 from orchestration.building.inputs import Files, all_with_files, with_files
 from orchestration.processes import subprocesses
-from orchestration.processes.confined import ended
-from orchestration.processes.guard import time_limited
+from orchestration.processes.child import Child, Died
 from orchestration.workers.provenance import versions
 from orchestration.workers.task import Broken, BrokenPlaceError, Chunk, Outcome, Ready, Task, row_of
 
 ATTEMPTS = 3
 """How often a run is flown, the later times first in a new process, before the death of its worker is its result."""
-_PATIENCE = 60.0
-"""[s], for a process that has closed its pipe"""
 _FROM_OUTSIDE = {-getattr(signal, name) for name in ("SIGKILL", "SIGTERM", "SIGHUP") if hasattr(signal, name)}
 """Ends that no run brings upon its process, but a user, or a machine that is out of memory."""
 
@@ -51,21 +46,6 @@ class Package:
         return hashlib.sha256(pickle.dumps((dict(self.contents), self.versions))).hexdigest()
 
 
-class Died(Exception):
-    """A worker process has ended without an answer."""
-
-    def __init__(self, code: int) -> None:
-        super().__init__(code)
-        self.code = code
-
-    def __str__(self) -> str:
-        return ended(self.code)
-
-
-class OutOfTime(Exception):
-    """A worker process was ended at the time limit of what it flew; the text says which."""
-
-
 class InterruptedWorker(QuadcosimError):
     """Somebody sent an interrupt to a worker process: it is meant for all."""
 
@@ -74,61 +54,29 @@ class WorkerProcess:
     """One worker process, its temporary files in a folder of its own."""
 
     def __init__(self, root: Path) -> None:
-        self._stack = ExitStack()
-        folder = self._stack.enter_context(
-            tempfile.TemporaryDirectory(dir=root, prefix="worker-", ignore_cleanup_errors=True)
+        self._folder = tempfile.TemporaryDirectory(dir=root, prefix="worker-", ignore_cleanup_errors=True)
+        place = self._folder.name
+        self._child = Child(
+            subprocesses.command("orchestration.workers.worker_process", place),
+            environment=subprocesses.environment(**dict.fromkeys(("TMPDIR", "TEMP", "TMP"), place)),
         )
-        # A session of its own: an interrupt from the terminal is the coordinator's to handle.
-        self.process = subprocess.Popen(
-            subprocesses.command("orchestration.workers.worker_process", folder),
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            env=subprocesses.environment(**dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder)), start_new_session=True,
-        )  # fmt: skip
 
     def ask(self, task: Task | Chunk) -> Any:
-        """The answer to a task, or to many; raises `Died`, or `OutOfTime` if it was ended at its time limit."""
-        with time_limited(self.process, task.time_limit) as guard:
-            try:
-                self._tell(task)
-                return self.listen()
-            except Died:
-                if guard is not None and guard.reached is not None:
-                    raise OutOfTime(guard.reached) from None
-                raise
-
-    def _tell(self, task: Task | Chunk) -> None:
-        assert self.process.stdin is not None
-        try:
-            pickle.dump(task, self.process.stdin)
-            self.process.stdin.flush()
-        except OSError:
-            raise Died(self._end()) from None
+        """The answer to a task, or to many; raises `Died`, also at its time limit."""
+        self._child.allow(task.time_limit)
+        self._child.say(task)
+        answer = self._child.hear()
+        self._child.allow(None)
+        return answer
 
     def listen(self) -> Any:
         """What it says next; raises `Died`."""
-        assert self.process.stdout is not None
-        try:
-            return pickle.load(self.process.stdout)
-        except (EOFError, OSError, ValueError, pickle.UnpicklingError):
-            raise Died(self._end()) from None
-
-    def _end(self) -> int:
-        """The exit code of a process that says no more, and should have ended."""
-        try:
-            return self.process.wait(timeout=_PATIENCE)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            return self.process.wait()
+        return self._child.hear()
 
     def close(self) -> None:
         """End it and remove what it left."""
-        self.process.kill()
-        self.process.wait()
-        for pipe in (self.process.stdin, self.process.stdout):
-            with suppress(OSError):
-                if pipe is not None:
-                    pipe.close()
-        self._stack.close()
+        self._child.close()
+        self._folder.cleanup()
 
 
 class Pilot:
@@ -151,14 +99,13 @@ class Pilot:
             worker = self._ready()
             try:
                 answer = worker.ask(task)
-            except OutOfTime as end:
-                self._drop()
-                return Outcome(row=row_of(task, None, f"it was ended: {end}", 0.0, self._machine))
             except Died as death:
                 self._drop()
-                if death.code == -signal.SIGINT:
-                    raise InterruptedWorker("a worker process was interrupted") from None
-                if death.code in _FROM_OUTSIDE:
+                if death.ending.reached is not None:
+                    message = f"it was ended: {death.ending.reached}"
+                    return Outcome(row=row_of(task, None, message, 0.0, self._machine))
+                _expect_no_interrupt(death)
+                if death.ending.code in _FROM_OUTSIDE:
                     killed += 1
                 else:
                     crashes += 1
@@ -184,13 +131,9 @@ class Pilot:
         """
         try:
             answer = self._ready().ask(chunk)
-        except OutOfTime:
-            self._drop()
-            return [self.fly(task) for task in chunk.tasks]
         except Died as death:
             self._drop()
-            if death.code == -signal.SIGINT:
-                raise InterruptedWorker("a worker process was interrupted") from None
+            _expect_no_interrupt(death)
             return [self.fly(task) for task in chunk.tasks]
         if isinstance(answer, Broken):
             raise BrokenPlaceError(f"no run's own failure: {answer.message}")
@@ -222,8 +165,7 @@ class Pilot:
                 ready = worker.listen()
             except Died as death:
                 self._drop()
-                if death.code == -signal.SIGINT:
-                    raise InterruptedWorker("a worker process was interrupted") from None
+                _expect_no_interrupt(death)
                 if attempt == ATTEMPTS - 1:
                     raise BrokenPlaceError(f"worker processes cannot start: the last one {death}") from None
                 continue
@@ -241,6 +183,11 @@ class Pilot:
                 f"{os.uname().nodename if hasattr(os, 'uname') else 'a worker'}: has another version of "
                 f"{', '.join(other)} than the coordinator; expected the same"
             )
+
+
+def _expect_no_interrupt(death: Died) -> None:
+    if death.ending.code == -signal.SIGINT:
+        raise InterruptedWorker("a worker process was interrupted") from None
 
 
 class Crew:

@@ -15,7 +15,7 @@ from orchestration.checks.validation.finding import name_of
 from orchestration.checks.validation.progress import Report, Told
 from orchestration.checks.validation.validator import PROCESS
 from orchestration.command import cli
-from orchestration.processes.confined import Limits
+from orchestration.processes.limits import Limits
 from tests.fmus.damage import Mutant
 from tests.fmus.mutants import MUTANTS
 from tests.fmus.verdicts import as_markdown, fmpy_finds, fmutool_finds, verdicts
@@ -41,11 +41,9 @@ def findings(built: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -
 
     @functools.cache
     def seen(mutant: Mutant) -> list[Finding]:
-        written = folder / f"{mutant.name}.report"
-        report = Report(written)
-        look(mutant.write(built[mutant.model], folder), Limits().size, report)
-        report.end()
-        return Told(written).findings
+        told = Told()
+        look(mutant.write(built[mutant.model], folder), Limits().size, Report(told.hear))
+        return told.findings
 
     with ThreadPoolExecutor(2) as pool:
         under_way = {m: pool.submit(found, m) for m in MUTANTS if m.rule not in WITHOUT_INSTANCES}

@@ -18,14 +18,14 @@ from orchestration.checks.validation.finding import check
 from orchestration.checks.validation.fmu import Fmu, read_co_simulation, read_fmu
 from orchestration.checks.validation.own_description import differences, elements
 from orchestration.checks.validation.probe import Bench
-from orchestration.checks.validation.progress import REPORT, Told
+from orchestration.checks.validation.progress import Frame, Told
 from orchestration.checks.validation.structure import initial_unknowns, known_dependencies, outputs
 from orchestration.checks.validation.units import dimensions, unit_meaning
 from orchestration.checks.validation.variables import aliases, names
 from orchestration.command import cli
 from orchestration.fmi.archive import Archive
-from orchestration.processes import confined
-from orchestration.processes.confined import Ending, Limits
+from orchestration.processes.child import Child, Ending
+from orchestration.processes.limits import Limits
 from tests.fmus.archive import files_of
 from tests.fmus.damage import DESCRIPTION, Damage, description, root, source, without, write_fmu
 from tests.fmus.foreign import lag, needs_compiler
@@ -231,16 +231,17 @@ def test_a_time_limit_must_be_positive(limit: str, capsys: pytest.CaptureFixture
 
 
 @pytest.mark.parametrize(
-    ("report", "words"), [("", "no such module"), ('{"rule": "runs"}\n{"error": "KeyError: 3"}\n{"ru', "KeyError: 3")]
+    ("report", "words"), [([], "no such module"), ([("begin", "runs"), ("failed", "KeyError: 3")], "KeyError: 3")]
 )
 def test_an_error_of_the_validation_itself_is_no_finding(
-    report: str, words: str, low_pass: Path, monkeypatch: pytest.MonkeyPatch
+    report: list[Frame], words: str, low_pass: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(command: list[str], environment: object, limits: Limits) -> Ending:
-        Path(command[-3], REPORT).write_text(report)
-        return Ending(code=1, reached=None, out_of_time=False, said="no such module")
+    def fail(child: Child, hear: Callable[[Frame], None]) -> Ending:
+        for frame in report:
+            hear(frame)
+        return Ending(code=1, said="no such module")
 
-    monkeypatch.setattr(confined, "run", fail)
+    monkeypatch.setattr(Child, "heard_by", fail)
     with pytest.raises(QuadcosimError, match=f"LowPass.fmu: it is the validation that failed: {words}"):
         validate(low_pass)
 
@@ -251,9 +252,9 @@ def test_the_child_reports_an_error_in_a_rule(low_pass: Path, monkeypatch: pytes
 
     monkeypatch.setattr(run_rules, "FIRST", (odd,))
     monkeypatch.setattr(confined_process, "restrict", lambda size: None)  # which would hold for the process of the test
+    told = Told()
     with pytest.raises(KeyError):
-        confined_process.main(low_pass, tmp_path, Limits())
-    told = Told(tmp_path / REPORT)
+        confined_process.main(low_pass, tmp_path, Limits(), told.hear)
     assert (told.rule, told.error, told.ended) == ("odd", "KeyError: 3", False)
 
 

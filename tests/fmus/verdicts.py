@@ -9,7 +9,7 @@ from pathlib import Path
 from fmpy.validation import validate_fmu
 
 from orchestration.checks.validation import Finding, validate
-from orchestration.processes.confined import Limits
+from orchestration.processes.limits import Limits
 from tests.fmus.damage import Mutant
 
 

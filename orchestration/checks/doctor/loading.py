@@ -1,28 +1,24 @@
 """Reading an FMU and loading it for real, in a confined process: one that cannot be loaded may well take its host down.
 
-`python -m orchestration.checks.doctor.loading FMU FOLDER MB` does what the process does: the FMU is unpacked in the
-folder, an empty one, and what came of it is written to it.
+`python -m orchestration.checks.doctor.loading FMU FOLDER MB` does what the process does: it unpacks the FMU in the
+folder, an empty one, and says what comes of it: an `error`, or the `fmu` and whether it `loads`, or the `failure`.
 """
 
-import json
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-
-from pydantic import TypeAdapter, ValidationError
+from typing import Any
 
 from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.checks.doctor.fmu import CO_SIMULATION, Fmu, read_fmu
 from orchestration.fmi.archive import OtherVersionError, UnreadableFmuError
-from orchestration.processes import confined, subprocesses
-from orchestration.processes.confined import Ending, Limits, restrict
+from orchestration.processes import subprocesses
+from orchestration.processes.channel import Parent
+from orchestration.processes.child import Child, Ending
+from orchestration.processes.limits import Limits, restrict
 
-_READ, _LOADED = "read", "loaded"
-"""Files in the folder: the FMU as it was read, or an error; whether it was loaded"""
-_MOST_BYTES = 50_000_000
-_FMU = TypeAdapter(Fmu)
 _MODEL_EXCHANGE = "not tried: it is for model exchange only"
 
 
@@ -59,61 +55,45 @@ def attempt(path: Path, limits: Limits) -> Trial:
 def _attempt(path: Path, limits: Limits, environment: Mapping[str, str]) -> Trial:
     with tempfile.TemporaryDirectory(prefix="quadcosim-", ignore_cleanup_errors=True) as folder:
         command = subprocesses.command("orchestration.checks.doctor.loading", path.resolve(), folder, limits.size)
-        ending = confined.run(command, environment, limits)
-        read, loaded = (_content(Path(folder, name)) for name in (_READ, _LOADED))
-    fmu = _read(path, read, ending)
-    return Trial(fmu=fmu, failure=_failure(loaded, ending) if CO_SIMULATION in fmu.kinds else _MODEL_EXCHANGE)
-
-
-def _content(path: Path) -> dict[str, object]:
-    try:
-        with path.open("rb") as stream:
-            content = json.loads(stream.read(_MOST_BYTES))
-    except (OSError, ValueError):
-        return {}
-    return content if isinstance(content, dict) else {}
-
-
-def _read(path: Path, content: dict[str, object], ending: Ending) -> Fmu:
-    if "other version" in content:
-        raise OtherVersionError(str(content["other version"]))
-    if "error" in content:
-        raise UsageError(f"{path}: {content['error']}")
-    try:
-        return _FMU.validate_python(content.get("fmu"))
-    except ValidationError:
+        found: dict[str, Any] = {}
+        with Child(command, environment=environment, limits=limits) as child:
+            ending = child.heard_by(found.update)
+    if isinstance(found.get("error"), OtherVersionError):
+        raise found["error"]
+    if "error" in found:
+        raise UsageError(f"{path}: {found['error']}")
+    if "fmu" not in found:
         words = f": {ending.said}" if ending.said else ""
-        raise UsageError(f"{path}: could not be read, the process {ending.described}{words}") from None
+        raise UsageError(f"{path}: could not be read, the process {ending.described}{words}")
+    fmu: Fmu = found["fmu"]
+    return Trial(fmu=fmu, failure=_failure(found, ending) if CO_SIMULATION in fmu.kinds else _MODEL_EXCHANGE)
 
 
-def _failure(loaded: dict[str, object], ending: Ending) -> str | None:
+def _failure(found: dict[str, Any], ending: Ending) -> str | None:
     """Why the FMU did not load; None if it did, and its process lived to its end."""
-    if "failure" in loaded:
-        return str(loaded["failure"])
+    if "failure" in found:
+        return str(found["failure"])
     if ending.code is None:
         return f"its process {ending.described}"
-    return None if loaded and ending.code == 0 else f"took its process down: it {ending.described}"
+    return None if "loads" in found and ending.code == 0 else f"took its process down: it {ending.described}"
 
 
-def main(path: Path, folder: Path, size_limit: float) -> None:
+def main(path: Path, folder: Path, size_limit: float, say: Callable[[object], None]) -> None:
     """Read, unpack, instantiate, initialise and free the FMU."""
     restrict(size_limit)
     try:
         fmu = read_fmu(path, size_limit)
-    except OtherVersionError as error:
-        _write(folder / _READ, **{"other version": str(error)})
-        return
     except UnreadableFmuError as error:
-        _write(folder / _READ, error=str(error))
+        say({"error": error})
         return
-    _write(folder / _READ, fmu=json.loads(_FMU.dump_json(fmu)))
+    say({"fmu": fmu})
     if CO_SIMULATION in fmu.kinds:
         try:
-            _load(fmu, folder / "fmu")
+            _load(fmu, folder)
         except (QuadcosimError, OSError) as error:
-            _write(folder / _LOADED, failure=" ".join(str(error).split()))
+            say({"failure": " ".join(str(error).split())})
         else:
-            _write(folder / _LOADED, loads=True)
+            say({"loads": True})
 
 
 def _load(fmu: Fmu, folder: Path) -> None:
@@ -148,9 +128,5 @@ def _load(fmu: Fmu, folder: Path) -> None:
     slave.freeInstance()
 
 
-def _write(path: Path, **content: object) -> None:
-    path.write_text(json.dumps(content), encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), Path(sys.argv[2]), float(sys.argv[3]))
+    main(Path(sys.argv[1]), Path(sys.argv[2]), float(sys.argv[3]), Parent().say)

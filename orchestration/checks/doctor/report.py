@@ -12,7 +12,7 @@ from orchestration.checks.doctor.loading import Trial, attempt
 from orchestration.checks.doctor.machine import Library, Machine, this_machine
 from orchestration.checks.doctor.verdict import Unjudged, Verdict, judge
 from orchestration.fmi.archive import OtherVersionError
-from orchestration.processes.confined import Limits
+from orchestration.processes.limits import Limits
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,10 +1,11 @@
 """The confined process that does all that touches the FMU.
 
 `python -m orchestration.checks.validation.confined_process FMU FOLDER SECONDS MB` unpacks the FMU in the folder, an
-empty one, and writes what is found to it (see `progress`).
+empty one, and says what it finds (see `progress`).
 """
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import fmpy
@@ -16,26 +17,26 @@ from orchestration.checks.validation.fmu import Fmu, read_co_simulation, read_fm
 from orchestration.checks.validation.instance import RefusedError
 from orchestration.checks.validation.own_description import own_description
 from orchestration.checks.validation.probe import Bench
-from orchestration.checks.validation.progress import PULSE, REPORT, Pulse, Report
+from orchestration.checks.validation.progress import Frame, Report
 from orchestration.fmi.archive import UnreadableFmuError, read_archive
 from orchestration.fmi.pythonfmu import expect_readable_place
-from orchestration.processes.confined import Limits, restrict
+from orchestration.processes.channel import Parent
+from orchestration.processes.limits import Limits, restrict
 
 READABLE, PLATFORM = "readable", "platform"
 """Rules that are kept here: there is an FMI 2.0 FMU to look at, and this machine can run it"""
 
 
-def main(path: Path, folder: Path, limits: Limits) -> None:
+def main(path: Path, folder: Path, limits: Limits, say: Callable[[Frame], None]) -> None:
     """Try every rule that is meant for the FMU."""
     restrict(limits.size)
-    report = Report(folder / REPORT)
+    report = Report(say)
     try:
         fmu = look(path, limits.size, report)
         if fmu is not None and can_be_unpacked(fmu.archive):
-            place = folder / "fmu"
-            fmpy.extract(str(path), str(place))
-            expect_readable_place(place)
-            _run(Bench(fmu, place, limits.time, Pulse(folder / PULSE).beat), report)
+            fmpy.extract(str(path), str(folder))
+            expect_readable_place(folder)
+            _run(Bench(fmu, folder, limits.time, report.beat), report)
         report.end()
     except Exception as error:
         report.failed(error)
@@ -81,4 +82,4 @@ def _run(bench: Bench, report: Report) -> None:
 
 if __name__ == "__main__":
     _path, _folder, _time, _size = sys.argv[1:]
-    main(Path(_path), Path(_folder), Limits(time=float(_time), size=float(_size)))
+    main(Path(_path), Path(_folder), Limits(time=float(_time), size=float(_size)), Parent().say)

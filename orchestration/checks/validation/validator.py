@@ -5,9 +5,10 @@ from pathlib import Path
 
 from orchestration.basics.errors import QuadcosimError
 from orchestration.checks.validation.finding import Finding
-from orchestration.checks.validation.progress import PULSE, REPORT, Told, since_last_beat
-from orchestration.processes import confined, subprocesses
-from orchestration.processes.confined import Ending, Limits
+from orchestration.checks.validation.progress import Told
+from orchestration.processes import subprocesses
+from orchestration.processes.child import Child, Ending
+from orchestration.processes.limits import Limits
 
 PROCESS = "process"
 """Rule that is kept here: the process of the FMU lives to its end"""
@@ -23,22 +24,24 @@ def validate(path: str | Path, *, limits: Limits | None = None) -> list[Finding]
     validation fails itself.
     """
     path, limits = Path(path), limits or Limits()
-    with tempfile.TemporaryDirectory(prefix="quadcosim-", ignore_cleanup_errors=True) as place:
-        folder = Path(place)
-        (folder / REPORT).touch()
+    with tempfile.TemporaryDirectory(prefix="quadcosim-", ignore_cleanup_errors=True) as folder:
         command = subprocesses.command(
             "orchestration.checks.validation.confined_process", path.resolve(), folder, limits.time, limits.size
         )
-        ending = confined.run(command, subprocesses.environment(), limits)
-        silent = since_last_beat(folder / PULSE)
-        told = Told(folder / REPORT)
+        with Child(command, limits=limits) as child:
+            told = Told(lambda: child.spent)
+            ending = child.heard_by(told.hear)
+    silent = None if told.beaten is None else child.spent - told.beaten
     if told.error is not None or (told.rule is None and ending.code is not None):
         raise QuadcosimError(f"{path}: it is the validation that failed: {told.error or ending.said}")
     return [*told.findings, *_of_ending(told, ending, silent, limits)]
 
 
 def _of_ending(told: Told, ending: Ending, silent: float | None, limits: Limits) -> list[Finding]:
-    """What the end of the process says of the FMU; `silent`: seconds since a call of it began or returned."""
+    """What the end of the process says of the FMU.
+
+    `silent`: seconds of the process's time since a call of the FMU began or returned; None if there was none.
+    """
     moment = "after the last rule" if told.ended else f"in {told.rule or 'reading'}"
     if ending.code is None:
         hangs = silent is not None and silent > _HANGS * limits.time

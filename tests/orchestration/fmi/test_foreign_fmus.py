@@ -350,7 +350,7 @@ def test_the_process_of_an_isolated_fmu_ends_with_its_parent(tmp_path: Path) -> 
         from orchestration.fmi.isolated import IsolatedInstance
 
         instance = IsolatedInstance(Path(sys.argv[1]), "it")
-        print(instance._process.pid, flush=True)
+        print(instance._child.pid, flush=True)
         os.kill(os.getpid(), 9)
     """)
     done = subprocess.run(

@@ -7,12 +7,13 @@ from typing import Any
 import pytest
 
 from orchestration.basics.errors import QuadcosimError, UsageError
+from orchestration.processes.child import Died, Ending
 from orchestration.studies.store import open_for_reading
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
 from orchestration.studies.sweep import AGREEMENT, sweep
 from orchestration.workers.batching import SAMPLE, Agreement, chunks, sample
-from orchestration.workers.pool import Died, Package, Pilot
+from orchestration.workers.pool import Package, Pilot
 from orchestration.workers.task import Chunk, Task
 from tests.orchestration.fmi.small import needs_compiler, small
 from tests.orchestration.studies.common import NOISY, RUNS, axis, bits, quadcosim, short, study, swept
@@ -135,7 +136,7 @@ def test_runs_that_end_their_process_together_are_flown_one_by_one(
 ) -> None:
     class Dying:
         def ask(self, what: Any) -> Any:
-            raise Died(-6)
+            raise Died(Ending(code=-6))
 
     flown: list[int] = []
     monkeypatch.setattr(Pilot, "_ready", lambda self: Dying())

@@ -13,7 +13,7 @@ from orchestration.building.models import MODELS
 from orchestration.checks.doctor import loading
 from orchestration.checks.doctor.as_lines import as_text
 from orchestration.checks.doctor.report import as_tables, examine
-from orchestration.processes.confined import Limits
+from orchestration.processes.limits import Limits
 from tests.commands import Main
 from tests.fmus.foreign import lag, needs_compiler
 from tests.fmus.process import ROOT, run

@@ -1,20 +1,23 @@
-"""A confined process is ended at its limits, with all that it started."""
+"""A process says what it has to say, and is ended at its limits, with all that it started."""
 
+import dataclasses
 import os
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
-from orchestration.processes import confined
-from orchestration.processes.confined import Ending, Limits
+from orchestration.processes.child import Child, Died, Ending
+from orchestration.processes.limits import UNLIMITED, Limits
 from tests.patience import PATIENCE
 
 linux_only = pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="no /proc")
 
+TALKS = "from orchestration.processes.channel import Parent; parent = Parent()"
 FORK = """
 import os, sys, time
 from tests.patience import PATIENCE
@@ -30,7 +33,9 @@ while not (os.path.exists(sys.argv[1]) and open(sys.argv[1]).read()):
 
 
 def python(program: str, *arguments: object, **limits: float) -> Ending:
-    return confined.run([sys.executable, "-c", program, *map(str, arguments)], os.environ, Limits(**limits))
+    command = [sys.executable, "-c", f"{TALKS}\n{program}", *map(str, arguments)]
+    with Child(command, limits=Limits(**limits)) as child:
+        return child.ending()
 
 
 def gone(pid: int) -> bool:
@@ -92,7 +97,7 @@ def test_the_memory_of_what_a_process_has_started_counts(tmp_path: Path) -> None
 
 
 def test_no_file_may_grow_beyond_its_limit(tmp_path: Path) -> None:
-    program = "import sys; from orchestration.processes.confined import restrict; restrict(1.0)\n" + (
+    program = "import sys; from orchestration.processes.limits import restrict; restrict(1.0)\n" + (
         "with open(sys.argv[1], 'wb') as file: file.write(bytes(2_000_000))"
     )
     assert "File too large" in python(program, tmp_path / "file").said
@@ -106,17 +111,19 @@ def test_the_system_ends_a_process_that_nobody_watches_any_more() -> None:
 
 
 UNDER_A_LIMIT = """
-import os, resource, sys
-from orchestration.processes import confined
+import resource, sys
+from orchestration.processes.child import Child
+from orchestration.processes.limits import Limits
 resource.setrlimit(resource.RLIMIT_CPU, ({soft}, {hard}))
-ending = confined.run([sys.executable, "-c", sys.argv[1]], os.environ, confined.Limits())
+with Child([sys.executable, "-c", sys.argv[1]], limits=Limits()) as child:
+    ending = child.ending()
 print(ending.code, ending.reached, ending.said, sep="|")
 """
 
 
 def under_a_limit(program: str, *, soft: int, hard: int) -> list[str]:
     """Code, limit reached and last words of a program confined by a process with a limit of processor time."""
-    command = [sys.executable, "-c", UNDER_A_LIMIT.format(soft=soft, hard=hard), program]
+    command = [sys.executable, "-c", UNDER_A_LIMIT.format(soft=soft, hard=hard), f"{TALKS}\n{program}"]
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
     return done.stdout.strip().split("|")
 
@@ -157,3 +164,109 @@ def test_the_time_in_which_a_process_waits_for_a_processor_is_not_its_own() -> N
         took = time.monotonic() - started
     assert (ending.said, ending.reached) == ("done", None)
     assert took > 2.0, "expected it to have waited for longer than its limit"
+
+
+# -- what is said -----------------------------------------------------------------------------------------
+
+ANSWERS = "for asked in parent: parent.say(asked)"
+
+
+@pytest.fixture
+def child() -> Iterator[Callable[..., Child]]:
+    """Starts a program that talks."""
+    with ExitStack() as stack:
+        yield lambda program, **limits: stack.enter_context(
+            Child([sys.executable, "-c", f"{TALKS}\n{program}"], limits=dataclasses.replace(UNLIMITED, **limits))
+        )
+
+
+def test_what_is_said_is_heard_whatever_is_printed_and_read_meanwhile(child: Callable[..., Child]) -> None:
+    one = child(f"import sys; print('printed', flush=True); sys.stdin.read()\n{ANSWERS}")
+    for said in ("a word", {"an": ["object"]}, b"x" * 1_000_000):
+        one.say(said)
+        assert one.hear() == said
+
+
+def test_a_child_that_is_asked_no_more_ends_itself_if_there_is_patience(
+    child: Callable[..., Child], tmp_path: Path
+) -> None:
+    one = child(f"{ANSWERS}\nopen({str(tmp_path / 'ended')!r}, 'w')")
+    one.say(0)
+    assert one.hear() == 0
+    one.close(PATIENCE)
+    assert (tmp_path / "ended").exists()
+
+
+@pytest.mark.parametrize(
+    ("program", "told"),
+    [
+        ("import sys; sys.exit(3)", "ended with exit code 3"),
+        ("import os; os.kill(os.getpid(), 11)", "ended by SIGSEGV"),
+        ("import os; os.write(parent._answers.fileno(), b'not a frame, but as long')", "ended with exit code 0"),
+        ("parent._answers.write(bytes([200, 0, 0, 0, 0, 0, 0, 0, 1]))", "ended with exit code 0"),
+        ("import os, time; os.close(parent._answers.fileno()); time.sleep(600)", "does not answer"),
+    ],
+)
+def test_how_a_child_dies_is_told_to_who_waits_for_its_answer(
+    program: str, told: str, child: Callable[..., Child], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if told == "does not answer":
+        monkeypatch.setattr("orchestration.processes.child._PATIENCE", 0.1)
+    one = child(program)
+    with pytest.raises(Died) as death:
+        one.hear()
+    assert str(death.value) == told
+    assert gone(one.pid)
+
+
+def test_what_a_child_may_take_counts_from_when_it_is_allowed(child: Callable[..., Child]) -> None:
+    one = child("import time\nfor seconds in parent: time.sleep(seconds); parent.say(seconds)", memory=1e6)
+    one.say(1.0)
+    assert one.hear() == 1.0
+    one.allow(0.5)
+    one.say(0.0)
+    assert one.hear() == 0.0
+    one.allow(None)
+    one.say(1.0)
+    assert one.hear() == 1.0
+    one.allow(0.5)
+    one.say(600.0)
+    with pytest.raises(Died) as death:
+        one.hear()
+    assert death.value.ending.reached == "it takes more than the time limit of 0.5 s"
+
+
+NESTED = """
+import sys
+from orchestration.processes.child import Child
+from orchestration.processes.limits import Limits
+parent.hear()
+with Child([sys.executable, "-c", "import time; time.sleep(2.0)"], limits=Limits(time=60.0), talks=False) as inner:
+    inner.ending()
+parent.say("done")
+"""
+
+
+@linux_only
+def test_the_time_of_a_process_with_a_limit_of_its_own_is_not_that_of_who_waits_for_it(
+    child: Callable[..., Child],
+) -> None:
+    one = child(NESTED)
+    one.allow(1.5)
+    one.say("begin")
+    assert one.hear() == "done"
+
+
+ORPHAN = f"""
+import os, sys
+from orchestration.processes.child import Child
+program = {TALKS!r} + "\\nimport os, time; parent.say(os.getpid()); time.sleep(600)"
+print(Child([sys.executable, "-c", program]).hear(), flush=True)
+os.kill(os.getpid(), 9)
+"""
+
+
+@linux_only
+def test_a_child_ends_with_its_parent_whatever_it_is_doing() -> None:
+    done = subprocess.run([sys.executable, "-c", ORPHAN], capture_output=True, text=True, check=False)
+    assert gone(int(done.stdout))
