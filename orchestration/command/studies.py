@@ -283,13 +283,16 @@ def margin(
     flags: FlightFlags,
 ) -> Answer:
     """Delays that the loop about hover tolerates: constant ones exactly, varying ones by bounds from theory."""
+    from orchestration.building.inputs import files_of
     from orchestration.flight.margin import margin_of
+    from orchestration.fmi.foreign import computed
     from orchestration.quadrotor.scenario import Scenario
+    from orchestration.system.request import system_meant
 
     chosen = request_from(scenario, flags)
     if not isinstance(chosen, Scenario):
         raise UsageError("margin: expected a scenario of the quadrotor")
-    found = dataclasses.asdict(margin_of(chosen))
+    found = dataclasses.asdict(computed(files_of(system_meant(chosen)).fmus.values(), margin_of, chosen))
     lines = []
     for name, value in found.items():
         shown = " ".join(f"{share:g}" for share in value) if isinstance(value, tuple) else value

@@ -3,8 +3,10 @@
 from collections.abc import Mapping
 
 from orchestration.building import fmus
+from orchestration.building.inputs import files_of
 from orchestration.comparison.crossovers import CROSSOVERS
 from orchestration.comparison.design import FMU, Comparison, Controller, Craft
+from orchestration.fmi.foreign import computed
 from orchestration.fmi.model import read_model
 from orchestration.studies.axes import Value
 from orchestration.system.request import ControlLoop
@@ -27,7 +29,9 @@ def bandwidths(comparison: Comparison) -> dict[Key, float]:
             for value in comparison.values:
                 tuned = tuple(sorted(controller.tuned.get((vehicle.name, value), {}).items()))
                 if tuned not in known:
-                    known[tuned] = controller.bandwidth or crossover(_loop(comparison, controller, vehicle, tuned))
+                    loop = _loop(comparison, controller, vehicle, tuned)
+                    fmus_of_it = files_of(loop.as_system()).fmus.values()
+                    known[tuned] = controller.bandwidth or computed(fmus_of_it, crossover, loop)
                 found[controller.name, vehicle.name, value] = known[tuned]
     return found
 

@@ -9,9 +9,10 @@ import numpy as np
 from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.basics.simulator import Floats, Transfer
 from orchestration.fmi.fmi2 import Fmi2Instance
+from orchestration.fmi.foreign import computed
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_instance
-from orchestration.interop.assignment import Job, loop_of
+from orchestration.interop.assignment import Job, Loop, loop_of
 from orchestration.interop.catalogue import Tool
 from orchestration.interop.copies import expect_traceable, traced_copy
 from orchestration.interop.trace import Trace, read_trace
@@ -111,21 +112,27 @@ class Flights:
         if key not in self._own:
             system = _in_order(_by_own_clocks(self._system, self._clocks), order, self.step)
 
-            def load(path: Path, instance_name: str) -> Instance:
-                if not start:
-                    return open_instance(path, instance_name)
-                inputs = self.loop.ports[instance_name].inputs
-                return _GivenStart(path, instance_name, inputs, *start[instance_name])
-
-            with prepared(system, load=load) as flight:
-                flight.master.initialise()
-                flight.master.run()
-                result = flight.result()
-            ended = result.divergence or result.termination
-            if ended is not None:
-                raise QuadcosimError(f"in this project's master, {order}: {ended}; nothing to compare")
-            self._own[key] = np.column_stack([result.signals[name] for name in ("time", *self.loop.signals)])
+            found = computed(self._fmus.values(), _rows, system, self.loop, start)
+            if isinstance(found, str):
+                raise QuadcosimError(f"in this project's master, {order}: {found}; nothing to compare")
+            self._own[key] = found
         return self._own[key]
+
+
+def _rows(system: System, loop: Loop, start: Start) -> Floats | str:
+    """The time and the signals of a flight here; why it has ended, if that was before its time."""
+
+    def load(path: Path, instance_name: str) -> Instance:
+        if not start:
+            return open_instance(path, instance_name)
+        return _GivenStart(path, instance_name, loop.ports[instance_name].inputs, *start[instance_name])
+
+    with prepared(system, load=load) as flight:
+        flight.master.initialise()
+        flight.master.run()
+        result = flight.result()
+    ended = result.divergence or result.termination
+    return ended or np.column_stack([result.signals[name] for name in ("time", *loop.signals)])
 
 
 def parameters_for(tool: Tool, part: Part) -> dict[str, Parameter]:

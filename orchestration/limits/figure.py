@@ -9,8 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats
+from orchestration.building.inputs import files_of
 from orchestration.figures.palette import BLUE, GREY, ORANGE, RED
 from orchestration.figures.style import SCREEN, Style
+from orchestration.fmi.foreign import computed
 from orchestration.limits.evaluation import RELIABILITY, Evaluation
 from orchestration.limits.found import Found
 from orchestration.results import display_names as labels
@@ -18,7 +21,7 @@ from orchestration.results import quantities
 from orchestration.results.quantities import Quantity
 from orchestration.stability.known_loops import LOOPS
 from orchestration.studies import figures
-from orchestration.system.request import Request
+from orchestration.system.request import Request, system_meant
 
 DIGITS = 4
 """of what is said of a value"""
@@ -149,23 +152,30 @@ def draw_spectral_radius(request: Request, found: Found, folder: Path, style: St
 
     Raises `UsageError` where linear theory does not apply.
     """
-    known = LOOPS.of(request.kind)
-    radius = None if known is None else known.radius_over(request, found.of)
-    if radius is None:
-        return []
     ends = [limit for limit in (found.local_limit, found.large_signal_limit) if limit is not None]
     last = 1.3 * max(ends, default=0.1)
     values = np.array([0.001 + i / 199.0 * (last - 0.001) for i in range(200)])
-    radii = np.array([radius(value) for value in values])
-    return figures.save(
-        lambda how: figures.spectral_radius(
-            found.of,
-            values,
-            radii,
-            local_limit=found.local_limit,
-            large_signal_limit=found.large_signal_limit,
-            style=how,
-        ),
-        folder / f"spectral_radius_{found.of}",
-        style,
+    radii = computed(files_of(system_meant(request)).fmus.values(), _radii, request, found.of, values)
+    return (
+        []
+        if radii is None
+        else figures.save(
+            lambda how: figures.spectral_radius(
+                found.of,
+                values,
+                radii,
+                local_limit=found.local_limit,
+                large_signal_limit=found.large_signal_limit,
+                style=how,
+            ),
+            folder / f"spectral_radius_{found.of}",
+            style,
+        )
     )
+
+
+def _radii(request: Request, of: str, values: Floats) -> Floats | None:
+    """The spectral radius at each value; None where no loop is known."""
+    known = LOOPS.of(request.kind)
+    radius = None if known is None else known.radius_over(request, of)
+    return None if radius is None else np.array([radius(value) for value in values])

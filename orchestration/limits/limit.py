@@ -13,6 +13,7 @@ from orchestration.basics.terminal import say
 from orchestration.building.inputs import Files, files_of
 from orchestration.engines.engine import Engine
 from orchestration.engines.wiring import checked
+from orchestration.fmi.foreign import LostError, computed
 from orchestration.limits.evaluation import RELIABILITY, Evaluator, is_random, said
 from orchestration.limits.found import Continuous, Found
 from orchestration.requests.ranges import Varied, range_asked_for
@@ -115,7 +116,7 @@ def find(
     metric = judged(varied.system)
     random = is_random(varied.at(span.last))
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
-    local = local_limits(varied, span)
+    local = _local(varied, span, files)
     with of_share(progress, "longest search") as hear, Pool(files, workers, engine) as pool:
         tell = announce or (lambda line: None)
         trials = Evaluator(varied, span, seeds, confidence if random else None, units[0], pool, tell, hear)
@@ -154,6 +155,13 @@ def _checked(request: Request, of: str, confidence: float) -> tuple[Varied, File
     if varied.system.criterion.good is None:
         raise UsageError("criterion.good: expected in the system file, for it says what the limit is of")
     return varied, files_of(varied.system)
+
+
+def _local(varied: Varied, span: Range, files: Files) -> Local:
+    try:
+        return computed(files.fmus.values(), local_limits, varied, span)
+    except LostError as error:
+        return Local(reason=f"no local limit: {error}")
 
 
 def as_text(found: Limit) -> dict[str, str]:

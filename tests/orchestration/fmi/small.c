@@ -232,6 +232,9 @@ API int fmi2SetString(void *c, const unsigned vr[], size_t n, const char *const 
 }
 
 API int fmi2GetFMUstate(void *c, void **state) {
+#ifdef ENDS_WHEN_SAVED
+    ENDS_WHEN_SAVED;
+#endif
     *state = realloc(*state, sizeof(State));
     memcpy(*state, &((Model *)c)->s, sizeof(State));
     return OK;

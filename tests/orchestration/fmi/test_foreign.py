@@ -1,0 +1,55 @@
+"""What is computed by FMUs of others is computed in another process: however that ends, this one goes on."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from orchestration.basics.errors import UsageError
+from orchestration.fmi.foreign import LostError, computed
+from orchestration.limits.limit import find
+from orchestration.system.model import Component, Connection, Criterion, Sampling, System
+from tests.orchestration.fmi.small import needs_compiler, small
+
+pytestmark = needs_compiler
+
+
+def refused() -> None:
+    raise UsageError("not so")
+
+
+def test_it_is_computed_here_by_fmus_of_this_kit_alone(built: dict[str, Path], tmp_path: Path) -> None:
+    ours, other = next(iter(built.values())), small(tmp_path)
+    assert computed([ours], os.getpid) == os.getpid()
+    assert computed([ours, other], os.getpid) != os.getpid()
+
+
+def test_what_it_raises_and_how_its_process_ends_is_told(tmp_path: Path) -> None:
+    other = small(tmp_path)
+    with pytest.raises(UsageError, match=r"^not so$"):
+        computed([other], refused)
+    with pytest.raises(LostError, match=r"^the process of the FMUs ended by SIGABRT$"):
+        computed([other], os.abort)
+
+
+def test_a_limit_is_measured_though_an_fmu_ends_the_process_of_the_local_one(tmp_path: Path) -> None:
+    path, other = small(tmp_path / "ends", "ENDS_WHEN_SAVED=abort()"), small(tmp_path / "other")
+    system = System(
+        stop_time=0.1,
+        components={
+            "it": Component(fmu=str(path), step=0.01, parameters={"gain": 1.0}),
+            "other": Component(fmu=str(other), sampling=Sampling(period=0.01)),
+        },
+        connections=(
+            Connection(name="0", start=("it.y",), end=("other.u",)),
+            Connection(name="1", start=("other.y",), end=("it.u",)),
+        ),
+        operating_point={"components.it.parameters.gain": 1.0},
+        objectives={"last": "max(it.y)"},
+        criterion=Criterion(good="last < 1"),
+    )
+    found = find(
+        system, "components.other.sampling.period", first=0.01, last=0.02, scan=0.01, progress=None, announce=None
+    )
+    assert [one.value for one in found.tried] == [0.01, 0.02]
+    assert found.note.endswith("no local limit: the process of the FMUs ended by SIGABRT")
