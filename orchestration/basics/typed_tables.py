@@ -39,6 +39,7 @@ class Table(pydantic.BaseModel):
 def table_of(
     record: type,
     *,
+    only: Sequence[str] = (),
     without: Sequence[str] = (),
     called: Mapping[str, str] | None = None,
     within: Sequence[Any] = (),
@@ -46,14 +47,15 @@ def table_of(
 ) -> Any:
     """The table of a file that says a record, with the keys, types and defaults that the record declares.
 
-    `without` are fields that no file says, `called` keys by another name, `within` the tables that stand for records in
-    it, and `other` the types and defaults of keys that a file says in other ways than the constructor takes them.
+    `only` are the fields that it says, else all but those `without`; `called` are keys by another name, `within` the
+    tables that stand for records in it, and `other` the types and defaults of keys that a file says in other ways than
+    the constructor takes them.
     """
     tables = {each.declared_by: each for each in within}
     hints = typing.get_type_hints(record, include_extras=True)
     fields: dict[str, Any] = {}
     for field in dataclasses.fields(record):
-        if field.name not in without:
+        if field.name in only if only else field.name not in without:
             hint, default = other.get(field.name, (_in_file(hints[field.name], tables), default_of(field)))
             default = tables[type(default)]() if type(default) in tables else default
             default = ... if default is dataclasses.MISSING else default

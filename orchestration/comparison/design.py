@@ -44,8 +44,11 @@ class Condition:
     """What differs from what a controller believes, or goes wrong: mass, lag, wind, losses."""
 
     name: str
+    """What tables and pictures call it."""
     sets: Values = field(default_factory=dict)
+    """Values by path."""
     multiplies: Mapping[str, float] = field(default_factory=dict)
+    """Factors by path, on the value that is there by then."""
 
 
 @record("front.")

@@ -1,6 +1,5 @@
 """Reads comparison files, and the files of parameters that they name."""
 
-import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import field
@@ -10,6 +9,7 @@ from typing import Any
 from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError, no_such_key
 from orchestration.basics.records import record
+from orchestration.basics.typed_tables import table_of
 from orchestration.comparison.design import FMU, Comparison, Condition, Controller, Craft, Front
 from orchestration.expressions.at_instant import compiled
 from orchestration.expressions.syntax import parse
@@ -52,21 +52,10 @@ class VehicleTable:
     """Parameters of every controller on top of those of the vehicle."""
 
 
-@record()
-class ConditionTable:
+class ConditionTable(  # type: ignore[misc]
+    table_of(Condition, sets=(dict[str, Any], {}), multiplies=(dict[str, Any], {}))
+):
     """`[[conditions]]`: what is set, and what is multiplied, by the names of axes of studies."""
-
-    name: str
-    """What tables and pictures call it."""
-    sets: dict[str, Any] = field(default_factory=dict)
-    """Values by path."""
-    multiplies: dict[str, Any] = field(default_factory=dict)
-    """Factors by path, on the value that is there by then."""
-
-
-@record()
-class FrontTable(Front):
-    """`[front]`: the objectives that are weighed against each other."""
 
 
 @record()
@@ -83,7 +72,7 @@ class ComparisonFile:
     """What else each is flown under; without any, nothing but the base."""
     starts: dict[str, Any] = field(default_factory=dict)
     """The initial states that every controller is flown from."""
-    front: FrontTable = field(default_factory=FrontTable)
+    front: Front = field(default_factory=Front)
     """The two objectives that are weighed against each other."""
     name: str | None = None
     """The name of the comparison and of its folder in `results/`; without it, that of the file."""
@@ -116,7 +105,7 @@ def _comparison(file: ComparisonFile, path: Path) -> Comparison:
         conditions=tuple(_condition(table) for table in file.conditions),
         axis=axis,
         starts=base.ensemble(file.starts),
-        front=Front(**_fields(file.front, Front)),
+        front=file.front,
     )
 
 
@@ -126,10 +115,6 @@ def _crafts(tables: list[VehicleTable], base: ControlLoop, folder: Path) -> tupl
     if tables:
         raise UsageError("base.vehicle and vehicles: expected one of them")
     return (Craft(name=base.vehicle.name, vehicle=base.vehicle),)
-
-
-def _fields(table: Any, of: type) -> dict[str, Any]:
-    return {f.name: getattr(table, f.name) for f in dataclasses.fields(of)}
 
 
 def _controller(table: ControllerTable, axis: str, keys: list[tuple[str, Value]], folder: Path) -> Controller:

@@ -8,9 +8,9 @@ from typing import Any, Protocol, TypeVar
 from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError
 from orchestration.basics.records import record
-from orchestration.basics.typed_tables import parsed
+from orchestration.basics.typed_tables import parsed, table_of
 from orchestration.requests.request import load_request, request_from_tables
-from orchestration.studies.axes import Axis, Method, Scale, Value, span
+from orchestration.studies.axes import Axis, Scale, Value, span
 from orchestration.studies.study import Study, names_fmu
 from orchestration.system.paths import names_table
 from orchestration.system.request import ControlLoop, Request
@@ -38,18 +38,10 @@ class AxisTable:
     """Whether the range has equal steps or equal ratios."""
 
 
-@record()
-class DesignTable:
+class DesignTable(  # type: ignore[misc]
+    table_of(Study, only=["method", "samples", "design_seed", "vary_seed"], called={"design_seed": "seed"})
+):
     """`[design]`: how axes without values are sampled."""
-
-    method: Method = "sobol"
-    """How the axes without values are sampled; `morris` and `saltelli` are for sensitivity."""
-    samples: int = 0
-    """How many samples are drawn; base samples for sensitivity."""
-    seed: int = 0
-    """The seed of the samples."""
-    vary_seed: bool = False
-    """Whether each run has random numbers of its own; else all have those of the base."""
 
 
 @record()
@@ -120,17 +112,14 @@ def loop_of(file: Based, folder: Path) -> ControlLoop:
 
 
 def _study(file: StudyFile, path: Path) -> Study:
-    if file.design.seed < 0:
-        raise UsageError(f"design.seed = {file.design.seed}: expected a whole number from 0")
+    if file.design.design_seed < 0:
+        raise UsageError(f"design.seed = {file.design.design_seed}: expected a whole number from 0")
     base = base_of(file, path.parent)
     study = Study(
         name=file.name or path.stem,
         base=base,
         axes=tuple(axis_of(table, path.parent) for table in file.axes),
-        method=file.design.method,
-        samples=file.design.samples,
-        design_seed=file.design.seed,
-        vary_seed=file.design.vary_seed,
+        **file.design.model_dump(),
         keep_signals=file.keep_signals if isinstance(file.keep_signals, bool) else tuple(file.keep_signals),
     )
     if not study.points:
@@ -142,8 +131,8 @@ def _study(file: StudyFile, path: Path) -> Study:
 def _expect_consumed(file: StudyFile, study: Study) -> None:
     """Raise `UsageError` for what is said of samples where none are drawn, and of runs that there are not."""
     if all(axis.values is not None for axis in study.axes):
-        for key in ("method", "samples", "seed"):
-            if getattr(file.design, key) != getattr(DesignTable, key):
+        for key, field in (("method", "method"), ("samples", "samples"), ("seed", "design_seed")):
+            if getattr(file.design, field) != getattr(Study, field):
                 raise UsageError(f"design.{key}: expected none; every axis has its values, so nothing is sampled")
     for index in () if isinstance(study.keep_signals, bool) else study.keep_signals:
         if not 0 <= index < len(study.points):

@@ -7,18 +7,13 @@ from typing import Any
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.records import record
+from orchestration.basics.typed_tables import table_of
 from orchestration.studies.study_file import AxisTable, axis_of, load, loop_of
 from orchestration.tuning.tuning import Found, Tuning
 
 
-@record()
-class CostTable:
+class CostTable(table_of(Tuning, only=["cost", "bad"], called={"cost": "of"})):  # type: ignore[misc]
     """`[cost]`: of a run that survives, by its objectives, and of one that diverges."""
-
-    of: str
-    """The cost of a run that survives: an expression over its objectives."""
-    bad: float
-    """The cost of one that diverges, or whose cost has no value; no run costs more."""
 
 
 JUDGED = "judged"
@@ -27,16 +22,8 @@ USUALLY_JUDGED = 200
 """of them, unless told"""
 
 
-@record()
-class SearchTable:
+class SearchTable(table_of(Tuning, only=["periods", "evaluations", "seeds"])):  # type: ignore[misc]
     """`[search]`: the effort."""
-
-    periods: list[float]
-    """The periods [s] that are tuned for, each by itself."""
-    evaluations: int
-    """How often the mean cost is evaluated, for each parameter."""
-    seeds: list[int]
-    """Seeds of the optimiser: a search each."""
 
 
 @record()
@@ -82,13 +69,10 @@ def _tuning(file: TuningFile, path: Path) -> Tuning:
         name=file.name or path.stem,
         base=base,
         parameters=parameters,
-        cost=file.cost.of,
-        bad=file.cost.bad,
+        **file.cost.model_dump(),
+        **file.search.model_dump(),
         starts=base.ensemble(starts, beside=(JUDGED,)),
         judged=judged,
-        periods=tuple(file.search.periods),
-        evaluations=file.search.evaluations,
-        seeds=tuple(file.search.seeds),
     )
 
 
