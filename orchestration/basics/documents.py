@@ -1,4 +1,4 @@
-"""Reads the text files that people write and edit: whatever is wrong with one is a `UsageError`.
+"""Reads the text files that people write and edit, where whatever is wrong is a `UsageError`; makes values of JSON.
 
 A file is read up to a stated size, so that none fills memory, and may begin with a byte-order mark, as
 editors on Windows write it.
@@ -10,7 +10,7 @@ import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 from orchestration.basics.errors import UsageError, shown
@@ -94,6 +94,21 @@ def read_json(path: Path, what: str) -> Any:
         raise UsageError(f"{path}: expected JSON, as it was written: {error}") from error
     _expect_plain(value, str(path))
     return value
+
+
+def plain(value: object) -> Any:
+    """`value` in the types of JSON: dataclasses as tables, paths as text, numbers that are not finite as None."""
+    from pydantic_core import to_jsonable_python  # not before: `--help` loads nothing of it
+
+    return to_jsonable_python(value, inf_nan_mode="null", fallback=_other)
+
+
+def _other(value: object) -> Any:
+    if isinstance(value, Mapping):
+        return dict(value)
+    if isinstance(value, PurePath):
+        return str(value)
+    raise TypeError(f"{type(value).__name__}: no type that JSON has")
 
 
 def _refuse_constant(name: str) -> None:

@@ -1,12 +1,11 @@
 """What a command answers: one document for programs, and the same in lines to read."""
 
-import dataclasses
 import json
-import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
-from typing import Any
+
+from orchestration.basics.documents import plain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,24 +21,10 @@ class Answer:
     @property
     def as_json(self) -> str:
         """The document as JSON; numbers that JSON does not have, as infinity, are null."""
-        return json.dumps(_plain(self.document), indent=2)
+        return json.dumps(plain(self.document), indent=2)
 
 
 def of_files(paths: Iterable[PurePath]) -> Answer:
     """The files that were written, one a line."""
     written = list(paths)
     return Answer(document={"files": written}, lines=[str(path) for path in written])
-
-
-def _plain(value: Any) -> Any:
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return _plain({field.name: getattr(value, field.name) for field in dataclasses.fields(value)})
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, PurePath):
-        return str(value)
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -2,11 +2,11 @@
 
 import dataclasses
 import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
+from orchestration.basics.documents import plain
 from orchestration.report.blobs import Blob
 
 Number = float | int | None
@@ -199,14 +199,4 @@ def as_json(report: Report) -> str:
     """The document of a report; what is not finite is null."""
     content = {each.name: getattr(report, each.name) for each in dataclasses.fields(report) if each.name != "blobs"}
     content["blobs"] = [blob.as_list() for blob in report.blobs]
-    return json.dumps(_plain(content), allow_nan=False, ensure_ascii=False, separators=(",", ":"))
-
-
-def _plain(value: Any) -> Any:
-    if dataclasses.is_dataclass(value):
-        return {each.name: _plain(getattr(value, each.name)) for each in dataclasses.fields(value)}
-    if isinstance(value, Mapping):
-        return {str(key): _plain(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return json.dumps(plain(content), allow_nan=False, ensure_ascii=False, separators=(",", ":"))
