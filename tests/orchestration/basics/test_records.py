@@ -1,0 +1,77 @@
+"""A record is declared once: its constructor, its table in files, its schema and its flags follow from it."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from orchestration.basics.attribute_docs import attribute_docs
+from orchestration.basics.errors import UsageError
+from orchestration.basics.typed_tables import docs_of_keys, fields_of
+from orchestration.quadrotor.timing import TIMING_KEYS
+from orchestration.studies.axes import Axis
+from orchestration.studies.study_file import DesignTable
+from orchestration.system.model import Component, Sampling, System
+from orchestration.system.system_file import ConnectionTable, SamplingTable, schema
+from orchestration.system.times import exact_nanoseconds, is_at_least
+from tests.commands import Main
+
+
+def test_a_whole_number_of_numpy_stays_one_and_a_float_stays_a_float() -> None:
+    given = {"count": np.int64(3), "share": np.float64(3.0), "on": np.bool_(True), "name": "x"}
+    kept = Component(fmu="tank.fmu", step=0.1, parameters=given).parameters  # type: ignore[arg-type]
+    assert {name: (value, type(value)) for name, value in kept.items()} == {
+        "count": (3, int), "share": (3.0, float), "on": (True, bool), "name": ("x", str),
+    }  # fmt: skip
+    assert [type(value) for value in Axis(name="seed", values=np.arange(2)).values or ()] == [int, int]  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("value", [2**63, -(2**63) - 1])
+def test_a_whole_number_beyond_64_bits_is_no_parameter(value: int) -> None:
+    with pytest.raises(UsageError, match=r"^parameters\.n: expected a whole number of at most 64 bits$"):
+        Component(fmu="tank.fmu", step=0.1, parameters={"n": value})
+
+
+def test_what_stands_below_a_field_is_read_without_importing_it() -> None:
+    said = attribute_docs("orchestration.system.model", "Sampling")
+    assert said["offset"] == ("The time of the first instant [s], in its own time.", "0.0")
+    assert said["period"].default == ""
+    assert attribute_docs("orchestration.system.model", "Nobody") == {}
+
+
+def test_a_table_has_the_keys_of_its_record_and_says_of_them_what_the_record_does() -> None:
+    assert [*fields_of(SamplingTable)] == [*attribute_docs("orchestration.system.model", "Sampling")]
+    assert {"from", "to", "name"} <= fields_of(ConnectionTable).keys()
+    assert not {"start", "end", "stated"} & fields_of(ConnectionTable).keys()
+    assert docs_of_keys(DesignTable)["seed"] == "The seed of the sampling."
+    period = schema()["$defs"]["SamplingTable"]["properties"]["period"]
+    assert period["description"] == attribute_docs("orchestration.system.model", "Sampling")["period"].text
+
+
+def test_the_flags_of_a_flight_say_what_the_record_of_its_timing_says(main: Main) -> None:
+    shown = letters(main("run", "--help").stdout)
+    for key in TIMING_KEYS:
+        said = attribute_docs("orchestration.quadrotor.timing", "Timing")[key].text
+        assert letters(said)[:15] in shown, key
+
+
+def letters(text: str) -> str:
+    return "".join(filter(str.isalnum, text))
+
+
+def test_what_is_wrong_with_a_record_within_another_is_at_its_place() -> None:
+    with pytest.raises(UsageError, match=r"^components\.a = 3: expected a value made by Component\(…\)$"):
+        System(stop_time=1.0, components={"a": 3})  # type: ignore[dict-item]
+    with pytest.raises(UsageError, match=r"^sampling = \{'period': 1.0\}: expected a value made by Sampling\(…\)$"):
+        Component(fmu="a", sampling={"period": 1.0})  # type: ignore[arg-type]
+
+
+def test_whether_a_time_is_at_least_so_many_nanoseconds_is_decided_by_decimals() -> None:
+    generator = np.random.default_rng(5)
+    least = [1.0, 1.3, 0.7, 2.9999999999999996, *generator.uniform(0.1, 10.0, 200)]
+    for nanoseconds in map(float, least):
+        about = float(f"{nanoseconds!r}e-9")
+        for seconds in (about, np.nextafter(about, 0.0), np.nextafter(about, 1.0), 0.5 * about, 2.0 * about):
+            exact = exact_nanoseconds(float(seconds)) >= Fraction(repr(nanoseconds))
+            assert is_at_least(float(seconds), nanoseconds) == exact
+    Sampling(period=1.3e-9, clock_ratio=1.3)
