@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 
 from orchestration.basics.errors import QuadcosimError
-from orchestration.basics.simulator import Floats, Simulator
+from orchestration.basics.simulator import Floats, Integers, Simulator
 from orchestration.engines.at_work import AtWork, SampledComponent, Terminated
 from orchestration.engines.backlog import Backlog
 from orchestration.engines.board import Board
@@ -83,14 +83,20 @@ class CompiledLoop:
         )
         self._channel_table = (c.Channel * len(work.channels))(*map(self._channel_of, range(len(work.channels))))
         self._components = (c.Component * len(names))(*map(self._component_of, range(len(names))))
+        self._reached: Integers = np.zeros(len(names), dtype=np.int64)
+        self._track = c.Track(lanes=1, stop=work.stop, now=address(self._reached))
         begun: dict[str, Any] = {
             "components": ctypes.addressof(self._components),
             "channels": ctypes.addressof(self._channel_table),
             "feeds": ctypes.addressof(self._feed_table),
-            "tasks": memory.indices(work.wires.sampled),
+            "continuous": memory.indices(work.wires.continuous),
+            "sampled": memory.indices(work.wires.sampled),
+            "tracks": ctypes.addressof(self._track),
+            "track_count": 1,
+            "channel_count": len(work.channels),
+            "alive": 1,
             "some_by_themselves": work.some_by_themselves,
             "settles": work.settles,
-            "stop": work.stop,
             "look": _Look(self._look_for_c),
             "stopped": _Stopped(self._stopped_for_c),
             "collect": _Collect(lambda index: memory.instances[index].collect_warnings()),
@@ -137,10 +143,11 @@ class CompiledLoop:
     def _slice(self, schedule: Schedule) -> int:
         """Have C pass through instants for about `SLICE`; the code says why it has come back."""
         work, loop, begin = self._work, self._loop, clock.perf_counter()
-        code = int(self._fly(ctypes.addressof(loop), min(len(schedule), loop.at + self._pace)))
+        self._track.count = min(len(schedule), self._track.at + self._pace)
+        code = int(self._fly(ctypes.addressof(loop)))
         share = SLICE / max(clock.perf_counter() - begin, 1e-9)
         self._pace = min(max(1, int(self._pace * min(share, 8.0))), len(schedule))
-        work.now, work.steps, work.cursor.at = loop.now, loop.steps, loop.at
+        work.now, work.steps, work.cursor.at = loop.now, loop.steps[0], self._track.at
         self._hear_of_moves()
         return code
 
@@ -153,7 +160,7 @@ class CompiledLoop:
 
     def _fail(self, code: int) -> None:
         """Raise what C has come back with."""
-        index, part = self._loop.component, self._loop.failed
+        index, part = self._loop.outcome_component[0], self._loop.failed
         if code in (c.FAILED, c.REFUSED):
             function, transfer = self._memory.calls[part]
             if code == c.FAILED:
@@ -190,16 +197,16 @@ class CompiledLoop:
 
     def _share(self, schedule: Schedule) -> None:
         """All that a schedule needs goes to where C has it, from the next instant on."""
-        work, loop = self._work, self._loop
-        loop.at = work.cursor.at
+        work, loop, track = self._work, self._loop, self._track
+        track.at = work.cursor.at
         for name, _ in c.Schedule._fields_:
-            setattr(loop.schedule, name, address(getattr(schedule, name)))
+            setattr(track.schedule, name, address(getattr(schedule, name)))
         self._tables.make_room(schedule)
         self._share_sources(schedule.times[:-1] / NANOSECONDS)
         for index, component in work.continuous.items():
-            self._components[index].now = component.now
-        loop.now, loop.steps = work.now, work.steps
-        rest = schedule.part(loop.at)
+            self._reached[index] = component.now
+        loop.now, loop.steps[0] = work.now, work.steps
+        rest = schedule.part(track.at)
         self._shared = [
             _OnTheirWay(channel, self._channel_table[i], *rest.of(i, work.wires.table(i)))
             for i, channel in enumerate(work.channels)
@@ -211,7 +218,7 @@ class CompiledLoop:
             each.take_back()
         self._shared = []
         for index, component in self._work.continuous.items():
-            component.now = self._components[index].now
+            component.now = int(self._reached[index])
 
     def _share_sources(self, t: Floats) -> None:
         self._fed = [np.ascontiguousarray(feed.each(t), dtype=np.float64) for feed in self._work.feeds]
@@ -236,6 +243,7 @@ class CompiledLoop:
         work, memory, name = self._work, self._memory, self._work.wires.names[index]
         component, into = work.component(index), work.wires.into(name)
         made = memory.component(index, component.read, work.outputs(name), len(component.outputs))
+        made.rank = work.wires.rank(index)
         made.feeds = memory.indices([work.feeds.index(feed) for feed in component.feeds])
         made.held, made.ahead, made.behind = map(memory.indices, (into.held, into.ahead, into.behind))
         if isinstance(component, SampledComponent):
@@ -250,10 +258,11 @@ class _OnTheirWay:
         """`count` messages take values, of which those with `keys` are kept until they arrive."""
         self._channel, self._into, self._size = channel, into, into.size
         self._keys = [*channel.in_flight, *keys]
-        self._flight: Floats = np.empty((len(self._keys), self._size))
+        self._flight: Floats = np.empty((1 << len(self._keys).bit_length(), self._size))
         for i, value in enumerate(channel.in_flight.values()):
             self._flight[i] = value
-        into.flight, into.first[0], into.last[0] = address(self._flight), 0, len(channel.in_flight)
+        into.flight, into.capacity = address(self._flight), len(self._flight)
+        into.first[0], into.last[0] = 0, len(channel.in_flight)
         self._applied: Floats = np.zeros((2, self._size))
         into.applied, into.applied_count[0] = address(self._applied), len(channel.applied)
         for i, (time, value) in enumerate(channel.applied):

@@ -6,12 +6,15 @@ from pathlib import Path
 from typing import Any
 
 from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
+from fmu_kit.compiler.runtime import FOLDER
 from orchestration.basics.errors import QuadcosimError
 from orchestration.basics.libraries import kept
 from orchestration.engines.structures import HEADER, declared, expect_same_sizes, shared
 
-FILES = (*(Path(__file__).with_name(name) for name in ("loop.c", "condition.h")), HEADER)
-"""What it is made of"""
+INSTANTS = Path(__file__).with_name("instants.h")
+"""What happens at an instant, of a run of FMUs and of kernels in lanes"""
+FILES = (*(Path(__file__).with_name(name) for name in ("loop.c", "condition.h")), INSTANTS, HEADER)
+"""What it is made of, beside a header of native FMUs"""
 Operation: Any = declared(FILES[1].read_text(encoding="utf-8"))["Operation"]
 """One step of a condition"""
 
@@ -19,7 +22,7 @@ Operation: Any = declared(FILES[1].read_text(encoding="utf-8"))["Operation"]
 @functools.cache
 def library() -> Any:
     """The function `fly` of loop.c; raises `QuadcosimError` that says what stands in the way."""
-    sources = {path.name: path.read_bytes() for path in FILES}
+    sources = {path.name: path.read_bytes() for path in (*FILES, FOLDER / "lanes.h")}
     path = kept("loop", sources, OPTIONS, lambda: compiled_here(sources, "loop.c", mathematics="libm"))
     try:
         made = ctypes.CDLL(str(path))
@@ -28,5 +31,5 @@ def library() -> Any:
     expect_same_sizes(made, {**shared(1), "Operation": Operation})
     fly = made.fly
     fly.restype = ctypes.c_int
-    fly.argtypes = (ctypes.c_void_p, ctypes.c_int64)
+    fly.argtypes = (ctypes.c_void_p,)
     return fly

@@ -64,7 +64,7 @@ def left_in(folder: Path, columns: Sequence[str]) -> Left | None:
     return Left(
         rows=rows.copy(),
         events=events[events[:, 0] <= until],
-        steps=int(loop.steps),
+        steps=int(loop.steps[0]),
         calling=None if loop.calling < 0 else int(loop.calling),
     )
 

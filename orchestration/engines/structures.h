@@ -86,10 +86,10 @@ typedef struct {
 } List;
 
 typedef struct {
+    int64_t rank; /* its place among those of its kind in the order of an instant */
     List held, ahead, behind; /* connections into it */
-    const double *ratio;      /* of the lanes */
+    const double *ratio;      /* of the lanes; of a sampled one */
     int64_t by_itself;
-    int64_t now; /* [ns] */
     /* of FMUs */
     void *fmu, *step;
     int32_t version, unused;
@@ -105,7 +105,7 @@ typedef struct {
     double *memory;
     const int64_t *places; /* of the connected outputs in it */
     const Fed *fed;
-    int64_t fed_count, settles;
+    int64_t fed_count;
 } Component;
 
 typedef struct {
@@ -116,7 +116,7 @@ typedef struct {
     const double *sigma, *quantum, *scale, *offset; /* of each lane, the first two of each variable too */
     const double *noise[L];                         /* what is drawn, message by message */
     double *value;                                  /* of the message at hand */
-    double *flight;                                 /* messages on their way, in the order of sending */
+    double *flight; /* messages on their way, in the order of sending, which is that of arrival: a ring */
     int64_t capacity, first[L], last[L];
     double *applied; /* the last two, of a first-order hold */
     int64_t applied_count[L], applied_time[2 * L];
@@ -126,31 +126,35 @@ typedef struct {
 
 typedef struct { /* runs that share a schedule */
     Schedule schedule;
-    int64_t count, at, last_window; /* instants of this window, the next of them, whether it is the last one */
+    int64_t count, at, last_window; /* instants of it to go through, the next one, whether it is the last window */
     Lanes lanes;
-    int64_t stop;            /* [ns] */
-    int64_t *now;            /* [ns] of each component */
-    const double *seen[L];   /* sources as objectives see them, and as inputs get them, at each instant */
+    int64_t stop; /* [ns] */
+    int64_t *now; /* [ns] of each component in continuous time */
+    /* of kernels */
+    const double *seen[L]; /* sources as objectives see them, and as inputs get them, at each instant */
     const double *given[L];
     int64_t one_for_all, unused; /* whether these are the same for all lanes */
 } Track;
 
-typedef struct { /* one run of FMUs */
+typedef struct {
     Component *components;
     Channel *channels;
-    const Feed *feeds;
-    List tasks; /* sampled components in the order of an instant */
+    List continuous, sampled; /* components in the order of an instant */
     int64_t some_by_themselves, settles;
-    Schedule schedule;
-    int64_t stop, pause_at; /* [ns] */
+    Track *tracks;
+    int64_t track_count, channel_count;
+    Lanes alive; /* that go on */
+    int64_t outcome[L], outcome_component[L], outcome_time[L], steps[L];
+    int64_t no_memory; /* for messages on their way, or for values that are kept */
+    /* of FMUs */
+    const Feed *feeds;
+    int64_t pause_at, now; /* [ns] */
     double *row, *rows;
     int64_t width, stride, row_count, row_limit; /* in numbers; after the width come sources, which Python adds */
     int64_t *events, *arrived; /* of `arrived` those of this instant, noted after what was sent at it */
     int64_t event_count, event_limit, arrived_count;
-    int64_t at; /* the instant that comes next */
-    int64_t steps, now;
     const Part *failed;
-    int64_t component; /* that failed, or whose output is not finite */
+    int64_t component; /* whose FMU was called last */
     double end;        /* of its step [s] */
     int64_t is_over;   /* with this instant: an FMU ends the run */
     int (*look)(double);
@@ -163,28 +167,18 @@ typedef struct { /* one run of FMUs */
     int64_t calling; /* the component whose FMU is called; -1: none */
     int64_t mode;    /* how numbers are rounded in this run */
     const void *environment;
-} Loop;
-
-typedef struct { /* runs of kernels in lanes */
-    Component *components;
-    int64_t component_count;
-    Channel *channels;
-    int64_t channel_count;
-    List bodies, tasks; /* in the order of an instant */
-    Track *tracks;
-    int64_t track_count, track;
-    Lanes alive, full;
+    /* of kernels */
+    int64_t track; /* whose next window is asked for */
     int64_t seen_count, given_count;
     double *seen, *given, *state, *constants, *numbers;
     Lanes doubtful; /* in which a value was not a number */
     Kept *kept;
-    int64_t fate[L], fate_component[L], fate_time[L], steps[L];
     int32_t *status;
     int64_t recorded_count, record_limit; /* columns that are kept row by row, for who wants to see them */
     const double **recorded;
     double *records[L];
     int64_t record_counts[L];
-} Batch;
+} Loop;
 
 /* -- that Python has the same -------------------------------------------------------------------------------------- */
 
@@ -195,7 +189,7 @@ typedef struct {
 
 #define SIZE_OF(structure) {#structure, sizeof(structure)}
 #define SIZES \
-    SIZE_OF(Message), SIZE_OF(Due), SIZE_OF(Schedule), SIZE_OF(Part), SIZE_OF(Transfer), SIZE_OF(Feed), SIZE_OF(Inputs), \
-    SIZE_OF(Fed), SIZE_OF(Kept), SIZE_OF(List), SIZE_OF(Component), SIZE_OF(Channel), SIZE_OF(Track), SIZE_OF(Loop), \
-    SIZE_OF(Batch), SIZE_OF(Size)
+    SIZE_OF(Message), SIZE_OF(Due), SIZE_OF(Schedule), SIZE_OF(Part), SIZE_OF(Transfer), SIZE_OF(Feed), \
+    SIZE_OF(Inputs), SIZE_OF(Fed), SIZE_OF(Kept), SIZE_OF(List), SIZE_OF(Component), SIZE_OF(Channel), SIZE_OF(Track), SIZE_OF(Loop), \
+    SIZE_OF(Size)
 #define EXPORT __attribute__((visibility("default")))

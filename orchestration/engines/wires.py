@@ -52,6 +52,10 @@ class Wires:
         held = [i for i, x in enumerate(connections) if x.receiver == name and x.hold == "first"]
         return Into(held=tuple(held), ahead=tuple(ahead), behind=tuple(i for i in wires if i not in ahead))
 
+    def rank(self, index: int) -> int:
+        """The place of a component among those of its kind in the order of an instant."""
+        return (self.continuous if index in self.continuous else self.sampled).index(index)
+
     def connected(self, name: str) -> tuple[str, ...]:
         """The outputs of a component that are connected, as they stand in the row."""
         return tuple(f"{name}.{output}" for output in self.board.outputs[name][: self.board.connected[name]])

@@ -111,10 +111,12 @@ class Batch:
         self._numbers = self._array(len(shape.numbers) + 1 + len(shape.inner))
         self._status = np.zeros(self._lanes, dtype=np.int32)
         self._kept = (c.Kept * max(1, len(self._written.folds.kept)))()
-        self._batch: Any = c.Batch(
-            components=ctypes.addressof(self._components), component_count=len(kernels),
-            channels=ctypes.addressof(self._channels), channel_count=len(connections),
-            bodies=self._indices(shape.wires.continuous), tasks=self._indices(shape.wires.sampled),
+        self._batch: Any = c.Loop(
+            components=ctypes.addressof(self._components), channels=ctypes.addressof(self._channels),
+            channel_count=len(connections),
+            some_by_themselves=any(map(shape.wires.is_by_itself, shape.names)),
+            settles=any(x.held.count or x.behind.count or x.fed_count for x in self._components),
+            continuous=self._indices(shape.wires.continuous), sampled=self._indices(shape.wires.sampled),
             tracks=ctypes.addressof(self._tracks), seen_count=seen, given_count=self._given_count,
             seen=address(self._array(seen)), given=address(self._array(self._given_count)),
             state=address(self._state), constants=address(self._array(len(self._written.folds.writer.constants))),
@@ -148,13 +150,13 @@ class Batch:
         self._library.clear(ctypes.addressof(batch))
         self._state[:] = np.array(self._written.states)[:, None]
         batch.doubtful = 0
-        for name in ("fate", "fate_component", "fate_time", "steps", "record_counts"):
+        for name in ("outcome", "outcome_component", "outcome_time", "steps", "record_counts"):
             getattr(batch, name)[:] = [0] * self._lanes
-        batch.alive = batch.full = (1 << count) - 1
+        batch.alive, batch.no_memory = (1 << count) - 1, 0
         self._put_values(systems, known)
         wrong = self._initialise(runs)
         for lane in np.flatnonzero(wrong[:count]).tolist():
-            batch.fate[lane] = self._c.REFUSED
+            batch.outcome[lane] = self._c.REFUSED
             batch.alive &= ~(1 << lane)
         tracks = self._tracks_of(runs, timings)
         recorded = self._record(record, tracks)
@@ -179,7 +181,9 @@ class Batch:
         for call, own in self._shape.calls.items():
             if call.function == "growth_share":
                 values[call] = self._growth(call, own, values)
-        arrays = [np.array(getattr(batch, name)[:count]) for name in ("fate", "fate_time", "fate_component", "steps")]
+        arrays = [
+            np.array(getattr(batch, name)[:count]) for name in ("outcome", "outcome_time", "outcome_component", "steps")
+        ]
         fate, time, component, steps = arrays
         doubtful = np.array([batch.doubtful >> lane & 1 for lane in range(count)], dtype=np.bool_)
         return Landed(
@@ -471,5 +475,5 @@ class Batch:
             step=shape.kernels[name].step, memory=address(self.memories[index]), places=address(places),
             connected=len(places), fed=ctypes.addressof(fed), fed_count=len(changing), held=self._indices(into.held),
             ahead=self._indices(into.ahead), behind=self._indices(into.behind), ratio=address(self._ratios[index]),
-            by_itself=shape.wires.is_by_itself(name), settles=bool(into.held or into.behind or changing),
+            by_itself=shape.wires.is_by_itself(name), rank=shape.wires.rank(index),
         )  # fmt: skip

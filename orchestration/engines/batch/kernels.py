@@ -15,10 +15,11 @@ from fmu_kit.compiler.pack.lanes import lanes_here as lanes_of_fmus
 from fmu_kit.compiler.runtime import FOLDER
 from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.basics.libraries import kept
+from orchestration.engines.loop import INSTANTS
 from orchestration.engines.structures import HEADER, expect_same_sizes, shared
 from orchestration.fmi.model import Model
 
-FILES = (Path(__file__).with_name("batch.c"), HEADER)
+FILES = (Path(__file__).with_name("batch.c"), INSTANTS, HEADER)
 """What it is made of, beside what is written for a system and headers of native FMUs"""
 _HEADERS = ("lanes.h", "mathematics.h")
 _SOURCES = "sources/"
