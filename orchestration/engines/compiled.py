@@ -43,8 +43,8 @@ Condition = Callable[[Board], tuple[Sequence[Step] | None, Sequence[Values]]]
 """The program of what is watched, None if there is none, and the sources in it"""
 
 
-def obstacle(simulators: Mapping[str, Simulator], stop: int) -> str | None:
-    """What stands in the way of the compiled loop for a run up to `stop` [ns], in a line; None: it can be had."""
+def reason_unavailable(simulators: Mapping[str, Simulator], stop: int) -> str | None:
+    """Why the compiled loop cannot be had for a run up to `stop` [ns], in a line; None: it can be."""
     for name, simulator in simulators.items():
         if not isinstance(simulator, NativeInstance):
             return f"components.{name} is not called in this process"
@@ -60,7 +60,7 @@ def obstacle(simulators: Mapping[str, Simulator], stop: int) -> str | None:
 
 
 class CompiledLoop:
-    """Passes through the instants of a run in whose way there is no `obstacle`."""
+    """Passes through the instants of a run for which there is no `reason_unavailable`."""
 
     engine = "compiled"
 

@@ -7,7 +7,7 @@ from typing import Any, Literal, cast, get_args
 
 from orchestration.basics.errors import QuadcosimError, UsageError, expected_name
 from orchestration.basics.simulator import Simulator
-from orchestration.engines.compiled import CompiledLoop, Condition, obstacle
+from orchestration.engines.compiled import CompiledLoop, Condition, reason_unavailable
 from orchestration.engines.master import Master
 from orchestration.engines.room import Room, private
 from orchestration.system.model import System
@@ -39,11 +39,11 @@ def master(
     The compiled loop keeps what it has not handed over in `room`; `others` are arguments of `Master`. Raises
     `QuadcosimError` naming what stands in the way of the compiled loop if that was asked for.
     """
-    hindered = None if engine == "python" else obstacle(simulators, nanoseconds(system.stop_time))
-    if hindered:
-        _NOTES.debug("no compiled loop: %s", hindered)
-    if engine == "python" or (engine is None and hindered):
+    reason = None if engine == "python" else reason_unavailable(simulators, nanoseconds(system.stop_time))
+    if reason:
+        _NOTES.debug("no compiled loop: %s", reason)
+    if engine == "python" or (engine is None and reason):
         return Master(system, simulators, **others)
-    if hindered:
-        raise QuadcosimError(f"--engine compiled cannot be had: {hindered}")
+    if reason:
+        raise QuadcosimError(f"--engine compiled cannot be had: {reason}")
     return Master(system, simulators, loop=partial(CompiledLoop, condition=condition, room=room), **others)
