@@ -18,7 +18,7 @@ from orchestration.engines.feeds import Feed
 from orchestration.engines.sources import Values
 from orchestration.engines.watch import Watch
 from orchestration.engines.wires import Wires
-from orchestration.schedule.cursor import Position
+from orchestration.schedule.cursor import Cursor
 from orchestration.schedule.schedule import Schedule
 from orchestration.schedule.streams import NOISE, Streams
 from orchestration.schedule.timetable import Timetable
@@ -101,7 +101,7 @@ class AtWork:
         self.sources, self.feeds = list(sources), list(feeds)
         self.columns = (*board.columns, *(signal for signals, _ in sources for signal in signals))
         """of every row: those of the board, then the signals of the sources"""
-        self.cursor = Position(timetable)
+        self.cursor = Cursor(timetable)
         self.interrupted = interrupted
         self.interrupted_at: int | None = None
         self.termination: str | None = None

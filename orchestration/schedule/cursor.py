@@ -11,7 +11,7 @@ TOGETHER = 2**9
 """of these so many are made into objects, few enough to stay in the processor's cache"""
 
 
-class Position:
+class Cursor:
     """A timetable, gone through from its begin to its end."""
 
     def __init__(self, timetable: Timetable) -> None:

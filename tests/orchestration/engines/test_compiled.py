@@ -33,7 +33,7 @@ from orchestration.runs.meant import RunInterrupted
 from orchestration.runs.pause import fly_until, resume
 from orchestration.runs.result import Result
 from orchestration.runs.simulation import prepared
-from orchestration.schedule import cursor as position
+from orchestration.schedule import cursor
 from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
 from orchestration.system.system_file import load_system
 from orchestration.system.times import Grid, exact_nanoseconds
@@ -116,7 +116,7 @@ def test_random_systems_run_the_same_in_schedules_of_any_length(
     fmu: Path, kept: Kept, what: System, instants: int
 ) -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(position, "INSTANTS", instants)
+        patch.setattr(cursor, "INSTANTS", instants)
         both(of(what, fmu), load=kept.load)
 
 
@@ -298,14 +298,14 @@ def test_a_run_that_one_engine_pauses_another_ends(first: Any, then: Any, fmu: P
 
 
 @settings(max_examples=30, derandomize=True, deadline=None)
-@given(systems(most=4), st.floats(0.0, 1.0), st.tuples(ENGINES, ENGINES), st.sampled_from((5, position.INSTANTS)))
+@given(systems(most=4), st.floats(0.0, 1.0), st.tuples(ENGINES, ENGINES), st.sampled_from((5, cursor.INSTANTS)))
 def test_random_systems_go_on_from_a_pause_as_if_there_was_none(
     fmu: Path, kept: Kept, what: System, share: float, engines: tuple[Any, Any], size: int
 ) -> None:
     system, (first, then) = of(what, fmu), engines
     whole = ran(system, "python", load=kept.load)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(position, "INSTANTS", size)
+        patch.setattr(cursor, "INSTANTS", size)
         with prepared(system, engine=first, load=kept.load) as run:
             run.master.initialise()
             if run.master.run(pause_at=int(share * 1e9 * system.stop_time)):

@@ -17,7 +17,7 @@ from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE
 from orchestration.recording.recording import Chunk, Event, InMemory
-from orchestration.schedule.cursor import Position
+from orchestration.schedule.cursor import Cursor
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
 
@@ -188,15 +188,15 @@ class Instant(NamedTuple):
     arrivals: tuple[int, ...]
 
 
-def position_of(timing: Timing, stop_time: float, seed: int = 0) -> Position:
+def cursor_of(timing: Timing, stop_time: float, seed: int = 0) -> Cursor:
     """At the start of a flight with this timing."""
     system = Scenario(timing=timing, stop_time=stop_time).as_system()
-    return Position(Timetable(system, Streams(seed, system.streams)))
+    return Cursor(Timetable(system, Streams(seed, system.streams)))
 
 
-def instants_of(position: Position) -> Iterator[Instant]:
+def instants_of(cursor: Cursor) -> Iterator[Instant]:
     """The instants of a flight in words of the loop of two: at each the plant halts."""
-    for instant in position.instants():
+    for instant in cursor.instants():
         sample, arrivals = None, [k for _, k, _, _ in instant.arrivals]
         for due in instant.dues:
             ((_, k, _, received),), ((_, _, sent, arrival),) = due.received, due.sent

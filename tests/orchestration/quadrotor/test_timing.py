@@ -17,8 +17,8 @@ from orchestration.command import cli
 from orchestration.command.flags import FlightFlags
 from orchestration.quadrotor.timing import TIMING_KEYS, Timing
 from orchestration.quadrotor.translation import quadrotor
-from orchestration.schedule import cursor as position
-from orchestration.schedule.cursor import INSTANTS, Position
+from orchestration.schedule import cursor
+from orchestration.schedule.cursor import INSTANTS, Cursor
 from orchestration.schedule.streams import Streams
 from orchestration.system.times import Grid, nanoseconds
 from quadcosim import Scenario
@@ -30,12 +30,12 @@ SECOND = 10**9
 COMMANDS = typer.main.get_command(cli.app).commands  # type: ignore[attr-defined]
 
 
-def position_of(case: Case) -> Position:
-    return stubs.position_of(case.timing, case.stop_time, case.seed)
+def cursor_of(case: Case) -> Cursor:
+    return stubs.cursor_of(case.timing, case.stop_time, case.seed)
 
 
 def instants_of(case: Case) -> list[Instant]:
-    return list(stubs.instants_of(position_of(case)))
+    return list(stubs.instants_of(cursor_of(case)))
 
 
 def samples_of(case: Case) -> list[Sample]:
@@ -141,7 +141,7 @@ def test_the_next_time_is_right_also_beyond_the_end(case: Case) -> None:
 
 @given(cases())
 def test_the_time_that_an_instant_announces_comes_next(case: Case) -> None:
-    instants = list(position_of(case).instants())
+    instants = list(cursor_of(case).instants())
     assert all(one.next_time == other.time for one, other in itertools.pairwise(instants))
     assert instants[-1].next_time > nanoseconds(case.stop_time)
 
@@ -328,11 +328,11 @@ def test_streams_of_one_seed_differ_from_each_other() -> None:
 def test_a_timetable_made_again_and_moved_on_continues_identically(case: Case, data: st.DataObject) -> None:
     whole = instants_of(case)
     at, size = data.draw(st.integers(0, len(whole))), data.draw(st.sampled_from((1, 3, INSTANTS)))
-    first, again = position_of(case), position_of(case)
+    first, again = cursor_of(case), cursor_of(case)
     before = list(itertools.islice(stubs.instants_of(first), at))
     assert first.past == at
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(position, "INSTANTS", size)
+        patch.setattr(cursor, "INSTANTS", size)
         passed = list(again.move_to(at))
         assert again.past == sum(map(len, passed)) == at
         assert before + list(stubs.instants_of(again)) == whole

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 
 from orchestration.engines.master import Master
 from orchestration.recording.recording import InMemory
-from orchestration.schedule.cursor import Position
+from orchestration.schedule.cursor import Cursor
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
 from tests.orchestration.engines.random_systems import systems_with_more
@@ -43,7 +43,7 @@ def test_adding_a_component_and_lossy_connections_changes_no_number_of_the_other
 def history(what, name):
     """When a component samples, and what becomes of the messages that it reads and sends."""
     place, found = list(what.components).index(name), []
-    for instant in Position(Timetable(what, Streams(what.seed))).instants():
+    for instant in Cursor(Timetable(what, Streams(what.seed))).instants():
         for due in (due for due in instant.dues if due.component == place):
             messages = [(what.connections[i].name, *message) for i, *message in (*due.received, *due.sent)]
             found.append((instant.time, {m for m in messages if len(m[0]) < len("c100")}))

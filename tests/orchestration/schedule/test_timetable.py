@@ -5,8 +5,8 @@ from fractions import Fraction
 import pytest
 
 from orchestration.basics.errors import UsageError
-from orchestration.schedule import cursor as position
-from orchestration.schedule.cursor import Position
+from orchestration.schedule import cursor
+from orchestration.schedule.cursor import Cursor
 from orchestration.schedule.fixed_step import FixedStep
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import LONGEST, Timetable
@@ -19,7 +19,7 @@ MS = 1_000_000
 
 
 def instants(what, fixed=None):
-    return list(Position(Timetable(what, Streams(what.seed), fixed)).instants())
+    return list(Cursor(Timetable(what, Streams(what.seed), fixed)).instants())
 
 
 def loop(sampling, **keys):
@@ -126,9 +126,9 @@ def test_between_two_points_of_a_fixed_step_is_an_error_that_names_them():
 def test_the_error_comes_when_all_instants_before_it_are_past(monkeypatch):
     what = loop(sampled(0.2), command={"delay": 0.03, "loss": 0.5}, stop_time=2.0, seed=5)
     first = next(time for time in instants(what) if time.arrivals).time
-    for size in (1, 3, position.INSTANTS):
-        monkeypatch.setattr(position, "INSTANTS", size)
-        begun = Position(Timetable(what, Streams(what.seed), fixed_plant(False)))
+    for size in (1, 3, cursor.INSTANTS):
+        monkeypatch.setattr(cursor, "INSTANTS", size)
+        begun = Cursor(Timetable(what, Streams(what.seed), fixed_plant(False)))
         with pytest.raises(UsageError, match=rf"arrival over connections\.command at t = {first / 1e9:g} s"):
             list(begun.instants())
         assert begun.past == len(range(0, first, 100 * MS))
