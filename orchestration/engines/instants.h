@@ -24,7 +24,7 @@ typedef struct {
     Lanes lanes, tracks; /* that have reached it */
     q_real t;
     int64_t time[L];
-    Rows halts, dues; /* of components, in the order of ranks */
+    Rows halts, samples; /* of components, in the order of ranks */
     Rows arrivals, posted, measured;
     Lanes *marks; /* of kernels: lanes in which a message of a connection has values of now */
 } Instant;
@@ -101,7 +101,7 @@ static const int64_t *row_of(Rows *rows, int64_t track, int64_t width) {
 /* Tracks have reached their next instant. */
 static void reach(Loop *l, Instant *now, Lanes tracks) {
     now->tracks = tracks, now->lanes = 0;
-    now->halts.tracks = now->dues.tracks = now->arrivals.tracks = now->posted.tracks = now->measured.tracks = 0;
+    now->halts.tracks = now->samples.tracks = now->arrivals.tracks = now->posted.tracks = now->measured.tracks = 0;
     TRACKS(track, tracks) {
         const Schedule *s = &track->schedule;
         int64_t time = time_of(track), at = track->at, number = track - l->tracks;
@@ -116,7 +116,7 @@ static void reach(Loop *l, Instant *now, Lanes tracks) {
         add(&now->arrivals, number, s->arrivals, WIDTH(Message), s->arrivals_at[at], s->arrivals_at[at + 1]);
         add(&now->posted, number, s->posted, WIDTH(Message), s->posted_at[at], s->posted_at[at + 1]);
         add(&now->measured, number, s->measured, WIDTH(Message), s->measured_at[at], s->measured_at[at + 1]);
-        add(&now->dues, number, s->dues, WIDTH(Due), s->dues_at[at], s->dues_at[at + 1]);
+        add(&now->samples, number, s->samples, WIDTH(SampleInstant), s->samples_at[at], s->samples_at[at + 1]);
     }
 }
 
@@ -377,18 +377,18 @@ static void step_continuous(Loop *l, Rows *halts, const Instant *now) {
 }
 
 /* A component reads, steps and sends in the tracks in which it is due; with a clock of its own it steps in all. */
-static void sample(Loop *l, int64_t index, Rows *dues, const Instant *now) {
+static void sample(Loop *l, int64_t index, Rows *samples, const Instant *now) {
     const Component *c = &l->components[index];
     Rows received, sent;
     q_real length = q_all(0.0);
     Lanes sampling = 0, stepping = 0;
     int64_t until = 0;
     received.tracks = sent.tracks = 0;
-    TRACKS(track, c->by_itself ? now->tracks : dues->tracks) {
+    TRACKS(track, c->by_itself ? now->tracks : samples->tracks) {
         const Schedule *s = &track->schedule;
         int64_t time = time_of(track), end = s->times[track->at + 1], number = track - l->tracks;
         Lanes lanes = track->lanes & l->alive;
-        const Due *due = (const Due *)turn_of(dues, number, index, WIDTH(Due));
+        const SampleInstant *due = (const SampleInstant *)turn_of(samples, number, index, WIDTH(SampleInstant));
         if (due) {
             if (!c->by_itself) end = due->next_time;
             add(&received, number, s->exchanged, WIDTH(Message), due->received, due->sent);
@@ -410,11 +410,11 @@ static void sample(Loop *l, int64_t index, Rows *dues, const Instant *now) {
     send(l, &sent, now);
 }
 
-static void sample_each(Loop *l, Rows *dues, const Instant *now) {
+static void sample_each(Loop *l, Rows *samples, const Instant *now) {
     if (l->some_by_themselves)
-        for (int64_t i = 0; i < l->sampled.count; i++) sample(l, l->sampled.items[i], dues, now);
+        for (int64_t i = 0; i < l->sampled.count; i++) sample(l, l->sampled.items[i], samples, now);
     else
-        while (dues->tracks) sample(l, l->sampled.items[next_rank(l, dues)], dues, now);
+        while (samples->tracks) sample(l, l->sampled.items[next_rank(l, samples)], samples, now);
 }
 
 /* What components in continuous time hold over the step that begins now. */
@@ -439,6 +439,6 @@ static void pass(Loop *l, Instant *now) {
     arrive(l, &now->arrivals, now); /* before what is sent now, which is delivered last if it arrives at once */
     post(l, &now->posted, now);
     measure(l, &now->measured, now);
-    sample_each(l, &now->dues, now);
+    sample_each(l, &now->samples, now);
     if (l->settles) settle(l, &now->halts, now);
 }

@@ -12,7 +12,7 @@ from orchestration.basics.errors import SimulatorError
 from orchestration.engines.at_work import AtWork, SampledComponent, Terminated
 from orchestration.engines.backlog import Backlog, Listed, events_of_a_chunk, rows_of_a_chunk
 from orchestration.recording.recording import ARRIVED, LOST, SAMPLED, SENT, Recorder
-from orchestration.schedule.schedule import Due, Message
+from orchestration.schedule.schedule import Message, SampleInstant
 from orchestration.system.times import NANOSECONDS
 
 
@@ -36,7 +36,7 @@ class PythonLoop:
     def run(self, pause_at: int | None, progress: Callable[[float], None] | None) -> bool:
         """Go on to the end, an interruption, or the first instant from `pause_at` [ns]; whether the run is over."""
         work, stop = self._work, self._stop
-        for count, (time, next_time, halts, arrivals, posted, measured, dues) in enumerate(self._instants, 1):
+        for count, (time, next_time, halts, arrivals, posted, measured, samples) in enumerate(self._instants, 1):
             work.now = time
             if halts:
                 self._step_continuous(time, halts)
@@ -47,9 +47,9 @@ class PythonLoop:
             if measured:
                 self._measure(measured)
             if work.some_by_themselves:
-                self._sample_in_turn(dues, time, next_time)
+                self._sample_in_turn(samples, time, next_time)
             else:
-                for due in dues:
+                for due in samples:
                     self._sample(due, time, due.next_time)
             if work.settles:
                 self._settle(time, halts)
@@ -109,19 +109,19 @@ class PythonLoop:
         self._arrived += (time, ARRIVED, index, k)
         self._channels[index].deliver(k, time)
 
-    def _sample_in_turn(self, dues: Sequence[Due], time: int, next_time: int) -> None:
+    def _sample_in_turn(self, samples: Sequence[SampleInstant], time: int, next_time: int) -> None:
         """The samples; who has a clock of its own is stepped to the next instant, and also if it does not sample."""
-        samples = {due.component: due for due in dues}
+        due_of = {due.component: due for due in samples}
         for index, task in self._sampled.items():
-            if index in samples:
-                due = samples[index]
+            if index in due_of:
+                due = due_of[index]
                 self._sample(due, time, next_time if task.by_itself else due.next_time)
             elif task.by_itself and time < self._stop:
                 for channel in task.held:
                     channel.extrapolate(time)
                 self._step_task(task, time, next_time)
 
-    def _sample(self, due: Due, time: int, end: int) -> None:
+    def _sample(self, due: SampleInstant, time: int, end: int) -> None:
         """A component reads, steps to `end` [ns], and sends."""
         task = self._sampled[due.component]
         self._sense(due.received, time)

@@ -24,13 +24,13 @@ typedef struct {
 
 typedef struct {
     int64_t component, next_time, received, sent, end; /* where its messages begin */
-} Due;
+} SampleInstant;
 
 typedef struct {
     const int64_t *times; /* one more than there are instants */
-    const int64_t *halts_at, *halts, *posted_at, *measured_at, *arrivals_at, *dues_at;
+    const int64_t *halts_at, *halts, *posted_at, *measured_at, *arrivals_at, *samples_at;
     const Message *posted, *measured, *arrivals, *exchanged;
-    const Due *dues;
+    const SampleInstant *samples;
 } Schedule;
 
 /* -- values of FMUs ------------------------------------------------------------------------------------------------ */
@@ -189,7 +189,7 @@ typedef struct {
 
 #define SIZE_OF(structure) {#structure, sizeof(structure)}
 #define SIZES \
-    SIZE_OF(Message), SIZE_OF(Due), SIZE_OF(Schedule), SIZE_OF(Part), SIZE_OF(Transfer), SIZE_OF(Feed), \
+    SIZE_OF(Message), SIZE_OF(SampleInstant), SIZE_OF(Schedule), SIZE_OF(Part), SIZE_OF(Transfer), SIZE_OF(Feed), \
     SIZE_OF(Inputs), SIZE_OF(Fed), SIZE_OF(Kept), SIZE_OF(List), SIZE_OF(Component), SIZE_OF(Channel), SIZE_OF(Track), SIZE_OF(Loop), \
     SIZE_OF(Size)
 #define EXPORT __attribute__((visibility("default")))

@@ -15,7 +15,7 @@ Message: TypeAlias = Sequence[int]
 that is; when it arrives [ns], negative if it is lost on the way"""
 
 
-class Due(NamedTuple):
+class SampleInstant(NamedTuple):
     """One sampling instant of a component."""
 
     component: int
@@ -42,7 +42,7 @@ class Instant(NamedTuple):
     """of components in continuous time to one another, where a message can be late or lost"""
     measured: Sequence[Message]
     """values that are measured now for samples to come"""
-    dues: Sequence[Due]
+    samples: Sequence[SampleInstant]
     """samples, in the order in which they are processed"""
 
 
@@ -62,10 +62,10 @@ class Schedule:
     measured_at: Integers
     arrivals: Integers
     arrivals_at: Integers
-    dues: Integers
+    samples: Integers
     """shape (m, 5): component, time of its next sample [ns], and where in `exchanged` what it receives begins, what it
     sends begins, and that ends"""
-    dues_at: Integers
+    samples_at: Integers
     exchanged: Integers
     """messages that samples read and send"""
 
@@ -75,16 +75,16 @@ class Schedule:
     def instants(self) -> Iterator[Instant]:
         """One by one."""
         times, messages = self.times.tolist(), self.exchanged.tolist()
-        dues = [
-            _made(Due, (component, next_time, messages[received:sent], messages[sent:end]))
-            for component, next_time, received, sent, end in self.dues.tolist()
+        samples = [
+            _made(SampleInstant, (component, next_time, messages[received:sent], messages[sent:end]))
+            for component, next_time, received, sent, end in self.samples.tolist()
         ]
         parts = (
             _parts(self.halts.tolist(), self.halts_at),
             _parts(self.arrivals.tolist(), self.arrivals_at),
             _parts(self.posted.tolist(), self.posted_at),
             _parts(self.measured.tolist(), self.measured_at),
-            _parts(dues, self.dues_at),
+            _parts(samples, self.samples_at),
         )
         return map(partial(_made, Instant), zip(times, times[1:], *parts))
 
@@ -95,14 +95,14 @@ class Schedule:
         for table in TABLES:
             at = getattr(self, f"{table}_at")[begin : end + 1]
             found |= {table: getattr(self, table)[at[0] : at[-1]], f"{table}_at": at - at[0]}
-        dues = found["dues"] = found["dues"].copy()
-        first, last = (dues[0, 2], dues[-1, 4]) if len(dues) else (0, 0)
-        dues[:, 2:] -= first
+        samples = found["samples"] = found["samples"].copy()
+        first, last = (samples[0, 2], samples[-1, 4]) if len(samples) else (0, 0)
+        samples[:, 2:] -= first
         return Schedule(exchanged=self.exchanged[first:last], **found)
 
     def most_events(self) -> int:
         """More than any instant has."""
-        exchanged = np.append(self.dues[:, 2], len(self.exchanged))[self.dues_at]
+        exchanged = np.append(self.samples[:, 2], len(self.exchanged))[self.samples_at]
         counts = 2 * np.diff(self.posted_at + exchanged) + np.diff(self.arrivals_at + self.posted_at + exchanged)
         return int(counts.max(initial=0)) + 1
 
@@ -115,12 +115,14 @@ class Schedule:
         which = messages[:, 0] == connection
         kept = which & (messages[:, 3] >= 0)
         if table == "exchanged":
-            sampled = np.repeat(np.repeat(self.times[:-1], np.diff(self.dues_at)), self.dues[:, 4] - self.dues[:, 2])
+            sampled = np.repeat(
+                np.repeat(self.times[:-1], np.diff(self.samples_at)), self.samples[:, 4] - self.samples[:, 2]
+            )
             kept &= messages[:, 3] != sampled
         return int(which.sum()), messages[kept, 1].tolist()
 
 
-TABLES = ("halts", "posted", "measured", "arrivals", "dues")
+TABLES = ("halts", "posted", "measured", "arrivals", "samples")
 
 _made = tuple.__new__
 """Makes a named tuple from a tuple, as its class does by way of a Python function"""

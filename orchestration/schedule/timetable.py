@@ -137,7 +137,7 @@ class Timetable:
         found = _Collected()
         posted, later = self._post(begin, end, found)
         measured = self._measure(begin, end, found)
-        dues, exchanged, sent = self._sample(begin, end, found)
+        samples, exchanged, sent = self._sample(begin, end, found)
         arrivals = self._arrive(end, [later, sent], found)
         self._halt_by_themselves(begin, end, found)
         for task in self._tasks:
@@ -155,8 +155,8 @@ class Timetable:
             measured_at=np.searchsorted(measured[:, 2], times),
             arrivals=arrivals,
             arrivals_at=np.searchsorted(arrivals[:, 3], times),
-            dues=np.ascontiguousarray(dues[:, 1:]),
-            dues_at=np.searchsorted(dues[:, 0], times),
+            samples=np.ascontiguousarray(samples[:, 1:]),
+            samples_at=np.searchsorted(samples[:, 0], times),
             exchanged=exchanged,
         )
 
@@ -212,14 +212,14 @@ class Timetable:
                 if link.index not in self._plan.read_ahead:
                     found.add(rows[:, TIME], int(self._sender[link.index]))
             messages, middle = task.messages(rows), len(task.incoming)
-            dues = np.empty((len(rows), 6), dtype=np.int64)
-            dues[:, 0], dues[:, 1], dues[:, 2], dues[:, 3] = rows[:, TIME], task.index, rows[:, NEXT], 0
-            dues[:, 4:] = middle, messages.shape[1]
-            drawn.append(dues)
+            samples = np.empty((len(rows), 6), dtype=np.int64)
+            samples[:, 0], samples[:, 1], samples[:, 2], samples[:, 3] = rows[:, TIME], task.index, rows[:, NEXT], 0
+            samples[:, 4:] = middle, messages.shape[1]
+            drawn.append(samples)
             exchanged.append(messages)
             for place, link in enumerate(task.outgoing):
                 _, k, sent, arrivals = messages[:, middle + place].T
-                later.append(self._under_way(_Sent(link, k, sent, arrivals, dues[:, 0], 1, task.rank, place), found))
+                later.append(self._under_way(_Sent(link, k, sent, arrivals, samples[:, 0], 1, task.rank, place), found))
         return *_one_after_the_other(np.concatenate(drawn), exchanged), np.concatenate(later)
 
     def _under_way(self, sent: "_Sent", found: _Collected) -> Integers:
@@ -301,22 +301,22 @@ class _Sent(NamedTuple):
         return rows
 
 
-def _one_after_the_other(dues: Integers, exchanged: Sequence[Integers]) -> tuple[Integers, Integers]:
+def _one_after_the_other(samples: Integers, exchanged: Sequence[Integers]) -> tuple[Integers, Integers]:
     """Samples in order of time, and what they exchange: their last three columns say from where on in it.
 
     They begin as 0, the number that is received, and that of all; `exchanged` has the messages task after task.
     """
     if sum(len(messages) > 0 for messages in exchanged) <= 1:
         table = np.concatenate([messages.reshape(-1, 4) for messages in exchanged])
-        dues[:, 3:] += (np.cumsum(dues[:, 5]) - dues[:, 5])[:, None]
-        return dues, table
-    order = np.argsort(dues[:, 0], kind="stable")
-    begins = np.empty(len(dues), dtype=np.int64)
-    begins[order] = np.cumsum(dues[order, 5]) - dues[order, 5]
-    table, first = np.empty((int(dues[:, 5].sum()), 4), dtype=np.int64), 0
+        samples[:, 3:] += (np.cumsum(samples[:, 5]) - samples[:, 5])[:, None]
+        return samples, table
+    order = np.argsort(samples[:, 0], kind="stable")
+    begins = np.empty(len(samples), dtype=np.int64)
+    begins[order] = np.cumsum(samples[order, 5]) - samples[order, 5]
+    table, first = np.empty((int(samples[:, 5].sum()), 4), dtype=np.int64), 0
     for messages in exchanged:
         places = begins[first : first + len(messages), None] + np.arange(messages.shape[1])
         table[places] = messages
         first += len(messages)
-    dues[:, 3:] += begins[:, None]
-    return dues[order], table
+    samples[:, 3:] += begins[:, None]
+    return samples[order], table

@@ -181,7 +181,7 @@ static void pass_and_sum_up(Loop *l, Instant *now, Lanes tracks) {
 }
 
 static int samples_next(const Track *track) {
-    const int64_t *at = track->schedule.dues_at + track->at;
+    const int64_t *at = track->schedule.samples_at + track->at;
     return at[1] > at[0];
 }
 

@@ -198,7 +198,7 @@ def instants_of(cursor: Cursor) -> Iterator[Instant]:
     """The instants of a flight in words of the loop of two: at each the plant halts."""
     for instant in cursor.instants():
         sample, arrivals = None, [k for _, k, _, _ in instant.arrivals]
-        for due in instant.dues:
+        for due in instant.samples:
             ((_, k, _, received),), ((_, _, sent, arrival),) = due.received, due.sent
             sample = Sample(k, instant.time, due.next_time, received < 0, sent, None if arrival < 0 else arrival)
             arrivals += [k] if arrival == instant.time else []

@@ -44,7 +44,7 @@ def history(what, name):
     """When a component samples, and what becomes of the messages that it reads and sends."""
     place, found = list(what.components).index(name), []
     for instant in Cursor(Timetable(what, Streams(what.seed))).instants():
-        for due in (due for due in instant.dues if due.component == place):
+        for due in (due for due in instant.samples if due.component == place):
             messages = [(what.connections[i].name, *message) for i, *message in (*due.received, *due.sent)]
             found.append((instant.time, {m for m in messages if len(m[0]) < len("c100")}))
         found += [message for message in posted(what, instant, name) if len(message[0]) < len("c100")]

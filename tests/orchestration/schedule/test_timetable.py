@@ -34,7 +34,7 @@ def loop(sampling, **keys):
 def test_instants_are_points_samples_arrivals_and_the_end():
     found = instants(loop(sampled(0.25), command={"delay": 0.03}, stop_time=0.5))
     assert [i.time // MS for i in found] == [0, 30, 100, 200, 250, 280, 300, 400, 500]
-    assert [i.time // MS for i in found if i.dues] == [0, 250]  # none at the end
+    assert [i.time // MS for i in found if i.samples] == [0, 250]  # none at the end
     assert [i.time // MS for i in found if i.arrivals] == [30, 280]
 
 
@@ -60,20 +60,20 @@ def test_a_delay_of_measurements_longer_than_periods_is_the_same():
     taken = [(sent // MS, arrival // MS) for i in found for _, _, sent, arrival in i.measured]
     assert taken[:3] == [(0, 0), (0, 100), (0, 200)]
     assert taken[3:] == [(50 + 100 * k, 300 + 100 * k) for k in range(10)]  # also for samples beyond the end
-    received = [[sent // MS for _, _, sent, _ in due.received] for i in found for due in i.dues]
+    received = [[sent // MS for _, _, sent, _ in due.received] for i in found for due in i.samples]
     assert received[:4] == [[0], [0], [0], [50]]
 
 
 def test_messages_never_overtake():
     found = instants(loop(sampled(0.01), command={"delay_jitter": 0.1}, stop_time=2.0, seed=4))
-    arrivals = [arrival for i in found for due in i.dues for *_, arrival in due.sent]
+    arrivals = [arrival for i in found for due in i.samples for *_, arrival in due.sent]
     assert arrivals == sorted(arrivals)
     assert len(set(arrivals)) < len(arrivals)  # some wait for the one before
 
 
 def test_in_jacobi_order_a_command_goes_out_with_the_next_sample():
     found = instants(loop(sampled(0.2), command={"order": "jacobi"}, stop_time=0.5))
-    assert [(i.time // MS, sent // MS) for i in found for due in i.dues for _, _, sent, _ in due.sent] == [
+    assert [(i.time // MS, sent // MS) for i in found for due in i.samples for _, _, sent, _ in due.sent] == [
         (0, 200), (200, 400), (400, 600),
     ]  # fmt: skip
 
@@ -109,7 +109,7 @@ def test_a_measurement_that_is_late_by_too_many_samples_is_refused_by_name():
 
 def test_components_that_are_due_together_follow_what_feeds_what():
     what = system({"controller": sampled(), "sensor": sampled()}, [wire("sensor.y", "controller.y")], stop_time=0.15)
-    assert [[due.component for due in i.dues] for i in instants(what) if i.dues] == [[1, 0], [1, 0]]
+    assert [[due.component for due in i.samples] for i in instants(what) if i.samples] == [[1, 0], [1, 0]]
 
 
 def fixed_plant(moves):
@@ -156,7 +156,7 @@ def test_times_up_to_the_longest_are_what_they_are():
 
 def test_or_moves_to_the_next_point():
     found = instants(loop(sampled(0.25), command={"delay": 0.03}, stop_time=0.8), fixed_plant(True))
-    assert [i.time // MS for i in found for due in i.dues] == [0, 300, 500]
+    assert [i.time // MS for i in found for due in i.samples] == [0, 300, 500]
     assert [arrival // MS for i in found for *_, arrival in i.arrivals] == [100, 400, 600]
     assert {i.time // MS % 100 for i in found} == {0}
 

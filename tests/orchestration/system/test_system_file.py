@@ -190,7 +190,7 @@ def test_a_file_without_components_is_a_scenario_of_the_quadrotor(tmp_path: Path
 
 def test_what_happens_when_needs_no_fmu(tmp_path: Path) -> None:
     system = loaded(tmp_path, TANK.replace("60.0", "1.0"))
-    assert sum(len(i.dues) for i in Cursor(Timetable(system, Streams(system.seed))).instants()) == 10
+    assert sum(len(i.samples) for i in Cursor(Timetable(system, Streams(system.seed))).instants()) == 10
 
 
 def test_the_schema_holds_for_the_files_that_are_read_and_for_no_unknown_key(tmp_path: Path) -> None:
