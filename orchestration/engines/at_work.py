@@ -144,10 +144,10 @@ class AtWork:
     def pass_over(self, schedule: Schedule) -> None:
         """These instants are past, and what follows from them alone is as if the run had gone through them."""
         self.now = int(schedule.times[-2])
-        reached = np.repeat(schedule.times[:-1], np.diff(schedule.halts_at))
+        reached = np.repeat(schedule.times[:-1], np.diff(schedule.stepped_at))
         self.steps += int(np.count_nonzero(reached))  # nobody steps to the start
         for index, component in self.continuous.items():
-            component.now = max(component.now, int(reached[schedule.halts == index].max(initial=0)))
+            component.now = max(component.now, int(reached[schedule.stepped == index].max(initial=0)))
         for index, channel in enumerate(self.channels):
             taken, _ = schedule.of(index, self.wires.table(index))
             channel.skip(taken)

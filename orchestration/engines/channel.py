@@ -112,7 +112,7 @@ class Channel:
         self.write()
 
     def extrapolate(self, time: int) -> None:
-        """First-order hold: the line through the last two that arrived, held until the next halt of the receiver."""
+        """First-order hold: the line through the last two that arrived, held over the receiver's next step."""
         if len(self.applied) < 2:
             return
         (t0, before), (t1, last) = self.applied

@@ -24,7 +24,7 @@ typedef struct {
     Lanes lanes, tracks; /* that have reached it */
     q_real t;
     int64_t time[L];
-    Rows halts, samples; /* of components, in the order of ranks */
+    Rows stepped, samples; /* of components, in the order of ranks */
     Rows arrivals, posted, measured;
     Lanes *marks; /* of kernels: lanes in which a message of a connection has values of now */
 } Instant;
@@ -101,7 +101,7 @@ static const int64_t *row_of(Rows *rows, int64_t track, int64_t width) {
 /* Tracks have reached their next instant. */
 static void reach(Loop *l, Instant *now, Lanes tracks) {
     now->tracks = tracks, now->lanes = 0;
-    now->halts.tracks = now->samples.tracks = now->arrivals.tracks = now->posted.tracks = now->measured.tracks = 0;
+    now->stepped.tracks = now->samples.tracks = now->arrivals.tracks = now->posted.tracks = now->measured.tracks = 0;
     TRACKS(track, tracks) {
         const Schedule *s = &track->schedule;
         int64_t time = time_of(track), at = track->at, number = track - l->tracks;
@@ -112,7 +112,7 @@ static void reach(Loop *l, Instant *now, Lanes tracks) {
             for (int lane = 0; lane < L; lane++) now->time[lane] = time;
         else
             EACH(lane, lanes) now->time[lane] = time;
-        add(&now->halts, number, s->halts, 1, s->halts_at[at], s->halts_at[at + 1]);
+        add(&now->stepped, number, s->stepped, 1, s->stepped_at[at], s->stepped_at[at + 1]);
         add(&now->arrivals, number, s->arrivals, WIDTH(Message), s->arrivals_at[at], s->arrivals_at[at + 1]);
         add(&now->posted, number, s->posted, WIDTH(Message), s->posted_at[at], s->posted_at[at + 1]);
         add(&now->measured, number, s->measured, WIDTH(Message), s->measured_at[at], s->measured_at[at + 1]);
@@ -349,16 +349,16 @@ static void count_steps(Loop *l, Lanes lanes) {
 }
 
 /* Components in continuous time reach the instant; divergence is noticed before any value is passed on. */
-static void step_continuous(Loop *l, Rows *halts, const Instant *now) {
+static void step_continuous(Loop *l, Rows *stepped, const Instant *now) {
     Lanes moved = 0;
-    while (halts->tracks) {
-        int64_t index = l->continuous.items[next_rank(l, halts)], until = 0;
+    while (stepped->tracks) {
+        int64_t index = l->continuous.items[next_rank(l, stepped)], until = 0;
         q_real begin = q_all(0.0), length = q_all(0.0);
         Lanes lanes = 0;
-        TRACKS(track, halts->tracks) {
+        TRACKS(track, stepped->tracks) {
             Lanes some = track->lanes & l->alive;
             int64_t time = time_of(track), before = track->now[index];
-            if (!turn_of(halts, track - l->tracks, index, 1) || !some || time == before) continue;
+            if (!turn_of(stepped, track - l->tracks, index, 1) || !some || time == before) continue;
             begin = q_select(mask_of(some), q_all((double)before / NANOSECONDS), begin);
             length = q_select(mask_of(some), q_all((double)(time - before) / NANOSECONDS), length);
             track->now[index] = until = time;
@@ -418,13 +418,13 @@ static void sample_each(Loop *l, Rows *samples, const Instant *now) {
 }
 
 /* What components in continuous time hold over the step that begins now. */
-static void settle(Loop *l, Rows *halts, const Instant *now) {
-    while (halts->tracks) {
-        int64_t index = l->continuous.items[next_rank(l, halts)];
+static void settle(Loop *l, Rows *stepped, const Instant *now) {
+    while (stepped->tracks) {
+        int64_t index = l->continuous.items[next_rank(l, stepped)];
         const Component *c = &l->components[index];
         Lanes lanes = 0;
-        TRACKS(track, halts->tracks)
-            if (turn_of(halts, track - l->tracks, index, 1)) lanes |= track->lanes & l->alive;
+        TRACKS(track, stepped->tracks)
+            if (turn_of(stepped, track - l->tracks, index, 1)) lanes |= track->lanes & l->alive;
         extrapolate_each(l, &c->held, lanes, now);
         pass_on_each(l, &c->behind, lanes, now);
         if (lanes & l->alive) feed(l, c, lanes & l->alive, now);
@@ -434,11 +434,11 @@ static void settle(Loop *l, Rows *halts, const Instant *now) {
 /* -- an instant ---------------------------------------------------------------------------------------------------- */
 
 static void pass(Loop *l, Instant *now) {
-    Rows halts = now->halts;
-    step_continuous(l, &halts, now);
+    Rows stepped = now->stepped;
+    step_continuous(l, &stepped, now);
     arrive(l, &now->arrivals, now); /* before what is sent now, which is delivered last if it arrives at once */
     post(l, &now->posted, now);
     measure(l, &now->measured, now);
     sample_each(l, &now->samples, now);
-    if (l->settles) settle(l, &now->halts, now);
+    if (l->settles) settle(l, &now->stepped, now);
 }

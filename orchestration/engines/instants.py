@@ -36,10 +36,10 @@ class PythonLoop:
     def run(self, pause_at: int | None, progress: Callable[[float], None] | None) -> bool:
         """Go on to the end, an interruption, or the first instant from `pause_at` [ns]; whether the run is over."""
         work, stop = self._work, self._stop
-        for count, (time, next_time, halts, arrivals, posted, measured, samples) in enumerate(self._instants, 1):
+        for count, (time, next_time, stepped, arrivals, posted, measured, samples) in enumerate(self._instants, 1):
             work.now = time
-            if halts:
-                self._step_continuous(time, halts)
+            if stepped:
+                self._step_continuous(time, stepped)
             if arrivals:  # before what is sent now, which is delivered last if it arrives at once
                 self._arrive(arrivals, time)
             if posted:
@@ -52,7 +52,7 @@ class PythonLoop:
                 for due in samples:
                     self._sample(due, time, due.next_time)
             if work.settles:
-                self._settle(time, halts)
+                self._settle(time, stepped)
             self._record(time)
             if work.termination is not None:
                 raise Terminated(work.termination)
@@ -65,11 +65,11 @@ class PythonLoop:
                 progress(time / stop)
         return True
 
-    def _step_continuous(self, time: int, halts: Sequence[int]) -> None:
+    def _step_continuous(self, time: int, stepped: Sequence[int]) -> None:
         """Components in continuous time reach `time`; divergence is noticed before any value is passed on."""
         moved = False
         t = time / NANOSECONDS
-        for index in halts:
+        for index in stepped:
             component = self._continuous[index]
             start = component.now
             if time == start:
@@ -172,9 +172,9 @@ class PythonLoop:
         if arrival < 0:
             self._events += (sent, LOST, index, k)
 
-    def _settle(self, time: int, halts: Sequence[int]) -> None:
+    def _settle(self, time: int, stepped: Sequence[int]) -> None:
         """What components in continuous time hold over the step that begins now."""
-        for index in halts:
+        for index in stepped:
             component = self._continuous[index]
             for channel in component.held:
                 channel.extrapolate(time)

@@ -28,7 +28,7 @@ typedef struct {
 
 typedef struct {
     const int64_t *times; /* one more than there are instants */
-    const int64_t *halts_at, *halts, *posted_at, *measured_at, *arrivals_at, *samples_at;
+    const int64_t *stepped_at, *stepped, *posted_at, *measured_at, *arrivals_at, *samples_at;
     const Message *posted, *measured, *arrivals, *exchanged;
     const SampleInstant *samples;
 } Schedule;

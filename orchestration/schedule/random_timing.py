@@ -21,7 +21,7 @@ class Link:
     def __init__(
         self, index: int, x: Connection, streams: Streams, fixed: FixedStep | None, refused: list[Refusal]
     ) -> None:
-        """`fixed` is who halts for its messages, if that takes steps of one length only."""
+        """`fixed` is who is stepped to its messages, if that takes steps of one length only."""
         owner, jitter = f"connections.{x.name}", nanoseconds(x.delay_jitter)
         self.index, self.delay, self.jacobi = index, nanoseconds(x.delay), x.order == "jacobi"
         self.longest = self.delay + jitter

@@ -34,7 +34,7 @@ class Instant(NamedTuple):
     """[ns]"""
     next_time: int
     """of the instant after it [ns]"""
-    halts: Sequence[int]
+    stepped: Sequence[int]
     """components in continuous time that are stepped to this time, in this order"""
     arrivals: Sequence[Message]
     """messages on their way that arrive, in the order of sending"""
@@ -52,9 +52,9 @@ class Schedule:
 
     times: Integers
     """[ns], shape (n + 1,): the last one is the time of the instant after these"""
-    halts: Integers
+    stepped: Integers
     """components in continuous time, in the order in which they are stepped"""
-    halts_at: Integers
+    stepped_at: Integers
     posted: Integers
     """messages, shape (m, 4), as `Message`; -1 is the arrival of one that is lost"""
     posted_at: Integers
@@ -80,7 +80,7 @@ class Schedule:
             for component, next_time, received, sent, end in self.samples.tolist()
         ]
         parts = (
-            _parts(self.halts.tolist(), self.halts_at),
+            _parts(self.stepped.tolist(), self.stepped_at),
             _parts(self.arrivals.tolist(), self.arrivals_at),
             _parts(self.posted.tolist(), self.posted_at),
             _parts(self.measured.tolist(), self.measured_at),
@@ -122,7 +122,7 @@ class Schedule:
         return int(which.sum()), messages[kept, 1].tolist()
 
 
-TABLES = ("halts", "posted", "measured", "arrivals", "samples")
+TABLES = ("stepped", "posted", "measured", "arrivals", "samples")
 
 _made = tuple.__new__
 """Makes a named tuple from a tuple, as its class does by way of a Python function"""

@@ -31,14 +31,14 @@ MOST_AHEAD = 10**6
 
 
 class _Collected:
-    """Instants of a window, and who halts at them: a component, or nobody (-1)."""
+    """Instants of a window, and who is stepped to them: a component, or nobody (-1)."""
 
     def __init__(self) -> None:
         self._times: list[Integers] = []
         self._who: list[Integers] = []
 
     def add(self, times: Integers, who: int | Integers = -1) -> None:
-        """Something happens at each of these times, for which each of these halts if it is in continuous time."""
+        """Something happens at each of these times, to which each of these is stepped if it is in continuous time."""
         self._times.append(times)
         self._who.append(np.broadcast_to(np.asarray(who, dtype=np.int64), times.shape))
 
@@ -48,12 +48,12 @@ class _Collected:
         result: Integers = times[np.diff(times, prepend=-1) > 0]
         return result
 
-    def halts(self, instants: Integers, order: Integers, place: Integers) -> tuple[Integers, Integers]:
-        """Who halts at each instant, by `order`, in which each component has a `place` or -1; and where each begins."""
+    def stepped(self, instants: Integers, order: Integers, place: Integers) -> tuple[Integers, Integers]:
+        """Who is stepped to each instant, by `order`, in which each has a `place` or -1; and where each begins."""
         places = place[np.concatenate(self._who)]
-        halting = places >= 0
+        moving = places >= 0
         table = np.zeros((len(instants), len(order)), dtype=np.bool_)
-        table[np.searchsorted(instants, np.concatenate(self._times)[halting]), places[halting]] = True
+        table[np.searchsorted(instants, np.concatenate(self._times)[moving]), places[moving]] = True
         _, columns = np.nonzero(table)
         return order[columns], np.append(0, np.cumsum(table.sum(axis=1)))
 
@@ -77,14 +77,14 @@ class Timetable:
         names = list(system.components)
         links = []
         for i, x in enumerate(system.connections):
-            halting = fixed.get(x.sender if i in plan.measured else x.receiver)
-            links.append(Link(i, x, streams, halting, self._refused))
-        self._bodies = np.array([names.index(name) for name in plan.continuous], dtype=np.int64)
+            stepped = fixed.get(x.sender if i in plan.measured else x.receiver)
+            links.append(Link(i, x, streams, stepped, self._refused))
+        self._continuous = np.array([names.index(name) for name in plan.continuous], dtype=np.int64)
         self._place = np.full(len(names) + 1, -1)  # the last one for nobody
-        self._place[self._bodies] = np.arange(len(self._bodies))
+        self._place[self._continuous] = np.arange(len(self._continuous))
         self._points = {
             i: Grid(Fraction(0), exact_nanoseconds(system.components[names[i]].step or 0.0))
-            for i in sorted(self._bodies.tolist())
+            for i in sorted(self._continuous.tolist())
         }
         self._tasks = [Task(name, plan, links, streams, fixed, self._refused) for name in plan.sampled]
         self.first_samples = {
@@ -139,16 +139,16 @@ class Timetable:
         measured = self._measure(begin, end, found)
         samples, exchanged, sent = self._sample(begin, end, found)
         arrivals = self._arrive(end, [later, sent], found)
-        self._halt_by_themselves(begin, end, found)
+        self._step_all(begin, end, found)
         for task in self._tasks:
             task.rows = task.rows[task.rows[:, TIME] >= end]
         instants = found.instants()
-        halts, halts_at = found.halts(instants, self._bodies, self._place)
+        stepped, stepped_at = found.stepped(instants, self._continuous, self._place)
         times = np.append(instants, end)
         return Schedule(
             times=times,
-            halts=halts,
-            halts_at=halts_at,
+            stepped=stepped,
+            stepped_at=stepped_at,
             posted=np.ascontiguousarray(posted[:, :4]),
             posted_at=np.searchsorted(posted[:, 4], times),
             measured=measured,
@@ -160,8 +160,8 @@ class Timetable:
             exchanged=exchanged,
         )
 
-    def _halt_by_themselves(self, begin: int, end: int, found: _Collected) -> None:
-        """The start, changes of sources, and the end, at which everybody halts."""
+    def _step_all(self, begin: int, end: int, found: _Collected) -> None:
+        """The start, changes of sources, and the end, to which everybody is stepped."""
         if begin == 0:
             found.add(np.zeros(1, dtype=np.int64))
         for grid, receivers in self._changes:  # the value of the start is that of initialisation
@@ -169,19 +169,19 @@ class Timetable:
             for receiver in receivers:
                 found.add(times, receiver)
         if end > self.stop:
-            found.add(np.full(len(self._bodies), self.stop), self._bodies)
+            found.add(np.full(len(self._continuous), self.stop), self._continuous)
             found.add(np.full(1, self.stop))
 
     def _post(self, begin: int, end: int, found: _Collected) -> tuple[Integers, Integers]:
         """Messages of components in continuous time to one another: all in order, and those that arrive later."""
         tables = [np.zeros((0, _ORDER + 4), dtype=np.int64)]
         later = [np.zeros((0, _ORDER + 4), dtype=np.int64)]
-        for body, grid in self._points.items():
+        for component, grid in self._points.items():
             first, last = grid.index_from(begin), grid.index_from(end)
             points = grid.between(first, last)
-            found.add(points, body)
-            for place, link in enumerate(self._posted[body]):
-                sent = _Sent(link, np.arange(first, last), points, link.messages(points), points, 0, body, place)
+            found.add(points, component)
+            for place, link in enumerate(self._posted[component]):
+                sent = _Sent(link, np.arange(first, last), points, link.messages(points), points, 0, component, place)
                 tables.append(sent.table())
                 later.append(self._under_way(sent, found))
         table = np.concatenate(tables)
@@ -223,7 +223,7 @@ class Timetable:
         return *_one_after_the_other(np.concatenate(drawn), exchanged), np.concatenate(later)
 
     def _under_way(self, sent: "_Sent", found: _Collected) -> Integers:
-        """Messages that arrive later; for those that arrive at once their receiver halts."""
+        """Messages that arrive later; for those that arrive at once their receiver is stepped."""
         found.add(sent.time[sent.arrival == sent.time], int(self._receiver[sent.link.index]))
         return sent.table(sent.arrival > sent.time)
 

@@ -87,7 +87,8 @@ def systems_of_fixed_steps(draw: st.DrawFn) -> tuple[System, list[str]]:
 def systems_with_more(draw: st.DrawFn) -> tuple[System, System]:
     """A system, and the same with a component and lossy connections more, some of them into what was there."""
     system = draw(systems(most=4))
-    plain = tuple(replace(x, hold="zero") for x in system.connections)  # a line would be read where more halts are
+    # a line would be read where more communication points are
+    plain = tuple(replace(x, hold="zero") for x in system.connections)
     parts = {"more": draw(components()), **system.components}
     added = [draw(connections(100 + i, list(parts))) for i in range(draw(st.integers(1, 4)))]
     lossy = tuple(replace(x, loss=0.4, burst_length=None) for x in added)

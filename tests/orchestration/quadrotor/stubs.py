@@ -181,7 +181,7 @@ class Sample(NamedTuple):
 
 
 class Instant(NamedTuple):
-    """A point at which the plant halts, and what happens there."""
+    """A communication point of the plant, and what happens there."""
 
     time: int
     sample: Sample | None
@@ -195,14 +195,14 @@ def cursor_of(timing: Timing, stop_time: float, seed: int = 0) -> Cursor:
 
 
 def instants_of(cursor: Cursor) -> Iterator[Instant]:
-    """The instants of a flight in words of the loop of two: at each the plant halts."""
+    """The instants of a flight in words of the loop of two: each is a communication point of the plant."""
     for instant in cursor.instants():
         sample, arrivals = None, [k for _, k, _, _ in instant.arrivals]
         for due in instant.samples:
             ((_, k, _, received),), ((_, _, sent, arrival),) = due.received, due.sent
             sample = Sample(k, instant.time, due.next_time, received < 0, sent, None if arrival < 0 else arrival)
             arrivals += [k] if arrival == instant.time else []
-        assert list(instant.halts) == [0]
+        assert list(instant.stepped) == [0]
         yield Instant(instant.time, sample, tuple(arrivals))
 
 

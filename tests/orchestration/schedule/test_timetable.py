@@ -38,15 +38,15 @@ def test_instants_are_points_samples_arrivals_and_the_end():
     assert [i.time // MS for i in found if i.arrivals] == [30, 280]
 
 
-def test_a_component_halts_only_where_something_happens_to_it():
+def test_a_component_is_stepped_only_to_where_something_happens_to_it():
     what = system(
         {"fast": continuous(0.1), "slow": continuous(0.5), "reader": sampled(0.25)},
         [wire("fast.y", "reader.y")],
         stop_time=1.0,
     )
-    halts = {i.time // MS: i.halts for i in instants(what)}
-    assert halts[250] == [0]
-    assert [time for time, which in halts.items() if 1 in which] == [0, 500, 1000]
+    stepped = {i.time // MS: i.stepped for i in instants(what)}
+    assert stepped[250] == [0]
+    assert [time for time, which in stepped.items() if 1 in which] == [0, 500, 1000]
 
 
 def test_what_is_measured_late_is_measured_before_its_sample():
@@ -171,4 +171,4 @@ def test_a_message_between_components_in_continuous_time_leaves_at_the_senders_p
     assert [(sent // MS, arrival // MS) for i in found for _, _, sent, arrival in i.posted] == [
         (0, 30), (100, 130), (200, 230), (300, 330),
     ]  # fmt: skip
-    assert [i.time // MS for i in found if 1 in i.halts] == [0, 30, 130, 230, 250, 300]
+    assert [i.time // MS for i in found if 1 in i.stepped] == [0, 30, 130, 230, 250, 300]
