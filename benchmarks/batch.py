@@ -27,7 +27,7 @@ from orchestration.fmi.model import read_model
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.runs.simulation import prepared
-from orchestration.schedule.schedule_cache import Windows, timing
+from orchestration.schedule.schedule_cache import ScheduleCache, timing
 from orchestration.studies.axes import Axis
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import sweep
@@ -116,7 +116,7 @@ def main() -> None:
     """Print steps a second and ratios, then runs a second of sweeps into their stores."""
     found: dict[tuple[str, str], list[float]] = defaultdict(list)
     made = {case: systems(*times) for case, times in CASES.items()}
-    batches = {case: Batch(shape, Windows()) for case, (shape, _) in made.items()}
+    batches = {case: Batch(shape, ScheduleCache()) for case, (shape, _) in made.items()}
     for _ in range(REPETITIONS):
         for case, (period, stop_time) in CASES.items():
             shape, runs = made[case]

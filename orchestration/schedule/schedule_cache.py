@@ -28,7 +28,7 @@ def timing(system: System) -> Hashable:
     )
 
 
-class Windows:
+class ScheduleCache:
     """Gives the windows of the schedules of runs, those that are asked for again from memory."""
 
     def __init__(self) -> None:

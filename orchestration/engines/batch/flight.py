@@ -21,7 +21,7 @@ from orchestration.expressions.syntax import Call
 from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.fmi.values import number_of, taken
 from orchestration.schedule.schedule import Schedule
-from orchestration.schedule.schedule_cache import Windows
+from orchestration.schedule.schedule_cache import ScheduleCache
 from orchestration.schedule.streams import NOISE, Streams
 from orchestration.schedule.timetable import Timetable
 from orchestration.system.model import System, component_of, variable_of
@@ -80,8 +80,8 @@ class _Track:
 class Batch:
     """Memory for the runs of a shape, used for one group of them after the other."""
 
-    def __init__(self, shape: Shape, windows: Windows) -> None:
-        self._shape, self._windows, self._lanes = shape, windows, shape.lanes
+    def __init__(self, shape: Shape, schedules: ScheduleCache) -> None:
+        self._shape, self._schedules, self._lanes = shape, schedules, shape.lanes
         self._library = shape.library
         self._said: dict[Hashable, tuple[Floats, Floats]] = {}
         self._written = shape.written
@@ -353,7 +353,7 @@ class Batch:
             found.setdefault(timing, []).append(lane)
         tracks = []
         for timing, lanes in found.items():
-            windows = self._windows.of((timing, id(self._shape)), runs[lanes[0]].system)
+            windows = self._schedules.of((timing, id(self._shape)), runs[lanes[0]].system)
             keys = {self._sources_of(runs[lane].system) for lane in lanes}
             tracks.append(
                 _Track(lanes=lanes, timing=timing, windows=windows, ahead=next(windows, None), alike=len(keys) == 1)

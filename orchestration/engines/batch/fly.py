@@ -16,7 +16,7 @@ from orchestration.engines.watch import watch
 from orchestration.engines.wiring import checked, source_values
 from orchestration.fmi.model import read_model
 from orchestration.results.objectives import Metrics, told
-from orchestration.schedule.schedule_cache import Windows, timing
+from orchestration.schedule.schedule_cache import ScheduleCache, timing
 from orchestration.schedule.streams import Streams
 from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS, nanoseconds
@@ -38,7 +38,7 @@ class Batches:
     """The batches of this process, by the shape of what they fly; their FMUs are files."""
 
     def __init__(self) -> None:
-        self._windows = Windows()
+        self._schedules = ScheduleCache()
         self._lanes = lanes_here()
         self._batches: dict[Hashable, tuple[Shape, Batch]] = {}
 
@@ -70,7 +70,7 @@ class Batches:
         if key not in self._batches:
             models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
             shape = Shape(system=checked(system, models).system, models=models, lanes=self._lanes)
-            self._batches[key] = shape, Batch(shape, self._windows)
+            self._batches[key] = shape, Batch(shape, self._schedules)
         return self._batches[key]
 
 

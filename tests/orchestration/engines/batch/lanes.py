@@ -12,7 +12,7 @@ from orchestration.engines.structures import structures
 from orchestration.engines.wiring import checked
 from orchestration.fmi.model import read_model
 from orchestration.runs.result import Result
-from orchestration.schedule.schedule_cache import Windows, timing
+from orchestration.schedule.schedule_cache import ScheduleCache, timing
 from orchestration.system.model import System
 
 
@@ -32,7 +32,7 @@ def shape_of(system: System) -> Shape:
 def landed(shape: Shape, systems: Sequence[System]) -> Landed:
     """Systems of one shape flown at once, everything recorded."""
     assert len({outline(system) for system in systems}) == 1
-    return Batch(shape, Windows()).fly(systems, [timing(system) for system in systems], shape.board.columns[1:])
+    return Batch(shape, ScheduleCache()).fly(systems, [timing(system) for system in systems], shape.board.columns[1:])
 
 
 def assert_the_same_signals(shape: Shape, found: Landed, lane: int, alone: Result) -> None:
