@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestration.building import fmus
-from orchestration.engines.batch.flight import Batch
+from orchestration.engines.batch.batch import Batch
 from orchestration.engines.batch.kernels import lanes_here
 from orchestration.engines.batch.shape import Shape
 from orchestration.engines.structures import address
@@ -82,8 +82,8 @@ def flown(batch: Batch, runs: list[System]) -> float:
     """CPU time of a step of the plant [s], events and objectives on."""
     timings = [timing(system) for system in runs]
     begin = time.process_time()
-    landed = batch.fly(runs, timings)
-    return (time.process_time() - begin) / float(landed.steps.sum())
+    result = batch.run(runs, timings)
+    return (time.process_time() - begin) / float(result.steps.sum())
 
 
 def compiled(system: System) -> float:

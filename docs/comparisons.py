@@ -24,7 +24,7 @@ from orchestration.comparison.cells import frame_of
 from orchestration.comparison.design import Comparison
 from orchestration.comparison.file import load_comparison
 from orchestration.comparison.outcome import as_json, concluded
-from orchestration.engines.batch import fly
+from orchestration.engines.batch import batches
 from orchestration.fmi.model import read_model
 from orchestration.runs.simulation import run
 from orchestration.system.model import System
@@ -127,11 +127,11 @@ class _Lanes:
     """The batches of this process."""
 
     def __init__(self) -> None:
-        self._batches = fly.Batches()
+        self._batches = batches.Batches()
 
     def metrics(self, systems: list[System]) -> Iterator[Any]:
         """Of systems whose FMUs are files; what lanes leave is flown alone."""
-        for system, flown in zip(systems, self._batches.fly(systems), strict=True):
+        for system, flown in zip(systems, self._batches.run(systems), strict=True):
             yield run(system).metrics if flown is None else flown.metrics
 
 

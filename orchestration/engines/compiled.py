@@ -68,7 +68,7 @@ class CompiledLoop:
         self._work = work
         self._pace = 4  # instants of a slice
         self._shared: list[_OnTheirWay] = []
-        self._fly = library()
+        self._run = library()
         self._failure: BaseException | None = None
         names = work.wires.names
         instances = cast(Mapping[str, NativeInstance], work.simulators)
@@ -144,7 +144,7 @@ class CompiledLoop:
         """Have C pass through instants for about `SLICE`; the code says why it has come back."""
         work, loop, begin = self._work, self._loop, clock.perf_counter()
         self._track.count = min(len(schedule), self._track.at + self._pace)
-        code = int(self._fly(ctypes.addressof(loop)))
+        code = int(self._run(ctypes.addressof(loop)))
         share = SLICE / max(clock.perf_counter() - begin, 1e-9)
         self._pace = min(max(1, int(self._pace * min(share, 8.0))), len(schedule))
         work.now, work.steps, work.cursor.at = loop.now, loop.steps[0], self._track.at

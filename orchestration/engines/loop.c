@@ -201,7 +201,7 @@ static void record(Loop *l, const Instant *now) {
 }
 
 /* Pass through instants of the schedule up to the count of the track; the code says why it ended. */
-EXPORT int fly(Loop *l) {
+EXPORT int run(Loop *l) {
     Track *track = l->tracks;
     Instant now = {.lanes = 0};
     fenv_t environment;

@@ -21,7 +21,7 @@ Operation: Any = declared(FILES[1].read_text(encoding="utf-8"))["Operation"]
 
 @functools.cache
 def library() -> Any:
-    """The function `fly` of loop.c; raises `QuadcosimError` that says what stands in the way."""
+    """The function `run` of loop.c; raises `QuadcosimError` that says what stands in the way."""
     sources = {path.name: path.read_bytes() for path in (*FILES, FOLDER / "lanes.h")}
     path = kept("loop", sources, OPTIONS, lambda: compiled_here(sources, "loop.c", mathematics="libm"))
     try:
@@ -29,7 +29,7 @@ def library() -> Any:
     except OSError as error:
         raise QuadcosimError(str(error)) from error
     expect_same_sizes(made, {**shared(1), "Operation": Operation})
-    fly = made.fly
-    fly.restype = ctypes.c_int
-    fly.argtypes = (ctypes.c_void_p,)
-    return fly
+    run = made.run
+    run.restype = ctypes.c_int
+    run.argtypes = (ctypes.c_void_p,)
+    return run

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from orchestration.basics.errors import QuadcosimError
 from orchestration.basics.simulator import Floats
 from orchestration.building.inputs import Files, all_with_files
-from orchestration.engines.batch.fly import Batches
+from orchestration.engines.batch.batches import Batches
 from orchestration.engines.wiring import columns_of, source_values
 from orchestration.report.known_layouts import layout_for
 from orchestration.report.tracks import Signals
@@ -75,7 +75,7 @@ def _flown(systems: Sequence[System], starts: Mapping[str, float], batches: Batc
     wanted = _columns(systems[0])
     columns = [name for name in wanted if name.partition(".")[0] in systems[0].components]
     rows: dict[int, Floats] = {}
-    for place, flown in enumerate(batches.fly(systems, columns, rows.__setitem__)):
+    for place, flown in enumerate(batches.run(systems, columns, rows.__setitem__)):
         if flown is None:
             yield _alone(systems[place])
             continue

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from orchestration.building import fmus
-from orchestration.engines.batch.fly import Batches
+from orchestration.engines.batch.batches import Batches
 from orchestration.results.objectives import Metrics
 from orchestration.runs.simulation import run
 from orchestration.system.model import System
@@ -22,7 +22,7 @@ def fly(systems: Sequence[System]) -> Iterator[Metrics]:
         if not paths.keys() >= {*system.fmus.values()}:
             paths |= {system.fmus[name]: str(path) for name, path in fmus.of_components(system.fmus).items()}
     located = [_with_fmus(system, paths) for system in twins]
-    for system, flown in zip(located, Batches().fly(located)):
+    for system, flown in zip(located, Batches().run(located)):
         yield run(system).metrics if flown is None else flown.metrics
 
 

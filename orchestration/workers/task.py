@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageError
-from orchestration.engines.batch.fly import Batches
+from orchestration.engines.batch.batches import Batches
 from orchestration.engines.engine import Engine
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.model import read_model
@@ -120,7 +120,7 @@ class Hangar:
             self._batches = Batches()
         _expect_files(chunk.tasks[0].system)
         try:
-            flown = self._batches.fly([task.system for task in chunk.tasks])
+            flown = self._batches.run([task.system for task in chunk.tasks])
         except (QuadcosimError, OSError, MemoryError) as error:
             raise BrokenPlaceError(str(error) or type(error).__name__) from error
         duration = (time.perf_counter() - started) / len(chunk.tasks)

@@ -187,12 +187,12 @@ static int samples_next(const Track *track) {
 
 /* Pass through the windows that the tracks have. Tracks that sample next wait for one another, since what a sample
    costs does not grow with the lanes that take part. */
-EXPORT int fly(Loop *l) {
+EXPORT int run(Loop *l) {
     Lanes marks[CHANNELS];
     Instant now = {.marks = marks};
     constants(l);
     for (;;) {
-        Lanes flying = 0, sampling = 0, setting_out = 0;
+        Lanes going = 0, sampling = 0, setting_out = 0;
         for (int64_t i = 0; i < l->track_count; i++) {
             Track *track = &l->tracks[i];
             if (!(track->lanes & l->alive)) continue;
@@ -201,12 +201,12 @@ EXPORT int fly(Loop *l) {
                 l->track = i;
                 return NEXT_WINDOW;
             }
-            flying |= (Lanes)1 << i;
+            going |= (Lanes)1 << i;
             setting_out |= (Lanes)(time_of(track) == 0) << i;
             sampling |= (Lanes)samples_next(track) << i;
         }
-        if (!flying) return AT_END;
-        Lanes moving = setting_out ? setting_out : flying & ~sampling ? flying & ~sampling : flying;
+        if (!going) return AT_END;
+        Lanes moving = setting_out ? setting_out : going & ~sampling ? going & ~sampling : going;
         pass_and_sum_up(l, &now, moving);
         if (l->no_memory) return NO_MEMORY;
         TRACKS(track, moving) track->at++;
@@ -232,7 +232,7 @@ EXPORT void clear(Loop *l) {
 }
 
 /* Free what was made. */
-EXPORT void land(Loop *l) {
+EXPORT void free_all(Loop *l) {
     for (int64_t i = 0; i < KEPT; i++) free(l->kept[i].values);
     for (int64_t i = 0; i < l->channel_count; i++) free(l->channels[i].flight);
 }

@@ -81,7 +81,7 @@ def batch(sizes: str, expressions: str, lanes: int) -> Any:
     compile_ = lambda: compiled_here(sources, "batch.c", options=options)  # noqa: E731
     library = ctypes.CDLL(str(kept("batch", sources, (OPTIONS, options), compile_)))
     expect_same_sizes(library, shared(lanes))
-    for name in ("fly", "clear", "land"):
+    for name in ("run", "clear", "free_all"):
         getattr(library, name).argtypes = (ctypes.c_void_p,)
     library.grown.argtypes = (ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
     return library

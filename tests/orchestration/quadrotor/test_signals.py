@@ -20,7 +20,7 @@ from orchestration.system.system_file import system_from_tables
 from orchestration.system.written import tables_of
 from quadcosim import DisturbanceChoice, ReferenceChoice, Scenario, UsageError, load_scenario
 from tests.commands import Main
-from tests.orchestration.engines.batch.lanes import assert_the_same_signals, landed, located, shape_of
+from tests.orchestration.engines.batch.lanes import assert_the_same_signals, in_lanes, located, shape_of
 from tests.orchestration.engines.batch.test_signals import plain
 from tests.orchestration.fmi.small import needs_compiler
 
@@ -113,7 +113,7 @@ def test_engines_have_the_same_rows_to_the_byte(name: str, points: Path) -> None
     python, compiled = quadcosim.run(system, engine="python"), quadcosim.run(system, engine="compiled")
     assert python.rows.tobytes() == compiled.rows.tobytes()
     shape, others = shape_of(system), [system, changed(system, {"seed": 6})]
-    found = landed(shape, others)
+    found = in_lanes(shape, others)
     for lane, what in enumerate(others):
         assert_the_same_signals(shape, found, lane, quadcosim.run(what, engine="compiled"))
 
@@ -212,6 +212,6 @@ def test_payloads_are_let_go_at_their_times_in_every_lane() -> None:
     path = "components.plant.parameters.payload"
     systems = [changed(base, {f"{path}.mass": mass, f"{path}.drop_time": time}) for mass, time in loads]
     shape = shape_of(base)
-    found = landed(shape, systems)
+    found = in_lanes(shape, systems)
     for lane, what in enumerate(systems):
         assert_the_same_signals(shape, found, lane, quadcosim.run(what, engine="compiled"))

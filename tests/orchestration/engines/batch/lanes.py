@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from orchestration.building import fmus
-from orchestration.engines.batch.flight import Batch, Landed
+from orchestration.engines.batch.batch import Batch, BatchResult
 from orchestration.engines.batch.kernels import lanes_here
 from orchestration.engines.batch.shape import Shape, outline
 from orchestration.engines.structures import structures
@@ -29,13 +29,13 @@ def shape_of(system: System) -> Shape:
     return Shape(system=checked(system, models).system, models=models, lanes=lanes_here())
 
 
-def landed(shape: Shape, systems: Sequence[System]) -> Landed:
+def in_lanes(shape: Shape, systems: Sequence[System]) -> BatchResult:
     """Systems of one shape flown at once, everything recorded."""
     assert len({outline(system) for system in systems}) == 1
-    return Batch(shape, ScheduleCache()).fly(systems, [timing(system) for system in systems], shape.board.columns[1:])
+    return Batch(shape, ScheduleCache()).run(systems, [timing(system) for system in systems], shape.board.columns[1:])
 
 
-def assert_the_same_signals(shape: Shape, found: Landed, lane: int, alone: Result) -> None:
+def assert_the_same_signals(shape: Shape, found: BatchResult, lane: int, alone: Result) -> None:
     """The rows of a lane are those of the run flown alone, to the byte."""
     columns = ["time", *shape.board.columns[1:]]
     own = np.ascontiguousarray(alone.rows[:, [alone.columns.index(column) for column in columns]])
@@ -43,5 +43,5 @@ def assert_the_same_signals(shape: Shape, found: Landed, lane: int, alone: Resul
     assert rows.shape == own.shape, (lane, rows[-3:, 0], own[-3:, 0])
     differing = [name for i, name in enumerate(columns) if rows[:, i].tobytes() != own[:, i].tobytes()]
     assert differing == []
-    assert found.fate[lane] == structures(shape.lanes).RUNNING or alone.metrics["divergence_time"] is not None
+    assert found.outcome[lane] == structures(shape.lanes).RUNNING or alone.metrics["divergence_time"] is not None
     assert found.steps[lane] == alone.metrics["steps"]

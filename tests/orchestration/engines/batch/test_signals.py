@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from orchestration.system.model import System
 from orchestration.system.system_file import load_system
-from tests.orchestration.engines.batch.lanes import assert_the_same_signals, landed, located, shape_of
+from tests.orchestration.engines.batch.lanes import assert_the_same_signals, in_lanes, located, shape_of
 from tests.orchestration.engines.moving import moving
 from tests.orchestration.engines.random_systems import TIMES, systems
 from tests.orchestration.engines.test_compiled import Kept, of, ran
@@ -67,7 +67,7 @@ def crowds(draw: st.DrawFn) -> list[System]:
 def test_random_systems_have_the_same_signals_beside_any_others(fmu: Path, kept: Kept, crowd: list[System]) -> None:
     flown = [of(what, fmu) for what in crowd]
     shape = shape_of(flown[0])
-    found = landed(shape, flown)
+    found = in_lanes(shape, flown)
     for lane, what in enumerate(flown):
         assert_the_same_signals(shape, found, lane, ran(what, "compiled", load=kept.load))
 
@@ -76,7 +76,7 @@ def test_random_systems_have_the_same_signals_beside_any_others(fmu: Path, kept:
 def test_flights_of_the_quadrotor_are_the_same(name: str) -> None:
     system = plain(located(scenario_of(FLIGHTS[name]["scenario"]).as_system()))
     shape = shape_of(system)
-    found = landed(shape, [system])
+    found = in_lanes(shape, [system])
     assert_the_same_signals(shape, found, 0, ran(system, "compiled"))
 
 
@@ -85,6 +85,6 @@ def test_examples_run_the_same_with_any_seed(path: Path) -> None:
     system = plain(located(replace(load_system(path), stop_time=3.0)))
     crowd = [replace(system, seed=seed) for seed in (1, 2, 3)]
     shape = shape_of(system)
-    found = landed(shape, crowd)
+    found = in_lanes(shape, crowd)
     for lane, what in enumerate(crowd):
         assert_the_same_signals(shape, found, lane, ran(what, "compiled"))

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from orchestration.basics.simulator import Floats
+from orchestration.engines.batch.batch import Batch, BatchResult
 from orchestration.engines.batch.combining import combined
-from orchestration.engines.batch.flight import Batch, Landed
 from orchestration.engines.batch.kernels import lanes_here
 from orchestration.engines.batch.shape import Shape, outline
 from orchestration.engines.structures import structures
@@ -26,7 +26,7 @@ Take = Callable[[int, Floats], None]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Flown:
+class RunSummary:
     """What a run came to."""
 
     metrics: Metrics
@@ -35,22 +35,22 @@ class Flown:
 
 
 class Batches:
-    """The batches of this process, by the shape of what they fly; their FMUs are files."""
+    """The batches of this process, by the shape of what they run; their FMUs are files."""
 
     def __init__(self) -> None:
         self._schedules = ScheduleCache()
         self._lanes = lanes_here()
         self._batches: dict[Hashable, tuple[Shape, Batch]] = {}
 
-    def fly(
+    def run(
         self, systems: Sequence[System], record: Sequence[str] = (), take: Take | None = None
-    ) -> list[Flown | None]:
+    ) -> list[RunSummary | None]:
         """What runs came to; None for one that is to be flown alone, by what flies anything.
 
         `record` are columns whose rows, the time [s] first, `take` is given of each run. Raises `UsageError` for what
         cannot be flown in lanes.
         """
-        found: list[Flown | None] = [None] * len(systems)
+        found: list[RunSummary | None] = [None] * len(systems)
         shapes: dict[Hashable, list[int]] = {}
         for index, system in enumerate(systems):
             shapes.setdefault(outline(system), []).append(index)
@@ -58,10 +58,10 @@ class Batches:
             shape, batch = self._batch(key, systems[indices[0]])
             timings = {index: timing(systems[index]) for index in indices}
             for group in _groups(indices, timings, self._lanes):
-                landed = batch.fly([systems[i] for i in group], [timings[i] for i in group], record)
-                for index, flown in zip(group, _told(shape, batch, landed, [systems[i] for i in group])):
+                result = batch.run([systems[i] for i in group], [timings[i] for i in group], record)
+                for index, flown in zip(group, _told(shape, batch, result, [systems[i] for i in group])):
                     found[index] = flown
-                for index, rows in zip(group, landed.signals if take is not None else ()):
+                for index, rows in zip(group, result.signals if take is not None else ()):
                     assert take is not None
                     take(index, rows)
         return found
@@ -75,7 +75,7 @@ class Batches:
 
 
 def _groups(indices: Sequence[int], timings: Mapping[int, Hashable], lanes: int) -> Iterator[list[int]]:
-    """Runs that fly together: of one timing as far as that goes."""
+    """Runs that go together: of one timing as far as that goes."""
     alike: dict[Hashable, list[int]] = {}
     for index in indices:
         alike.setdefault(timings[index], []).append(index)
@@ -89,27 +89,27 @@ def _groups(indices: Sequence[int], timings: Mapping[int, Hashable], lanes: int)
         yield rest[first : first + lanes]
 
 
-def _told(shape: Shape, batch: Batch, landed: Landed, systems: Sequence[System]) -> Iterator[Flown | None]:
+def _told(shape: Shape, batch: Batch, result: BatchResult, systems: Sequence[System]) -> Iterator[RunSummary | None]:
     count, c = len(systems), structures(shape.lanes)
     numbers = batch.numbers(systems)
-    values = {name: combined(node, landed.reductions, numbers, count) for name, node in shape.nodes.items()}
+    values = {name: combined(node, result.reductions, numbers, count) for name, node in shape.nodes.items()}
     found = {name: (np.isfinite(value) & ~none, value.tolist()) for name, (value, none) in values.items()}
     for lane, system in enumerate(systems):
-        steps = int(landed.steps[lane])
-        if landed.fate[lane] == c.RUNNING and not landed.doubtful[lane]:
+        steps = int(result.steps[lane])
+        if result.outcome[lane] == c.RUNNING and not result.doubtful[lane]:
             end = nanoseconds(system.stop_time) / NANOSECONDS
             metrics = {name: value[lane] if there[lane] else None for name, (there, value) in found.items()}
-            yield Flown(
+            yield RunSummary(
                 metrics=told(
                     shape.system, metrics, end=end, stop_time=system.stop_time, divergence_time=None, steps=steps
                 ),
                 message=None,
             )
-        elif landed.fate[lane] == c.DIVERGED:
-            time = int(landed.time[lane]) / NANOSECONDS
+        elif result.outcome[lane] == c.DIVERGED:
+            time = int(result.time[lane]) / NANOSECONDS
             message = _complaint(shape, batch, system, lane, time)
             metrics = told(shape.system, None, end=time, stop_time=system.stop_time, divergence_time=time, steps=steps)
-            yield None if message is None else Flown(metrics=metrics, message=message)
+            yield None if message is None else RunSummary(metrics=metrics, message=message)
         else:
             yield None
 

@@ -34,10 +34,10 @@ _SAID = 64
 
 
 @dataclass(frozen=True, kw_only=True)
-class Landed:
+class BatchResult:
     """What has become of the runs of a batch, lane by lane."""
 
-    fate: Integers
+    outcome: Integers
     time: Integers
     """[ns] of divergence"""
     component: Integers
@@ -126,17 +126,17 @@ class Batch:
 
     def __del__(self) -> None:
         if hasattr(self, "_batch"):
-            self._library.land(ctypes.addressof(self._batch))
+            self._library.free_all(ctypes.addressof(self._batch))
 
     # -- a group of runs -------------------------------------------------------------------------------------------
 
-    def fly(self, systems: Sequence[System], timings: Sequence[Hashable], record: Sequence[str] = ()) -> Landed:
-        """Fly at most as many runs as there are lanes; `record` are columns that are kept of each row."""
+    def run(self, systems: Sequence[System], timings: Sequence[Hashable], record: Sequence[str] = ()) -> BatchResult:
+        """Go through at most as many runs as there are lanes; `record` are columns that are kept of each row."""
         found: dict[Call, Floats] = {}
         for _ in range(self._shape.passes):
-            landed = self._once(systems, timings, found, record)
-            found = dict(landed.reductions)
-        return landed
+            result = self._once(systems, timings, found, record)
+            found = dict(result.reductions)
+        return result
 
     def _once(
         self,
@@ -144,7 +144,7 @@ class Batch:
         timings: Sequence[Hashable],
         known: Mapping[Call, Floats],
         record: Sequence[str],
-    ) -> Landed:
+    ) -> BatchResult:
         batch, count = self._batch, len(systems)
         runs = [self._run(system) for system in systems]
         self._library.clear(ctypes.addressof(batch))
@@ -161,19 +161,19 @@ class Batch:
         tracks = self._tracks_of(runs, timings)
         recorded = self._record(record, tracks)
         self._pass(runs, tracks)
-        return self._landed(systems, recorded)
+        return self._result(systems, recorded)
 
     def _pass(self, runs: Sequence[_Run], tracks: Sequence[_Track]) -> None:
         batch = self._batch
         batch.track_count = len(tracks)
         for i in range(len(tracks)):
             self._next_window(i, tracks[i], runs)
-        while (code := self._library.fly(ctypes.addressof(batch))) == self._c.NEXT_WINDOW:
+        while (code := self._library.run(ctypes.addressof(batch))) == self._c.NEXT_WINDOW:
             self._next_window(batch.track, tracks[batch.track], runs)
         if code == self._c.NO_MEMORY:
             raise QuadcosimError("a batch of runs: expected memory for the messages that are on their way")
 
-    def _landed(self, systems: Sequence[System], recorded: Sequence[Floats]) -> Landed:
+    def _result(self, systems: Sequence[System], recorded: Sequence[Floats]) -> BatchResult:
         batch, count = self._batch, len(systems)
         end = np.array([nanoseconds(system.stop_time) / NANOSECONDS for system in systems])
         states = self._state[:, :count]
@@ -184,10 +184,10 @@ class Batch:
         arrays = [
             np.array(getattr(batch, name)[:count]) for name in ("outcome", "outcome_time", "outcome_component", "steps")
         ]
-        fate, time, component, steps = arrays
+        outcome, time, component, steps = arrays
         doubtful = np.array([batch.doubtful >> lane & 1 for lane in range(count)], dtype=np.bool_)
-        return Landed(
-            fate=fate, time=time, component=component, steps=steps, doubtful=doubtful,
+        return BatchResult(
+            outcome=outcome, time=time, component=component, steps=steps, doubtful=doubtful,
             reductions={call: np.where(np.isfinite(found), found, np.nan) for call, found in values.items()},
             signals=[rows[: batch.record_counts[lane]] for lane, rows in enumerate(recorded)],
         )  # fmt: skip

@@ -9,13 +9,13 @@ import pytest
 
 from orchestration.basics.errors import UsageError
 from orchestration.building import fmus
-from orchestration.engines.batch.fly import Batches
+from orchestration.engines.batch.batches import Batches
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.runs.in_lanes import fly
 from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
 from orchestration.system.paths import changed
-from tests.orchestration.engines.batch.lanes import landed, located, shape_of
+from tests.orchestration.engines.batch.lanes import in_lanes, located, shape_of
 from tests.orchestration.engines.moving import moving
 from tests.orchestration.engines.test_compiled import Kept, of, ran
 from tests.orchestration.fmi.small import needs_compiler, small
@@ -107,7 +107,7 @@ def test_every_function_over_every_kind_of_signal(fmu: Path, kept: Kept, tmp_pat
         changed(first, {"components.controller.sampling.period": 0.03, "stop_time": 0.7}),
         changed(first, {"components.plant.parameters.place": 2.0, "sources.one.constant": 0.7}),
     ]
-    for what, found in zip(crowd, Batches().fly(crowd)):
+    for what, found in zip(crowd, Batches().run(crowd)):
         assert found is not None
         alone = ran(what, "compiled", load=kept.load).metrics
         assert_the_same_numbers(found.metrics, alone)
@@ -120,7 +120,7 @@ CONDITIONS = ("plant.y > 0.9", "norm(plant.y, controller.y) >= 1.2 and time > 0.
 def test_a_run_that_diverges_ends_as_it_does_alone_and_others_go_on(condition: str, fmu: Path, kept: Kept) -> None:
     first = replace(of(LOOP, fmu), objectives={"peak": "max(plant.y)"}, criterion=Criterion(diverged=condition))
     crowd = [replace(first, seed=seed) for seed in range(6)]
-    for what, found in zip(crowd, Batches().fly(crowd)):
+    for what, found in zip(crowd, Batches().run(crowd)):
         alone = ran(what, "compiled", load=kept.load)
         assert found is not None
         assert (found.metrics, found.message) == (alone.metrics, alone.divergence)
@@ -129,7 +129,7 @@ def test_a_run_that_diverges_ends_as_it_does_alone_and_others_go_on(condition: s
 def test_what_a_component_refuses_or_makes_infinite_is_left_to_be_flown_alone(fmu: Path, kept: Kept) -> None:
     habits: Sequence[dict[str, float]] = ({}, {"fails_at": 0.3}, {"nan_at": 0.4}, {})
     crowd = [replace(of(LOOP, fmu, plant=habit), objectives={"peak": "max(plant.y)"}) for habit in habits]
-    found = Batches().fly(crowd)
+    found = Batches().run(crowd)
     assert [each is None for each in found] == [False, True, True, False]
     alone = ran(crowd[3], "compiled", load=kept.load)
     assert found[3] is not None
@@ -142,7 +142,7 @@ def test_narrower_registers_give_the_same_bits(lanes: int, fmu: Path) -> None:
     crowd = [replace(first, seed=seed) for seed in range(lanes)]
     wide = shape_of(first)
     narrow = replace(wide, lanes=lanes)
-    found, expected = landed(narrow, crowd), landed(wide, crowd)
+    found, expected = in_lanes(narrow, crowd), in_lanes(wide, crowd)
     for call, values in expected.reductions.items():
         assert found.reductions[call].tobytes() == values.tobytes()
     assert [rows.tobytes() for rows in found.signals] == [rows.tobytes() for rows in expected.signals]
