@@ -2,11 +2,10 @@
    0 where both do the same operations of IEEE 754, some rounding where a root or a source is in it. What the bounds do
    not decide, Python does. */
 
-enum { NUMBER, TIME, SIGNAL, SOURCE, NEG, ABS, ADD, SUB, MUL, DIV, NORM, LESS, LESS_EQUAL, MORE, MORE_EQUAL, EQUAL,
-       NOT_EQUAL, NOT, AND, OR };
+enum { NUMBER, TIME, SIGNAL, SOURCE };
 
 typedef struct {
-    int64_t code, operands; /* of SIGNAL and SOURCE the place */
+    int64_t code, operands; /* an operator of operators.h, or a leaf: of SIGNAL and SOURCE the place */
     double number;
 } Operation;
 
@@ -41,23 +40,16 @@ static Known norm(const Known *parts, int64_t count) {
 
 static Known truth(int is, int undecided) { return undecided ? (Known){1.0, INFINITY} : (Known){is, 0.0}; }
 
-static Known comparison(int64_t code, Known a, Known b) {
+static int is_close(Known a, Known b) {
     double error = a.error + b.error;
-    int undecided = error > 0.0 && !(fabs(a.value - b.value) > error);
-    switch (code) {
-    case LESS: return truth(a.value < b.value, undecided);
-    case LESS_EQUAL: return truth(a.value <= b.value, undecided);
-    case MORE: return truth(a.value > b.value, undecided);
-    case MORE_EQUAL: return truth(a.value >= b.value, undecided);
-    case EQUAL: return truth(a.value == b.value, undecided);
-    default: return truth(a.value != b.value, undecided);
-    }
+    return error > 0.0 && !(fabs(a.value - b.value) > error);
 }
 
 static int is_undecided(Known a) { return a.error > 0.0 && !(fabs(a.value) > a.error); }
 
-static Known joined(int64_t code, const Known *parts, int64_t count) {
-    int open = 0, ends = code == OR; /* the side that decides by itself */
+/* `ends`: the side that decides by itself. */
+static Known joined(int ends, const Known *parts, int64_t count) {
+    int open = 0;
     for (int64_t i = 0; i < count; i++) {
         if (is_undecided(parts[i]))
             open = 1;
@@ -66,6 +58,8 @@ static Known joined(int64_t code, const Known *parts, int64_t count) {
     }
     return truth(!ends, open);
 }
+
+#include "operators.h"
 
 /* Whether the condition may hold: it does, or the bounds do not say. */
 static int may_hold(const Operation *program, int64_t length, double t, const double *row, const double *sources) {
@@ -81,19 +75,7 @@ static int may_hold(const Operation *program, int64_t length, double t, const do
             continue;
         }
         Known *a = stack + top - n;
-        switch (o->code) {
-        case NEG: *a = known(-a->value, a->error); break;
-        case ABS: *a = known(fabs(a->value), a->error); break;
-        case ADD: *a = known(a[0].value + a[1].value, a[0].error + a[1].error); break;
-        case SUB: *a = known(a[0].value - a[1].value, a[0].error + a[1].error); break;
-        case MUL: *a = product(a[0], a[1]); break;
-        case DIV: *a = quotient(a[0], a[1]); break;
-        case NORM: *a = norm(a, n); break;
-        case NOT: *a = truth(a->value == 0.0, is_undecided(*a)); break;
-        case AND:
-        case OR: *a = joined(o->code, a, n); break;
-        default: *a = comparison(o->code, a[0], a[1]);
-        }
+        *a = applied(o->code, a, n);
         top += 1 - n;
     }
     return is_undecided(stack[0]) || stack[0].value != 0.0;

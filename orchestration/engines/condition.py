@@ -6,22 +6,32 @@ from typing import TypeAlias
 from orchestration.engines.board import Board
 from orchestration.engines.sources import Values
 from orchestration.engines.watch import is_wanted
-from orchestration.expressions.syntax import Name, Node, Number, Operation, names, parse
+from orchestration.expressions.operators import OPERATORS
+from orchestration.expressions.scalars import scalars
+from orchestration.expressions.syntax import Call, Name, Node, Number, Operation, names, parse
 
 Step: TypeAlias = tuple[int, int, float]
 """What is done, how many operands it takes (of a signal, its place), and the number that it is"""
 
-_CODES = (
-    "number", "time", "signal", "source", "neg", "abs", "+", "-", "*", "/", "norm", "<", "<=", ">", ">=", "==", "!=",
-    "not", "and", "or",
-)  # fmt: skip
+_LEAVES = ("number", "time", "signal", "source")
 """As condition.h counts them"""
+_BOUNDED = {word: made.bounded for word, made in OPERATORS.items() if made.bounded is not None}
+_CODES = {word: code for code, word in enumerate((*_LEAVES, *_BOUNDED))}
 _DEEPEST = 256
 """Numbers that it has room for"""
 
 
 class _Unknown(Exception):
-    """A function or a vector that has no program: Python is asked at every instant."""
+    """A function that has no program: Python is asked at every instant."""
+
+
+def operators() -> str:
+    """The C of operators.h, which condition.h includes: what each operator makes of its operands."""
+    cases = [f"    case {_CODES[word]}: return {code}; /* {word} */" for word, code in _BOUNDED.items()]
+    head = "static Known applied(int64_t code, const Known *a, int64_t n) {"
+    return "\n".join(
+        [head, "    switch (code) {", *cases, "    default: return (Known){0.0, INFINITY};", "    }", "}", ""]
+    )
 
 
 def program(
@@ -33,10 +43,10 @@ def program(
 ) -> tuple[Sequence[Step] | None, Sequence[Values]]:
     """The steps over the row and the sources that are in it, whose signals are counted through; None: no program.
 
-    Arguments are those of `watch`.
+    Arguments are those that `watch` has taken.
     """
     if condition is None:
-        return [(_CODES.index("number"), 0, 0.0)], ()
+        return [(_CODES["number"], 0, 0.0)], ()
     node = parse(condition)
     wanted = set(names(node))
     used = [name for name, signals in signals_of.items() if any(is_wanted(signal, wanted) for signal in signals)]
@@ -44,40 +54,29 @@ def program(
     leaves["time"] = ("time", 0, 0.0)
     leaves |= {s: ("source", i, 0.0) for i, s in enumerate(signal for name in used for signal in signals_of[name])}
     leaves |= {name: ("number", 0, float(value)) for name, value in numbers.items()}
+    (scalar,) = scalars(node, {name: _axes(name, leaves) for name in wanted})
     try:
-        parts = _parts(node, leaves)
+        steps = [(_CODES[word], operands, number) for word, operands, number in _words(scalar, leaves)]
     except _Unknown:
         return None, ()
-    steps = [(_CODES.index(word), operands, number) for word, operands, number in parts[0]]
-    return (steps if len(parts) == 1 and len(steps) < _DEEPEST else None), [sources[name] for name in used]
+    return (steps if len(steps) < _DEEPEST else None), [sources[name] for name in used]
 
 
 _Words: TypeAlias = list[tuple[str, int, float]]
 
 
-def _parts(node: Node, leaves: Mapping[str, tuple[str, int, float]]) -> list[_Words]:
-    """One list of steps for a number, several for a vector."""
-    if isinstance(node, Number):
-        return [[("number", 0, node.value)]]
-    if isinstance(node, Name):
-        found = [node.text] if node.text in leaves else [f"{node.text}.{axis}" for axis in "xyzw"]
-        if not any(name in leaves for name in found):
-            raise _Unknown
-        return [[leaves[name]] for name in found if name in leaves]
-    if isinstance(node, Operation):
-        operands = [_parts(operand, leaves) for operand in node.operands]
-        size = max(map(len, operands))
-        return [_applied(node.sign, [parts[i if len(parts) > 1 else 0] for parts in operands]) for i in range(size)]
-    function = getattr(node, "function", None)
-    arguments = [part for argument in getattr(node, "arguments", ()) for part in _parts(argument, leaves)]
-    if function in ("norm", "hypot"):
-        return [_applied("norm", arguments)]
-    if function == "abs" and len(arguments) == 1:
-        return [_applied("abs", arguments)]
+def _axes(name: str, leaves: Mapping[str, tuple[str, int, float]]) -> Sequence[str]:
+    """What a name stands for."""
+    return (name,) if name in leaves else [part for axis in "xyzw" if (part := f"{name}.{axis}") in leaves]
+
+
+def _words(node: Node, leaves: Mapping[str, tuple[str, int, float]]) -> _Words:
+    """Operands before what is made of them."""
+    match node:
+        case Number(value):
+            return [("number", 0, value)]
+        case Name(name):
+            return [leaves[name]]
+        case Operation(word, operands) | Call(word, operands) if word in _BOUNDED:
+            return [*(step for operand in operands for step in _words(operand, leaves)), (word, len(operands), 0.0)]
     raise _Unknown
-
-
-def _applied(word: str, operands: Sequence[_Words]) -> _Words:
-    if word not in _CODES:
-        raise _Unknown
-    return [*(step for operand in operands for step in operand), (word, len(operands), 0.0)]

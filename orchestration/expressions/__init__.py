@@ -1,1 +1,1 @@
-"""The words in which objectives and criteria are written: parsed once, evaluated without Python's own evaluator."""
+"""The words in which objectives and criteria are written: parsed once, and written for each that evaluates them."""

@@ -1,13 +1,14 @@
 """Expressions over one span of a run: at its rows, just before the next ones, and half-way between."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
+from orchestration.expressions.operators import applied
 from orchestration.expressions.recorded import STOP_TIME, TIME, Recorded
 from orchestration.expressions.reductions import Course, Fold
 from orchestration.expressions.syntax import Call, Name, Node, Number, Operation, Sampled, is_over_run, names
@@ -51,14 +52,14 @@ class SpanValues:
                 return value
             case Name(name):
                 return self._named(name, place)
-            case Operation(sign, operands):
-                return _applied(_OPERATIONS[sign], [self._at(operand, place) for operand in operands])
             case Sampled(connection, _):
                 expected = "inside max, mean, rms, share or growth_share"
                 raise UsageError(f"sampled({connection}, …): expected {expected}")
-            case Call(function, arguments) if not is_over_run(node):
-                return _applied(_FUNCTIONS[function], [self._at(argument, place) for argument in arguments])
-        return self._known[node]
+            case Call() if is_over_run(node):
+                return self._known[node]
+            case Operation(word, operands) | Call(word, operands):
+                values = [self._at(operand, place) for operand in operands]
+                return None if any(value is None for value in values) else applied(word, *values)
 
     def _named(self, name: str, place: str) -> Any:
         recorded = self._recorded
@@ -104,45 +105,3 @@ def _between(values: Floats, ends: Floats | None, place: str) -> Floats:
         return values
     before_next = values[1:] if ends is None else ends
     return before_next if place == "ends" else 0.5 * (values[:-1] + before_next)
-
-
-def _applied(function: Callable[..., Any], values: list[Any]) -> Any:
-    return None if any(value is None for value in values) else function(*values)
-
-
-def _norm(*parts: Any) -> Any:
-    numbers = [number for part in parts for number in (part if np.ndim(part) == 2 else [part])]
-    return np.sqrt(sum(np.square(number) for number in numbers))
-
-
-def _logic(function: Callable[..., Any]) -> Callable[..., Any]:
-    def wrapped(*values: Any) -> Any:
-        found = np.asarray(function(*(np.asarray(value) != 0.0 for value in values)))
-        return found.astype(float) if found.ndim else float(found)
-
-    return wrapped
-
-
-def _comparison(function: Callable[..., Any]) -> Callable[..., Any]:
-    def wrapped(a: Any, b: Any) -> Any:
-        found = np.asarray(function(a, b))
-        return found.astype(float) if found.ndim else float(found)
-
-    return wrapped
-
-
-_OPERATIONS: dict[str, Callable[..., Any]] = {
-    "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power, "neg": np.negative,
-    "<": _comparison(np.less), "<=": _comparison(np.less_equal), ">": _comparison(np.greater),
-    ">=": _comparison(np.greater_equal), "==": _comparison(np.equal), "!=": _comparison(np.not_equal),
-    "not": _logic(np.logical_not),
-    "and": _logic(lambda *sides: np.logical_and.reduce(np.broadcast_arrays(*sides))),
-    "or": _logic(lambda *sides: np.logical_or.reduce(np.broadcast_arrays(*sides))),
-}  # fmt: skip
-
-_FUNCTIONS: dict[str, Callable[..., Any]] = {
-    "abs": np.abs, "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "sin": np.sin, "cos": np.cos, "tan": np.tan,
-    "asin": np.arcsin, "acos": np.arccos, "atan2": np.arctan2, "tanh": np.tanh, "hypot": _norm, "norm": _norm,
-    "min": lambda *v: np.minimum.reduce(np.broadcast_arrays(*v)),
-    "max": lambda *v: np.maximum.reduce(np.broadcast_arrays(*v)),
-}  # fmt: skip

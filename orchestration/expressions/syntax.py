@@ -10,15 +10,11 @@ from typing import TypeAlias
 
 from fmu_kit.syntax_trees import parsed_expression
 from orchestration.basics.errors import UsageError
+from orchestration.expressions.operators import OPERATORS
 
 LONGEST, DEEPEST = 10_000, 60
 """Characters and nesting of an expression"""
 
-POINTWISE = {
-    "abs": (1, 1), "sqrt": (1, 1), "exp": (1, 1), "log": (1, 1), "sin": (1, 1), "cos": (1, 1), "tan": (1, 1),
-    "asin": (1, 1), "acos": (1, 1), "atan2": (2, 2), "tanh": (1, 1), "hypot": (1, 99), "norm": (1, 99),
-}  # fmt: skip
-"""Functions of values at one instant, with the fewest and most arguments."""
 OVER_RUN = {
     "min": (1, 99), "max": (1, 99), "mean": (1, 1), "rms": (1, 1), "last": (1, 1), "first": (1, 1),
     "integral": (1, 1), "peak_time": (1, 1), "settling_time": (2, 2), "total_variation": (1, 1), "share": (1, 1),
@@ -47,7 +43,7 @@ class Name:
 
 @dataclass(frozen=True)
 class Operation:
-    """An operator with its operands: + - * / ** < <= > >= == != and or not, and `neg`."""
+    """An operator of `OPERATORS` with its operands; the sign of a number is `neg`."""
 
     sign: str
     operands: tuple["Node", ...]
@@ -122,7 +118,7 @@ def is_number(node: Node) -> bool:
     """Whether an expression is a number by the way it is written, so that it can be no condition."""
     match node:
         case Operation(sign):
-            return sign in ("neg", *_BINARY.values())
+            return not OPERATORS[sign].gives_truth
         case Call() | Sampled():
             return True
     return isinstance(node, Number) and node.value not in (0.0, 1.0)
@@ -146,10 +142,7 @@ def children(node: Node) -> tuple[Node, ...]:
     return node.arguments if isinstance(node, Call) else ()
 
 
-_BINARY: dict[type, str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
-_COMPARISONS: dict[type, str] = {
-    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
-}  # fmt: skip
+_SIGNS = {operator.tree: word for word, operator in OPERATORS.items() if operator.tree is not None}
 
 
 def _node(tree: ast.expr, text: str, depth: int) -> Node:
@@ -169,21 +162,17 @@ def _node(tree: ast.expr, text: str, depth: int) -> Node:
             return Number(number)
         case ast.Name() | ast.Attribute() | ast.Subscript():
             return Name(_dotted(tree, text))
-        case ast.BinOp(op=op) if type(op) in _BINARY:
-            return Operation(_BINARY[type(op)], (build(tree.left), build(tree.right)))
-        case ast.UnaryOp(op=ast.USub()):
-            return Operation("neg", (build(tree.operand),))
         case ast.UnaryOp(op=ast.UAdd()):
             return build(tree.operand)
-        case ast.UnaryOp(op=ast.Not()):
-            return Operation("not", (build(tree.operand),))
+        case ast.UnaryOp(op=op) if type(op) in _SIGNS:
+            return Operation(_SIGNS[type(op)], (build(tree.operand),))
+        case ast.BinOp(op=op) if type(op) in _SIGNS:
+            return Operation(_SIGNS[type(op)], (build(tree.left), build(tree.right)))
         case ast.BoolOp(op=op):
-            return Operation("and" if isinstance(op, ast.And) else "or", tuple(map(build, tree.values)))
-        case ast.Compare() if all(type(op) in _COMPARISONS for op in tree.ops):
+            return Operation(_SIGNS[type(op)], tuple(map(build, tree.values)))
+        case ast.Compare() if all(type(op) in _SIGNS for op in tree.ops):
             sides = [build(side) for side in (tree.left, *tree.comparators)]
-            pairs = [
-                Operation(_COMPARISONS[type(op)], (left, right)) for op, left, right in zip(tree.ops, sides, sides[1:])
-            ]
+            pairs = [Operation(_SIGNS[type(op)], (left, right)) for op, left, right in zip(tree.ops, sides, sides[1:])]
             return pairs[0] if len(pairs) == 1 else Operation("and", tuple(pairs))
         case ast.Call(func=ast.Name(id="sampled"), args=[ast.Name(id=connection), argument], keywords=[]):
             return Sampled(connection, build(argument))
@@ -212,7 +201,8 @@ def _dotted(tree: ast.expr, text: str) -> str:
 
 
 def _known(function: str, count: int, text: str) -> str:
-    functions = {**POINTWISE, **OVER_RUN, SAMPLED: (2, 2)}
+    at_instant = {word: operator.arguments for word, operator in OPERATORS.items() if operator.tree is None}
+    functions = {**at_instant, **OVER_RUN, SAMPLED: (2, 2)}
     if function not in functions:
         near = difflib.get_close_matches(function, functions, n=1)
         hint = f"; did you mean {near[0]}?" if near else ""

@@ -11,12 +11,13 @@ import numpy.typing as npt
 from orchestration.engines import initial
 from orchestration.engines.batch.code import Written, written
 from orchestration.engines.batch.kernels import Kernel, batch, component
-from orchestration.engines.batch.writing import Kind, Leaf, scalars
+from orchestration.engines.batch.writing import Kind, Leaf
 from orchestration.engines.board import Board
 from orchestration.engines.channel import of_each
 from orchestration.engines.wires import Wires
 from orchestration.expressions.over_run import inlined, reductions
 from orchestration.expressions.recorded import STOP_TIME, TIME, vectors
+from orchestration.expressions.scalars import scalars
 from orchestration.expressions.syntax import Call, Node, names, parse
 from orchestration.fmi.model import Model, Variable
 from orchestration.results.objectives import GOOD

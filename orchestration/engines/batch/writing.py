@@ -1,11 +1,12 @@
 """Expressions as C over lanes: at a row, just before the next one, and half-way, as in `expressions/over_span.py`."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from orchestration.basics.errors import UsageError
-from orchestration.expressions.syntax import Call, Name, Node, Number, Operation, Sampled, is_over_run
+from orchestration.expressions.operators import OPERATORS
+from orchestration.expressions.syntax import Call, Name, Node, Number, Operation, Sampled
 
 Place: TypeAlias = Literal["row", "end", "middle"]
 Kind: TypeAlias = Literal["number", "continuous", "held", "line"]
@@ -105,7 +106,12 @@ class Writer:
     def truth(self, node: Node, place: Place, into: Section) -> str:
         """The mask of the lanes in which it is not zero."""
         is_here = place == "row" or self.kinds(node) - {"number", "held"}
-        if isinstance(node, Operation) and node.sign in _TRUTHS and is_here and self.kinds(node) - {"number"}:
+        if (
+            isinstance(node, Operation)
+            and OPERATORS[node.sign].gives_truth
+            and is_here
+            and self.kinds(node) - {"number"}
+        ):
             return into.named((node, place, "truth"), lambda: self._truth(node, place, into), "q_mask")
         return f"q_ne({self.value(node, place, into)}, 0.0)"
 
@@ -121,18 +127,13 @@ class Writer:
         match node:
             case Name(name):
                 return self._at(node, self.leaf(name), place)
-            case Operation(sign, operands) if sign in _TRUTHS:
+            case Operation(sign) if OPERATORS[sign].gives_truth:
                 return f"TRUE({self._truth(node, place, into)})"
-            case Operation("**", (base, Number(2.0))):
-                found = self.value(base, place, into)
-                return f"{found} * {found}"
-            case Operation(sign, operands):
-                return _OPERATIONS[sign](*(self.value(operand, place, into) for operand in operands))
             case Sampled(connection, _):
                 expected = "inside max, mean, rms, share or growth_share"
                 raise UsageError(f"sampled({connection}, …): expected {expected}")
-            case Call(function, arguments) if node not in self._reductions:
-                return _FUNCTIONS[function](*(self.value(argument, place, into) for argument in arguments))
+            case Operation(word, operands) | Call(word, operands) if node not in self._reductions:
+                return OPERATORS[word].lanes(*(self.value(operand, place, into) for operand in operands))
         return self._reductions[node]
 
     def _at(self, node: Name, leaf: Leaf, place: Place) -> str:
@@ -147,76 +148,5 @@ class Writer:
         return end if place == "end" else f"0.5 * ({before} + {end})"
 
     def _truth(self, node: Operation, place: Place, into: Section) -> str:
-        if node.sign in ("and", "or", "not"):
-            sides = [self.truth(operand, place, into) for operand in node.operands]
-            return f"q_not({sides[0]})" if node.sign == "not" else {"and": " & ", "or": " | "}[node.sign].join(sides)
-        left, right = (self.value(operand, place, into) for operand in node.operands)
-        return f"{_COMPARED[node.sign]}({left}, {right})"
-
-
-def scalars(node: Node, vectors: Mapping[str, Sequence[str]]) -> list[Node]:
-    """An expression whose names are signals alone: one, or several for a vector."""
-    match node:
-        case Name(name):
-            return [Name(part) for part in vectors.get(name, (name,))]
-        case Operation(sign, operands):
-            return [Operation(sign, parts) for parts in _side_by_side(sign, operands, vectors)]
-        case Call("norm" | "hypot", arguments):
-            return [Call("norm", tuple(part for argument in arguments for part in scalars(argument, vectors)))]
-        case Call(function, arguments) if is_over_run(node):
-            return [Call(function, tuple(_one(argument, vectors) for argument in arguments))]
-        case Call(function, arguments):
-            return [Call(function, parts) for parts in _side_by_side(function, arguments, vectors)]
-        case Sampled(connection, argument):
-            return [Sampled(connection, _one(argument, vectors))]
-    return [node]
-
-
-def _one(node: Node, vectors: Mapping[str, Sequence[str]]) -> Node:
-    found = scalars(node, vectors)
-    if len(found) > 1:
-        raise UsageError("it is a vector; expected a number, as norm(…)")
-    return found[0]
-
-
-def _side_by_side(what: str, nodes: Sequence[Node], vectors: Mapping[str, Sequence[str]]) -> list[tuple[Node, ...]]:
-    parts = [scalars(node, vectors) for node in nodes]
-    size = max(map(len, parts))
-    if any(len(each) not in (1, size) for each in parts):
-        raise UsageError(f"{what} of vectors of different sizes")
-    return [tuple(each[i if len(each) > 1 else 0] for each in parts) for i in range(size)]
-
-
-def _called(function: str) -> Callable[..., str]:
-    return lambda *arguments: f"{function}({', '.join(arguments)})"
-
-
-def _folded(function: str) -> Callable[..., str]:
-    def write(*arguments: str) -> str:
-        found = arguments[0]
-        for argument in arguments[1:]:
-            found = f"{function}({found}, {argument})"
-        return found
-
-    return write
-
-
-def _norm(*parts: str) -> str:
-    return f"q_sqrt({' + '.join(f'{part} * {part}' for part in parts)})"
-
-
-def _infix(sign: str) -> Callable[..., str]:
-    return lambda a, b: f"{a} {sign} {b}"
-
-
-_COMPARED = {"<": "q_lt", "<=": "q_le", ">": "q_gt", ">=": "q_ge", "==": "q_eq", "!=": "q_ne"}
-_TRUTHS = (*_COMPARED, "and", "or", "not")
-_OPERATIONS: dict[str, Callable[..., str]] = {
-    "+": _infix("+"), "-": _infix("-"), "*": _infix("*"), "/": _infix("/"), "**": _called("q_pow"),
-    "neg": lambda a: f"-{a}",
-}  # fmt: skip
-_FUNCTIONS: dict[str, Callable[..., str]] = {
-    "abs": _called("q_fabs"), "norm": _norm, "min": _folded("lowest"), "max": _folded("highest"),
-    **{name: _called(f"q_{name}") for name in ("sqrt", "exp", "log", "sin", "cos", "tan")},
-    **{name: _called(f"q_{name}") for name in ("asin", "acos", "atan2", "tanh")},
-}  # fmt: skip
+        write = self.truth if OPERATORS[node.sign].takes_truths else self.value
+        return OPERATORS[node.sign].lanes(*(write(operand, place, into) for operand in node.operands))

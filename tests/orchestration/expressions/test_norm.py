@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestration.engines.batch.writing import Leaf, Section, Writer, scalars
+from orchestration.engines.batch.writing import Leaf, Section, Writer
 from orchestration.expressions.at_instant import compiled
 from orchestration.expressions.over_run import evaluate
 from orchestration.expressions.recorded import Recorded
+from orchestration.expressions.scalars import scalars
 from orchestration.expressions.syntax import Call, Node, parse
 
 PLACES = {"p.x": 0, "p.y": 1, "p.z": 2, "v": 3}

@@ -1,0 +1,43 @@
+"""Expressions of vectors as expressions of the signals that they are made of."""
+
+from collections.abc import Mapping, Sequence
+
+from orchestration.basics.errors import UsageError
+from orchestration.expressions.operators import OPERATORS
+from orchestration.expressions.syntax import Call, Name, Node, Operation, Sampled, is_over_run
+
+
+def scalars(node: Node, vectors: Mapping[str, Sequence[str]]) -> list[Node]:
+    """An expression whose names are signals alone: one, or several for a vector.
+
+    `vectors` are names that stand for several signals. Raises `UsageError` for vectors that do not go together.
+    """
+    match node:
+        case Name(name):
+            return [Name(part) for part in vectors.get(name, (name,))]
+        case Operation(sign, operands):
+            return [Operation(sign, parts) for parts in _side_by_side(sign, operands, vectors)]
+        case Call(function, arguments) if is_over_run(node):
+            return [Call(function, tuple(_one(argument, vectors) for argument in arguments))]
+        case Call(function, arguments) if OPERATORS[function].joins:
+            return [Call(function, tuple(part for argument in arguments for part in scalars(argument, vectors)))]
+        case Call(function, arguments):
+            return [Call(function, parts) for parts in _side_by_side(function, arguments, vectors)]
+        case Sampled(connection, argument):
+            return [Sampled(connection, _one(argument, vectors))]
+    return [node]
+
+
+def _one(node: Node, vectors: Mapping[str, Sequence[str]]) -> Node:
+    found = scalars(node, vectors)
+    if len(found) > 1:
+        raise UsageError("it is a vector; expected a number, as norm(…)")
+    return found[0]
+
+
+def _side_by_side(what: str, nodes: Sequence[Node], vectors: Mapping[str, Sequence[str]]) -> list[tuple[Node, ...]]:
+    parts = [scalars(node, vectors) for node in nodes]
+    size = max(map(len, parts))
+    if any(len(each) not in (1, size) for each in parts):
+        raise UsageError(f"{what} of vectors of different sizes")
+    return [tuple(each[i if len(each) > 1 else 0] for each in parts) for i in range(size)]
