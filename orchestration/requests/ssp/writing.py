@@ -20,6 +20,7 @@ from orchestration.fmi.model import Kind, Variable
 from orchestration.requests.ssp import timing
 from orchestration.requests.ssp.carried import Carried, Part, carried
 from orchestration.requests.ssp.document import add, document, element
+from orchestration.requests.ssp.refused import refused
 from orchestration.system.model import System, variable_of
 from orchestration.system.request import Request
 
@@ -40,12 +41,15 @@ def write(
     """Write a system as an SSP; the same system and FMUs give the same bytes.
 
     `announce` hears of FMUs that are built for it. `warn` hears, a line each, of what the SSP has no words for: it is
-    another system without its file with timing. Raises `UsageError` for different FMUs of one file name.
+    another system without its file with timing; and of what it says and some masters do not take. Raises `UsageError`
+    for different FMUs of one file name.
     """
     given = carried(asked, announce)
     if warn is not None:
         for line in given.unsaid:
             warn(f"{line.partition('; expected')[0]}; only its file with timing does")
+        for line in refused(given):
+            warn(asked.in_words(line))
     files = {source: fmu.read_bytes() for source, fmu in _sources(given.parts).items()}
     for part in given.parts:
         files[_parameter_file(part)] = document(_parameter_set({"": part}))

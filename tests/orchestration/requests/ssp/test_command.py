@@ -13,6 +13,7 @@ from orchestration.requests.ssp import writing
 from quadcosim import Scenario, Timing, UsageError
 from tests.commands import Main
 from tests.fmus.making import PAIR
+from tests.orchestration.fmi.small import needs_compiler, small
 from tests.orchestration.interop.common import OTHER
 from tests.orchestration.studies.common import error_line, one_line, quadcosim
 
@@ -130,6 +131,46 @@ def test_a_timing_that_an_ssp_cannot_say_is_said_to_be_in_its_file_only(
 
 def test_nothing_is_said_of_a_scenario_that_an_ssp_can_say(short: Scenario, tmp_path: Path) -> None:
     assert heard(short, tmp_path) == []
+
+
+def test_an_enumeration_that_other_masters_do_not_take_is_said(short: Scenario, tmp_path: Path) -> None:
+    given = short.with_changes(parameters={"controller.discretisation": "match"})
+    assert heard(given, tmp_path) == [
+        "controller.discretisation = match: of type Enumeration; libcosim crashes, ecos and fmpy refuse the SSP"
+    ]
+
+
+MIXED = """\
+stop_time = 0.1
+[components.a]
+fmu = "a.fmu"
+step = 0.01
+parameters = { mode = 2, label = "text" }
+[components.b]
+fmu = "b.fmu"
+step = 0.01
+[[connections]]
+from = ["a.y", "a.high", "a.count"]
+to = ["b.u", "b.on", "b.mode"]
+[[connections]]
+from = ["b.high"]
+to = ["a.u"]
+"""
+
+
+@needs_compiler
+def test_types_that_other_masters_do_not_take_are_said_by_the_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, main: Main
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    small(tmp_path / "a").rename("a.fmu")
+    small(tmp_path / "b", mode_is_input=True).rename("b.fmu")
+    Path("mixed.toml").write_text(MIXED, encoding="utf-8")
+    assert main("ssp", "-q", "mixed.toml").stderr.splitlines() == [
+        "warning: components.a.parameters.mode = 2: of type Enumeration; libcosim and ecos leave it as it starts",
+        "warning: components.a.parameters.label = text: of type String; fmpy refuses the SSP",
+        "warning: b.high to a.u: from Boolean to Real; libcosim and ecos refuse the SSP",
+    ]
 
 
 def heard(scenario: Scenario, folder: Path) -> list[str]:

@@ -1,0 +1,34 @@
+"""What an SSP can say and masters that were tried do not take (`docs/guides/ssp.md` has them)."""
+
+from collections.abc import Iterator
+
+from orchestration.requests.ssp.carried import Carried, Part
+from orchestration.system.model import Parameter, variable_of
+
+
+def refused(given: Carried) -> Iterator[str]:
+    """Values and connections, a line each that names the place, in the words of a system, and the masters."""
+    parts = {part.name: part for part in given.parts}
+    for part in given.parts:
+        for name, value in part.parameters.items():
+            masters = _masters_without(part, name, value)
+            if masters is not None:
+                kind = part.variable(name).kind
+                yield f"components.{part.name}.parameters.{name} = {value}: of type {kind}; {masters}"
+    for x in given.system.connections:
+        for start, end in zip(x.start, x.end, strict=True):
+            kinds = [
+                parts[name].variable(variable_of(port)).kind for name, port in ((x.sender, start), (x.receiver, end))
+            ]
+            if kinds[0] != kinds[1] or "Enumeration" in kinds:
+                yield f"{start} to {end}: from {kinds[0]} to {kinds[1]}; libcosim and ecos refuse the SSP"
+
+
+def _masters_without(part: Part, name: str, value: Parameter) -> str | None:
+    """What the masters do that do not take a value; None if all do."""
+    kind = part.variable(name).kind
+    if kind == "Enumeration" and isinstance(value, str):
+        return "libcosim crashes, ecos and fmpy refuse the SSP"
+    if kind == "Enumeration":
+        return "libcosim and ecos leave it as it starts"
+    return "fmpy refuses the SSP" if kind == "String" else None
