@@ -108,6 +108,11 @@ static int step(Model *m, double t, double h) {
 #ifdef WARNS
     if (m->s.count == 0) say(m, WARNING, 7, 50.0);
 #endif
+#ifdef SAYS
+    if (m->log2) m->log2(m->environment, m->name, ERROR, "logStatus", SAYS);
+    if (m->log3) m->log3(m->environment, ERROR, "logStatus", SAYS);
+    return ERROR;
+#endif
 #ifdef REFUSES
     say(m, ERROR, 7, 50.0);
     return ERROR;
