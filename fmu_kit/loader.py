@@ -12,6 +12,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from fmu_kit import libraries
+
 SOURCE = Path(__file__).with_name("loader.c")
 PLATFORM = "binaries/linux64"
 BESIDE = f"{PLATFORM}/libpythonfmu-export.so"
@@ -47,10 +49,14 @@ def packed(files: dict[str, bytes], model: str) -> dict[str, bytes]:
 
 @functools.cache
 def compiled() -> bytes:
-    """The loader library: from one compiler, always the same bytes."""
+    """The loader library: from one compiler, always the same bytes, which are kept in the user's cache."""
     cc = compiler()
     if cc is None:
         raise LoaderError("no C compiler that is called cc")
+    return libraries.content("loader", {SOURCE.name: SOURCE.read_bytes()}, _OPTIONS, lambda: _compiled_by(cc))
+
+
+def _compiled_by(cc: str) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         library = Path(folder, "loader.so")
         command = [cc, "-x", "c", "-", "-o", str(library), *_OPTIONS]  # from no file, whose path it would hold

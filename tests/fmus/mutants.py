@@ -392,7 +392,7 @@ BEHAVIOUR = (
     ),
     Mutant(
         name="step without end", rule="process", words=("limit of 8 s; a call does not return",), time_limit=8.0,
-        damage=source("plant_fmu/slave.py", _STEP, f"while True:\n            pass\n        {_STEP}"),
+        damage=source("plant_fmu/slave.py", _STEP, f"__import__('time').sleep(1e6)\n        {_STEP}"),
     ),
     Mutant(
         name="bound not enforced", rule="bounds-enforced", words=("mass = -1",),

@@ -51,14 +51,23 @@ def hashes_of(sources: Path) -> dict[str, str]:
 # -- reproducible ---------------------------------------------------------------------------------------
 
 
+@pytest.fixture
+def nothing_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All is compiled anew: the user's cache is empty."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+
+@pytest.mark.usefixtures("nothing_kept")
 def test_building_again_in_another_folder_gives_the_same_bytes(built: dict[str, Path], tmp_path: Path) -> None:
     for path in fmus.build(MODELS, tmp_path / "elsewhere"):
         assert path.read_bytes() == built[path.stem].read_bytes()
 
 
+@pytest.mark.usefixtures("nothing_kept")
 def test_building_again_in_the_same_folder_gives_the_same_bytes(tmp_path: Path) -> None:
     (path,) = fmus.build(["QuadrotorPlant"], tmp_path)
     first = path.read_bytes()
+    shutil.rmtree(tmp_path / "cache")
     (again,) = fmus.build(["QuadrotorPlant"], tmp_path)
     assert again == path
     assert again.read_bytes() == first

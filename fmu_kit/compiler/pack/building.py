@@ -13,13 +13,14 @@ import types
 from collections.abc import Sequence
 from pathlib import Path
 
-from fmu_kit import packaging
+from fmu_kit import libraries, packaging
 from fmu_kit.bundle import PackagingError, Target, bundled_sources, place
 from fmu_kit.compiler.emit.c_code import c_code
 from fmu_kit.compiler.emit.lane_code import lane_code
 from fmu_kit.compiler.emit.standards import STANDARDS, Standard
 from fmu_kit.compiler.emit.tables import places, tables
 from fmu_kit.compiler.pack.c_compiler import (
+    OPTIONS,
     Mathematics,
     compiled_for,
     compiled_here,
@@ -78,13 +79,14 @@ def build(
     described(files, target, making, standard.describe(slave_class(target), standard.main))
     sources = c_sources(program, put_guid(files), standard)
     files |= {f"sources/{name}": text for name, text in sources.items()}
-    libraries: dict[str, bytes] = {}
+    compiled: dict[str, bytes] = {}
     here = host_platform(version)
     if not systems and here is not None:
-        libraries[here] = compiled_here(sources, standard.main, mathematics=mathematics)
+        compile_ = functools.partial(compiled_here, sources, standard.main, mathematics=mathematics)
+        compiled[here] = libraries.content("native", sources, (OPTIONS, standard.main, mathematics), compile_)
     for system in systems:
-        libraries |= compiled_for(system, sources, standard.main, version)
-    files |= {library_path(system, target.model): library for system, library in libraries.items()}
+        compiled |= compiled_for(system, sources, standard.main, version)
+    files |= {library_path(system, target.model): library for system, library in compiled.items()}
     return written(files, target, folder)
 
 
