@@ -27,7 +27,7 @@ from orchestration.quadrotor import wiring
 from orchestration.quadrotor.scenario import FmuChoice, Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.runs.simulation import prepared
-from orchestration.schedule.cursor import Position
+from orchestration.schedule.cursor import Cursor
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
 from orchestration.system.check import recorded
@@ -136,7 +136,7 @@ def clock(timing: Timing) -> float:
     system = Scenario(timing=timing, stop_time=STEPS * MILLISECOND).as_system()
 
     def work() -> int:
-        return sum(1 for _ in Position(Timetable(system, Streams(0, system.streams))).instants())
+        return sum(1 for _ in Cursor(Timetable(system, Streams(0, system.streams))).instants())
 
     return microseconds(work, work())
 

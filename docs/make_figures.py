@@ -12,7 +12,7 @@ from orchestration.figures.style import DOCS, save
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.runs.draw import draw
-from orchestration.schedule.cursor import Position
+from orchestration.schedule.cursor import Cursor
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
 from quadcosim import run
@@ -66,11 +66,11 @@ def timing_diagram() -> Figure:
 
 def _draw_case(axes: Axes, timing: Timing) -> None:
     system, sampled = Scenario(timing=timing, stop_time=0.065, seed=3).as_system(), {}
-    for instant in Position(Timetable(system, Streams(system.seed, system.streams))).instants():
+    for instant in Cursor(Timetable(system, Streams(system.seed, system.streams))).instants():
         now, arrivals = instant.time * MILLISECONDS, [k for _, k, _, _ in instant.arrivals]
         axes.plot(now, 0.0, "|", color=GREY, markersize=4, label="plant point")
-        for due in instant.dues:
-            ((_, k, _, arrival),) = due.sent
+        for sample in instant.samples:
+            ((_, k, _, arrival),) = sample.sent
             sampled[k] = now
             axes.plot(now, 1.0, "o", color=BLUE, markersize=5, label="sample")
             if arrival < 0:

@@ -52,8 +52,8 @@ class VehicleTable:
     """Parameters of every controller on top of those of the vehicle."""
 
 
-class ConditionTable(  # type: ignore[misc]
-    table_of(Condition, sets=(dict[str, Any], {}), multiplies=(dict[str, Any], {}))
+class ConditionTable(
+    table_of(Condition, sets=(dict[str, Any], {}), multiplies=(dict[str, Any], {}))  # type: ignore[misc]
 ):
     """`[[conditions]]`: what is set, and what is multiplied, by the names of axes of studies."""
 

@@ -38,8 +38,8 @@ class AxisTable:
     """Whether the range has equal steps or equal ratios."""
 
 
-class DesignTable(  # type: ignore[misc]
-    table_of(Study, only=["method", "samples", "design_seed", "vary_seed"], called={"design_seed": "seed"})
+class DesignTable(
+    table_of(Study, only=["method", "samples", "design_seed", "vary_seed"], called={"design_seed": "seed"})  # type: ignore[misc]
 ):
     """`[design]`: how axes without values are sampled."""
 

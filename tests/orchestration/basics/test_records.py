@@ -19,7 +19,7 @@ from tests.commands import Main
 
 def test_a_whole_number_of_numpy_stays_one_and_a_float_stays_a_float() -> None:
     given = {"count": np.int64(3), "share": np.float64(3.0), "on": np.bool_(True), "name": "x"}
-    kept = Component(fmu="tank.fmu", step=0.1, parameters=given).parameters  # type: ignore[arg-type]
+    kept = Component(fmu="tank.fmu", step=0.1, parameters=given).parameters
     assert {name: (value, type(value)) for name, value in kept.items()} == {
         "count": (3, int), "share": (3.0, float), "on": (True, bool), "name": ("x", str),
     }  # fmt: skip

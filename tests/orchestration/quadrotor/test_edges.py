@@ -11,7 +11,7 @@ from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.scenario_file import load_scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.runs.run_directory import run_folder
-from tests.orchestration.quadrotor.stubs import Counting, Flown, Plant, Straying, instants_of, position_of
+from tests.orchestration.quadrotor.stubs import Counting, Flown, Plant, Straying, cursor_of, instants_of
 
 
 @pytest.mark.parametrize("name", ["velocity__x", "quaternion__w"])
@@ -55,7 +55,7 @@ def test_instants_less_than_a_nanosecond_apart_are_refused(timing: dict[str, flo
 
 
 def test_a_period_of_a_nanosecond_has_instants_that_increase() -> None:
-    times = [instant.time for instant in instants_of(position_of(Timing(period=1e-9, plant_interval=1e-9), 1e-8))]
+    times = [instant.time for instant in instants_of(cursor_of(Timing(period=1e-9, plant_interval=1e-9), 1e-8))]
     assert times == list(range(11))
 
 
