@@ -1,7 +1,8 @@
 """What the controller takes on a microcontroller: `python -m benchmarks.embedded [--page PAGE]`.
 
-Sizes are those of the compiler's object; stack and instructions are counted under QEMU, in a flight of 10 s against the
-plant. QEMU counts instructions, not cycles. With `--page` the table is put there.
+Sizes are those of the compiler's object, and so is the stack: its frames along the deepest path of calls. Instructions
+are counted under QEMU, in a flight of 10 s against the plant: instructions, not cycles. With `--page` the table is put
+there.
 """
 
 import argparse
@@ -9,6 +10,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+from benchmarks import stack
 from benchmarks.mathematics import table
 from docs.pages import fill
 from fmu_kit.bundle import Target
@@ -24,16 +26,16 @@ WITHOUT_TEXTS = "-DUNIFIEDCONTROLLER_NO_TEXTS"
 MACHINES = {"M4F": M4F, "M7": M7}
 
 
-def text_of(source: Path, folder: Path, *flags: str) -> int:
-    """The code and constants of a source [bytes]."""
+def compiled(source: Path, folder: Path, *flags: str) -> tuple[int, int]:
+    """Of a source, the code and constants, and the stack of the deepest of its calls [bytes]."""
     made = folder / "size.o"
-    subprocess.run([ARM, *OPTIONS, *flags, "-c", str(source), "-o", str(made)], check=True)
+    subprocess.run([ARM, *OPTIONS, *stack.OPTIONS, *flags, "-c", str(source), "-o", str(made)], check=True)
     done = subprocess.run(["arm-none-eabi-size", str(made)], check=True, capture_output=True, text=True)
-    return int(done.stdout.splitlines()[1].split()[0])
+    return int(done.stdout.splitlines()[1].split()[0]), max(stack.deepest(made.with_suffix(".ci").read_text()).values())
 
 
 def flown(sources: list[Path], folder: Path, board: str, *flags: str) -> list[int]:
-    """Bytes of the instance, bytes of stack, and instructions a step: mean and most."""
+    """Bytes of the instance, and instructions a step: mean and most."""
     board_files = [str(BOARD_FILES / "cortex_m.c"), "-T", str(BOARD_FILES / "cortex_m.ld"), "--specs=rdimon.specs"]
     places = [f"-I{source.parent}" for source in sources]
     program = [str(HERE / "embedded.c"), *map(str, sources), "-lm", "-o", str(folder / "flown")]
@@ -72,10 +74,10 @@ def main() -> None:
             source = write(controller, folder / precision, single=precision == "single")
             for machine, flags in MACHINES.items():
                 for optimised in ("-O2", "-Os"):
-                    size, stack, mean, most = flown([source, plant_source], folder, BOARDS[flags], *flags, optimised)
-                    text = text_of(source, folder, *flags, optimised)
-                    bare = text_of(source, folder, *flags, optimised, WITHOUT_TEXTS)
-                    numbers = (text, bare, size, stack, mean, most)
+                    size, mean, most = flown([source, plant_source], folder, BOARDS[flags], *flags, optimised)
+                    text, depth = compiled(source, folder, *flags, optimised)
+                    bare, _ = compiled(source, folder, *flags, optimised, WITHOUT_TEXTS)
+                    numbers = (text, bare, size, depth, mean, most)
                     rows.append([precision, machine, f"`{optimised}`", *(f"{n:,}" for n in numbers)])
         double, single = (folder / precision / "UnifiedController.c" for precision in ("double", "single"))
         far = differences(double, single, plant_source)
