@@ -29,16 +29,21 @@ else:
 Class = TypeVar("Class", bound=type)
 
 
-class _OnlyFloats:
-    """Not all that has a value as a float: a whole number of NumPy's is to stay one."""
+class _Scalar:
+    """Not all that has a value as a float is one: whole numbers of NumPy's stay whole. What is most often is first."""
 
     @staticmethod
-    def __get_pydantic_core_schema__(source: Any, handler: pydantic.GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        is_float = core_schema.chain_schema([core_schema.is_instance_schema(float), handler(source)])
-        return core_schema.json_or_python_schema(handler(source), is_float)
+    def __get_pydantic_core_schema__(_source: Any, _handler: Any) -> core_schema.CoreSchema:
+        truth, real, text = core_schema.bool_schema(), core_schema.float_schema(), core_schema.str_schema()
+        whole = core_schema.int_schema(ge=-(2**63), lt=2**63)
+        only_float = core_schema.chain_schema([core_schema.is_instance_schema(float), real])
+        return core_schema.json_or_python_schema(
+            core_schema.union_schema([truth, whole, real, text], mode="left_to_right"),
+            core_schema.union_schema([only_float, truth, whole, text], mode="left_to_right"),
+        )
 
 
-Scalar = bool | Annotated[int, pydantic.Field(ge=-(2**63), lt=2**63)] | Annotated[float, _OnlyFloats] | str
+Scalar = Annotated[bool | int | float | str, _Scalar]
 """What a parameter of an FMU can be, and a value of an axis"""
 
 _CONFIG = pydantic.ConfigDict(extra="forbid", strict=True, arbitrary_types_allowed=True)

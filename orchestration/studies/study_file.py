@@ -39,7 +39,9 @@ class AxisTable:
 
 
 class DesignTable(
-    table_of(Study, only=["method", "samples", "design_seed", "vary_seed"], called={"design_seed": "seed"})  # type: ignore[misc]
+    table_of(  # type: ignore[misc]
+        Study, only=["method", "samples", "design_seed", "vary_seed"], called={"design_seed": "seed"}
+    )
 ):
     """`[design]`: how axes without values are sampled."""
 

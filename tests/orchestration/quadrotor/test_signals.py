@@ -177,7 +177,7 @@ def test_axes_and_flags_reach_the_parameters(main: Main) -> None:
         ("[reference]\nradius = 1", "reference.radius: no such key; expected one of name, file"),
         ('[disturbance]\nname = "circle"', "disturbance.name = circle: expected one of dryden"),
         ('[disturbance]\nname = "dryden"\nheight = 1', "disturbance.height = 1.0: expected 3.048 to 304.8 m"),
-        ('[disturbance]\nname = "dryden"\ndrag = -1', "disturbance.drag = -1: expected zero or a positive number"),
+        ('[disturbance]\nname = "dryden"\ndrag = -1', "disturbance.drag = -1.0: expected zero or a positive number"),
         ('[disturbance]\nname = "dryden"\ninterpolation = "previous"', "disturbance.interpolation = previous: expe"),
         ('[disturbance]\nfile = "a.csv"\ninterpolation = "cubic"', "disturbance.interpolation = cubic: expected one"),
         ("[disturbance]\nname = 3", "disturbance.name = 3: expected a text"),
