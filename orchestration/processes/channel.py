@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator
 from typing import IO, Any
 
 _HEADER = struct.Struct("<Q")
+_NO_FRAME = (struct.error, OverflowError, MemoryError, ValueError, pickle.UnpicklingError)
+"""What comes of a stream that is cut off or closed, or of bytes that somebody else has written"""
 _POLL = 0.5
 """[s] between two looks at whether the parent lives"""
 
@@ -26,7 +28,7 @@ def receive(stream: IO[bytes]) -> Any:
     try:
         header = stream.read(_HEADER.size)
         return pickle.loads(stream.read(*_HEADER.unpack(header)))
-    except Exception as error:  # whatever comes of bytes that somebody else has written
+    except _NO_FRAME as error:
         raise EOFError from error
 
 

@@ -59,7 +59,7 @@ class Watch:
     def close(self) -> None:
         """Look no longer."""
         self._over.set()
-        if self._thread not in (None, threading.current_thread()):
+        if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join()
 
     def _start(self) -> None:

@@ -246,6 +246,23 @@ def test_an_error_of_the_validation_itself_is_no_finding(
         validate(low_pass)
 
 
+@pytest.mark.parametrize(("spent", "words"), [(41.0, "a call does not return"), (39.0, "its calls return, it is slow")])
+def test_whether_a_call_hangs_is_told_by_the_time_of_the_process(
+    spent: float, words: str, low_pass: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    times = iter([10.0, spent])
+
+    def out_of_time(child: Child, hear: Callable[[Frame], None]) -> Ending:
+        hear(("begin", "runs"))
+        hear(("beat",))
+        return Ending(code=None, reached="it is late", out_of_time=True)
+
+    monkeypatch.setattr(Child, "spent", property(lambda child: next(times)))
+    monkeypatch.setattr(Child, "heard_by", out_of_time)
+    (found,) = validate(low_pass, limits=Limits(time=60.0))
+    assert found.text == f"stopped in runs: it is late; {words}; the rest was not checked"
+
+
 def test_the_child_reports_an_error_in_a_rule(low_pass: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def odd(bench: Bench) -> list[str]:
         raise KeyError(3)

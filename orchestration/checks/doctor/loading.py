@@ -4,6 +4,7 @@
 folder, an empty one, and says what comes of it: an `error`, or the `fmu` and whether it `loads`, or the `failure`.
 """
 
+import importlib
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
@@ -81,6 +82,7 @@ def _failure(found: dict[str, Any], ending: Ending) -> str | None:
 def main(path: Path, folder: Path, size_limit: float, say: Callable[[object], None]) -> None:
     """Read, unpack, instantiate, initialise and free the FMU."""
     restrict(size_limit)
+    importlib.import_module("pydantic")  # as every command that runs an FMU does: it may be that of another Python
     try:
         fmu = read_fmu(path, size_limit)
     except UnreadableFmuError as error:
