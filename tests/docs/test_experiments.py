@@ -54,7 +54,7 @@ def test_limits_of_the_page_fly_and_what_lies_a_little_above_does_not() -> None:
 
 def test_medians_of_the_page_are_those_of_its_starts() -> None:
     """Of one cell in twenty: the middle of thirty first ends."""
-    (cell,) = (cells[0] for size, cells in rows("Other starts").items() if size == "2 m")
+    (cell,) = (cells[0] for size, cells in rows("Other initial conditions").items() if size == "2 m")
     median = float(DECIMAL.findall(cell)[0]) * 1e-3
     near = [T for T in experiments.PERIODS if abs(T - median) <= 0.0026]
     flights = [experiments.flight(period=T, start=start) for start in experiments.random_starts()[1] for T in near]
