@@ -9,22 +9,14 @@ import reprlib
 import typing
 from collections.abc import Callable, Collection, Mapping, Sequence, Set
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import pydantic
 import pydantic.dataclasses
 from pydantic_core import core_schema
+from typing_extensions import dataclass_transform
 
 from orchestration.basics.errors import UsageError, no_such_key, shown
-
-if TYPE_CHECKING:
-    from typing_extensions import dataclass_transform
-else:
-
-    def dataclass_transform(**_options: Any) -> Callable[[Any], Any]:
-        """What says it to type checkers stands in no library that Python 3.10 is sure to have."""
-        return lambda function: function
-
 
 Class = TypeVar("Class", bound=type)
 
