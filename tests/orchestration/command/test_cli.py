@@ -111,7 +111,15 @@ def test_help_of_run_lists_every_flag() -> None:
     assert [flag for flag in flags.split() if f"{flag} " not in text] == []
 
 
-HEAVY = ("numpy", "matplotlib", "pandas", "pyarrow", "fmpy", "pydantic", "orchestration.system.model")
+HEAVY = (
+    "numpy",
+    "matplotlib",
+    "pandas",
+    "pyarrow",
+    "fmpy",
+    "orchestration.basics.records",
+    "orchestration.system.model",
+)
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"]])
