@@ -1,48 +1,80 @@
-"""Flies the comparisons of `findings/` in lanes, and keeps what their cells come to beside the page.
+"""Flies the comparisons of `findings.md` and keeps what their cells come to beside the page: `docs/data/NAME.json`.
 
-`quadcosim compare studies/comparisons/NAME.toml` flies the same runs one store after the other; here a run leaves no
-row, only the cell that it belongs to: `docs/data/NAME.json`.
+`python -m docs.comparisons NAME …` flies what `quadcosim compare studies/comparisons/NAME.toml --engine batch` does, in
+a store in `results/comparisons/NAME`, and goes on where it was stopped.
 """
 
 import json
 import sys
 import time
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
-from multiprocessing import get_context
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
-from docs import comparison_charts as charts
 from orchestration.basics.statistics import wilson
-from orchestration.comparison.bandwidth import bandwidths
-from orchestration.comparison.cells import frame_of
+from orchestration.comparison import pictures
+from orchestration.comparison.cells import CellSummary, Median, Share, sizes
 from orchestration.comparison.design import Comparison
+from orchestration.comparison.fates import FATES, SETTLING, survived
 from orchestration.comparison.file import load_comparison
-from orchestration.comparison.outcome import as_json, concluded
-from orchestration.engines.batch import batches
-from orchestration.fmi.model import read_model
-from orchestration.runs.simulation import run
-from orchestration.system.model import System
-from orchestration.system.request import Start
+from orchestration.comparison.fronts import Point
+from orchestration.comparison.limits import Limit
+from orchestration.comparison.outcome import as_json
+from orchestration.comparison.pictures import BINS, Reach
+from orchestration.comparison.run import compare
+from orchestration.figures.palette import BLUE, BROWN, GREEN, GREY, ORANGE, PURPLE, RED
+from orchestration.figures.style import DOCS
+from orchestration.results import display_names as labels
+from orchestration.results.quantities import Quantity
+from orchestration.studies.axis_labels import quantity_of
 
 ROOT = Path(__file__).parent.parent
 FILES = ROOT / "studies" / "comparisons"
 DATA = Path(__file__).parent / "data"
+RESULTS = ROOT / "results" / "comparisons"
 NAMES = (
     "periods", "fast_inner", "tuned", "tuned_mean", "delays", "inertias", "mismatches", "losses", "jitters", "vehicles",
 )  # fmt: skip
-FAST_INNER = "cascade, fast inner loops"
+RATES = 20.0
+"""Periods of the outer loops by those of the inner ones, where these are fast"""
+WIDE = replace(DOCS, width=254.0)
 TOLD = ("settling_time", "residual", "position_rmse", "torque_max", "total_variation.torque")
 WORKERS = 2
 HORIZONS = (20.0, 30.0, 40.0, 60.0)
 """[s] by which runs are counted, to see whether the shares still move"""
-BINS = 8
-"""of the size of the initial error"""
+COLORS = {
+    "unified": RED,
+    "unified, no coupling": BLUE,
+    "unified, mean": ORANGE,
+    "no coupling, mean": "#5b3f8f",
+    "geometric": GREEN,
+    "geometric, published gains": "#8ecf9b",
+    "geometric, mean": BROWN,
+    "cascade, one rate": GREY,
+    "cascade, no rate derivative": "#3a3a3a",
+    "cascade, filter of 5 ms scaled": "#6f4f28",
+    "cascade, filter of 1 ms scaled": "#c9a66b",
+    "cascade, no velocity integral": "#b0b0b0",
+    "unified, predictor": PURPLE,
+    "no coupling, predictor": BROWN,
+    "mean, predictor": GREEN,
+    "unified, paper's gains": RED,
+    "unified, tuned for 10 ms": ORANGE,
+    "unified, tuned for its period": BLUE,
+    "unified, mean, tuned for 10 ms": PURPLE,
+    "unified, mean, tuned for its period": BROWN,
+    "geometric, tuned for 10 ms": "#5b3f8f",
+    "geometric, tuned for its period": GREEN,
+    "cascade, one rate, tuned for 10 ms": "#b0b0b0",
+    "cascade, one rate, tuned for its period": GREY,
+}
+"""Of controllers, the same in every figure"""
 
 
 @cache
@@ -57,94 +89,26 @@ def kept(name: str) -> Any:
 
 
 def fly_all(name: str) -> Any:
-    """Fly a comparison whole, and keep what comes of it."""
-    import pandas as pd
-
+    """Fly what is missing of a comparison, and keep what comes of it."""
     began, comparison = time.perf_counter(), loaded(name)
-    paths = {fmu: str(path) for fmu, path in comparison.study.files().fmus.items()}  # built here, once
-    cells = [cell.index for cell in comparison.cells()]
-    parts = []
-    with ProcessPoolExecutor(WORKERS, get_context("spawn")) as pool:
-        for done, part in enumerate(pool.map(cell_flown, [name] * len(cells), cells, [paths] * len(cells)), 1):
-            parts.append(part)
-            print(f"\r{name}: {done} of {len(cells)} cells", end="", file=sys.stderr)
-    table = frame_of(comparison, [run for part in parts for run in part])
-    known = bandwidths(comparison)
-    found = as_json(comparison, concluded(comparison, table, known), known)
+    flown = compare(comparison, folder=RESULTS / name, workers=WORKERS, engine="batch", figures=False)
+    found, table = as_json(comparison, flown.outcome, flown.bandwidths), flown.table
+    minutes = round((time.perf_counter() - began) / 60.0, 1)
     content = {
         "flights": len(table),
-        "minutes": round((time.perf_counter() - began) / 60.0, 1),
+        "minutes": minutes if flown.summary.flown else kept(name)["minutes"],
         "cells": [_short(cell, table[table["design_index"].isin(comparison.runs_of(comparison.cell(cell["cell"])))],
                          comparison) for cell in found["cells"]],
         "limits": found["limits"],
         "fronts": [_point(point) for point in found["fronts"]],
     }  # fmt: skip
-    assert isinstance(table, pd.DataFrame)
     DATA.mkdir(exist_ok=True)
     (DATA / f"{name}.json").write_text(_compact(content), encoding="utf-8")
     return kept(name)
 
 
-def cell_flown(name: str, index: int, paths: dict[str, str]) -> list[tuple[int, Any]]:
-    """All runs of a cell, by their number in the study."""
-    comparison = loaded(name)
-    runs = comparison.runs_of(comparison.cell(index))
-    return [*zip(runs, (_batches().metrics(systems_of(comparison, index, paths))), strict=True)]
-
-
-def systems_of(comparison: Comparison, index: int, paths: dict[str, str]) -> list[System]:
-    """Its systems: that of the first run, from every start."""
-    runs = comparison.runs_of(comparison.cell(index))
-    first = comparison.study.system(runs[0], _starts(tuple(paths.items())))
-    components = {key: replace(each, fmu=paths[each.fmu]) for key, each in first.components.items()}
-    plant = components["plant"]
-    return [
-        replace(
-            first,
-            seed=comparison.base.seed + comparison.starts.first + i,
-            components={**components, "plant": replace(plant, parameters={**plant.parameters, **_of_plant(start)})},
-        )
-        for i, start in enumerate(comparison.drawn)
-    ]
-
-
-def _of_plant(start: Start) -> dict[str, Any]:
-    return {target.removeprefix("plant."): value for target, value in start.values.items()}
-
-
-@cache
-def _starts(paths: tuple[tuple[str, str], ...]) -> dict[str, float]:
-    """Start values of the plant's parameters, which conditions multiply."""
-    (plant,) = (path for name, path in paths if name.endswith("QuadrotorPlant"))
-    return {
-        f"plant.{variable.name}": float(variable.start)
-        for variable in read_model(Path(plant)).variables.values()
-        if variable.kind == "Real" and variable.causality == "parameter" and variable.start is not None
-    }
-
-
-class _Lanes:
-    """The batches of this process."""
-
-    def __init__(self) -> None:
-        self._batches = batches.Batches()
-
-    def metrics(self, systems: list[System]) -> Iterator[Any]:
-        """Of systems whose FMUs are files; what lanes leave is flown alone."""
-        for system, flown in zip(systems, self._batches.run(systems), strict=True):
-            yield run(system).metrics if flown is None else flown.metrics
-
-
-@cache
-def _batches() -> _Lanes:
-    return _Lanes()
-
-
 def _short(cell: dict[str, Any], rows: Any, comparison: Comparison) -> dict[str, Any]:
     """A cell as it is kept: counts, medians with their intervals, and counts by the size of the initial error."""
-    from orchestration.comparison.cells import sizes
-    from orchestration.comparison.fates import FATES, SETTLING, survived
-
     bins = (sizes(comparison, rows) * BINS).astype(int).clip(upper=BINS - 1)
     alive, settling = survived(rows), rows[SETTLING].to_numpy(float)
     counts = ("cell", "vehicle", "condition", "controller", "value", "count", "survives", "settles", "diverged")
@@ -213,43 +177,73 @@ def _numbers(median: list[float | None]) -> str:
 
 def figures() -> Iterator[tuple[str, Figure]]:
     """All figures of the comparisons that were flown, by their names."""
-    at_one_rate, inner = kept("periods"), kept("fast_inner")
-    yield "comparison_basins", charts.basins([*at_one_rate["cells"], *inner["cells"]], {FAST_INNER: 20.0})
-    ends = [*_limits(at_one_rate), *_limits(inner, 20.0)]
-    yield "comparison_limits", charts.limits(ends, 600.0, "period [ms], of the outer loops")
-    tuned = kept("tuned")
-    both = [*tuned["cells"], *kept("tuned_mean")["cells"]]
-    yield "comparison_tuned", charts.shares({"paper's body": both}, "period [ms]")
-    for name, content, values in (
-        ("fronts", at_one_rate, (0.02, 0.05, 0.08)),
-        ("tuned_fronts", tuned, (0.01, 0.05, 0.1)),
-    ):
-        names = list(dict.fromkeys(cell["controller"] for cell in content["cells"]))
-        yield f"comparison_{name}", charts.fronts(content["fronts"], values, charts.colored(names))
-    yield "comparison_delays", charts.shares({"period of 20 ms": kept("delays")["cells"]}, "delay [ms]")
-    yield "comparison_mismatches", charts.shares(_by("condition", kept("mismatches")), "period [ms]")
-    yield (
-        "comparison_inertias",
-        charts.shares(_by("condition", kept("inertias")), "inertia, times the one believed [1]", 1.0),
-    )
-    yield "comparison_vehicles", charts.shares(_by("vehicle", kept("vehicles")), "period [ms]")
-    yield (
-        "comparison_losses",
-        charts.shares({"period of 20 ms": kept("losses")["cells"]}, "share of messages lost [1]", 1.0),
-    )
-    yield "comparison_jitters", charts.shares({"period of 50 ms": kept("jitters")["cells"]}, "jitter [ms]")
+    outer = Quantity(name="period", unit="ms", factor=1e3)  # of the outer loops
+    by_size = dict([*_by_size("periods"), *_by_size("fast_inner", RATES)])
+    tall = replace(DOCS, width=280.0, height=260.0)
+    yield "comparison_basins", pictures.basins(by_size, outer, "survive", "paper's body", tall)
+    reaches = [*_reaches("periods"), *_reaches("fast_inner", RATES)]
+    yield "comparison_limits", pictures.limits_of(reaches, outer, True, WIDE)
+    yield "comparison_tuned", _shares({"paper's body": [*_cells("tuned"), *_cells("tuned_mean")]}, "tuned")
+    yield "comparison_fronts", _fronts("periods", (0.02, 0.05, 0.08))
+    yield "comparison_tuned_fronts", _fronts("tuned", (0.01, 0.05, 0.1))
+    for name, title in (("delays", "period of 20 ms"), ("losses", "period of 20 ms"), ("jitters", "period of 50 ms")):
+        yield f"comparison_{name}", _shares({title: _cells(name)}, name)
+    for name, key in (("mismatches", "condition"), ("inertias", "condition"), ("vehicles", "vehicle")):
+        cells = _cells(name)
+        titles = dict.fromkeys(getattr(cell, key) for cell in cells)
+        by = {title: [cell for cell in cells if getattr(cell, key) == title] for title in titles}
+        yield f"comparison_{name}", _shares(by, name)
 
 
-def _limits(content: Any, factor: float = 1.0) -> Iterator[tuple[str, Any, Any, float]]:
-    """Half and nine in ten of each controller, with the factor on the axis."""
-    settling = [one for one in content["limits"] if one["fate"] == "settle"]
-    for half, most in zip(settling[::2], settling[1::2], strict=True):
-        yield half["controller"], half, most, factor
+def _axis(name: str) -> Quantity:
+    known = {"inertias": "inertia, times the one believed", "losses": "share of messages lost"}
+    return Quantity(name=known[name], unit="1") if name in known else quantity_of(loaded(name).axis, {})
 
 
-def _by(key: str, content: Any) -> dict[str, Any]:
-    titles = dict.fromkeys(cell[key] for cell in content["cells"])
-    return {title: [cell for cell in content["cells"] if cell[key] == title] for title in titles}
+def _shares(found: Mapping[str, Sequence[CellSummary]], name: str) -> Figure:
+    return pictures.shares(found, _axis(name), COLORS, WIDE)
+
+
+def _fronts(name: str, values: Sequence[float]) -> Figure:
+    front, points = loaded(name).front, [*map(_read_point, kept(name)["fronts"])]
+    metrics = (labels.metric_with_unit(front.effort, "N.m"), labels.metric_with_unit(front.error, "m"))
+    return pictures.fronts_of(points, values, _axis(name), metrics, COLORS, "paper's body", WIDE)
+
+
+def _cells(name: str) -> list[CellSummary]:
+    """As they are kept, without medians."""
+    return [
+        CellSummary(
+            **{key: cell[key] for key in ("cell", "vehicle", "condition", "controller", "value", "count")},
+            **{key: cell[key] for key in ("diverged", "diverged_late")},
+            survives=Share.of(cell["survives"], cell["count"]),
+            settles=Share.of(cell["settles"], cell["count"]),
+            medians={},
+        )
+        for cell in kept(name)["cells"]
+    ]
+
+
+def _by_size(name: str, factor: float = 1.0) -> Iterator[tuple[str, pictures.BySize]]:
+    """Of each controller values of the axis, with a factor on them, and the shares that survive."""
+    for controller, group in groupby(kept(name)["cells"], lambda cell: cell["controller"]):
+        cells = [*group]
+        share = np.array([[alive / count for alive, count in cell["by_size"]["survive"]] for cell in cells])
+        yield controller, ([factor * cell["value"] for cell in cells], share.T)
+
+
+def _reaches(name: str, factor: float = 1.0) -> Iterator[Reach]:
+    """How far each controller goes, with a factor on the axis, which is none on the attitude loop's period."""
+    last = factor * float(loaded(name).values[-1])
+    for controller, group in groupby(kept(name)["limits"], lambda one: one["controller"]):
+        limits = [Limit(**{**one, **{key: one[key] and factor * one[key] for key in ("value", "low", "high")},
+                           "bandwidth": one["bandwidth"] if factor == 1.0 else None}) for one in group]  # fmt: skip
+        yield Reach(name=controller, limits=limits, last=last)
+
+
+def _read_point(point: dict[str, Any]) -> Point:
+    medians = {key: Median(**dict(zip(("value", "low", "high"), point[key]))) for key in ("error", "effort")}
+    return Point(**{**point, **medians})
 
 
 if __name__ == "__main__":

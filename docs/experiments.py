@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from fmu_kit.trajectory import Trajectory
+from orchestration.basics.statistics import first_end
 from orchestration.quadrotor.scenario import FmuChoice, Scenario
 from orchestration.system.model import Parameter
 
@@ -56,8 +57,7 @@ def first_ends(flew: Array) -> Array:
 
     `flew` has the periods along its last axis.
     """
-    failed = np.concatenate([~flew, np.ones((*flew.shape[:-1], 1), bool)], axis=-1)
-    return np.concatenate([[0.0], PERIODS])[failed.argmax(axis=-1)]
+    return np.apply_along_axis(lambda one: first_end(PERIODS, one) or 0.0, -1, flew)
 
 
 def some_flights(number: int) -> list[Scenario]:

@@ -22,7 +22,7 @@ import pandas as pd
 
 from docs import charts, comparisons, experiments, theory
 from docs.experiments import PAPER
-from orchestration.basics.statistics import quantile, wilson
+from orchestration.basics.statistics import first_end, quantile, wilson
 from orchestration.building.inputs import files_of
 from orchestration.figures.style import DOCS, save
 from orchestration.flight.hover_loop import HoverLoop
@@ -90,7 +90,7 @@ def _processor_time() -> float:
 
 def compared() -> list[str]:
     """Controllers from the same starts: limits and cells of every comparison."""
-    found = {name: kept(f"compared_{name}", partial(comparisons.fly_all, name)) for name in comparisons.NAMES}
+    found = {name: comparisons.fly_all(name) for name in comparisons.NAMES}
     pictures()
     return [line for name, content in found.items() for line in comparisons.lines(name, content)]
 
@@ -431,13 +431,8 @@ def flying_up_to(table: pd.DataFrame, by: str, axis: str) -> list[str]:
 
 def _first_ends(table: pd.DataFrame, by: str, axis: str) -> Any:
     """For each value of `by`, upward, the last value along `axis` before the first that does not fly; nan: none."""
-    ends = []
-    for _, group in table.groupby(by, sort=True):
-        ordered = group.sort_values(axis)
-        flew, along = figures.flew(ordered).to_numpy(), ordered[axis].to_numpy(float)
-        first = len(flew) if flew.all() else int((~flew).argmax())
-        ends.append(along[first - 1] if first else np.nan)
-    return np.array(ends)
+    groups = table.sort_values(axis).groupby(by, sort=True)
+    return np.array([first_end(group[axis], figures.flew(group)) for _, group in groups], float)
 
 
 def _fell(table: pd.DataFrame) -> pd.Series:

@@ -1,7 +1,7 @@
 """What a number of trials says about a share: its interval, and what it refutes."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from statistics import NormalDist
 from typing import NamedTuple
 
@@ -82,3 +82,13 @@ def refutes(successes: int, trials: int, share: float, confidence: float) -> boo
     """
     tail = sum(math.comb(trials, k) * share**k * (1.0 - share) ** (trials - k) for k in range(successes + 1))
     return tail <= 1.0 - confidence
+
+
+def first_end(values: Iterable[float], holds: Iterable[bool]) -> float | None:
+    """Of values that grow, the last before the first at which something does not hold; None: it is the first of all."""
+    end = None
+    for value, here in zip(values, holds):
+        if not here:
+            break
+        end = value
+    return end

@@ -3,10 +3,9 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import takewhile
 from typing import TYPE_CHECKING, Any
 
-from orchestration.basics.statistics import Estimate, quantile
+from orchestration.basics.statistics import Estimate, first_end, quantile
 from orchestration.comparison.bandwidth import Bandwidths
 from orchestration.comparison.design import CONDITION, CONTROLLER, START, VEHICLE, Comparison
 from orchestration.comparison.fates import FATES
@@ -69,8 +68,7 @@ def first_ends(comparison: Comparison, rows: "pd.DataFrame", has: "Fate") -> Seq
     """For each start the last value before the first at which it has not that fate; 0 if it never has."""
     cube = rows.assign(has=has(rows)).pivot(index=START, columns=comparison.axis.name, values="has")
     values = [float(value) for value in cube.columns]
-    before = (takewhile(lambda pair: pair[1], zip(values, row)) for row in cube.to_numpy())
-    return [max((value for value, _ in those), default=0.0) for those in before]
+    return [first_end(values, row) or 0.0 for row in cube.to_numpy()]
 
 
 def _at(bandwidths: Bandwidths, controller: str, vehicle: str, value: float, comparison: Comparison) -> float | None:

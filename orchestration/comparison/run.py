@@ -118,8 +118,13 @@ def compare(
     )
 
 
-def cell_again(comparison: Comparison, index: int, *, workers: int = 1, engine: Engine | None = None) -> CellSummary:
-    """Fly all runs of one cell, whatever a store has of it; raises `UsageError` for a cell that there is not."""
+def cell_again(
+    comparison: Comparison, index: int, *, workers: int = 1, engine: Engine | None = None, in_lanes: bool = False
+) -> CellSummary:
+    """Fly all runs of one cell, whatever a store has of it, by native FMUs many at once if they are to fly `in_lanes`.
+
+    Raises `UsageError` for a cell that there is not.
+    """
     cell, study = comparison.cell(index), comparison.study
     files = study.files()
     starts, runs = files.starts_of(study.origin), comparison.runs_of(cell)
@@ -127,7 +132,7 @@ def cell_again(comparison: Comparison, index: int, *, workers: int = 1, engine: 
         systems = [study.system(i, starts) for i in runs]
         checked(systems[0], files.models_of(systems[0]))
     with Pool(files, workers, engine) as pool:
-        flights = pool.fly_all(systems)
+        flights = pool.fly_all(systems, in_lanes=in_lanes)
     (found,) = results(comparison, frame_of(comparison, zip(runs, flights)))
     return found
 

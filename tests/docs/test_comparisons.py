@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from docs import comparisons
-from orchestration.comparison.cells import frame_of, results
+from orchestration.comparison.run import cell_again
 
 PAGES = sorted((Path(comparisons.__file__).parent / "findings").glob("*.md"))
 FLOWN = sorted(path.stem for path in comparisons.DATA.glob("*.json"))
@@ -18,6 +18,11 @@ def test_every_comparison_of_the_pages_is_kept_and_said_how_to_fly() -> None:
     assert sorted(comparisons.NAMES) == FLOWN
     text = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
     assert {*re.findall(r"quadcosim compare studies/comparisons/(\w+)\.toml", text)} >= {*FLOWN}
+
+
+def test_every_picture_of_a_comparison_is_drawn_from_what_is_kept() -> None:
+    shown = {path.stem for path in (Path(comparisons.__file__).parent / "figures").glob("comparison_*.png")}
+    assert {name for name, _ in comparisons.figures()} == shown
 
 
 @pytest.mark.parametrize("name", FLOWN)
@@ -35,11 +40,8 @@ def test_every_cell_of_a_map_is_one_of_its_file(name: str) -> None:
 def test_one_cell_in_a_hundred_is_what_is_flown_again(name: str) -> None:
     """What `quadcosim compare studies/comparisons/NAME.toml --cell K` flies, here in lanes."""
     comparison, kept = comparisons.loaded(name), comparisons.kept(name)["cells"]
-    paths = {fmu: str(path) for fmu, path in comparison.study.files().fmus.items()}
     for cell in random.Random(name).sample(kept, math.ceil(len(kept) / 100)):
-        runs = comparisons.cell_flown(name, cell["cell"], paths)
-        (found,) = results(comparison, frame_of(comparison, runs))
-        row = found.row("value")
+        row = cell_again(comparison, cell["cell"], in_lanes=True).row("value")
         for key in ("count", "survives", "settles", "diverged", "diverged_late"):
             assert row[key] == cell[key], key
         for key in comparisons.TOLD:

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom
 
-from orchestration.basics.statistics import quantile, refutes, wilson
+from orchestration.basics.statistics import first_end, quantile, refutes, wilson
 from quadcosim import UsageError
 
 
@@ -81,3 +81,9 @@ def test_few_values_bound_nothing_and_many_cover_what_they_should() -> None:
 def test_numbers_that_cannot_be_are_told(seen: int, trials: int, level: float) -> None:
     with pytest.raises(UsageError, match="expected"):
         wilson(seen, trials, level)
+
+
+def test_what_holds_again_beyond_its_first_end_does_not_move_it() -> None:
+    assert first_end([0.1, 0.2, 0.3], [True, False, True]) == 0.1
+    assert first_end([0.1, 0.2], [True, True]) == 0.2
+    assert first_end([0.1, 0.2], [False, True]) is None
