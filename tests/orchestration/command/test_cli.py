@@ -144,8 +144,8 @@ def test_run_prints_all_metrics_as_json_and_nothing_else() -> None:
     assert {**printed, "wall_time": None} == flown()
 
 
-def test_run_prints_every_metric_on_a_line() -> None:
-    lines = quadcosim("run", *SHORT).stdout.splitlines()
+def test_run_prints_every_metric_on_a_line(main: Main) -> None:
+    lines = main("run", *SHORT).stdout.splitlines()
     assert {line.split()[0] for line in lines} == KEYS
 
 
@@ -231,8 +231,8 @@ def test_flags_go_before_the_scenario_file(main: Main, here: Path) -> None:
     assert scenario.plant.parameters == {"mass": 1.1}
 
 
-def test_out_keeps_the_run_and_its_figures(here: Path) -> None:
-    done = quadcosim("run", *SHORT, "--json", "--out", "results/first")
+def test_out_keeps_the_run_and_its_figures(main: Main, here: Path) -> None:
+    done = main("run", *SHORT, "--json", "--out", "results/first")
     printed = json.loads(done.stdout)
     kept, notes = (
         json.loads((here / "results/first" / name).read_text()) for name in ("metrics.json", "provenance.json")
@@ -247,7 +247,7 @@ def test_out_keeps_the_run_and_its_figures(here: Path) -> None:
 def test_plot_zooms_on_a_window(main: Main, here: Path) -> None:
     save_run(run(Scenario(stop_time=0.5)), here / "run")
     before = (here / "run" / "commands.png").read_bytes()
-    done = quadcosim("plot", "run", "--from", "0.1", "--to", "0.2")
+    done = main("plot", "run", "--from", "0.1", "--to", "0.2")
     assert {Path(line).name for line in done.stdout.splitlines()} == {f"{name}.png" for name in FLIGHT}
     assert (here / "run" / "commands.png").read_bytes() != before
     for start, end in (("0.2", "0.1"), ("50", "60"), ("0.5", "0.6"), ("-1", "0.1"), ("0.1", "inf"), ("nan", "0.1")):
@@ -285,7 +285,7 @@ def test_ctrl_c_ends_a_flight_with_one_line_and_130(here: Path, out: list[str]) 
 
 def test_divergence_is_a_result(main: Main) -> None:
     diverging = ("run", "--stop-time", "2", "--period", "0.3")
-    done = quadcosim(*diverging)
+    done = main(*diverging)
     assert "diverged: norm(plant.angular_velocity) = " in done.stdout
     assert "Traceback" not in done.stderr
     printed = json.loads(main(*diverging, "--json").stdout)
@@ -304,9 +304,9 @@ def test_divergence_is_a_result(main: Main) -> None:
         (["controller.gain.translation.x=1e308"], "controller (UnifiedController): fmi2GetReal: ", 0.0),
     ],
 )
-def test_an_fmu_that_says_it_diverged_gives_a_result(parameters: list[str], text: str, time: float) -> None:
+def test_an_fmu_that_says_it_diverged_gives_a_result(parameters: list[str], text: str, time: float, main: Main) -> None:
     flags = [flag for parameter in parameters for flag in ("--set", parameter)]
-    done = quadcosim("run", *SHORT, *flags)
+    done = main("run", *SHORT, *flags)
     assert f"diverged: {text}" in done.stdout
     assert "expected a finite value" in done.stdout
     assert f"divergence_time         {time:g}" in done.stdout
@@ -316,7 +316,7 @@ def test_an_fmu_that_says_it_diverged_gives_a_result(parameters: list[str], text
 def test_a_run_paused_and_resumed_is_the_same_run(main: Main, here: Path) -> None:
     lossy = ("run", "--loss", "0.1", "--delay", "0.015", *SHORT)
     assert main(*lossy, "--pause-at", "0.2", "--out", "paused").stdout == ""
-    resumed = quadcosim("run", "--resume", "paused", "--json", "--out", "whole", "--no-figures")
+    resumed = main("run", "--resume", "paused", "--json", "--out", "whole", "--no-figures")
     assert json.loads(resumed.stdout)["steps"] == 500
     timing = Timing(measurement_loss=0.1, command_loss=0.1, delay=0.015)
     expected = run(Scenario(stop_time=0.5, timing=timing))
@@ -441,16 +441,16 @@ def test_debug_shows_where(main: Main, parameter: str, code: int, text: str) -> 
 # -- build and validate -----------------------------------------------------------------------------------
 
 
-def test_build_writes_all_fmus_where_it_is_told(here: Path) -> None:
-    done = quadcosim("build", "--out", "mine")
+def test_build_writes_all_fmus_where_it_is_told(here: Path, main: Main) -> None:
+    done = main("build", "--out", "mine")
     assert {Path(line).resolve() for line in done.stdout.splitlines()} == {
         here.resolve() / "mine" / f"{model}.fmu" for model in MODELS
     }
     assert len(list((here / "mine").iterdir())) == len(MODELS)
 
 
-def test_validate_finds_nothing_wrong_with_an_fmu(built: dict[str, Path]) -> None:
-    assert quadcosim("validate", built["QuadrotorPlant"]).stdout.count(": no problems found") == 1
+def test_validate_finds_nothing_wrong_with_an_fmu(built: dict[str, Path], main: Main) -> None:
+    assert main("validate", built["QuadrotorPlant"]).stdout.count(": no problems found") == 1
 
 
 def test_validate_takes_all_fmus_of_the_project_unless_told(main: Main) -> None:
@@ -470,8 +470,8 @@ def damaged(fmu: Path, path: Path) -> Path:
     return path
 
 
-def test_validate_ends_with_1_for_a_damaged_fmu(built: dict[str, Path], here: Path) -> None:
-    done = quadcosim("validate", damaged(built["QuadrotorPlant"], here / "damaged.fmu"), code=1)
+def test_validate_ends_with_1_for_a_damaged_fmu(built: dict[str, Path], here: Path, main: Main) -> None:
+    done = main("validate", damaged(built["QuadrotorPlant"], here / "damaged.fmu"), code=1)
     assert "damaged.fmu" in done.stdout + done.stderr
     assert "Traceback" not in done.stderr
 

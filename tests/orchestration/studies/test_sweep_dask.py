@@ -105,7 +105,12 @@ def test_a_scheduler_that_is_not_there_is_one_line(tmp_path: Path, address: str,
     with pytest.raises(QuadcosimError, match=rf"--dask {address}: {said}") as caught:
         sweep(study(PERIODS), folder=tmp_path, dask=address)
     one_line(caught.value)
-    assert sweep(study(PERIODS), folder=tmp_path).flown == 2, "expected the store to be of use still"
+
+
+def test_the_store_is_of_use_after_a_scheduler_that_was_not_there(tmp_path: Path) -> None:
+    with pytest.raises(QuadcosimError, match="--dask nonsense: "):
+        sweep(study(PERIODS), folder=tmp_path, dask="nonsense")
+    assert sweep(study(PERIODS), folder=tmp_path).flown == 2
 
 
 @pytest.mark.usefixtures("impatient")

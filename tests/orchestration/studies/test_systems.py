@@ -25,7 +25,8 @@ from orchestration.studies.table import frame
 from orchestration.system.model import Criterion, System
 from orchestration.system.paths import changed
 from quadcosim import Scenario, Timing, UsageError, run
-from tests.orchestration.studies.common import bits, error_line, one_line, quadcosim
+from tests.commands import Main
+from tests.orchestration.studies.common import bits, error_line, one_line
 
 FILE = Path(__file__).resolve().parents[3] / "examples" / "double_integrator" / "system.toml"
 PERIOD, DELAY = "components.controller.sampling.period", "connections.command.delay"
@@ -272,10 +273,10 @@ def test_a_system_without_a_criterion_has_no_limit(system: System) -> None:
         find(dataclasses.replace(system, criterion=Criterion()), DELAY, first=0.0, last=1.0)
 
 
-def test_the_command_prints_the_limit_of_a_path_as_json(tmp_path: Path) -> None:
+def test_the_command_prints_the_limit_of_a_path_as_json(main: Main) -> None:
     options = ["--of", DELAY, "--from", "0", "--to", "4", "--scan", "2", "--tolerance", "1", "--set", "stop_time=10"]
-    found = json.loads(quadcosim("limit", FILE, *options, "--json", cwd=tmp_path).stdout)
+    found = json.loads(main("limit", FILE, *options, "--json").stdout)
     assert (found["of"], found["scan"], found["tolerance"]) == (DELAY, 2.0, 1.0)
     assert {"local_limit", "large_signal_limit", "confidence", "local_method"} <= found.keys()
-    line = error_line(quadcosim("limit", FILE, "--of", "connections.command.dely", cwd=tmp_path, code=2))
+    line = error_line(main("limit", FILE, "--of", "connections.command.dely", code=2))
     assert "did you mean delay?" in line

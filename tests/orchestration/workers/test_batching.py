@@ -15,8 +15,9 @@ from orchestration.studies.sweep import AGREEMENT, sweep
 from orchestration.workers.batching import SAMPLE, Agreement, chunks, sample
 from orchestration.workers.pool import Package, Pilot
 from orchestration.workers.task import Chunk, Task
+from tests.commands import Main
 from tests.orchestration.fmi.small import needs_compiler, small
-from tests.orchestration.studies.common import NOISY, RUNS, axis, bits, quadcosim, short, study, swept
+from tests.orchestration.studies.common import NOISY, RUNS, axis, bits, short, study, swept
 
 pytestmark = needs_compiler
 OWN = ("duration", "machine")
@@ -91,11 +92,12 @@ def test_a_system_without_lanes_is_refused_before_anything_is_flown(tmp_path: Pa
     assert not (tmp_path / "out" / "study.sqlite").exists()
 
 
-def test_the_command_says_how_far_they_agree(tmp_path: Path) -> None:
+def test_the_command_says_how_far_they_agree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, main: Main) -> None:
+    monkeypatch.chdir(tmp_path)
     noisy(tmp_path)
-    done = quadcosim("sweep", "study.toml", "--engine", "batch", cwd=tmp_path)
+    done = main("sweep", "study.toml", "--engine", "batch")
     assert "8 runs flown by FMUs too: largest relative difference" in done.stdout
-    assert done.stdout.splitlines()[-1] in quadcosim("status", "study.toml", cwd=tmp_path).stdout
+    assert done.stdout.splitlines()[-1] in main("status", "study.toml").stdout
 
 
 def test_a_difference_names_run_and_metric() -> None:
