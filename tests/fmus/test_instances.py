@@ -5,10 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.building.models import MODELS
 from tests.fmus.expected import law_command
 from tests.fmus.instance import Instance
-from tests.fmus.making import Making
+from tests.fmus.making import PAIR, Making
 from tests.fmus.process import run_script
 from tests.fmus.source_tree import build, copy_sources, replace
 
@@ -24,7 +23,7 @@ def test_two_instances_of_both_fmus_at_once_fly_as_if_alone(
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="memory is read from /proc, which is Linux's")
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", PAIR)
 def test_instances_one_after_another_leave_path_and_memory_as_they_were(
     model: str, making: Making, built: dict[str, Path]
 ) -> None:
