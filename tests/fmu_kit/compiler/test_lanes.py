@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from fmu_kit import libraries
 from fmu_kit.bundle import PackagingError, Target
 from fmu_kit.compiler.emit.c_code import ERRORS
 from fmu_kit.compiler.emit.standards import STANDARDS
 from fmu_kit.compiler.pack.building import c_sources, modules_of
-from fmu_kit.compiler.pack.c_compiler import compiled_here
+from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, OPTIONS
 from fmu_kit.compiler.pack.lanes import compiled_lanes, lanes_here
 from fmu_kit.compiler.passes.precomputing import precomputed
 from fmu_kit.compiler.trace.tracing import trace
@@ -22,7 +23,7 @@ from orchestration.building import fmus
 from orchestration.building.models import MODELS
 from tests.fmu_kit.compiler.compiled import compiler
 from tests.fmu_kit.compiler.in_lanes import Alone, Together, Values, bits
-from tests.fmu_kit.compiler.twins import GUID
+from tests.fmu_kit.compiler.twins import GUID, compiled
 
 PROBES = {"Arithmetic": 4, "Branches": 8, "Integers": 8, "Kept": 4, "Loops": 4, "Memory": 1}
 """Slaves that do what slaves may do, and in how many lanes"""
@@ -51,13 +52,20 @@ def _given(rng: np.random.Generator, variables: list[Variable], causality: str, 
     }
 
 
+def in_lanes(sources: dict[str, bytes], lanes: int, folder: Path) -> None:
+    """The sources as `lanes.so`, which is that of the engine where it has the same in as many lanes."""
+    how = (OPTIONS, FOR_THIS_PROCESSOR, lanes)
+    content = libraries.content("lanes", sources, how, lambda: compiled_lanes(sources, lanes))
+    (folder / "lanes.so").write_bytes(content)
+
+
 @pytest.mark.parametrize("model", MODELS)
 def test_in_a_lane_are_the_bits_of_the_fmu(model: str, tmp_path: Path) -> None:
     compiler("cc")
     path = Path(fmpy.extract(str(fmus.locate(f"native/{model}")), str(tmp_path)))
     guid = fmpy.read_model_description(str(path)).guid
     sources = {file.name: file.read_bytes() for file in (path / "sources").iterdir()}
-    (tmp_path / "lanes.so").write_bytes(compiled_lanes(sources, 8))
+    in_lanes(sources, 8, tmp_path)
     target = Target.parse(MODELS[model])
     shutil.copy(path / "binaries" / fmpy.platform / f"{model}.so", tmp_path / "alone.so")
     may_diverge = {DIVERGENCE} if model in ("QuadrotorPlant", "UnifiedController") else set()
@@ -68,9 +76,9 @@ def test_in_a_lane_are_the_bits_of_the_fmu(model: str, tmp_path: Path) -> None:
 def test_whatever_a_slave_does_it_does_in_lanes(name: str, tmp_path: Path) -> None:
     compiler("cc")
     target = Target.parse(f"tests.fmu_kit.compiler.probes:{name}")
-    sources = c_sources(precomputed(trace(slave_class(target), modules_of(target))), GUID, STANDARDS[2])
-    (tmp_path / "alone.so").write_bytes(compiled_here(sources, STANDARDS[2].main))
-    (tmp_path / "lanes.so").write_bytes(compiled_lanes(sources, PROBES[name]))
+    program = precomputed(trace(slave_class(target), modules_of(target)))
+    compiled(program, tmp_path / "alone.so", "own")
+    in_lanes(c_sources(program, GUID, STANDARDS[2]), PROBES[name], tmp_path)
     assert _come_to(tmp_path, target, GUID) > {0}
 
 

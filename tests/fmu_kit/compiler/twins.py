@@ -1,5 +1,6 @@
 """A slave in Python and the same one compiled, called alike: what they answer, to the last bit."""
 
+import functools
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,12 +10,13 @@ from typing import Any
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
+from fmu_kit import libraries
 from fmu_kit.bundle import Target
 from fmu_kit.compiler.emit.standards import STANDARDS
 from fmu_kit.compiler.pack.building import c_sources, modules_of
-from fmu_kit.compiler.pack.c_compiler import compiled_here
+from fmu_kit.compiler.pack.c_compiler import OPTIONS, Mathematics, compiled_here
 from fmu_kit.compiler.passes.precomputing import precomputed
-from fmu_kit.compiler.trace.tracing import trace
+from fmu_kit.compiler.trace.tracing import Program, trace
 from fmu_kit.packaging import slave_class
 from fmu_kit.slave import Slave
 from fmu_kit.variables import Variable
@@ -26,9 +28,14 @@ Answer = tuple[str, ...]
 
 def library(target: Target, folder: Path) -> Path:
     """The library of a slave that is written out as C, on the libm that CPython takes."""
-    program = precomputed(trace(slave_class(target), modules_of(target)))
-    path = folder / f"{target.model}.so"
-    path.write_bytes(compiled_here(c_sources(program, GUID, STANDARDS[2]), STANDARDS[2].main, mathematics="libm"))
+    return compiled(precomputed(trace(slave_class(target), modules_of(target))), folder / f"{target.model}.so", "libm")
+
+
+def compiled(program: Program, path: Path, mathematics: Mathematics) -> Path:
+    """The library of a traced slave, as FMI 2.0; one of the same sources is not compiled again."""
+    sources, main = c_sources(program, GUID, STANDARDS[2]), STANDARDS[2].main
+    compile_ = functools.partial(compiled_here, sources, main, mathematics=mathematics)
+    path.write_bytes(libraries.content("native", sources, (OPTIONS, main, mathematics), compile_))
     return path
 
 
