@@ -327,12 +327,13 @@ class Batch:
 
     def _begin(self, lane: int, system: System) -> None:
         """When the own time of each component begins, as `Master` has it: 0 unless it begins with a later sample."""
-        samplings = [component.sampling for component in system.components.values()]
+        waits = {name for name, model in self._shape.models.items() if model.waits}
+        samplings = [component.sampling for name, component in system.components.items() if name not in waits]
         is_late = any(sampling is not None and (sampling.offset or sampling.jitter) for sampling in samplings)
         first = Timetable(system, Streams(system.seed, system.streams)).first_samples if is_late else {}
         for index, name in enumerate(self._shape.names):
             ratio, sample = clock_of(system, name, first)
-            self._begins[index][lane] = 0.0 if self._shape.models[name].waits else ratio * sample
+            self._begins[index][lane] = 0.0 if name in waits else ratio * sample
 
     def _compute(self, index: int) -> Lanes:
         """The outputs of a component in initialisation mode; lanes in which that fails."""

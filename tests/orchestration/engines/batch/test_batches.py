@@ -136,6 +136,19 @@ def test_what_a_component_refuses_or_makes_infinite_is_left_to_be_flown_alone(fm
     assert found[3].metrics == alone.metrics
 
 
+def test_components_that_are_told_of_their_first_sample_need_no_timetable_to_begin(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Lanes whose samples come at random times would each draw all of them a second time."""
+
+    def drawn(*_: Any) -> None:
+        raise AssertionError("a timetable for the begin of a run")
+
+    monkeypatch.setattr("orchestration.engines.batch.batch.Timetable", drawn)
+    late = Scenario(timing=Timing(jitter=0.002), stop_time=0.05).as_system()
+    assert len(list(fly([replace(late, seed=seed) for seed in range(2)]))) == 2
+
+
 @pytest.mark.parametrize("lanes", [2, 4])
 def test_narrower_registers_give_the_same_bits(lanes: int, fmu: Path) -> None:
     first = replace(of(LOOP, fmu), objectives={"peak": "max(plant.y)", "rms": "rms(plant.y * controller.z)"})
