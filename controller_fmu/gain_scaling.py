@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 from fmu_kit.algebra import Inertia, Vec3
 from fmu_kit.scalar import Scalar
-from fmu_kit.variables import fixed_parameter
 
 
 class GainScaling(enum.IntEnum):
@@ -15,17 +14,6 @@ class GainScaling(enum.IntEnum):
     """torques [N·m] and [N·m·s]"""
     INERTIA = 2
     """angular accelerations [1/s²] and [1/s], which the nominal inertia matrix J makes torques of"""
-
-
-GAIN_SCALING = (
-    fixed_parameter(
-        "gain_scaling",
-        "of the attitude's gains: as they are, or per unit inertia (in 1/s2 and 1/s), times the inertia matrix; "
-        "energy is per unit inertia then, in 1/s2",
-        None,
-        GainScaling.ABSOLUTE,
-    ),
-)
 
 
 class Feedback(NamedTuple):

@@ -1,88 +1,80 @@
 """The variables that every controller FMU has; each law adds its own."""
 
+from controller_fmu.gain_scaling import GainScaling
+from fmu_kit.algebra import ZERO, Quaternion
+from fmu_kit.interface import FixedParameter, Input, Local, Output
+from fmu_kit.rigid_body import Body
+from fmu_kit.slave import Slave
 from fmu_kit.trajectory import Trajectory
-from fmu_kit.variables import (
-    INERTIA_AXES,
-    QUATERNION_AXES,
-    continuous_input,
-    discrete_local,
-    discrete_output,
-    fixed_parameter,
-    vector,
-)
 
-MEASUREMENT = (
-    *vector(continuous_input("position", "measured position P, inertial frame (north-east-down)", "m")),
-    *vector(continuous_input("velocity", "measured velocity V, inertial frame", "m/s")),
-    *vector(
-        continuous_input("quaternion", "measured attitude Q, inertial to body; all zero: no measurement", "1"),
-        QUATERNION_AXES,
-        (0.0, 0.0, 0.0, 1.0),
-    ),
-    *vector(
-        continuous_input("angular_velocity", "measured angular velocity, body frame (forward-right-down)", "rad/s")
-    ),
-)
+_BODY, _TRAJECTORY = Body(), Trajectory()
+_UPRIGHT, _NONE = Quaternion(ZERO, 1.0), Quaternion(ZERO, 0.0)
+_USED = "used when use_reference_inputs is true"
 
-REFERENCE = tuple(
-    variable
-    for derivative, unit in (
-        ("position", "m"),
-        ("velocity", "m/s"),
-        ("acceleration", "m/s2"),
-        ("jerk", "m/s3"),
-        ("snap", "m/s4"),
+
+class ControllerInterface(Slave):
+    """What makes one controller FMU exchangeable for another."""
+
+    position = Input("measured position P, inertial frame (north-east-down)", "m", ZERO)
+    velocity = Input("measured velocity V, inertial frame", "m/s", ZERO)
+    quaternion = Input("measured attitude Q, inertial to body; all zero: no measurement", "1", _UPRIGHT)
+    angular_velocity = Input("measured angular velocity, body frame (forward-right-down)", "rad/s", ZERO)
+
+    reference_position = Input(f"desired position, {_USED}", "m", ZERO, name="reference.position")
+    reference_velocity = Input(f"desired velocity, {_USED}", "m/s", ZERO, name="reference.velocity")
+    reference_acceleration = Input(f"desired acceleration, {_USED}", "m/s2", ZERO, name="reference.acceleration")
+    reference_jerk = Input(f"desired jerk, {_USED}", "m/s3", ZERO, name="reference.jerk")
+    reference_snap = Input(f"desired snap, {_USED}", "m/s4", ZERO, name="reference.snap")
+
+    thrust = Output("total thrust along -z of the body, held between samples", "N")
+    torque = Output("body torque, held between samples", "N.m", ZERO)
+
+    trajectory_amplitude_x = FixedParameter(
+        "a_x of [a_x sin wt cos wt, a_y sin wt, z0 + vz t]",
+        "m",
+        _TRAJECTORY.amplitude_x,
+        name="trajectory.amplitude_x",
     )
-    for variable in vector(
-        continuous_input(
-            f"reference.{derivative}", f"desired {derivative}, used when use_reference_inputs is true", unit
-        )
+    trajectory_amplitude_y = FixedParameter(
+        "a_y of the built-in trajectory", "m", _TRAJECTORY.amplitude_y, name="trajectory.amplitude_y"
     )
-)
+    trajectory_frequency = FixedParameter(
+        "w of the built-in trajectory", "rad/s", _TRAJECTORY.frequency, name="trajectory.frequency"
+    )
+    trajectory_start_z = FixedParameter(
+        "z0 of the built-in trajectory, positive down", "m", _TRAJECTORY.start_z, name="trajectory.start_z"
+    )
+    trajectory_rate_z = FixedParameter(
+        "vz of the built-in trajectory, positive down", "m/s", _TRAJECTORY.rate_z, name="trajectory.rate_z"
+    )
+    mass = FixedParameter("nominal mass m", "kg", _BODY.mass, above=0.0)
+    gravity = FixedParameter("nominal gravity g", "m/s2", _BODY.gravity, minimum=0.0)
+    inertia = FixedParameter("entry of the nominal inertia matrix J, body frame", "kg.m2", _BODY.inertia)
+    sample_period = FixedParameter(
+        "of the FMU's own clock; 0: sample at every communication point from sample_offset on", "s", 0.01, minimum=0.0
+    )
+    sample_offset = FixedParameter("time of the first sample of the FMU's own clock", "s", 0.0, minimum=0.0)
 
-COMMAND = (
-    discrete_output("thrust", "total thrust along -z of the body, held between samples", "N"),
-    *vector(discrete_output("torque", "body torque, held between samples", "N.m")),
-)
+    desired_quaternion = Local("desired attitude Q_d as of the last sample (12)", "1", _NONE)
+    position_error = Local("P - P_d as of the last sample, inertial frame", "m", ZERO)
+    velocity_error = Local("V - V_d as of the last sample, inertial frame", "m/s", ZERO)
+    attitude_error = Local("Q_d^-1 Q as of the last sample (8)", "1", _NONE)
+    angular_velocity_error = Local("angular velocity minus the desired one, body frame", "rad/s", ZERO)
 
-_TRAJECTORY = Trajectory()
+    sample_count = Local("number of samples since the start, initialisation not counted", None, 0)
+    use_reference_inputs = FixedParameter("true: follow reference.*; false: the built-in trajectory", start=False)
 
-COMMON_PARAMETERS = (
-    fixed_parameter(
-        "trajectory.amplitude_x", "a_x of [a_x sin wt cos wt, a_y sin wt, z0 + vz t]", "m", _TRAJECTORY.amplitude_x
-    ),
-    fixed_parameter("trajectory.amplitude_y", "a_y of the built-in trajectory", "m", _TRAJECTORY.amplitude_y),
-    fixed_parameter("trajectory.frequency", "w of the built-in trajectory", "rad/s", _TRAJECTORY.frequency),
-    fixed_parameter("trajectory.start_z", "z0 of the built-in trajectory, positive down", "m", _TRAJECTORY.start_z),
-    fixed_parameter("trajectory.rate_z", "vz of the built-in trajectory, positive down", "m/s", _TRAJECTORY.rate_z),
-    fixed_parameter("mass", "nominal mass m", "kg", 1.0, above=0.0),
-    fixed_parameter("gravity", "nominal gravity g", "m/s2", 9.81, minimum=0.0),
-    *vector(
-        fixed_parameter("inertia", "entry of the nominal inertia matrix J, body frame", "kg.m2", 0.0),
-        INERTIA_AXES,
-        (1.0, 1.0, 1.0, 0.0, 0.0, 0.0),
-    ),
-    fixed_parameter(
-        "sample_period",
-        "of the FMU's own clock; 0: sample at every communication point from sample_offset on",
-        "s",
-        0.01,
-        minimum=0.0,
-    ),
-    fixed_parameter("sample_offset", "time of the first sample of the FMU's own clock", "s", 0.0, minimum=0.0),
-)
 
-COMMON_LOCALS = (
-    *vector(
-        discrete_local("desired_quaternion", "desired attitude Q_d as of the last sample (12)", "1"), QUATERNION_AXES
-    ),
-    *vector(discrete_local("position_error", "P - P_d as of the last sample, inertial frame", "m")),
-    *vector(discrete_local("velocity_error", "V - V_d as of the last sample, inertial frame", "m/s")),
-    *vector(discrete_local("attitude_error", "Q_d^-1 Q as of the last sample (8)", "1"), QUATERNION_AXES),
-    *vector(discrete_local("angular_velocity_error", "angular velocity minus the desired one, body frame", "rad/s")),
-)
+class ScaledGains(ControllerInterface):
+    """A controller whose gains of the attitude are of either kind."""
 
-COUNT_AND_SWITCH = (
-    discrete_local("sample_count", "number of samples since the start, initialisation not counted", None, 0),
-    fixed_parameter("use_reference_inputs", "true: follow reference.*; false: the built-in trajectory", None, False),
-)
+    gain_scaling = FixedParameter(
+        "of the attitude's gains: as they are, or per unit inertia (in 1/s2 and 1/s), times the inertia matrix; "
+        "energy is per unit inertia then, in 1/s2",
+        start=GainScaling.ABSOLUTE,
+    )
+
+    @property
+    def per_inertia(self) -> bool:
+        """Whether they are per unit inertia."""
+        return self.gain_scaling == GainScaling.INERTIA  # type: ignore[no-any-return]

@@ -236,6 +236,9 @@ class Inertia:
         """J⁻¹ v."""
         return _combine(self._inverse_columns, v)
 
+    def __iter__(self) -> Iterator[Scalar]:
+        return iter((self.xx, self.yy, self.zz, self.xy, self.xz, self.yz))
+
     def __repr__(self) -> str:
         return (
             f"Inertia(xx={self.xx!r}, yy={self.yy!r}, zz={self.zz!r}, xy={self.xy!r}, xz={self.xz!r}, yz={self.yz!r})"

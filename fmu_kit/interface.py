@@ -9,49 +9,68 @@
             self.u = -self.gain * self.x
 
 The type of the start value is the type of the attribute: a float, a `Vec3` (an FMI variable for each of .x, .y, .z), a
-`Quaternion` (.x, .y, .z, .w), a bool, a member of an `IntEnum`, or an int if `unit` is None. Units are in SI, as in
-`fmu_kit.units`.
+`Quaternion` (.x, .y, .z, .w), an `Inertia` (.xx, .yy, .zz, .xy, .xz, .yz), a bool, a member of an `IntEnum`, or an int
+if `unit` is None. Units are in SI, as in `fmu_kit.units`. What several slaves have in common is declared in a class
+that they inherit.
 """
 
-import enum
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
-from fmu_kit.algebra import Quaternion, Vec3
+from fmu_kit.algebra import Inertia, Quaternion, Vec3, is_positive_definite
+from fmu_kit.errors import require
 from fmu_kit.units import base_unit_exponents
-from fmu_kit.values import Values
-from fmu_kit.variables import QUATERNION_AXES, Causality, Variability, Variable, vector
+from fmu_kit.variables import Causality, Variability, Variable
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Kind:
-    """What an attribute can hold, and the methods of a slave that know it."""
+    """What an attribute can hold, and how it is read from the place of its first variable on."""
 
     type: type
-    get: Callable[[Any, str], Any]
-    put: Callable[[Any, str, Any], None]
-    has_unit: bool = False
+    get: Callable[[int], Callable[[Any], Any]]
+    is_real: bool = True
     axes: tuple[str, ...] = ()
     expected: str = "a number"
 
 
+def _inertia(place: int) -> Callable[[Any], Inertia]:
+    def get(slave: Any) -> Inertia:
+        """The matrix of six entries; raises `FmuError` unless it is positive definite."""
+        entries = dict(zip(_INERTIA_AXES, slave._reals[place : place + 6]))
+        name = slave.variables[place].name.removesuffix(_INERTIA_AXES[0]) + f"{{{','.join(_INERTIA_AXES)}}}"
+        listed = ", ".join(f"{axis} {value:g}" for axis, value in entries.items())
+        require(is_positive_definite(**entries), name, listed, "a positive definite matrix")
+        return Inertia(**entries)
+
+    return get
+
+
+_QUATERNION_AXES = ("x", "y", "z", "w")
+_INERTIA_AXES = ("xx", "yy", "zz", "xy", "xz", "yz")
 _KINDS = (  # a bool is an int too, and an item of an IntEnum
-    _Kind(type=bool, get=Values.boolean, put=Values.put_boolean),
-    _Kind(type=enum.IntEnum, get=Values.enumeration, put=Values.put_count),
-    _Kind(type=int, get=Values.count, put=Values.put_count),
-    _Kind(type=float, get=Values.real, put=Values.put, has_unit=True),
-    _Kind(type=Vec3, get=Values.vec3, put=Values.put_vec3, has_unit=True, axes=("x", "y", "z"), expected="a Vec3"),
+    _Kind(type=bool, get=lambda i: lambda slave: bool(slave._others[i]), is_real=False),
+    _Kind(type=int, get=lambda i: lambda slave: int(slave._others[i]), is_real=False),
+    _Kind(type=float, get=lambda i: lambda slave: slave._reals[i]),
     _Kind(
-        type=Quaternion, get=Values.quaternion, put=Values.put_quaternion, has_unit=True, axes=QUATERNION_AXES,
-        expected="a Quaternion",
+        type=Vec3, get=lambda i: lambda slave: Vec3(*slave._reals[i : i + 3]),
+        axes=("x", "y", "z"), expected="a Vec3",
     ),
+    _Kind(
+        type=Quaternion, get=lambda i: lambda slave: Quaternion.from_xyzw(*slave._reals[i : i + 4]),
+        axes=_QUATERNION_AXES, expected="a Quaternion",
+    ),
+    _Kind(type=Inertia, get=_inertia, axes=_INERTIA_AXES, expected="an Inertia"),
 )  # fmt: skip
-_NO_NUMBER = (Vec3, Quaternion, str, tuple, list, dict, type(None))
+_NO_NUMBER = (Vec3, Quaternion, Inertia, str, tuple, list, dict, type(None))
 
 
-class Declared:
-    """A variable that is declared as an attribute; each causality is a class of its own, below."""
+class Declared(property):
+    """A variable that is declared as an attribute; each causality is a class of its own, below.
+
+    What it reads and sets depends on where its class has it: each class of slaves has its own, made by `at`.
+    """
 
     causality: ClassVar[Causality]
     usually: ClassVar[Variability]
@@ -75,14 +94,14 @@ class Declared:
 
         Raises `ValueError` for a unit that is none, `TypeError` for a start that no variable can have.
         """
-        if not isinstance(start, float | int | Vec3 | Quaternion):
-            raise TypeError(
-                f"start = {start!r}: expected a number, a truth value, a member of an IntEnum, a Vec3 or a Quaternion"
-            )
+        super().__init__()
+        if not isinstance(start, float | int | Vec3 | Quaternion | Inertia):
+            expected = "a number, a truth value, a member of an IntEnum, a Vec3, a Quaternion or an Inertia"
+            raise TypeError(f"start = {start!r}: expected {expected}")
         self.description = description
         self.start: Any = float(start) if type(start) is int and unit else start
         self._kind = next(kind for kind in _KINDS if isinstance(self.start, kind.type))
-        self.unit = unit if self._kind.has_unit else None
+        self.unit = unit if self._kind.is_real else None
         if self.unit is not None:
             base_unit_exponents(self.unit)
         self.name, self._variability = name or "", variability or self.usually
@@ -91,17 +110,48 @@ class Declared:
     def __set_name__(self, owner: type, attribute: str) -> None:
         self.attribute, self.name = attribute, self.name or attribute
 
-    def __get__(self, slave: Any, owner: type) -> Any:
-        return self if slave is None else self._kind.get(slave, self.name)
+    @property
+    def first(self) -> str:
+        """The name of the first of its FMI variables."""
+        return ".".join((self.name, *self._kind.axes[:1]))
 
-    def __set__(self, slave: Any, value: Any) -> None:
-        if not (self.own or slave.is_fresh):
-            what = "an input" if self.causality == "input" else "a parameter"
-            raise AttributeError(f"self.{self.attribute} cannot be set: it is {what}, which is given to the FMU")
-        fits = isinstance(value, self._kind.type) if self._kind.axes else not isinstance(value, _NO_NUMBER)
-        if not fits:
-            raise TypeError(f"self.{self.attribute} = {value}: expected {self._kind.expected}")
-        self._kind.put(slave, self.name, value)
+    def at(self, place: int) -> "Declared":
+        """The same, read and set in slaves that have its first variable at a place."""
+        placed = type(self).__new__(type(self))
+        vars(placed).update(vars(self))
+        put = self._put_at(place)
+
+        def give(slave: Any, value: Any) -> None:
+            if not slave.is_fresh:
+                what = "an input" if self.causality == "input" else "a parameter"
+                raise AttributeError(f"self.{self.attribute} cannot be set: it is {what}, which is given to the FMU")
+            put(slave, value)
+
+        property.__init__(placed, self._kind.get(place), put if self.own else give)
+        return placed
+
+    def _put_at(self, place: int) -> Callable[[Any, Any], None]:
+        kind, end = self._kind, place + len(self._kind.axes)
+
+        def put_parts(slave: Any, value: Any) -> None:
+            if not isinstance(value, kind.type):
+                self._refuse(value)
+            slave._reals[place:end] = value
+
+        def put_real(slave: Any, value: Any) -> None:
+            if type(value) is not float and isinstance(value, _NO_NUMBER):
+                self._refuse(value)
+            slave._reals[place] = value
+
+        def put_other(slave: Any, value: Any) -> None:
+            if isinstance(value, _NO_NUMBER):
+                self._refuse(value)
+            slave._others[place] = value
+
+        return put_parts if kind.axes else put_real if kind.is_real else put_other
+
+    def _refuse(self, value: Any) -> None:
+        raise TypeError(f"self.{self.attribute} = {value}: expected {self._kind.expected}")
 
     def variables(self) -> list[Variable]:
         """The FMI variables that it stands for."""
@@ -118,7 +168,9 @@ class Declared:
             start=0.0 if axes else self.start,
             **self._bounds,
         )
-        return vector(variable, axes, self.start) if axes else [variable]
+        if not axes:
+            return [variable]
+        return [replace(variable, name=f"{name}.{axis}", start=value) for axis, value in zip(axes, self.start)]
 
 
 class Input(Declared):
@@ -130,7 +182,14 @@ class Input(Declared):
 class Parameter(Declared):
     """What is set before a run and, unless its variability is fixed, between steps."""
 
-    causality, usually, own = "parameter", "tunable", False
+    causality, own = "parameter", False
+    usually: ClassVar[Variability] = "tunable"
+
+
+class FixedParameter(Parameter):
+    """What is set before a run, and holds for all of it."""
+
+    usually = "fixed"
 
 
 class Output(Declared):
@@ -164,14 +223,28 @@ def declared_in(slave: type) -> list[Declared]:
 
 
 def variables_of(declared: Iterable[Declared]) -> tuple[Variable, ...]:
-    """Their FMI variables: as declared, then the starts of states; Reals before all others, as a slave has them."""
+    """Their FMI variables: as declared, then the starts of states; Reals first, among them locals last."""
     listed = list(declared)
     found = [variable for each in listed for variable in each.variables()]
     found += [variable for each in listed if isinstance(each, State) for variable in each.initial()]
-    return tuple(sorted(found, key=lambda variable: variable.type != "Real"))
+    return tuple(sorted(found, key=lambda each: 2 if each.type != "Real" else each.causality == "local"))
 
 
 def initial_values(declared: Iterable[Declared]) -> dict[str, str]:
     """The variables of states, and the parameters from which they start."""
     states = [each for each in declared if isinstance(each, State)]
     return {v.name: start.name for each in states for v, start in zip(each.variables(), each.initial())}
+
+
+_Record = TypeVar("_Record")
+
+
+def gathered(slave: Any, record: Callable[..., _Record], prefix: str = "") -> _Record:
+    """A dataclass of the attributes of a slave that are called as its fields are, with a prefix."""
+    return record(**{each.name: getattr(slave, prefix + each.name) for each in fields(record)})  # type: ignore[arg-type]
+
+
+def show(slave: Any, values: NamedTuple) -> None:
+    """Set the outputs and locals that are called as fields of a named tuple to what these hold."""
+    for name in filter(slave._own.__contains__, values._fields):
+        setattr(slave, name, getattr(values, name))

@@ -25,7 +25,6 @@ from fmu_kit.failure import Failure, printf_safe, report
 from fmu_kit.interface import Declared, declared_in, initial_values, variables_of
 from fmu_kit.saved_state import State, expect_state, parsed, serialised
 from fmu_kit.unloading import release_at_exit
-from fmu_kit.values import Values
 from fmu_kit.variables import Variable
 
 
@@ -58,16 +57,16 @@ def guarded(method: _Method) -> _Method:
     return call  # type: ignore[return-value]
 
 
-class Slave(Values, Fmi2Slave):  # type: ignore[misc]
+class Slave(Fmi2Slave):  # type: ignore[misc]
     """A co-simulation slave with declared variables, checked calls and a complete saved state.
 
-    Subclasses declare their variables as attributes (`fmu_kit.interface`) and define `step`. An interface that several
-    slaves share, with dots in its names, is a list instead: `variables`, Reals first. The class that is packaged must
-    define `__init__` and `do_step` itself, or pythonfmu crashes on the second instance: the entry script that packaging
-    writes does.
+    Subclasses declare their variables as attributes (`fmu_kit.interface`) and define `step`. The class that is packaged
+    must define `__init__` and `do_step` itself, or pythonfmu crashes on the second instance: the entry script that
+    packaging writes does.
     """
 
-    variables: ClassVar[tuple[Variable, ...]]
+    variables: ClassVar[tuple[Variable, ...]] = ()
+    """By value reference, Reals first."""
     description: ClassVar[str]
     """Of the FMU, in a line; the first of the docstring, unless told."""
     initial_outputs_depend_on_inputs: ClassVar[bool | None] = None
@@ -93,29 +92,29 @@ class Slave(Values, Fmi2Slave):  # type: ignore[misc]
         super().__init_subclass__(**kwargs)
         if "description" not in cls.__dict__ and (cls.__doc__ or not hasattr(cls, "description")):
             cls.description = _first_line(cls.__doc__ or cls.__name__)
-        listed = "variables" in cls.__dict__
+        if "variables" in cls.__dict__:
+            raise TypeError(
+                f"{cls.__name__}.variables: expected variables as attributes, as fmu_kit.interface has them"
+            )
         declared = declared_in(cls)
-        if declared:
-            _expect_free_names(cls, declared)
-            if listed or (hasattr(cls, "variables") and not cls._declared):
-                raise TypeError(f"{cls.__name__}: expected its variables as attributes or as a list, not both")
-            cls.variables, cls._declared = variables_of(declared), tuple(declared)
-            cls._initial = initial_values(declared)
-            cls.__setattr__ = _set_declared  # type: ignore[assignment]
-        if listed or declared:
-            reals = [v.type == "Real" for v in cls.variables]
-            if reals != sorted(reals, reverse=True):
-                raise TypeError(f"{cls.__name__}.variables: expected all Reals before the others")
-            cls._index = {v.name: i for i, v in enumerate(cls.variables)}
-            cls._real_count = sum(v.type == "Real" for v in cls.variables)
-            cls._readable = frozenset(range(cls._real_count))
-            cls._given = frozenset(i for i, v in enumerate(cls.variables) if v.has_start)
-            cls._inputs = frozenset(i for i, v in enumerate(cls.variables) if v.causality == "input")
-            cls._tunable = frozenset(i for i, v in enumerate(cls.variables) if v.variability == "tunable")
+        _expect_free_names(cls, declared)
+        cls.variables, cls._initial = variables_of(declared), initial_values(declared)
+        cls.__setattr__ = _set_declared  # type: ignore[assignment]
+        cls._index = {v.name: i for i, v in enumerate(cls.variables)}
+        placed = {each.attribute: each.at(cls._index[each.first]) for each in declared}
+        for attribute, each in placed.items():
+            setattr(cls, attribute, each)
+        cls._own = {attribute: each.fset for attribute, each in placed.items() if each.own}
+        cls._real_count = sum(v.type == "Real" for v in cls.variables)
+        cls._readable = frozenset(range(cls._real_count))
+        cls._given = frozenset(i for i, v in enumerate(cls.variables) if v.has_start)
+        cls._inputs = frozenset(i for i, v in enumerate(cls.variables) if v.causality == "input")
+        cls._tunable = frozenset(i for i, v in enumerate(cls.variables) if v.variability == "tunable")
 
-    _declared: ClassVar[tuple[Declared, ...]] = ()
-    _initial: ClassVar[dict[str, str]] = {}
-    _index: ClassVar[dict[str, int]]  # type: ignore[misc]
+    _own: ClassVar[dict[str, Callable[[Any, Any], None] | None]]
+    """The variables that a slave sets itself, in order, and how."""
+    _initial: ClassVar[dict[str, str]]
+    _index: ClassVar[dict[str, int]]
     _real_count: ClassVar[int]
     _readable: ClassVar[frozenset[int]]
     _given: ClassVar[frozenset[int]]
@@ -367,7 +366,7 @@ class Slave(Values, Fmi2Slave):  # type: ignore[misc]
     def _initialise(self) -> None:
         self._take_parameters()
         for name, start in self._initial.items():
-            self.put(name, self.real(start))
+            self._reals[self._index[name]] = self._reals[self._index[start]]
         try:
             self.initialise(self._start_time)
         except (ArithmeticError, ValueError) as error:
@@ -446,18 +445,22 @@ def _first_line(text: str) -> str:
 
 def _set_declared(slave: Slave, name: str, value: Any) -> None:
     """Set an attribute; raises `AttributeError` for one that is not declared, which is a slip of the pen."""
-    is_made = "_of_the_base" in vars(slave)
-    if is_made and not (name.startswith("_") or name in slave._of_the_base or hasattr(type(slave), name)):
-        own = ", ".join(each.attribute for each in slave._declared if each.own)
+    put = slave._own.get(name)
+    if put is not None:
+        put(slave, value)
+    elif name in slave.__dict__:
+        slave.__dict__[name] = value  # faster than by object.__setattr__
+    elif name.startswith("_") or hasattr(type(slave), name) or "_of_the_base" not in slave.__dict__:
+        object.__setattr__(slave, name, value)
+    else:
+        own = ", ".join(slave._own)
         raise AttributeError(f"self.{name}: no such variable; expected {own}, or a name that begins with _")
-    object.__setattr__(slave, name, value)
 
 
 def _expect_free_names(slave: type[Slave], declared: Iterable[Declared]) -> None:
     """Raise `TypeError` for an attribute that every slave has for something else."""
     for each in declared:
-        is_taken = hasattr(Slave, each.attribute) and each.attribute not in vars(Values)
-        if is_taken or each.attribute in (*Slave.__annotations__, *_OF_PYTHONFMU):
+        if hasattr(Slave, each.attribute) or each.attribute in (*Slave.__annotations__, *_OF_PYTHONFMU):
             raise TypeError(f"{slave.__name__}.{each.attribute}: every slave has this name; expected another one")
 
 

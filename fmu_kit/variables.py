@@ -1,10 +1,9 @@
-"""Declarations of FMI variables: a slave lists them, and everything else is derived from the list."""
+"""An FMI variable: all that is said of a slave from outside is derived from a list of them."""
 
 import enum
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from typing import Literal, Protocol
+from dataclasses import dataclass
+from typing import Literal
 
 from fmu_kit.errors import require
 
@@ -33,9 +32,7 @@ class Variable:
     above: float | None = None
 
     def __post_init__(self) -> None:
-        """Raise `TypeError` for a start that no variable has, and an Enumeration whose range would not be checked."""
-        if not isinstance(self.start, float | int):
-            raise TypeError(f"{self.name}: start = {self.start!r}: expected a number or a truth value")
+        """Raise `TypeError` for an Enumeration whose range would not be checked."""
         if self.items and (self.causality != "parameter" or [*self.items.values()] != [*range(1, len(self.items) + 1)]):
             raise TypeError(f"{self.name}: expected an Enumeration to be a parameter, its items 1, 2, …")
 
@@ -93,50 +90,3 @@ class Variable:
             and (self.maximum is None or value <= self.maximum)
         )
         require(inside, self.name, value, self.bounds)
-
-
-class _Kind(Protocol):
-    def __call__(
-        self, name: str, description: str, unit: str | None, start: float | int | bool = 0.0, **bounds: float
-    ) -> Variable: ...
-
-
-def _kind(causality: Causality, variability: Variability) -> _Kind:
-    def declare(
-        name: str, description: str, unit: str | None, start: float | int | bool = 0.0, **bounds: float
-    ) -> Variable:
-        return Variable(
-            name=name,
-            description=description,
-            causality=causality,
-            variability=variability,
-            unit=unit,
-            start=start,
-            **bounds,
-        )
-
-    return declare
-
-
-continuous_input = _kind("input", "continuous")
-discrete_input = _kind("input", "discrete")
-continuous_output = _kind("output", "continuous")
-discrete_output = _kind("output", "discrete")
-continuous_local = _kind("local", "continuous")
-discrete_local = _kind("local", "discrete")
-fixed_parameter = _kind("parameter", "fixed")
-tunable_parameter = _kind("parameter", "tunable")
-
-
-def vector(
-    template: Variable, axes: Sequence[str] = ("x", "y", "z"), start: Iterable[float] | None = None
-) -> list[Variable]:
-    """`template` once for each axis, as `name.axis`, with the starts given or else that of the template."""
-    starts = [template.start] * len(axes) if start is None else list(start)
-    return [
-        replace(template, name=f"{template.name}.{axis}", start=value) for axis, value in zip(axes, starts, strict=True)
-    ]
-
-
-QUATERNION_AXES = ("x", "y", "z", "w")
-INERTIA_AXES = ("xx", "yy", "zz", "xy", "xz", "yz")

@@ -1,17 +1,9 @@
 """The variables of the plant FMU."""
 
-from fmu_kit.algebra import Quaternion, Vec3
+from fmu_kit.algebra import ZERO, Quaternion
+from fmu_kit.interface import FixedParameter, Input, Local, Output, Parameter
 from fmu_kit.rigid_body import Body
-from fmu_kit.variables import (
-    INERTIA_AXES,
-    QUATERNION_AXES,
-    continuous_input,
-    continuous_local,
-    continuous_output,
-    fixed_parameter,
-    tunable_parameter,
-    vector,
-)
+from fmu_kit.slave import Slave
 from plant_fmu.actuators import Box, Motors
 from plant_fmu.wind import Wind
 
@@ -21,100 +13,88 @@ PAPER_ATTITUDE = Quaternion.from_xyzw(0.1699, 0.3058, 0.1699, 0.9212)
 LARGEST_INTERNAL_STEP = 0.002
 """[s]"""
 
-_BODY, _WIND, _BOX, _MOTORS, _ORIGIN = Body(), Wind(), Box(), Motors(), Vec3(0.0, 0.0, 0.0)
+_BODY, _WIND, _BOX, _MOTORS = Body(), Wind(), Box(), Motors()
 
 
-COMMAND = (
-    continuous_input(
-        "thrust", "total thrust along -z of the body, before limits and lag", "N", _BODY.mass * _BODY.gravity
-    ),
-    *vector(continuous_input("torque", "body torque, before limits and lag", "N.m")),
-)
+class PlantInterface(Slave):
+    """What goes in, what comes out, and of what the vehicle is."""
 
-MOTION = (
-    *vector(continuous_output("position", "position P, inertial frame (north-east-down)", "m")),
-    *vector(continuous_output("velocity", "velocity V, inertial frame", "m/s")),
-    *vector(continuous_output("quaternion", "attitude Q, inertial to body, scalar last", "1"), QUATERNION_AXES),
-    *vector(continuous_output("angular_velocity", "angular velocity, body frame (forward-right-down)", "rad/s")),
-)
+    thrust = Input("total thrust along -z of the body, before limits and lag", "N", _BODY.mass * _BODY.gravity)
+    torque = Input("body torque, before limits and lag", "N.m", ZERO)
+    external_force = Input("force in the inertial frame, added to the wind", "N", ZERO)
 
-MOTOR = (
-    fixed_parameter(
-        "motor.thrust_max",
-        "largest thrust of each of four motors on an X frame; 0: no motors",
-        "N",
-        _MOTORS.thrust_max,
-        minimum=0.0,
-    ),
-    fixed_parameter("motor.thrust_min", "least thrust of each motor", "N", _MOTORS.thrust_min),
-    fixed_parameter("motor.arm.x", "from the centre to each motor along x of the body", "m", _MOTORS.arm_x, above=0.0),
-    fixed_parameter("motor.arm.y", "from the centre to each motor along y of the body", "m", _MOTORS.arm_y, above=0.0),
-    fixed_parameter(
-        "motor.drag_to_thrust", "torque about z by thrust of a propeller", "m", _MOTORS.drag_to_thrust, above=0.0
-    ),
-    fixed_parameter(
-        "motor.time_constant.up",
-        "lag of a motor's thrust that grows; 0: actuator_time_constant",
-        "s",
-        _MOTORS.up,
-        minimum=0.0,
-    ),
-    fixed_parameter(
-        "motor.time_constant.down",
-        "lag of a motor's thrust that falls; 0: actuator_time_constant",
-        "s",
-        _MOTORS.down,
-        minimum=0.0,
-    ),
-)
+    position = Output("position P, inertial frame (north-east-down)", "m", ZERO, variability="continuous")
+    velocity = Output("velocity V, inertial frame", "m/s", ZERO, variability="continuous")
+    quaternion = Output(
+        "attitude Q, inertial to body, scalar last", "1", Quaternion(ZERO, 0.0), variability="continuous"
+    )
+    angular_velocity = Output(
+        "angular velocity, body frame (forward-right-down)", "rad/s", ZERO, variability="continuous"
+    )
 
-PARAMETERS = (
-    fixed_parameter("mass", "mass m", "kg", _BODY.mass, above=0.0),
-    fixed_parameter("gravity", "gravity g, along +z of the inertial frame", "m/s2", _BODY.gravity, minimum=0.0),
-    *vector(
-        fixed_parameter("inertia", "entry of the inertia matrix J, body frame", "kg.m2"),
-        INERTIA_AXES,
-        (1.0, 1.0, 1.0, 0.0, 0.0, 0.0),
-    ),
-    *vector(fixed_parameter("initial.position", "P(0)", "m"), start=_ORIGIN),
-    *vector(fixed_parameter("initial.velocity", "V(0)", "m/s"), start=_ORIGIN),
-    *vector(
-        fixed_parameter("initial.quaternion", "Q(0), normalised at initialisation", "1"),
-        QUATERNION_AXES,
-        PAPER_ATTITUDE,
-    ),
-    *vector(fixed_parameter("initial.angular_velocity", "angular velocity at 0, body frame", "rad/s"), start=_ORIGIN),
-    *vector(
-        tunable_parameter("wind.amplitude", "a of the wind force a cos(w t), inertial frame", "N"),
-        start=_WIND.amplitude,
-    ),
-    tunable_parameter("wind.frequency", "w of the wind force a cos(w t)", "rad/s", _WIND.frequency),
-    fixed_parameter("thrust_max", "thrust is limited to [0, thrust_max]", "N", _BOX.thrust_max, minimum=0.0),
-    fixed_parameter("torque_max", "each torque is limited to +-torque_max", "N.m", _BOX.torque_max, minimum=0.0),
-    fixed_parameter(
-        "actuator_time_constant",
+    mass = FixedParameter("mass m", "kg", _BODY.mass, above=0.0)
+    gravity = FixedParameter("gravity g, along +z of the inertial frame", "m/s2", _BODY.gravity, minimum=0.0)
+    inertia = FixedParameter("entry of the inertia matrix J, body frame", "kg.m2", _BODY.inertia)
+    initial_position = FixedParameter("P(0)", "m", ZERO, name="initial.position")
+    initial_velocity = FixedParameter("V(0)", "m/s", ZERO, name="initial.velocity")
+    initial_quaternion = FixedParameter(
+        "Q(0), normalised at initialisation", "1", PAPER_ATTITUDE, name="initial.quaternion"
+    )
+    initial_angular_velocity = FixedParameter(
+        "angular velocity at 0, body frame", "rad/s", ZERO, name="initial.angular_velocity"
+    )
+    wind_amplitude = Parameter(
+        "a of the wind force a cos(w t), inertial frame", "N", _WIND.amplitude, name="wind.amplitude"
+    )
+    wind_frequency = Parameter("w of the wind force a cos(w t)", "rad/s", _WIND.frequency, name="wind.frequency")
+    thrust_max = FixedParameter("thrust is limited to [0, thrust_max]", "N", _BOX.thrust_max, minimum=0.0)
+    torque_max = FixedParameter("each torque is limited to +-torque_max", "N.m", _BOX.torque_max, minimum=0.0)
+    actuator_time_constant = FixedParameter(
         "first-order lag of thrust and torques, or of the motors, after the limits; 0: none",
         "s",
         _BOX.time_constant,
         minimum=0.0,
-    ),
-    fixed_parameter("max_internal_step", "largest internal integration step", "s", LARGEST_INTERNAL_STEP, above=0.0),
-    *MOTOR,
-    tunable_parameter("payload.mass", "payload at the centre of gravity, added to the mass", "kg", 0.0, minimum=0.0),
-    tunable_parameter("payload.drop_time", "when the payload is let go; 0: never", "s", 0.0, minimum=0.0),
-)
+    )
+    max_internal_step = FixedParameter("largest internal integration step", "s", LARGEST_INTERNAL_STEP, above=0.0)
 
-LOCALS = (
-    *vector(continuous_local("acceleration", "dV/dt, inertial frame", "m/s2")),
-    *vector(continuous_local("wind.force", "wind force, inertial frame", "N")),
-    continuous_local("tilt", "angle between the z axes of body and inertial frame", "rad"),
-)
+    motor_thrust_max = FixedParameter(
+        "largest thrust of each of four motors on an X frame; 0: no motors",
+        "N",
+        _MOTORS.thrust_max,
+        name="motor.thrust_max",
+        minimum=0.0,
+    )
+    motor_thrust_min = FixedParameter("least thrust of each motor", "N", _MOTORS.thrust_min, name="motor.thrust_min")
+    motor_arm_x = FixedParameter(
+        "from the centre to each motor along x of the body", "m", _MOTORS.arm_x, name="motor.arm.x", above=0.0
+    )
+    motor_arm_y = FixedParameter(
+        "from the centre to each motor along y of the body", "m", _MOTORS.arm_y, name="motor.arm.y", above=0.0
+    )
+    motor_drag_to_thrust = FixedParameter(
+        "torque about z by thrust of a propeller", "m", _MOTORS.drag_to_thrust, name="motor.drag_to_thrust", above=0.0
+    )
+    motor_up = FixedParameter(
+        "lag of a motor's thrust that grows; 0: actuator_time_constant",
+        "s",
+        _MOTORS.up,
+        name="motor.time_constant.up",
+        minimum=0.0,
+    )
+    motor_down = FixedParameter(
+        "lag of a motor's thrust that falls; 0: actuator_time_constant",
+        "s",
+        _MOTORS.down,
+        name="motor.time_constant.down",
+        minimum=0.0,
+    )
+    payload_mass = Parameter(
+        "payload at the centre of gravity, added to the mass", "kg", 0.0, name="payload.mass", minimum=0.0
+    )
+    payload_drop_time = Parameter(
+        "when the payload is let go; 0: never", "s", 0.0, name="payload.drop_time", minimum=0.0
+    )
 
-QUADROTOR = (
-    *COMMAND,
-    *vector(continuous_input("external_force", "force in the inertial frame, added to the wind", "N")),
-    *MOTION,
-    *PARAMETERS,
-    *LOCALS,
-)
-"""All variables of the plant; the place in this list is the value reference."""
+    acceleration = Local("dV/dt, inertial frame", "m/s2", ZERO, variability="continuous")
+    wind_force = Local("wind force, inertial frame", "N", ZERO, name="wind.force", variability="continuous")
+    tilt = Local("angle between the z axes of body and inertial frame", "rad", variability="continuous")

@@ -1,30 +1,31 @@
 """The quadrotor as an FMU: integrates the rigid body over each communication step."""
 
 import math
+from dataclasses import replace
 
 from fmu_kit.authors import AUTHOR, LICENSE
 from fmu_kit.errors import require, require_finite_state
 from fmu_kit.integrator import internal_steps, rk4_step
+from fmu_kit.interface import gathered
 from fmu_kit.rigid_body import Body, RigidState, Wrench, acceleration, derivative, tilt
 from fmu_kit.saved_state import State
 from fmu_kit.scalar import FLOAT, repeat
-from fmu_kit.slave import Slave
-from fmu_kit.variables import QUATERNION_AXES
 from plant_fmu.actuators import Actuators, Box, Channels, Motors
-from plant_fmu.interface import MOTION, QUADROTOR
+from plant_fmu.interface import PlantInterface
 from plant_fmu.payload import Payload
 from plant_fmu.wind import Wind
 
 MOST_INTERNAL_STEPS = 100_000
 """In one communication step: some seconds of work, during which no master can get in between"""
-_MOTION_NAMES = tuple(variable.name for variable in MOTION)
+_MOTION = tuple(each.name for each in PlantInterface.variables if each.causality == "output")
 
 
-class QuadrotorPlant(Slave):
-    """A quadrotor as a rigid body with wind, actuator limits and lag."""
+class QuadrotorPlant(PlantInterface):
+    """Quadrotor as a rigid body: thrust and body torques in, motion out.
 
-    variables = QUADROTOR
-    description = "Quadrotor as a rigid body: thrust and body torques in, motion out"
+    With wind, actuator limits and lag.
+    """
+
     author, license = AUTHOR, LICENSE
     initial_outputs_depend_on_inputs = False
 
@@ -32,25 +33,20 @@ class QuadrotorPlant(Slave):
     def initial_dependencies(cls, output: str) -> frozenset[str]:
         """The motion on where it starts; the quaternion, which is normalised, on all four parts of that."""
         vector, _, axis = output.rpartition(".")
-        return frozenset(f"initial.{vector}.{other}" for other in (QUATERNION_AXES if vector == "quaternion" else axis))
+        return frozenset(f"initial.{vector}.{other}" for other in ("xyzw" if vector == "quaternion" else axis))
 
     def read_parameters(self) -> None:
         """Build the body, the wind, the payload and the actuators."""
-        self._body = Body(mass=self.real("mass"), inertia=self.inertia(), gravity=self.real("gravity"))
-        self._wind = Wind(amplitude=self.vec3("wind.amplitude"), frequency=self.real("wind.frequency"))
-        self._payload = Payload(mass=self.real("payload.mass"), drop_time=self.real("payload.drop_time"))
+        self._body = gathered(self, Body)
+        self._wind, self._payload = gathered(self, Wind, "wind_"), gathered(self, Payload, "payload_")
         self._actuators = self._read_actuators()
-        self._largest_step = self.real("max_internal_step")
 
     def initialise(self, t: float) -> None:
         """Start at the initial state, the actuators at the limited initial command."""
-        quaternion = self.quaternion("initial.quaternion")
+        quaternion = self.initial_quaternion
         require(any(quaternion), "initial.quaternion", tuple(quaternion), "a quaternion that is not zero")
         self._state = RigidState(
-            self.vec3("initial.position"),
-            self.vec3("initial.velocity"),
-            quaternion.unit(),
-            self.vec3("initial.angular_velocity"),
+            self.initial_position, self.initial_velocity, quaternion.unit(), self.initial_angular_velocity
         )
         self._channels = self._actuators.limited(self._command())
         self._write(t)
@@ -61,14 +57,14 @@ class QuadrotorPlant(Slave):
         Where the payload is let go inside of it, both parts of the step have equal internal steps of their own.
         """
         body, wind, actuators = self._body, self._wind, self._actuators
-        largest = self._largest_step
+        largest = self.max_internal_step
         start, target = self._channels, actuators.limited(self._command())
-        external = self.vec3("external_force")
+        external = self.external_force
         require(
-            h <= MOST_INTERNAL_STEPS * self._largest_step,
+            h <= MOST_INTERNAL_STEPS * largest,
             "communicationStepSize",
             h,
-            f"at most {MOST_INTERNAL_STEPS} times max_internal_step = {self._largest_step} s",
+            f"at most {MOST_INTERNAL_STEPS} times max_internal_step = {largest} s",
         )
         carried = self._payload.until_drop(t, h)
         loaded, bare, drop = self._mass_at(t), self._mass_at(t + carried), t + carried
@@ -98,25 +94,12 @@ class QuadrotorPlant(Slave):
         """Put the actuators and the motion back."""
         a, b, c, d = map(float, state["actuators"])
         self._channels = Channels(a, b, c, d)
-        self._state = RigidState(
-            self.vec3("position"), self.vec3("velocity"), self.quaternion("quaternion"), self.vec3("angular_velocity")
-        )
+        self._state = RigidState(self.position, self.velocity, self.quaternion, self.angular_velocity)
 
     def _read_actuators(self) -> Actuators:
-        box = Box(
-            thrust_max=self.real("thrust_max"),
-            torque_max=self.real("torque_max"),
-            time_constant=self.real("actuator_time_constant"),
-        )
-        motors = Motors(
-            thrust_max=self.real("motor.thrust_max"),
-            thrust_min=self.real("motor.thrust_min"),
-            arm_x=self.real("motor.arm.x"),
-            arm_y=self.real("motor.arm.y"),
-            drag_to_thrust=self.real("motor.drag_to_thrust"),
-            up=_unless_zero(self.real("motor.time_constant.up"), box.time_constant),
-            down=_unless_zero(self.real("motor.time_constant.down"), box.time_constant),
-        )
+        lag, motors = self.actuator_time_constant, gathered(self, Motors, "motor_")
+        box = Box(thrust_max=self.thrust_max, torque_max=self.torque_max, time_constant=lag)
+        motors = replace(motors, up=_unless_zero(motors.up, lag), down=_unless_zero(motors.down, lag))
         if motors.thrust_max > 0.0:
             highest = motors.thrust_max
             require(
@@ -129,22 +112,21 @@ class QuadrotorPlant(Slave):
         return mass
 
     def _command(self) -> Wrench:
-        return Wrench(self.real("thrust"), self.vec3("torque"))
+        return Wrench(self.thrust, self.torque)
 
     def _write(self, t: float) -> None:
         state = self._state
         values = (*state.position, *state.velocity, *state.quaternion, *state.angular_velocity)
         if not math.isfinite(sum(values)):
-            require_finite_state(_MOTION_NAMES, values)
-        first = self._index["position.x"]
-        self._reals[first : first + len(values)] = values
+            require_finite_state(_MOTION, values)
+        self.position, self.velocity = state.position, state.velocity
+        self.quaternion, self.angular_velocity = state.quaternion, state.angular_velocity
         wind = self._wind.force(t)
-        force = wind + self.vec3("external_force")
+        force = wind + self.external_force
         thrust = self._actuators.wrench(self._channels).thrust
         body = self._body.with_mass(self._mass_at(t))
-        self.put_vec3("acceleration", acceleration(state.quaternion, thrust, force, body))
-        self.put_vec3("wind.force", wind)
-        self.put("tilt", tilt(state.quaternion))
+        self.acceleration = acceleration(state.quaternion, thrust, force, body)
+        self.wind_force, self.tilt = wind, tilt(state.quaternion)
 
 
 def _unless_zero(own: float, general: float) -> float:

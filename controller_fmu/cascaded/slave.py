@@ -2,7 +2,7 @@
 
 from controller_fmu.cascaded.airframe import Airframe
 from controller_fmu.cascaded.attitude_loop import AttitudeLoop, attitude_of
-from controller_fmu.cascaded.interface import CASCADED
+from controller_fmu.cascaded.interface import CascadeInterface
 from controller_fmu.cascaded.position_loop import PositionLoop
 from controller_fmu.cascaded.rate_loop import RateLoop, RateState, control_rate, rate_state_at
 from controller_fmu.cascaded.velocity_loop import VelocityLoop, VelocityState, control_velocity, velocity_state_at
@@ -10,37 +10,33 @@ from controller_fmu.sampled import SampledController
 from controller_fmu.vehicle import Measurement
 from fmu_kit.algebra import Quaternion, Vec3
 from fmu_kit.errors import require, require_finite_state
+from fmu_kit.interface import gathered
 from fmu_kit.saved_state import State
 from fmu_kit.trajectory import Reference
 
 _RESULTS = ("thrust", "torque.x", "torque.y", "torque.z")
 
 
-class CascadedController(SampledController):
-    """Position, velocity, attitude and rate loops; a sample runs the rate loop, and the others every few samples."""
+class CascadedController(SampledController, CascadeInterface):
+    """Cascade of position, velocity, attitude and rate loops for a quadrotor, with PX4's structure, sampled.
 
-    variables = CASCADED
-    description = (
-        "Cascade of position, velocity, attitude and rate loops for a quadrotor, with PX4's structure, sampled"
-    )
+    A sample runs the rate loop, and the others every few samples.
+    """
 
     initially_idle = SampledController.initially_idle | {
         "angular_velocity.z",
         *(f"reference.{name}.{axis}" for name in ("jerk", "snap") for axis in "xyz"),
     }
 
-    def read_gains(self) -> None:
-        """Take over the loops, the airframe and the ratios."""
-        self._airframe = Airframe(
-            motor_thrust=self.real("motor.thrust_max"),
-            arm_x=self.real("motor.arm.x"),
-            arm_y=self.real("motor.arm.y"),
-            drag_to_thrust=self.real("motor.drag_to_thrust"),
-        )
+    def read_parameters(self) -> None:
+        """Take over the airframe and the loops."""
+        super().read_parameters()
+        self._airframe = gathered(self, Airframe)
         self._read_translation()
-        self._read_rotation()
-        self._velocity_ratio = self.count("velocity_ratio")
-        self._attitude_ratio = self.count("attitude_ratio")
+        self._attitude_loop = AttitudeLoop(
+            gain=self.attitude_gain, yaw_weight=self.yaw_weight, rate_limit=self.rate_limit
+        )
+        self._rate_loop = gathered(self, RateLoop, "rate_")
 
     def initialise(self, t: float) -> None:
         """Hold the command for the initial inputs; nothing of them is remembered, as this is not a sample."""
@@ -55,9 +51,9 @@ class CascadedController(SampledController):
         """Run the loops whose turn it is; raises `DivergenceError` if they have no finite command."""
         if not self._begun:
             self._begin(measurement)
-        if self._runs % self._velocity_ratio == 0:
+        if self._runs % self.velocity_ratio == 0:
             self._run_translation(measurement, reference)
-        if self._runs % self._attitude_ratio == 0:
+        if self._runs % self.attitude_ratio == 0:
             self._run_attitude(measurement.quaternion)
         self._run_rate(measurement)
         self._runs = self._runs + 1
@@ -121,8 +117,7 @@ class CascadedController(SampledController):
         )
         self._velocity_time = self._now
         self._thrust, self._desired_attitude = force.norm(), attitude_of(force)
-        self.put_vec3("desired_velocity", desired)
-        self.put_vec3("velocity_integral", self._velocity_state.integral)
+        self.desired_velocity, self.held_velocity_integral = desired, self._velocity_state.integral
 
     def _run_attitude(self, attitude: Quaternion) -> None:
         self._desired_rate = self._attitude_loop.angular_velocity(attitude, self._desired_attitude)
@@ -139,59 +134,39 @@ class CascadedController(SampledController):
         )
         self._rate_time = self._now
         require_finite_state(_RESULTS, (self._thrust, *torque))
-        self.put("thrust", self._thrust)
-        self.put_vec3("torque", torque)
-        self.put_vec3("rate_integral", self._rate_state.integral)
+        self.thrust, self.torque, self.held_rate_integral = self._thrust, torque, self._rate_state.integral
 
     def _write_errors(self, measurement: Measurement, reference: Reference) -> None:
-        self.put_vec3("position_error", measurement.position - reference.position)
-        self.put_vec3("velocity_error", measurement.velocity - reference.velocity)
-        self.put_quaternion("desired_quaternion", self._desired_attitude)
-        self.put_quaternion("attitude_error", self._desired_attitude.inverse() * measurement.quaternion)
-        self.put_vec3("desired_angular_velocity", self._desired_rate)
-        self.put_vec3("angular_velocity_error", measurement.angular_velocity - self._desired_rate)
-
-    # -- parameters -------------------------------------------------------------------------------------------
+        self.position_error = measurement.position - reference.position
+        self.velocity_error = measurement.velocity - reference.velocity
+        self.desired_quaternion = self._desired_attitude
+        self.attitude_error = self._desired_attitude.inverse() * measurement.quaternion
+        self.desired_angular_velocity = self._desired_rate
+        self.angular_velocity_error = measurement.angular_velocity - self._desired_rate
 
     def _read_translation(self) -> None:
         self._position_loop = PositionLoop(
-            gain=self._plane("gain.position"),
-            horizontal_limit=self.real("limit.velocity.horizontal"),
-            upward_limit=self.real("limit.velocity.up"),
-            downward_limit=self.real("limit.velocity.down"),
+            gain=_of_axes(self.position_horizontal, self.position_vertical),
+            horizontal_limit=self.horizontal_limit,
+            upward_limit=self.upward_limit,
+            downward_limit=self.downward_limit,
         )
-        least, most = self.real("limit.thrust.least"), self.real("limit.thrust.most")
+        least, most = self.least_thrust, self.most_thrust
         require(least <= most, "limit.thrust.least", least, f"at most limit.thrust.most = {most}")
         self._velocity_loop = VelocityLoop(
-            proportional=self._plane("gain.velocity"),
-            integral=self._plane("gain.velocity_integral"),
-            derivative=self._plane("gain.velocity_derivative"),
-            derivative_cutoff=self.real("cutoff.velocity_derivative"),
-            tilt_limit=self.real("limit.tilt"),
+            proportional=_of_axes(self.velocity_horizontal, self.velocity_vertical),
+            integral=_of_axes(self.velocity_integral_horizontal, self.velocity_integral_vertical),
+            derivative=_of_axes(self.velocity_derivative_horizontal, self.velocity_derivative_vertical),
+            derivative_cutoff=self.velocity_derivative_cutoff,
+            tilt_limit=self.tilt_limit,
             least_thrust=least,
             most_thrust=most,
-            horizontal_margin=self.real("limit.thrust.horizontal_margin"),
+            horizontal_margin=self.horizontal_margin,
         )
 
-    def _read_rotation(self) -> None:
-        self._attitude_loop = AttitudeLoop(
-            gain=self.vec3("gain.attitude"),
-            yaw_weight=self.real("yaw_weight"),
-            rate_limit=self.vec3("limit.angular_velocity"),
-        )
-        self._rate_loop = RateLoop(
-            proportional=self.vec3("gain.rate"),
-            integral=self.vec3("gain.rate_integral"),
-            derivative=self.vec3("gain.rate_derivative"),
-            feedforward=self.vec3("gain.rate_feedforward"),
-            integral_limit=self.vec3("limit.rate_integral"),
-            derivative_cutoff=self.real("cutoff.rate_derivative"),
-            yaw_cutoff=self.real("cutoff.yaw_torque"),
-        )
 
-    def _plane(self, name: str) -> Vec3:
-        horizontal = self.real(f"{name}.horizontal")
-        return Vec3(horizontal, horizontal, self.real(f"{name}.vertical"))
+def _of_axes(horizontal: float, vertical: float) -> Vec3:
+    return Vec3(horizontal, horizontal, vertical)
 
 
 def _vector(values: list[float]) -> Vec3:

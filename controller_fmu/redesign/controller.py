@@ -2,9 +2,9 @@
 
 import math
 from abc import abstractmethod
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from controller_fmu.redesign.interface import Discretisation
+from controller_fmu.redesign.interface import Discretisation, RedesignInterface
 from controller_fmu.redesign.matching import matched
 from controller_fmu.redesign.nominal import closed_loop, held
 from controller_fmu.redesign.prediction import MOST_ON_THEIR_WAY, Sent, at_rest, predicted, with_newest
@@ -12,6 +12,7 @@ from controller_fmu.sampled import SHORTEST_PERIOD, SampledController
 from controller_fmu.vehicle import Measurement
 from fmu_kit.algebra import Vec3
 from fmu_kit.errors import require, require_finite_state
+from fmu_kit.interface import show
 from fmu_kit.rigid_body import RigidState, Wrench
 from fmu_kit.saved_state import State
 from fmu_kit.trajectory import Reference
@@ -24,30 +25,36 @@ def _of(condition: bool, one: float, other: float) -> float:
     return one if condition else other
 
 
-class RedesignedController(SampledController):
-    """Holds what a redesign makes of a law that is a pure function: laws define `command` beside `control`.
+class RedesignedController(SampledController, RedesignInterface):
+    """Holds what a redesign makes of a law that is a pure function: laws define `evaluation`.
 
-    Thrust and torque are the redesign's; all else that `control` writes is the law's at the sample.
+    Thrust and torque are the redesign's; all else that is shown is the law's at the sample.
     """
 
     offers_semi_implicit: ClassVar[bool] = False
-    """Whether `command` knows a time that is not zero."""
+    """Whether `evaluation` knows a time that is not zero."""
 
     @abstractmethod
-    def command(self, measurement: Measurement, reference: Reference, implicit: float) -> Wrench:
-        """The command of the law; with `implicit` > 0 [s] that of its semi-implicit form over this time."""
+    def evaluation(self, measurement: Measurement, reference: Reference, implicit: float) -> Any:
+        """What the law comes to, thrust, torque and energy among it, as a named tuple of what variables show.
+
+        With `implicit` > 0 [s] that of its semi-implicit form over this time.
+        """
+
+    def control(self, measurement: Measurement, reference: Reference) -> None:
+        """Evaluate the law and show it; raises `DivergenceError` if it has no finite command."""
+        found = self.evaluation(measurement, reference, 0.0)
+        require_finite_state((*_COMMAND, "energy"), (found.thrust, *found.torque, found.energy))
+        show(self, found)
 
     def read_parameters(self) -> None:
         """Take over the redesign too."""
         super().read_parameters()
-        self._discretisation = self.enumeration("discretisation")
-        self._stages = self.count("stages")
-        self._prediction = self.real("prediction")
-        period = self.real("hold_period")
+        period = self.hold_period
         require(period == 0.0 or period >= SHORTEST_PERIOD, "hold_period", period, f"0 or at least {SHORTEST_PERIOD} s")
-        self._hold_period = period if period > 0.0 else self.real("sample_period")
+        self._hold_period = period if period > 0.0 else self.sample_period
         require(
-            self.offers_semi_implicit or self._discretisation != Discretisation.SEMI_IMPLICIT,
+            self.offers_semi_implicit or self.discretisation != Discretisation.SEMI_IMPLICIT,
             "discretisation",
             "semi_implicit",
             "another: this law has no semi-implicit form",
@@ -57,7 +64,7 @@ class RedesignedController(SampledController):
         """Hold the command for the initial inputs: it acts at once, and until the first sample's does."""
         self._pending = at_rest(t, self._held_command())  # which is none yet; nothing is predicted from it
         super().initialise(t)
-        self._pending = at_rest(t - self._prediction, self._held_command())
+        self._pending = at_rest(t - self.prediction, self._held_command())
 
     def internal_state(self) -> State:
         """The clock, and the commands on their way."""
@@ -75,37 +82,36 @@ class RedesignedController(SampledController):
     def sample(self, t: float, h: float) -> None:
         """Hold the redesigned command, and remember it if it is to be on its way."""
         super().sample(t, h)
-        if self._prediction > 0.0 and h > 0.0:
+        if self.prediction > 0.0 and h > 0.0:
             self._remember(t)
 
     def respond(self, t: float, h: float, measurement: Measurement) -> None:
         """Write what the law says here and now; then, if asked for, another command."""
         super().respond(t, h, measurement)
-        if self._discretisation != Discretisation.EXPLICIT or self._prediction > 0.0:
+        if self.discretisation != Discretisation.EXPLICIT or self.prediction > 0.0:
             self._redesign(t, h, measurement)
 
     def _remember(self, t: float) -> None:
         self._pending = with_newest(self._pending, t, self._held_command())
 
     def _held_command(self) -> Wrench:
-        return Wrench(self.real("thrust"), self.vec3("torque"))
+        return Wrench(self.thrust, self.torque)
 
     def _redesign(self, t: float, h: float, measurement: Measurement) -> None:
         """Hold the redesigned command; at initialisation (`h` = 0) none is on its way, and this one acts at once."""
         hold = self._hold_period if self._hold_period > 0.0 else h
         state, start = RigidState(*measurement), t
-        if self._prediction > 0.0 and h > 0.0:
-            state, start = self._predicted(t, state, hold), t + self._prediction
+        if self.prediction > 0.0 and h > 0.0:
+            state, start = self._predicted(t, state, hold), t + self.prediction
         elif hold == 0.0:
             return
         command = self._discretised(t, start, state, hold)
         require_finite_state(_COMMAND, (command.thrust, *command.torque))
-        self.put("thrust", command.thrust)
-        self.put_vec3("torque", command.torque)
+        self.thrust, self.torque = command
 
     def _discretised(self, sampled: float, t: float, state: RigidState, hold: float) -> Wrench:
         """The command to be held over [t, t + hold] from `state`, known at the time `sampled`."""
-        kind, count = self._discretisation, self._stages
+        kind, count = self.discretisation, self.stages
         if kind <= Discretisation.SEMI_IMPLICIT:
             return self._law(sampled, t, state, _of(kind == Discretisation.SEMI_IMPLICIT, hold, 0.0))
         horizon = _of(kind == Discretisation.MIDPOINT, 0.5 * hold, hold)
@@ -121,20 +127,20 @@ class RedesignedController(SampledController):
 
     def _matched(self, state: RigidState, target: RigidState, first: Wrench, hold: float) -> Wrench:
         def flight(command: Wrench) -> RigidState:
-            return self._advanced(state, command, hold / self._stages, self._stages)
+            return self._advanced(state, command, hold / self.stages, self.stages)
 
-        return matched(flight, self._model, target, first, self.real("weight") / hold)
+        return matched(flight, self._model, target, first, self.weight / hold)
 
     def _predicted(self, t: float, state: RigidState, hold: float) -> RigidState:
         """Where the vehicle is when a command given at `t` acts."""
-        oldest, delay = self._pending[0].time, self._prediction
+        oldest, delay = self._pending[0].time, self.prediction
         require(
             oldest + delay <= t + 1e-6 * delay,
             "prediction",
             delay,
             f"at most {t - oldest:g} s: {MOST_ON_THEIR_WAY} commands can be on their way",
         )
-        longest = hold / self._stages
+        longest = hold / self.stages
 
         def advanced(x: RigidState, command: Wrench, time: float) -> RigidState:
             count = math.ceil(time / longest - 1e-6)
@@ -149,10 +155,11 @@ class RedesignedController(SampledController):
     def _law(self, sampled: float, t: float, state: RigidState, implicit: float) -> Wrench:
         """The law's command at `t` in a state of the nominal model, with the reference as known when `sampled`."""
         measurement = Measurement(state.position, state.velocity, state.quaternion, state.angular_velocity)
-        return self.command(measurement, self._reference_ahead(sampled, t), implicit)
+        found = self.evaluation(measurement, self._reference_ahead(sampled, t), implicit)
+        return Wrench(found.thrust, found.torque)
 
     def _reference_ahead(self, sampled: float, t: float) -> Reference:
         """The built-in trajectory at `t`; else what follows from the inputs as they are."""
-        if not self._use_reference_inputs:
+        if not self.use_reference_inputs:
             return self._trajectory.at(t)
         return self._reference(sampled).after(t - sampled)

@@ -2,7 +2,8 @@
 
 import enum
 
-from fmu_kit.variables import fixed_parameter
+from controller_fmu.interface import ControllerInterface
+from fmu_kit.interface import FixedParameter
 
 
 class Discretisation(enum.IntEnum):
@@ -20,39 +21,25 @@ class Discretisation(enum.IntEnum):
     """the command that leads where the law leads"""
 
 
-REDESIGN = (
-    fixed_parameter(
-        "hold_period",
+class RedesignInterface(ControllerInterface):
+    """How the command of a law is redesigned."""
+
+    hold_period = FixedParameter(
         "T for which a command is held, as the redesign has it; 0: sample_period, and with that 0 the communication "
         "step",
         "s",
         0.0,
         minimum=0.0,
-    ),
-    fixed_parameter(
-        "weight",
-        "w of discretisation match: of the attitude at the end of T, in (w/T)^2 |dtheta|^2",
-        "1",
-        1.0,
-        minimum=0.0,
-    ),
-    fixed_parameter(
-        "prediction",
-        "delay to make up for, from sample to effect: the nominal model runs ahead; 0: none",
-        "s",
-        0.0,
-        minimum=0.0,
-    ),
-)
-
-CHOICES = (
-    fixed_parameter(
-        "discretisation",
+    )
+    weight = FixedParameter(
+        "w of discretisation match: of the attitude at the end of T, in (w/T)^2 |dtheta|^2", "1", 1.0, minimum=0.0
+    )
+    prediction = FixedParameter(
+        "delay to make up for, from sample to effect: the nominal model runs ahead; 0: none", "s", 0.0, minimum=0.0
+    )
+    discretisation = FixedParameter(
         "what is held: the law at the sample (explicit), at the sliding variable that it leads to (semi_implicit), in "
         "the middle of T (midpoint), its mean over T (mean), or what leads where the law leads (match)",
-        None,
-        Discretisation.EXPLICIT,
-    ),
-    fixed_parameter("stages", "steps of the nominal model over T", None, 3, minimum=1, maximum=100),
-)
-"""Those that are no Reals."""
+        start=Discretisation.EXPLICIT,
+    )
+    stages = FixedParameter("steps of the nominal model over T", None, 3, minimum=1, maximum=100)

@@ -1,82 +1,65 @@
-"""The controller as an FMU: evaluates the law at its samples, and writes what it computed."""
+"""The unified controller as an FMU: its parameters, and what it shows."""
 
-from typing import NamedTuple
-
-from controller_fmu.gain_scaling import GainScaling
+from controller_fmu.interface import ScaledGains
 from controller_fmu.redesign.controller import RedesignedController
-from controller_fmu.sliding_mode.interface import UNIFIED
-from controller_fmu.sliding_mode.law import Gains, evaluate
+from controller_fmu.sliding_mode.law import Evaluation, Gains, evaluate
 from controller_fmu.vehicle import Measurement
-from fmu_kit.algebra import Quaternion, Vec3
-from fmu_kit.errors import require_finite_state
-from fmu_kit.rigid_body import Wrench
+from fmu_kit.algebra import ZERO
+from fmu_kit.interface import Local, Parameter, gathered
 from fmu_kit.trajectory import Reference
 
-_RESULTS = ("thrust", "torque.x", "torque.y", "torque.z", "energy")
+_GAINS = Gains()
 
 
-class _Shown(NamedTuple):
-    """Of an evaluation of the law, what variables show."""
+class UnifiedController(RedesignedController, ScaledGains):
+    """Unified finite-time sliding-mode quaternion tracking controller for a quadrotor, sampled."""
 
-    thrust: float
-    torque: Vec3
-    desired_quaternion: Quaternion
-    position_error: Vec3
-    velocity_error: Vec3
-    attitude_error: Quaternion
-    angular_velocity_error: Vec3
-    sliding: Vec3
-    theta: Vec3
-    desired_angular_velocity: Vec3
-    energy: float
-
-
-class UnifiedController(RedesignedController):
-    """The unified finite-time sliding-mode controller behind its own sample clock."""
-
-    variables = UNIFIED
-    description = "Unified finite-time sliding-mode quaternion tracking controller for a quadrotor, sampled"
     offers_semi_implicit = True
 
-    def read_gains(self) -> None:
+    k_t = Parameter(
+        "k_t, of tanh(s) in the virtual control (22)", "m/s2", _GAINS.k_t, name="gain.translation", minimum=0.0
+    )
+    beta = Parameter(
+        "beta, of tanh(s) against the disturbance (32)", "m/s2", _GAINS.beta, name="gain.disturbance", minimum=0.0
+    )
+    k_s = Parameter(
+        "k_s of the sliding surface (19)-(21); in 1/s for an exponent of 1",
+        "1/s",
+        _GAINS.k_s,
+        name="gain.surface",
+        minimum=0.0,
+    )
+    k_eta = Parameter("k_eta, of the attitude error in Psi (29)", "rad/s", _GAINS.k_eta, name="gain.eta", minimum=0.0)
+    k_theta = Parameter("k_theta, of Theta in the torque (30)", "N.m.s", _GAINS.k_theta, name="gain.theta", minimum=0.0)
+    k_q = Parameter("k_q, of the attitude error in the torque (30)", "N.m", _GAINS.k_q, name="gain.attitude", above=0.0)
+    beta_t = Parameter(
+        "beta_t of the sliding surface (19)-(21)", "1", _GAINS.beta_t, name="surface_exponent", above=0.0, maximum=1.0
+    )
+    epsilon = Parameter(
+        "epsilon: below this position error the surface is linear",
+        "m",
+        _GAINS.epsilon,
+        name="boundary_layer",
+        above=0.0,
+    )
+    kappa = Parameter(
+        "kappa >= 0, weight of s.s/2 in the energy (33) and so of its term in Psi (29): "
+        "0 none, 1 as the energy is printed, k_q as Psi is printed",
+        "kg",
+        _GAINS.kappa,
+        name="coupling",
+    )
+
+    sliding = Local("sliding variable s as of the last sample (19)-(21)", "m/s", ZERO)
+    theta = Local("Theta as of the last sample (9), body frame", "rad/s", ZERO)
+    desired_angular_velocity = Local("Omega_d as of the last sample (13), desired body frame", "rad/s", ZERO)
+    energy = Local("energy function L_kappa as of the last sample (33), with coupling/2 s.s", "J")
+
+    def read_parameters(self) -> None:
         """Take over the gains."""
-        self._gains = Gains(
-            k_t=self.vec3("gain.translation"),
-            beta=self.real("gain.disturbance"),
-            k_s=self.real("gain.surface"),
-            beta_t=self.real("surface_exponent"),
-            epsilon=self.real("boundary_layer"),
-            k_eta=self.real("gain.eta"),
-            k_theta=self.real("gain.theta"),
-            k_q=self.real("gain.attitude"),
-            kappa=self.real("coupling"),
-            per_inertia=self.enumeration("gain_scaling") == GainScaling.INERTIA,
-        )
+        super().read_parameters()
+        self._gains = gathered(self, Gains)
 
-    def control(self, measurement: Measurement, reference: Reference) -> None:
-        """Evaluate the law; raises `DivergenceError` if it has no finite command."""
-        evaluation = self._evaluation(measurement, reference, 0.0)
-        require_finite_state(_RESULTS, (evaluation.thrust, *evaluation.torque, evaluation.energy))
-        self._write(evaluation)
-
-    def command(self, measurement: Measurement, reference: Reference, implicit: float) -> Wrench:
-        """Evaluate the law for thrust and torque alone."""
-        evaluation = self._evaluation(measurement, reference, implicit)
-        return Wrench(evaluation.thrust, evaluation.torque)
-
-    def _evaluation(self, measurement: Measurement, reference: Reference, implicit: float) -> _Shown:
-        found = evaluate(measurement, reference, self._gains, self._model, implicit=implicit)
-        return _Shown(*(getattr(found, name) for name in _Shown._fields))
-
-    def _write(self, evaluation: _Shown) -> None:
-        self.put("thrust", evaluation.thrust)
-        self.put_vec3("torque", evaluation.torque)
-        self.put_quaternion("desired_quaternion", evaluation.desired_quaternion)
-        self.put_vec3("position_error", evaluation.position_error)
-        self.put_vec3("velocity_error", evaluation.velocity_error)
-        self.put_quaternion("attitude_error", evaluation.attitude_error)
-        self.put_vec3("angular_velocity_error", evaluation.angular_velocity_error)
-        self.put_vec3("sliding", evaluation.sliding)
-        self.put_vec3("theta", evaluation.theta)
-        self.put_vec3("desired_angular_velocity", evaluation.desired_angular_velocity)
-        self.put("energy", evaluation.energy)
+    def evaluation(self, measurement: Measurement, reference: Reference, implicit: float) -> Evaluation:
+        """Evaluate the law."""
+        return evaluate(measurement, reference, self._gains, self._model, implicit=implicit)

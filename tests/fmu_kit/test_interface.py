@@ -2,15 +2,16 @@
 
 import enum
 import re
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import pytest
 
-from fmu_kit.algebra import ZERO, Quaternion, Vec3
+from fmu_kit.algebra import ZERO, Inertia, Quaternion, Vec3
+from fmu_kit.errors import FmuError
 from fmu_kit.failure import Failure
-from fmu_kit.interface import Declared, Input, Local, Output, Parameter, State
+from fmu_kit.interface import Declared, FixedParameter, Input, Local, Output, Parameter, State, gathered, show
 from fmu_kit.slave import Slave
-from fmu_kit.variables import continuous_output
 
 
 class Mode(enum.IntEnum):
@@ -64,6 +65,79 @@ def test_attributes_are_fmi_variables_in_order_reals_first():
     assert [found[name].variability for name in ("force.x", "angle", "initial.angle", "gain")] == [
         "discrete", "continuous", "fixed", "tunable",
     ]  # fmt: skip
+
+
+class Weighed(Slave):
+    """What others inherit."""
+
+    weight = FixedParameter("of it", "kg", 2.0, name="body.weight")
+    drift = Local("shown", "m")
+    is_shown = Parameter("a switch", start=True)
+
+
+class Turned(Weighed):
+    """A group of its own."""
+
+    inertia = FixedParameter("of it", "kg.m2", Inertia(xx=1.0, yy=2.0, zz=3.0, xy=0.5), name="body.inertia")
+
+
+class Both(Turned):
+    """Inherits groups and adds to them."""
+
+    force = Output("command", "N", ZERO)
+    mode = Parameter("what it does", start=Mode.ON)
+
+    def step(self, t: float, h: float) -> None: ...
+
+
+def test_what_is_inherited_comes_first_and_real_locals_after_all_other_reals():
+    assert [v.name for v in Both.variables] == [
+        "body.weight", *(f"body.inertia.{axis}" for axis in ("xx", "yy", "zz", "xy", "xz", "yz")),
+        "force.x", "force.y", "force.z", "drift", "is_shown", "mode",
+    ]  # fmt: skip
+    found = {v.name: v for v in Both.variables}
+    assert (found["body.weight"].variability, found["mode"].variability) == ("fixed", "tunable")
+    assert [found[f"body.inertia.{axis}"].start for axis in ("yy", "xy", "yz")] == [2.0, 0.5, 0.0]
+
+
+def test_an_inertia_is_read_whole_and_refused_unless_it_is_positive_definite():
+    slave = Both()
+    assert [*slave.inertia] == [1.0, 2.0, 3.0, 0.5, 0.0, 0.0]
+    slave.inertia = Inertia(xx=1.0, yy=1.0, zz=1.0, xy=2.0)
+    words = "body.inertia.{xx,yy,zz,xy,xz,yz} = xx 1, yy 1, zz 1, xy 2, xz 0, yz 0: expected a positive definite matrix"
+    with pytest.raises(FmuError, match=re.escape(words)):
+        _ = slave.inertia
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gains:
+    gain: float
+    first: float
+
+
+class Found(NamedTuple):
+    angle: float
+    x: float
+    force: Vec3
+    nothing: float
+
+
+def test_parameters_are_gathered_by_the_fields_of_a_record_with_a_prefix():
+    assert gathered(Law(), Gains) == Gains(gain=2.0, first=1.5)
+
+    class Prefixed(Slave):
+        law_gain = Parameter("of x", "N/m", 3.0)
+        law_first = Parameter("at the start", "N", 4.0)
+
+        def step(self, t: float, h: float) -> None: ...
+
+    assert gathered(Prefixed(), Gains, "law_") == Gains(gain=3.0, first=4.0)
+
+
+def test_outputs_are_shown_by_their_names_and_what_is_given_to_the_slave_stays():
+    law = Law()
+    show(law, Found(0.75, 9.0, Vec3(1.0, 2.0, 3.0), 4.0))
+    assert (law.angle, law.x, law.force) == (0.75, 0.0, Vec3(1.0, 2.0, 3.0))
 
 
 def test_a_law_reads_and_sets_its_attributes():
@@ -162,13 +236,6 @@ def test_a_unit_that_is_none_is_refused_where_it_is_written():
 def test_a_start_that_no_variable_can_have_is_refused_where_it_is_written(start):
     with pytest.raises(TypeError, match=re.escape(f"start = {start!r}: expected a number, a truth value, a member")):
         Input("measured", "m", start)
-    with pytest.raises(TypeError, match=re.escape(f"x: start = {start!r}: expected a number or a truth value")):
-        continuous_output("x", "measured", "m", start)
-
-
-def test_variables_are_attributes_or_a_list():
-    with pytest.raises(TypeError, match="Both: expected its variables as attributes or as a list, not both"):
-        type("Both", (Law,), {"variables": ()})
 
 
 def test_without_author_and_licence_an_fmu_says_nothing_of_them():

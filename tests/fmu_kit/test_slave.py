@@ -1,42 +1,38 @@
 """A slave of a few lines has all that FMI asks of it: only its variables and its step must be said."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 import pytest
 
 from fmu_kit.failure import Failure
+from fmu_kit.interface import FixedParameter, Input, Output
 from fmu_kit.slave import Slave
-from fmu_kit.variables import (
-    continuous_input,
-    continuous_output,
-    discrete_input,
-    discrete_output,
-    fixed_parameter,
-)
+from fmu_kit.variables import Variable
 
 
 class Sum(Slave):
-    variables = (
-        continuous_input("u", "to be summed", "m"),
-        continuous_output("sum", "so far", "m"),
-        fixed_parameter("gain", "of it", "1", 2.0, above=0.0),
-        discrete_input("on", "whether it sums", None, True),
-        discrete_output("count", "of steps", None, 0),
-    )
-    description = "A sum"
+    """A sum."""
+
+    u = Input("to be summed", "m")
+    sum = Output("so far", "m")
+    gain = FixedParameter("of it", "1", 2.0, above=0.0)
+    on = Input("whether it sums", start=True)
+    count = Output("of steps", None, 0)
 
     def step(self, t: float, h: float) -> None:
-        if self.boolean("on"):
-            self.put("sum", self.real("sum") + self.real("gain") * self.real("u"))
-        self.put_count("count", self.count("count") + 1)
+        if self.on:
+            self.sum = self.sum + self.gain * self.u
+        self.count = self.count + 1
 
 
 class Switch(Slave):
-    variables = (continuous_input("u", "", "1"), discrete_output("high", "", None, False))
-    description = "A switch"
+    """A switch."""
+
+    u = Input()
+    high = Output(start=False)
 
     def initialise(self, t: float) -> None:
-        self.put_boolean("high", self.real("u") > 1.0)
+        self.high = self.u > 1.0
 
     def step(self, t: float, h: float) -> None:
         self.initialise(t)
@@ -85,8 +81,7 @@ def test_a_boolean_asked_for_first_has_seen_the_inputs_of_initialisation() -> No
     assert slave.get_boolean([1]) == [False]
 
 
-def test_variables_out_of_order_are_refused_where_they_are_declared() -> None:
-    with pytest.raises(TypeError, match=r"Disordered\.variables: expected all Reals before the others"):
-
-        class Disordered(Sum):
-            variables: ClassVar[Any] = (discrete_input("on", "", None, True), continuous_input("u", "", "1"))
+def test_variables_as_a_list_are_refused_where_they_are_declared() -> None:
+    u = Variable(name="u", description="", causality="input", variability="continuous")
+    with pytest.raises(TypeError, match=r"Listed\.variables: expected variables as attributes"):
+        type("Listed", (Slave,), {"variables": (u,)})

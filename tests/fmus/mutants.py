@@ -303,14 +303,14 @@ STRUCTURE = (
     ),
 )  # fmt: skip
 
-_TILT = 'self.put("tilt", tilt(state.quaternion))'
-_INITIAL_VELOCITY = 'self.vec3("initial.velocity")'
+_TILT = "self.wind_force, self.tilt = wind, tilt(state.quaternion)"
+_INITIAL_VELOCITY = "self.initial_velocity"
 _STEP = "body, wind, actuators = self._body, self._wind, self._actuators"
 
 BEHAVIOUR = (
     Mutant(
-        name="output not finite", rule="finite-outputs", words=("position.y = nan",),
-        damage=source("plant_fmu/slave.py", _TILT, f'{_TILT}\n        self.put("position.y", math.nan)'),
+        name="output not finite", rule="finite-outputs", words=("position.x = nan",),
+        damage=source("plant_fmu/slave.py", _TILT, f"{_TILT}\n        self.position = math.nan * self.position"),
     ),
     Mutant(
         name="output follows an input", rule="undeclared-dependency",
@@ -319,13 +319,13 @@ BEHAVIOUR = (
     ),
     Mutant(
         name="runs by chance", rule="repeatable", words=("as in an equal run before",),
-        damage=source("plant_fmu/slave.py", _TILT, f'{_TILT}\n        self.put("tilt", __import__("random").random())'),
+        damage=source("plant_fmu/slave.py", _TILT, f'{_TILT}\n        self.tilt = __import__("random").random()'),
     ),
     Mutant(
         name="state kept over reset", rule="reset", words=("without the run and reset before it",),
         damage=every(
             source("plant_fmu/slave.py", _TILT, f"{_TILT}\n        _KEPT[self.instance_name] = state.velocity"),
-            source("plant_fmu/slave.py", "_MOTION_NAMES = ", "_KEPT = {}\n_MOTION_NAMES = "),
+            source("plant_fmu/slave.py", "_MOTION = ", "_KEPT = {}\n_MOTION = "),
             source("plant_fmu/slave.py", _INITIAL_VELOCITY, f"_KEPT.get(self.instance_name, {_INITIAL_VELOCITY})"),
         ),
     ),
@@ -364,7 +364,7 @@ BEHAVIOUR = (
     Mutant(
         name="torque refused", rule="general-run", words=("torque.x",),
         damage=source(
-            "plant_fmu/slave.py", _STEP, f'require(self.real("torque.x") == 0.0, "torque.x", 1, "0")\n        {_STEP}'
+            "plant_fmu/slave.py", _STEP, f'require(self.torque.x == 0.0, "torque.x", 1, "0")\n        {_STEP}'
         ),
     ),
     Mutant(

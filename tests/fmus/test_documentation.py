@@ -279,17 +279,17 @@ def test_the_entry_of_the_licences_and_the_page_name_all_of_them(of: Documented)
 # -- a slave of somebody else ---------------------------------------------------------------------------------
 
 SLAVE = """
+from fmu_kit.interface import FixedParameter, Output
 from fmu_kit.slave import Slave
-from fmu_kit.variables import continuous_output, fixed_parameter, vector
 
 
 class Still(Slave):
-    variables = (
-        continuous_output("a", "x & <y>", "m"),
-        *vector(fixed_parameter("near", "alike but for the start", "1", minimum=-1e-7), ("p", "q"), (0.0, 1.0000001)),
-        fixed_parameter("near.r", "not alike", "1"),
-        fixed_parameter("switch", "on", None, True),
-    )
+    a = Output("x & <y>", "m", variability="continuous")
+    p = FixedParameter("alike but for the start", "1", name="near.p", minimum=-1e-7)
+    q = FixedParameter("alike but for the start", "1", 1.0000001, name="near.q", minimum=-1e-7)
+    r = FixedParameter("not alike", "1", name="near.r")
+    switch = FixedParameter("on", start=True)
+
     description = "Does <nothing> & ends"
     author = "Somebody & \\"else\\""
     license = "All <rights>"

@@ -25,11 +25,11 @@ def odd_plant(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A plant with a parameter of each type: it is heavier by 0.1 kg for each box of its `cargo` if it is `loaded`."""
     folder = tmp_path_factory.mktemp("odd")
     sources = copy_sources(folder / "sources")
-    declared = """    *LOCALS,
-    fixed_parameter("cargo", "number of boxes", None, 0),
-    fixed_parameter("loaded", "whether they are on board", None, False),
-)"""
-    replace(sources / "plant_fmu" / "interface.py", "    *LOCALS,\n)", declared)
-    heavier = 'mass=self.real("mass") + 0.1 * self.count("cargo") * self.boolean("loaded")'
-    replace(sources / "plant_fmu" / "slave.py", 'mass=self.real("mass")', heavier)
+    declared = """    cargo = FixedParameter("number of boxes", None, 0)
+    loaded = FixedParameter("whether they are on board", start=False)
+    acceleration = """
+    replace(sources / "plant_fmu" / "interface.py", "    acceleration = ", declared)
+    body = "gathered(self, Body)"
+    heavier = f"{body}.with_mass(self.mass + 0.1 * self.cargo * self.loaded)"
+    replace(sources / "plant_fmu" / "slave.py", body, heavier)
     return build(sources, folder, "QuadrotorPlant")

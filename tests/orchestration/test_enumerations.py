@@ -10,7 +10,8 @@ import pytest
 from fmpy.validation import validate_fmu
 
 from fmu_kit.errors import FmuError
-from fmu_kit.variables import discrete_input, fixed_parameter
+from fmu_kit.interface import Declared, FixedParameter, Input
+from fmu_kit.slave import Slave
 from orchestration.building import fmus
 from orchestration.checks.validation.validator import validate
 from orchestration.fmi import instances
@@ -27,8 +28,8 @@ from tests.fmu_kit.compiler.probes import Mode
 SLAVE = """
 import dataclasses
 import enum
+from fmu_kit.interface import FixedParameter, Output
 from fmu_kit.slave import Slave
-from fmu_kit.variables import continuous_output, fixed_parameter
 
 class Shape(enum.IntEnum):
     FLAT = 1
@@ -36,18 +37,16 @@ class Shape(enum.IntEnum):
     TWO_LINES = 3
 
 class Maker(Slave):
-    variables = (
-        continuous_output("y", "what is made", "m"),
-        fixed_parameter("shape", "of what is made", None, Shape.LINE),
-        fixed_parameter("times", "how often", None, 1, minimum=1, maximum=5),
-    )
-    description = "Makes shapes"
+    '''Makes shapes.'''
+
+    y = Output("what is made", "m", variability="continuous")
+    shape = FixedParameter("of what is made", start=Shape.LINE)
+    times = FixedParameter("how often", None, 1, minimum=1, maximum=5)
 
     def step(self, t: float, h: float) -> None:
-        shape = self.enumeration("shape")
-        if shape != Shape.FLAT:
-            slope = 2.0 if shape == Shape.TWO_LINES else 1.0
-            self.put("y", slope * self.count("times") * (t + h))
+        if self.shape != Shape.FLAT:
+            slope = 2.0 if self.shape == Shape.TWO_LINES else 1.0
+            self.y = slope * self.times * (t + h)
 """
 SYSTEM = """
 stop_time = 1.0
@@ -173,7 +172,10 @@ class Gapped(enum.IntEnum):
 
 
 def test_its_type_and_its_range_follow_from_the_items() -> None:
-    mode = fixed_parameter("mode", "how", None, Mode.TURNED)
+    class Chooses(Slave):
+        mode = FixedParameter("how", start=Mode.TURNED)
+
+    (mode,) = Chooses.variables
     assert (mode.type, mode.declared_type) == ("Enumeration", "Mode")
     assert mode.items == {"as_it_is": 1, "turned": 2, "doubled": 3}
     for value in (0, 4):
@@ -181,9 +183,7 @@ def test_its_type_and_its_range_follow_from_the_items() -> None:
             mode.check(value)
 
 
-@pytest.mark.parametrize(
-    "declare", [lambda: fixed_parameter("m", "", None, Gapped.ONE), lambda: discrete_input("m", "", None, Mode.TURNED)]
-)
-def test_items_with_gaps_and_enumerations_that_are_no_parameters_are_refused(declare: object) -> None:
+@pytest.mark.parametrize("declared", [FixedParameter(start=Gapped.ONE), Input(start=Mode.TURNED)])
+def test_items_with_gaps_and_enumerations_that_are_no_parameters_are_refused(declared: Declared) -> None:
     with pytest.raises(TypeError, match="m: expected an Enumeration to be a parameter, its items 1, 2"):
-        declare()
+        type("Chooses", (Slave,), {"m": declared})

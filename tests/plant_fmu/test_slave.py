@@ -14,11 +14,12 @@ import plant_fmu.slave
 from fmu_kit.algebra import ZERO
 from fmu_kit.integrator import rk4_step
 from fmu_kit.rigid_body import RigidState
-from plant_fmu.interface import QUADROTOR
 from plant_fmu.slave import QuadrotorPlant
 from tests.reference.flight import Q0, integrated, quaternion
 from tests.reference.law import Parameters, rotation
 from tests.slaves import BODY_OUT_OF_RANGE, assert_fails, assert_initialisation_fails, get, named, put
+
+QUADROTOR = QuadrotorPlant.variables
 
 POSITION = ("position.x", "position.y", "position.z")
 VELOCITY = ("velocity.x", "velocity.y", "velocity.z")

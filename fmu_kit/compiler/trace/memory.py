@@ -47,7 +47,7 @@ class Memory:
         self.versions: dict[tuple[int, Statement], int] = {}
         """after each call, by the one before it and the call"""
         self._joined: dict[tuple[int, int, int], int] = {}
-        self._base = _attributes_of_the_base(type(slave)) - set(KEPT_BY_THE_BASE)
+        self._base = _attributes_of_the_base() - set(KEPT_BY_THE_BASE)
 
     # -- the attributes -----------------------------------------------------------------------------------------
 
@@ -186,9 +186,9 @@ class Memory:
         return 1 + len(self.versions) + len(self._joined)
 
 
-def _attributes_of_the_base(cls: type[Slave]) -> frozenset[str]:
+def _attributes_of_the_base() -> frozenset[str]:
     """What an instance of the base class has of its own; the rest is what the model keeps."""
-    bare = type("Bare", (Slave,), {"variables": cls.variables, "description": "", "step": None})
+    bare = type("Bare", (Slave,), {"step": None})
     return frozenset(vars(bare(instance_name="bare")))
 
 

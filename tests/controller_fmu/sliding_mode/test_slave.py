@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from pythonfmu.enums import Fmi2Status
 
 from controller_fmu.gain_scaling import GainScaling
-from controller_fmu.sliding_mode.interface import UNIFIED
 from controller_fmu.sliding_mode.law import Gains, evaluate
 from controller_fmu.sliding_mode.slave import UnifiedController
 from controller_fmu.vehicle import Measurement, Model
@@ -20,6 +19,8 @@ from fmu_kit.algebra import ZERO, Inertia, Quaternion, Vec3
 from fmu_kit.failure import Failure
 from fmu_kit.trajectory import Reference, Trajectory
 from tests.slaves import BODY_OUT_OF_RANGE, assert_fails, assert_initialisation_fails, get, named, put
+
+UNIFIED = UnifiedController.variables
 
 COMMAND = ("thrust", "torque.x", "torque.y", "torque.z")
 PAPER_ATTITUDE = Quaternion.from_xyzw(0.1699, 0.3058, 0.1699, 0.9212).normalised()

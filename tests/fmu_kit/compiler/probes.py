@@ -3,24 +3,15 @@
 import enum
 import math
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 from fmu_kit import interface
 from fmu_kit.algebra import Vec3
 from fmu_kit.errors import DivergenceError, FmuError, require
-from fmu_kit.interface import Input, Output, Parameter
+from fmu_kit.interface import FixedParameter, Input, Output, Parameter
 from fmu_kit.saved_state import State
 from fmu_kit.scalar import repeat
 from fmu_kit.slave import Slave
-from fmu_kit.variables import (
-    Variable,
-    continuous_input,
-    continuous_output,
-    discrete_input,
-    discrete_output,
-    fixed_parameter,
-    tunable_parameter,
-)
 
 
 class Mode(enum.IntEnum):
@@ -34,19 +25,17 @@ class Mode(enum.IntEnum):
 class Probe(Slave):
     """What all have: inputs a, b, n, on; parameters p, q, times, mode; outputs y0 to y7, count, lit."""
 
-    variables: ClassVar[tuple[Variable, ...]] = (
-        continuous_input("a", "A number.", None),
-        continuous_input("b", "A number.", None),
-        tunable_parameter("p", "A parameter.", None, 1.5, minimum=-100.0, maximum=100.0),
-        fixed_parameter("q", "A parameter.", None, 0.25, above=0.0),
-        *(continuous_output(f"y{k}", "A number.", None) for k in range(8)),
-        discrete_input("n", "A whole number.", None, 3),
-        discrete_output("count", "A whole number.", None, 0),
-        discrete_input("on", "A truth value.", None, False),
-        discrete_output("lit", "A truth value.", None, False),
-        fixed_parameter("times", "How often.", None, 2, minimum=0, maximum=9),
-        tunable_parameter("mode", "What becomes of it.", None, Mode.TURNED),
-    )
+    a = Input("A number.", None)
+    b = Input("A number.", None)
+    p = Parameter("A parameter.", None, 1.5, minimum=-100.0, maximum=100.0)
+    q = FixedParameter("A parameter.", None, 0.25, above=0.0)
+    y0, y1, y2, y3, y4, y5, y6, y7 = (Output("A number.", None, variability="continuous") for _ in range(8))
+    n = Input("A whole number.", None, 3, variability="discrete")
+    count = Output("A whole number.", None, 0)
+    on = Input("A truth value.", None, False, variability="discrete")
+    lit = Output("A truth value.", None, False)
+    times = FixedParameter("How often.", None, 2, minimum=0, maximum=9)
+    mode = Parameter("What becomes of it.", None, Mode.TURNED)
 
     def internal_state(self) -> State:
         """Not what these are about."""
@@ -87,42 +76,42 @@ class Branches(Probe):
 
     def step(self, t: float, h: float) -> None:
         """All kinds of branches, in several methods: paths through one method multiply."""
-        a, b = self.real("a"), self.real("b")
-        self.put("y0", _step_of_stairs(a) + 10.0 * _step_of_stairs(b))
+        a, b = self.a, self.b
+        self.y0 = _step_of_stairs(a) + 10.0 * _step_of_stairs(b)
         value, both = _of_two(a, b)
-        self.put("y1", value)
-        self.put("y2", _of_two(_step_of_stairs(b), a, most=self.real("p"))[0])
+        self.y1 = value
+        self.y2 = _of_two(_step_of_stairs(b), a, most=self.p)[0]
         self._choose(a, b, both)
         self._leave_early(a, b, t, h)
         self._combine(a, b, both)
 
     def _choose(self, a: float, b: float, both: bool) -> None:
         """if and elif without an else."""
-        if both and (a > 1.0 or b > 1.0) and self.boolean("on"):
-            self.put("y3", a)
-        elif self.count("n") > 2 and a != b:
-            self.put("y3", b)
+        if both and (a > 1.0 or b > 1.0) and self.on:
+            self.y3 = a
+        elif self.n > 2 and a != b:
+            self.y3 = b
 
     def _leave_early(self, a: float, b: float, t: float, h: float) -> None:
         """From within a branch."""
         if a > b:
-            self.put("y4", t)
+            self.y4 = t
             if self._is_small(a):
-                self.put("y5", h)
+                self.y5 = h
                 return
-            self.put("y5", -h)
-        self.put("y3", self.real("y3") + 1.0)
+            self.y5 = -h
+        self.y3 = self.y3 + 1.0
 
     def _combine(self, a: float, b: float, both: bool) -> None:
         """Conditions within values."""
-        self.put("y6", 1.0 if -1.0 < a < b <= 3.0 else 2.0)
-        self.put("y7", (a or b) + (1 if a and b else 0))
-        self.put_boolean("lit", any((a > 3.0, b > 3.0)) and not all(self._is_large(x) for x in (a, b)))
-        self.put_count("count", self.count("n") + (2 if self.boolean("on") else -1) + both)
+        self.y6 = 1.0 if -1.0 < a < b <= 3.0 else 2.0
+        self.y7 = (a or b) + (1 if a and b else 0)
+        self.lit = any((a > 3.0, b > 3.0)) and not all(self._is_large(x) for x in (a, b))
+        self.count = self.n + (2 if self.on else -1) + both
 
     def _is_large(self, x: float) -> bool:
         """Nothing but a truth value: it may be asked for in vain."""
-        return (x if x > 0.0 else -x) > self.real("q") + 0.75
+        return (x if x > 0.0 else -x) > self.q + 0.75
 
     def _is_small(self, x: float) -> bool:
         """A method with a truth value of its own."""
@@ -131,7 +120,7 @@ class Branches(Probe):
         return self._is_small_and_positive(x)
 
     def _is_small_and_positive(self, x: float) -> bool:
-        return 0.0 <= x < self.real("q")
+        return 0.0 <= x < self.q
 
 
 # -- arithmetic ----------------------------------------------------------------------------------------------------
@@ -144,40 +133,40 @@ class Arithmetic(Probe):
 
     def step(self, t: float, h: float) -> None:
         """One of them, by the number n."""
-        a, b, n = self.real("a"), self.real("b"), self.count("n")
+        a, b, n = self.a, self.b, self.n
         i, k = (math.floor(min(max(x, -1e6), 1e6)) for x in (a, b))
         if n == 0:
-            self.put("y0", a / b)
+            self.y0 = a / b
         elif n == 1:
-            self.put("y0", a % b)
+            self.y0 = a % b
         elif n == 2:
-            self.put("y0", a**b if a >= 0.0 else a**3)
+            self.y0 = a**b if a >= 0.0 else a**3
         elif n == 3:
-            self.put("y0", math.sqrt(a))
+            self.y0 = math.sqrt(a)
         elif n == 4:
-            self.put("y0", math.exp(a) + math.expm1(b))
+            self.y0 = math.exp(a) + math.expm1(b)
         elif n == 5:
-            self.put("y0", math.log(a))
+            self.y0 = math.log(a)
         elif n == 6:
-            self.put("y0", math.asin(a) + math.acos(b))
+            self.y0 = math.asin(a) + math.acos(b)
         elif n == 7:
-            self.put_count("count", math.ceil(b / 1e305) + i % 7)
+            self.count = math.ceil(b / 1e305) + i % 7
         elif n == 8:
-            self.put("y0", math.pow(a, b))
+            self.y0 = math.pow(a, b)
         elif n == 9:
-            self.put("y0", a // b)
+            self.y0 = a // b
         elif n == 10:
-            self.put_count("count", i // 3 + k % -5 + 7 // k)
+            self.count = i // 3 + k % -5 + 7 // k
         elif n == 11:
-            self.put("y0", (a * 1e200) * (b * 1e200))
-            require(math.isfinite(self.real("y0")), "y0", self.real("y0"), "a finite value")
-        self.put("y1", abs(a) + math.fabs(b) - math.copysign(a, b))
-        self.put("y2", math.sin(a) + math.cos(b) + math.tan(a) + math.tanh(b))
-        self.put("y3", math.atan(a) + math.atan2(a, b))
-        self.put("y4", min(a, b, 0.5) + max((a, b)) + sum((a, b, 1.0)))
-        self.put("y5", a**2 - b**-2.0 if b else a**0.5 if a > 0.0 else -a + +b)
-        self.put("y6", float(math.isnan(a / 2.0)) + (a == b) + float(n))
-        self.put("y7", (n * n - n // 2) / 4)
+            self.y0 = (a * 1e200) * (b * 1e200)
+            require(math.isfinite(self.y0), "y0", self.y0, "a finite value")
+        self.y1 = abs(a) + math.fabs(b) - math.copysign(a, b)
+        self.y2 = math.sin(a) + math.cos(b) + math.tan(a) + math.tanh(b)
+        self.y3 = math.atan(a) + math.atan2(a, b)
+        self.y4 = min(a, b, 0.5) + max((a, b)) + sum((a, b, 1.0))
+        self.y5 = a**2 - b**-2.0 if b else a**0.5 if a > 0.0 else -a + +b
+        self.y6 = float(math.isnan(a / 2.0)) + (a == b) + float(n)
+        self.y7 = (n * n - n // 2) / 4
 
 
 class Zeros(Slave):
@@ -222,23 +211,21 @@ class Integers(Probe):
 
     def step(self, t: float, h: float) -> None:
         """Each in turn."""
-        n, on = self.count("n"), self.boolean("on")
+        n, on = self.n, self.on
         self._congruential = (self._congruential * 1103515245 + 12345) % 2147483648
         self._shifted = _mixed(self._shifted + n)
         self._seen += 1
         self._large = (self._large * (self._large - n)) % (9007199254740881 if on else -9007199254740847)
-        self.put("y0", self._congruential / 2147483648)
-        self.put("y1", float(self._shifted))
-        self.put("y2", self._large)
-        self.put("y3", self._small(n, on))
-        self.put(
-            "y4", math.atan2(0.0, -n * (n - 3)) + math.copysign(1.0, (n * 0) * -1.0) + math.copysign(1.0, -(n - n))
-        )
-        self.put("y5", ((self._congruential << 40) // (7 * n + 11) >> 20) + (self._shifted * self._large) // 2**70)
-        self.put("y6", repeat(self.count("times"), lambda i, x: (x * (2**40 + i) + 1) % 1000003, n))
-        self.put_count("count", (_larger(self._shifted >> 8, self._congruential >> 8) + n**3) % 1000)
-        self.put_boolean("lit", (self._large * n > self._shifted * self._large) ^ on)
-        if self.real("a") > 2.0:
+        self.y0 = self._congruential / 2147483648
+        self.y1 = float(self._shifted)
+        self.y2 = self._large
+        self.y3 = self._small(n, on)
+        self.y4 = math.atan2(0.0, -n * (n - 3)) + math.copysign(1.0, (n * 0) * -1.0) + math.copysign(1.0, -(n - n))
+        self.y5 = ((self._congruential << 40) // (7 * n + 11) >> 20) + (self._shifted * self._large) // 2**70
+        self.y6 = repeat(self.times, lambda i, x: (x * (2**40 + i) + 1) % 1000003, n)
+        self.count = (_larger(self._shifted >> 8, self._congruential >> 8) + n**3) % 1000
+        self.lit = (self._large * n > self._shifted * self._large) ^ on
+        if self.a > 2.0:
             self.warn_once("a", f"{self._large} and {self._shifted * 2:d}, {-n * 0}, {2**53 - 1 - self._seen}")
 
     def _small(self, n: int, on: bool) -> int:
@@ -264,7 +251,7 @@ class Choices(Probe):
 
     def read_parameters(self) -> None:
         """One that is known from the parameters alone."""
-        self._offset = 10.0 if self.enumeration("mode") >= Mode.TURNED else 0.0
+        self._offset = 10.0 if self.mode >= Mode.TURNED else 0.0
 
     def initialise(self, t: float) -> None:
         """Outputs of the inputs."""
@@ -272,12 +259,12 @@ class Choices(Probe):
 
     def step(self, t: float, h: float) -> None:
         """In a function, in a method and as a number."""
-        mode = self.enumeration("mode")
-        self.put("y0", _chosen(self.real("a"), mode) + self._offset)
-        self.put("y1", repeat(self.count("times"), lambda i, x: _chosen(x, mode), self.real("b")))
-        if mode != Mode.DOUBLED and self.count("times") > 1:
-            self.put("y2", t)
-        self.put_count("count", 10 * mode + self.count("times"))
+        mode = self.mode
+        self.y0 = _chosen(self.a, mode) + self._offset
+        self.y1 = repeat(self.times, lambda i, x: _chosen(x, mode), self.b)
+        if mode != Mode.DOUBLED and self.times > 1:
+            self.y2 = t
+        self.count = 10 * mode + self.times
 
 
 # -- what is kept ----------------------------------------------------------------------------------------------------
@@ -320,14 +307,14 @@ class Memory(Probe):
 
     def read_parameters(self) -> None:
         """Only if they are what they have to be together."""
-        self._share = self.real("q") / (1.0 + abs(self.real("p")))
-        require(self.real("p") != 13.0, "p", self.real("p"), "another number")
+        self._share = self.q / (1.0 + abs(self.p))
+        require(self.p != 13.0, "p", self.p, "another number")
 
     def initialise(self, t: float) -> None:
         """All that is kept has its shape from here on."""
-        self._filters = [Filter(self.real("a")), Filter(0.0, seen=10)]
+        self._filters = [Filter(self.a), Filter(0.0, seen=10)]
         self._named = {"low": math.inf, "high": -math.inf}
-        self._last = Pair(self.real("a"), self.real("b"))
+        self._last = Pair(self.a, self.b)
         self._whole: float = 0
         self._delayed = [0.0] * 4
         self._armed = False
@@ -335,29 +322,29 @@ class Memory(Probe):
 
     def step(self, t: float, h: float) -> None:
         """Some of each."""
-        a, b = self.real("a"), self.real("b")
+        a, b = self.a, self.b
         chosen = self._filters[0]
-        if self.boolean("on"):
+        if self.on:
             chosen = self._filters[1]
             self._last = Pair(b, self._last.first)
-        self.put("y0", self._filters[0].take(a, self._share))
-        self.put("y1", self._filters[1].take(chosen.value + b, self._share))
+        self.y0 = self._filters[0].take(a, self._share)
+        self.y1 = self._filters[1].take(chosen.value + b, self._share)
         if a < self._named["low"]:
             self._named["low"] = a
         self._named["high"] = max(self._named["high"], b)
-        self.put("y2", self._last.second - self._last.first)
+        self.y2 = self._last.second - self._last.first
         self._delayed = [a, *self._delayed[:-1]]
         _raise_all(self._delayed, -2.0)
         self._delayed[1] += 0.0
-        self.put("y3", self._delayed[3])
+        self.y3 = self._delayed[3]
         self._whole += 0.5 if self._armed else 1
-        self.put("y4", math.floor(self._whole))
+        self.y4 = math.floor(self._whole)
         self._armed = a > b or (self._armed and a > 0.0)
-        self.put_boolean("lit", self._armed)
-        self.put_count("count", self._filters[0].seen + self._filters[1].seen)
-        self.put("y5", t - self._started)
+        self.lit = self._armed
+        self.count = self._filters[0].seen + self._filters[1].seen
+        self.y5 = t - self._started
         if self._named["low"] <= self._named["high"]:
-            self.put("y6", self._named["high"] - self._named["low"])
+            self.y6 = self._named["high"] - self._named["low"]
 
 
 class Kept(Probe):
@@ -372,14 +359,14 @@ class Kept(Probe):
 
     def initialise(self, t: float) -> None:
         """Not the total: that begins with what it was made with, and goes on."""
-        self._offset = Vec3(self.real("a"), self._total, 3.0)
+        self._offset = Vec3(self.a, self._total, 3.0)
 
     def step(self, t: float, h: float) -> None:
         """Both ways of moving."""
-        self.put("y0", self._moved(self.real("a"), self.real("b")))
-        self.put("y1", self._listed(self.real("a"), self.real("b"), self._total))
+        self.y0 = self._moved(self.a, self.b)
+        self.y1 = self._listed(self.a, self.b, self._total)
         self._total = self._total + h
-        self.put("y2", self._total + self._offset.x * self._offset.y)
+        self.y2 = self._total + self._offset.x * self._offset.y
 
     def _moved(self, x: float, by: float) -> float:
         return x + by if x > by else x
@@ -396,8 +383,8 @@ class Below(Kept):
     def step(self, t: float, h: float) -> None:
         """Its own, and around that of its base."""
         super().step(t, h)
-        self.put("y3", self._moved(self.real("b"), 1.0))
-        self.put("y4", super()._moved(self.real("b"), 1.0))
+        self.y3 = self._moved(self.b, 1.0)
+        self.y4 = super()._moved(self.b, 1.0)
 
     def _moved(self, x: float, by: float) -> float:
         return 2.0 * super()._moved(x, by) + super()._moved(by, x)
@@ -442,7 +429,7 @@ class Loops(Probe):
 
     def step(self, t: float, h: float) -> None:
         """A sum, a product that is cut off, one loop in another."""
-        a, b, n = self.real("a"), self.real("b"), self.count("n")
+        a, b, n = self.a, self.b, self.n
         times = min(max(n, 0), 20)
 
         def add(i: int, state: tuple[float, float]) -> tuple[float, float]:
@@ -452,30 +439,30 @@ class Loops(Probe):
             return total + i * b, _clipped(product * a)
 
         total, product = repeat(times, add, (0.0, 1.0))
-        self.put("y0", total)
-        self.put("y1", product)
+        self.y0 = total
+        self.y1 = product
         nothing: float = 0
         inner = repeat(times, lambda i, x: x + repeat(i, lambda k, y: y + k * b, 0.0), nothing)
-        self.put("y2", inner)
+        self.y2 = inner
         half = repeat(times, lambda i, x: x + 0.5, nothing)
-        self.put_count("count", math.floor(half))
+        self.count = math.floor(half)
 
         def root(i: int, x: float) -> float:
             require(x > -3.0, "root", x, "more than -3")
             return x - 1.0
 
-        self.put("y3", repeat(times, root, abs(b)))
-        self.put("y4", repeat(times, lambda i, x: self._nearer(x, i + self._nearer(x, 1.0)), a))
-        self.put("y5", self._nearer(b, 2.0))
-        self.put("y6", self._turned(times, a))
+        self.y3 = repeat(times, root, abs(b))
+        self.y4 = repeat(times, lambda i, x: self._nearer(x, i + self._nearer(x, 1.0)), a)
+        self.y5 = self._nearer(b, 2.0)
+        self.y6 = self._turned(times, a)
 
     def _turned(self, times: int, x: float) -> float:
-        return _either_way(times, x, math.exp(0.01 * self.real("p")))
+        return _either_way(times, x, math.exp(0.01 * self.p))
 
     def _nearer(self, x: float, far: float) -> float:
         """Half of the way from one number to another, by what this step has put."""
         require(far != 17.0, "far", far, "another number than 17")
-        return x if far < 0.0 else x + 0.5 * (far - x) * self.real("p") / (1.0 + abs(self.real("y0")))
+        return x if far < 0.0 else x + 0.5 * (far - x) * self.p / (1.0 + abs(self.y0))
 
 
 # -- words ---------------------------------------------------------------------------------------------------------
@@ -488,14 +475,14 @@ class Words(Probe):
 
     def read_parameters(self) -> None:
         """Errors of parameters."""
-        if self.real("p") > 50.0:
-            raise FmuError(f'p = {self.real("p"):g}, which is 100 % more than {50:d}: expected "less" \\ µ')
+        if self.p > 50.0:
+            raise FmuError(f'p = {self.p:g}, which is 100 % more than {50:d}: expected "less" \\ µ')
 
     def step(self, t: float, h: float) -> None:
         """Warnings once, then errors."""
-        a, b, n = self.real("a"), self.real("b"), self.count("n")
+        a, b, n = self.a, self.b, self.n
         if a > 1.0:
-            self.warn_once("a", f"a = {a} and {b:g} at t = {t}: 100 % of {n}, {self.boolean('on')}, {a > b}")
+            self.warn_once("a", f"a = {a} and {b:g} at t = {t}: 100 % of {n}, {self.on}, {a > b}")
         if b > 1.0:
             self.warn_once("b", f"b = {b:.3f}, {b:.2e}, {a:.4g}, {-b!r}, {float(n)}, {math.floor(b)}, {n:d}")
         if a > 1.0 and b > 1.0:
@@ -505,4 +492,4 @@ class Words(Probe):
         require(n != 8, "n", n, f"another number than {n + 0.5}")
         if n == 9:
             raise ValueError(f"n is {n}")
-        self.put("y0", a)
+        self.y0 = a

@@ -15,9 +15,9 @@ import time
 from collections import deque
 
 from fmu_kit.errors import require
+from fmu_kit.interface import Input, Output
 from fmu_kit.scalar import repeat
 from fmu_kit.slave import Slave
-from fmu_kit.variables import continuous_input, continuous_output, discrete_output
 
 
 def careful(x):
@@ -34,11 +34,9 @@ class Helper:
 
 class Refused(Slave):
     description = "Refused."
-    variables = (
-        continuous_input("a", "A number.", None),
-        continuous_output("y", "A number.", None),
-        discrete_output("count", "A whole number.", None, 0),
-    )
+    a = Input("A number.", None)
+    y = Output("A number.", None)
+    count = Output("A whole number.", None, 0)
     hidden = 0.0
 
     def initialise(self, t):
@@ -55,20 +53,20 @@ class Refused(Slave):
         return x > 1.0
 
     def step(self, t, h):
-        a = self.real("a")
+        a = self.a
         {step}
 """
 IN_A_STEP = [
-    ("self.put('y', '{}'.isdigit() + math.hypot(a, 1.0))", "a function that takes floats only was given a computed"),
-    ("self.put('y', round(a))", "round() of a computed value: expected math.floor or math.ceil"),
-    ("self.put('y', int(a))", "int() of a computed float: expected math.floor or math.ceil"),
-    ("for k in range(math.floor(a)): self.put('y', k)", "expected fmu_kit.scalar.repeat for a loop"),
-    ("self.put('y', (1.0, 2.0)[math.floor(a)])", "a computed value where an integer must be known"),
-    ("self.put('y', {1.0: 2.0}.get(a, 3.0))", "as the key of a dictionary, in a set or in a cache: expected an if"),
+    ("self.y = '{}'.isdigit() + math.hypot(a, 1.0)", "a function that takes floats only was given a computed"),
+    ("self.y = round(a)", "round() of a computed value: expected math.floor or math.ceil"),
+    ("self.y = int(a)", "int() of a computed float: expected math.floor or math.ceil"),
+    ("for k in range(math.floor(a)): self.y = k", "expected fmu_kit.scalar.repeat for a loop"),
+    ("self.y = (1.0, 2.0)[math.floor(a)]", "a computed value where an integer must be known"),
+    ("self.y = {1.0: 2.0}.get(a, 3.0)", "as the key of a dictionary, in a set or in a cache: expected an if"),
     ("require(a > 1.0, 'a', f'{a:>10}', 'more')", "{value:>10} of a float in a text: expected {value} or a format as"),
-    ("self.put_count('count', a)", "count: expected a value of its type, found a float"),
-    ("self.put('y', random.random())", "random.random(): expected what follows from the variables and from time"),
-    ("self.put('y', time.time())", "time.time(): expected what follows from the variables and from time alone"),
+    ("self.count = a", "count: expected a value of its type, found a float"),
+    ("self.y = random.random()", "random.random(): expected what follows from the variables and from time"),
+    ("self.y = time.time()", "time.time(): expected what follows from the variables and from time alone"),
     ("print(a)", "print(): expected self.warn_once"),
     ("self.log('a')", "self.log: expected self.warn_once"),
     ("self._new = a", "self._new is first set in a step: expected it set by initialise"),
@@ -76,26 +74,26 @@ IN_A_STEP = [
     ("self._kept = None", "self._kept changes in a step in more than numbers: self._kept is a number and None"),
     ("self._kept = [a]", "self._kept changes in a step in more than numbers: "),
     ("if a > 1.0: self._kept = 'on'", "what is kept differs in more than numbers between two paths: "),
-    ("self.put('y', min([a, t], key=abs))", "min() of computed values with key: expected values only"),
-    ("self.put('y', None)", "what is kept changes in a step in more than numbers: y is a number and None"),
-    ("if a > 1.0: self.put_count('count', 'on')", "between two paths: count is 'on' and a number"),
+    ("self.y = min([a, t], key=abs)", "min() of computed values with key: expected values only"),
+    ("self.y = None", "self.y = None: expected a number"),
+    ("if a > 1.0: self.count = 'on'", "self.count = on: expected a number"),
     (
         "while a > 1.0: a = a / 2.0",
         "while: more than 200 rounds by a computed condition, expected fmu_kit.scalar.repeat",
     ),
     ("assert a > 1.0", "AssertionError"),
-    ("self.put('y', repeat(math.floor(a), lambda i, x: (x, x), a))", "repeat: expected the body to return what it is"),
+    ("self.y = repeat(math.floor(a), lambda i, x: (x, x), a)", "repeat: expected the body to return what it is"),
     (
-        "self.put('y', repeat(math.floor(a), lambda i, x: self.put('y', i * x) or x, a))",
+        "self.y = repeat(math.floor(a), lambda i, x: setattr(self, 'y', i * x) or x, a)",
         "repeat: its body changes what the slave keeps",
     ),
     (
-        "self.put('y', repeat(math.floor(a), lambda i, x: self._changing(x) * x, a))",
+        "self.y = repeat(math.floor(a), lambda i, x: self._changing(x) * x, a)",
         "repeat: its body calls a method that changes what the slave keeps",
     ),
-    ("self.put('y', any(self._speaking(x) for x in (a, t)))", "any() of values of which a later one may fail"),
-    ("self.put('y', all(self._changing(x) for x in (a, t)))", "all() of values of which a later one may fail"),
-    ("self.put('y', any(1.0 / x > 2.0 for x in (a, t, h)))", "any() of values of which a later one may fail"),
+    ("self.y = any(self._speaking(x) for x in (a, t))", "any() of values of which a later one may fail"),
+    ("self.y = all(self._changing(x) for x in (a, t))", "all() of values of which a later one may fail"),
+    ("self.y = any(1.0 / x > 2.0 for x in (a, t, h))", "any() of values of which a later one may fail"),
 ]
 IN_INITIALISE = [
     ("self._queue = deque([0.0])", "deque: expected numbers in tuples, lists, dictionaries and objects"),
@@ -139,7 +137,7 @@ def test_what_a_step_may_not_do_is_said_in_a_line(
 def test_what_may_not_be_kept_is_said_in_a_line(
     statement: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    text = SLAVE.replace("{initialise}", statement).replace("{step}", "self.put('y', a)")
+    text = SLAVE.replace("{initialise}", statement).replace("{step}", "self.y = a")
     _, said = refusal(tmp_path, monkeypatch, text)
     assert words in said
     assert "\n" not in said
@@ -148,8 +146,8 @@ def test_what_may_not_be_kept_is_said_in_a_line(
 @pytest.mark.parametrize(
     ("called", "where", "words"),
     [
-        ("self.put('y', careful(a))", "    try:", "try: expected an if before what may fail"),
-        ("self.put('y', self._careful(a))", "        try:  # mine", "try: expected an if before what may fail"),
+        ("self.y = careful(a)", "    try:", "try: expected an if before what may fail"),
+        ("self.y = self._careful(a)", "        try:  # mine", "try: expected an if before what may fail"),
     ],
 )
 def test_errors_that_are_caught_are_refused_where_they_are(
@@ -175,7 +173,7 @@ def halved(x):
         if x < 1.0:  # enough
             return x
 """
-    text = SLAVE.replace("{initialise}", "pass").replace("{step}", "self.put('y', halved(a))") + method
+    text = SLAVE.replace("{initialise}", "pass").replace("{step}", "self.y = halved(a)") + method
     path, said = refusal(tmp_path, monkeypatch, text)
     assert said.startswith(f"Refused: {path}, line {line_of(path, '# enough')}: while: more than 200 rounds")
 

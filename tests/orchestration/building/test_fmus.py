@@ -138,20 +138,19 @@ def test_a_build_says_how_far_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 # -- slaves of anybody ------------------------------------------------------------------------------------
 
 LAMP = """
+from fmu_kit.interface import Input, Output
 from fmu_kit.slave import Slave
-from fmu_kit.variables import continuous_output, discrete_input
 from voltage import VOLTS
 
 
 class Lamp(Slave):
-    variables = (
-        continuous_output("voltage", "at the lamp", "{unit}"),
-        discrete_input("switch", "whether it is on", None, False),
-    )
-    description = "A lamp"
+    '''A lamp.'''
+
+    voltage = Output("at the lamp", "{unit}")
+    switch = Input("whether it is on", start=False, variability="discrete")
 
     def step(self, t: float, h: float) -> None:
-        self.put("voltage", VOLTS * self.boolean("switch"))
+        self.voltage = VOLTS * self.switch
 """
 
 

@@ -13,7 +13,7 @@ ABORTS, KILLED, SPENT = 1.11, 1.13, 1.14
 _BEFORE = "        body, wind, actuators = self._body, self._wind, self._actuators\n"
 _SICKNESS = f"""
         import os
-        mass = self.real("mass")
+        mass = self.mass
         if mass == {ABORTS}:
             os.abort()
         if mass == {KILLED}:
