@@ -202,7 +202,7 @@ def test_somebody_elses_fmu_is_left_as_it_is_beside_a_slave_of_its_name(lamp: Pa
 
 def test_a_slave_that_cannot_be_built_is_an_error_of_one_line(lamp: Path) -> None:
     (lamp / "lamp.py").write_text(LAMP.format(unit="furlong"), encoding="utf-8")
-    with pytest.raises(QuadcosimError, match=r"failed: ValueError: unit furlong: expected powers of .*$"):
+    with pytest.raises(QuadcosimError, match=r"failed: .*lamp.py, line 10: ValueError: unit furlong: expected"):
         fmus.locate(str(lamp / "Lamp.fmu"))
     (lamp / "voltage.py").write_text("import numpy\n", encoding="utf-8")
     with pytest.raises(QuadcosimError, match=r"voltage.py:1: imports numpy, but an FMU has the standard library only$"):
