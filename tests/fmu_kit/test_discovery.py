@@ -74,6 +74,32 @@ def test_modules_of_a_package_are_named_from_where_its_outermost_package_lies(fo
     assert slaves_in(inner) == [Target("plants.inner.tank", "Tank", folder.parent)]
 
 
+SHARED = """
+from abc import abstractmethod
+from fmu_kit.slave import Slave
+class Laws(Slave):
+    @abstractmethod
+    def law(self): ...
+class Gains(Laws):
+    def read(self): ...
+class Stepped(Laws):
+    def step(self, t, h): ...
+    def law(self): ...
+class Whole(Gains, Stepped): ...
+class Other(Stepped, Gains): ...
+class Open(Gains, Laws): ...
+class Again(Stepped):
+    @abstractmethod
+    def law(self): ...
+class Nothing(Laws, Gains): ...
+"""
+
+
+def test_what_one_base_leaves_open_another_may_define_as_python_looks_for_it(tmp_path: Path) -> None:
+    (tmp_path / "shared.py").write_text(SHARED, encoding="utf-8")
+    assert [target.model for target in slaves_in(tmp_path)] == ["Stepped", "Whole", "Other"]
+
+
 def test_the_projects_own_slaves_are_found() -> None:
     assert slaves_in(ROOT / "controller_fmu" / "sliding_mode") == [
         Target("controller_fmu.sliding_mode.slave", "UnifiedController", ROOT)
