@@ -98,12 +98,15 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             )
         declared = declared_in(cls)
         _expect_free_names(cls, declared)
+        if declared == getattr(cls, "_declared", None):
+            return  # as its base has them: pythonfmu 0.7.0 keeps the class of each instance for ever, so it has little
         cls.variables, cls._initial = variables_of(declared), initial_values(declared)
         cls.__setattr__ = _set_declared  # type: ignore[assignment]
         cls._index = {v.name: i for i, v in enumerate(cls.variables)}
         placed = {each.attribute: each.at(cls._index[each.first]) for each in declared}
         for attribute, each in placed.items():
             setattr(cls, attribute, each)
+        cls._declared = list(placed.values())
         cls._own = {attribute: each.fset for attribute, each in placed.items() if each.own}
         cls._real_count = sum(v.type == "Real" for v in cls.variables)
         cls._readable = frozenset(range(cls._real_count))
@@ -111,6 +114,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         cls._inputs = frozenset(i for i, v in enumerate(cls.variables) if v.causality == "input")
         cls._tunable = frozenset(i for i, v in enumerate(cls.variables) if v.variability == "tunable")
 
+    _declared: ClassVar[list[Declared]]
     _own: ClassVar[dict[str, Callable[[Any, Any], None] | None]]
     """The variables that a slave sets itself, in order, and how."""
     _initial: ClassVar[dict[str, str]]
