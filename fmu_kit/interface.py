@@ -35,6 +35,26 @@ class _Kind:
     expected: str = "a number"
 
 
+def _vec3(x: int) -> Callable[[Any], Vec3]:
+    y, z = x + 1, x + 2
+
+    def get(slave: Any) -> Vec3:
+        reals = slave._reals
+        return Vec3(reals[x], reals[y], reals[z])
+
+    return get
+
+
+def _quaternion(x: int) -> Callable[[Any], Quaternion]:
+    y, z, w = x + 1, x + 2, x + 3
+
+    def get(slave: Any) -> Quaternion:
+        reals = slave._reals
+        return Quaternion(Vec3(reals[x], reals[y], reals[z]), reals[w])
+
+    return get
+
+
 def _inertia(place: int) -> Callable[[Any], Inertia]:
     def get(slave: Any) -> Inertia:
         """The matrix of six entries; raises `FmuError` unless it is positive definite."""
@@ -53,16 +73,10 @@ _KINDS = (  # a bool is an int too, and an item of an IntEnum
     _Kind(type=bool, get=lambda i: lambda slave: bool(slave._others[i]), is_real=False),
     _Kind(type=int, get=lambda i: lambda slave: int(slave._others[i]), is_real=False),
     _Kind(type=float, get=lambda i: lambda slave: slave._reals[i]),
-    _Kind(
-        type=Vec3, get=lambda i: lambda slave: Vec3(*slave._reals[i : i + 3]),
-        axes=("x", "y", "z"), expected="a Vec3",
-    ),
-    _Kind(
-        type=Quaternion, get=lambda i: lambda slave: Quaternion.from_xyzw(*slave._reals[i : i + 4]),
-        axes=_QUATERNION_AXES, expected="a Quaternion",
-    ),
+    _Kind(type=Vec3, get=_vec3, axes=("x", "y", "z"), expected="a Vec3"),
+    _Kind(type=Quaternion, get=_quaternion, axes=_QUATERNION_AXES, expected="a Quaternion"),
     _Kind(type=Inertia, get=_inertia, axes=_INERTIA_AXES, expected="an Inertia"),
-)  # fmt: skip
+)
 _NO_NUMBER = (Vec3, Quaternion, Inertia, str, tuple, list, dict, type(None))
 
 
@@ -133,6 +147,11 @@ class Declared(property):
     def _put_at(self, place: int) -> Callable[[Any, Any], None]:
         kind, end = self._kind, place + len(self._kind.axes)
 
+        def put_vec3(slave: Any, value: Any) -> None:
+            if not isinstance(value, Vec3):
+                self._refuse(value)
+            slave._reals[place:end] = (value.x, value.y, value.z)  # the most frequent of all: not by its iterator
+
         def put_parts(slave: Any, value: Any) -> None:
             if not isinstance(value, kind.type):
                 self._refuse(value)
@@ -148,6 +167,8 @@ class Declared(property):
                 self._refuse(value)
             slave._others[place] = value
 
+        if kind.type is Vec3:
+            return put_vec3
         return put_parts if kind.axes else put_real if kind.is_real else put_other
 
     def _refuse(self, value: Any) -> None:

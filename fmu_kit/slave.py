@@ -101,13 +101,11 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         if declared == getattr(cls, "_declared", None):
             return  # as its base has them: pythonfmu 0.7.0 keeps the class of each instance for ever, so it has little
         cls.variables, cls._initial = variables_of(declared), initial_values(declared)
-        cls.__setattr__ = _set_declared  # type: ignore[assignment]
         cls._index = {v.name: i for i, v in enumerate(cls.variables)}
-        placed = {each.attribute: each.at(cls._index[each.first]) for each in declared}
-        for attribute, each in placed.items():
-            setattr(cls, attribute, each)
-        cls._declared = list(placed.values())
-        cls._own = {attribute: each.fset for attribute, each in placed.items() if each.own}
+        for each in declared:
+            setattr(cls, each.attribute, each.at(cls._index[each.first]))
+        cls._declared = declared_in(cls)
+        cls._own = tuple(each.attribute for each in declared if each.own)
         cls._real_count = sum(v.type == "Real" for v in cls.variables)
         cls._readable = frozenset(range(cls._real_count))
         cls._given = frozenset(i for i, v in enumerate(cls.variables) if v.has_start)
@@ -115,8 +113,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         cls._tunable = frozenset(i for i, v in enumerate(cls.variables) if v.variability == "tunable")
 
     _declared: ClassVar[list[Declared]]
-    _own: ClassVar[dict[str, Callable[[Any, Any], None] | None]]
-    """The variables that a slave sets itself, in order, and how."""
+    _own: ClassVar[tuple[str, ...]]
+    """The variables that a slave sets itself, as attributes."""
     _initial: ClassVar[dict[str, str]]
     _index: ClassVar[dict[str, int]]
     _real_count: ClassVar[int]
@@ -145,6 +143,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._quickly_settable: frozenset[int] = frozenset()
         self._warned: list[str] = []
         self._has_failed = False  # of this object, whatever phase a restored state says
+        self._known_attributes = 0  # how many there were when they were looked at last
         self._of_the_base = frozenset(vars(self))
 
     # -- what a model defines ---------------------------------------------------------------------------
@@ -230,6 +229,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         """fmi2ExitInitializationMode: parameters are checked together here."""
         self._expect(Phase.INITIALIZATION, "fmi2ExitInitializationMode")
         self._initialise()
+        self._expect_declared(self._initialise)
         self._phase = Phase.STEPPING
         self._initialised = True
         self._quickly_settable = self._inputs
@@ -240,6 +240,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._expect(Phase.STEPPING, "fmi2DoStep")
         self._expect_in_time(current_time, step_size)
         self._advance(current_time, step_size)
+        if len(self.__dict__) != self._known_attributes:
+            self._expect_declared(lambda: self._advance(current_time, step_size))
         self._reached = current_time + step_size
         return True
 
@@ -406,6 +408,28 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         if t + h - self._stop_time > slack:
             raise FmuError(f"communicationStepSize = {h} from {t}: expected no step past stopTime = {self._stop_time}")
 
+    def _expect_declared(self, again: Callable[[], None]) -> None:
+        """Raise `AttributeError` for an attribute that was set and is not declared, which is a slip of the pen.
+
+        Where it was set is known by doing it `again`: to look at each attribute as it is set would slow all steps down.
+        """
+        slips = [name for name in vars(self) if self._is_slip(name)]
+        self._known_attributes = len(vars(self))
+        if slips:
+            type(self).__setattr__ = _set_declared  # type: ignore[method-assign, assignment]
+            try:
+                again()
+            finally:
+                del type(self).__setattr__
+            self._refuse_slip(slips[0])
+
+    def _is_slip(self, name: str) -> bool:
+        return not (name.startswith("_") or name in self._of_the_base or hasattr(type(self), name))
+
+    def _refuse_slip(self, name: str) -> None:
+        own = ", ".join(self._own)
+        raise AttributeError(f"self.{name}: no such variable; expected {own}, or a name that begins with _")
+
     def _settable(self, vr: int, *types: str) -> Variable:
         """The variable of `vr`, of one of the types, if its value may be set now; raises `FmuError` if not."""
         self._of_type([vr], *types)
@@ -448,17 +472,10 @@ def _first_line(text: str) -> str:
 
 
 def _set_declared(slave: Slave, name: str, value: Any) -> None:
-    """Set an attribute; raises `AttributeError` for one that is not declared, which is a slip of the pen."""
-    put = slave._own.get(name)
-    if put is not None:
-        put(slave, value)
-    elif name in slave.__dict__:
-        slave.__dict__[name] = value  # faster than by object.__setattr__
-    elif name.startswith("_") or hasattr(type(slave), name) or "_of_the_base" not in slave.__dict__:
-        object.__setattr__(slave, name, value)
-    else:
-        own = ", ".join(slave._own)
-        raise AttributeError(f"self.{name}: no such variable; expected {own}, or a name that begins with _")
+    """Set an attribute; raises `AttributeError` for one that is not declared."""
+    if slave._is_slip(name):
+        slave._refuse_slip(name)
+    object.__setattr__(slave, name, value)
 
 
 def _expect_free_names(slave: type[Slave], declared: Iterable[Declared]) -> None:
