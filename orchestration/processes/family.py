@@ -6,11 +6,11 @@ import signal
 import subprocess
 import sys
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestration.processes.waiting import waited
+from orchestration.processes.waiting import waits
 
 _MARK = "QUADCOSIM_FAMILY"
 """Has the name of each family that a process is of, the outermost first"""
@@ -28,8 +28,8 @@ class Member:
     """Whether its time is limited by itself, in a family within this one"""
     processor: float
     """[s] that it has had of it"""
-    waited: float
-    """[s] for which it could run and was not let to"""
+    waits: Mapping[int, float]
+    """[s] for which it could run and was not let to, by thread"""
     memory: int
     """[byte] resident"""
 
@@ -55,7 +55,7 @@ class Family:
                 found[pid] = Member(
                     limited=_LIMITED in inner,
                     processor=(int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK"),
-                    waited=waited(pid),
+                    waits=waits(pid),
                     memory=int(fields[21]) * os.sysconf("SC_PAGE_SIZE"),
                 )
         return found

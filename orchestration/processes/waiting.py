@@ -8,19 +8,19 @@ from pathlib import Path
 _NANOSECONDS = 1e9
 
 
-def waited(process: int) -> float:
-    """Seconds for which it could run and was not let to, of its threads the one that waited longest.
+def waits(process: int) -> dict[int, float]:
+    """Seconds for which it could run and was not let to, by thread that lives.
 
-    0 for a process that is gone, and where the system does not say (it does on Linux).
+    None for a process that is gone, and where the system does not say (it does on Linux).
     """
-    longest = 0
+    found = {}
     with contextlib.suppress(OSError):
         for thread in Path(f"/proc/{process}/task").iterdir():
             with contextlib.suppress(OSError, ValueError, IndexError):  # it may end meanwhile
-                longest = max(longest, int((thread / "schedstat").read_text().split()[1]))
-    return longest / _NANOSECONDS
+                found[int(thread.name)] = int((thread / "schedstat").read_text().split()[1]) / _NANOSECONDS
+    return found
 
 
 def own_clock() -> float:
     """Seconds on a clock of this process that stands still while it waits for a processor."""
-    return time.monotonic() - waited(os.getpid())
+    return time.monotonic() - max(waits(os.getpid()).values(), default=0.0)

@@ -4,10 +4,11 @@ import math
 import subprocess
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
-from orchestration.processes.family import Family, Member
+from orchestration.processes.family import Family
 from orchestration.processes.limits import Limits
+from orchestration.processes.taken import Taken
 
 _POLL = 0.05
 """[s] between two looks, at least"""
@@ -21,8 +22,9 @@ class Watch:
     """Looks at a process and its family until it ends or is closed; in a thread, if there is something to look at.
 
     Time is that in which it computes or sleeps: a call that waits for ever is noticed, and how busy the machine is
-    changes nothing. That in which a process with a limit of its own lives does not count. Where the system says
-    nothing of processes (not on Linux) it is the time of the wall, and memory is not limited.
+    changes nothing. Of what is allowed it is the time of a processor, of all threads, if that is more. That in which a
+    process with a limit of its own lives does not count. Where the system says nothing of processes (not on Linux) it
+    is the time of the wall, and memory is not limited.
     """
 
     def __init__(
@@ -33,25 +35,29 @@ class Watch:
         written: Callable[[], int],
     ) -> None:
         """`written` tells the bytes of output so far."""
-        self.spent = 0.0
-        """[s] of its time"""
         self.reached: str | None = None
         """The limit at which it was ended, in words"""
         self.out_of_time = False
         """Whether that is a limit of time"""
         self._process, self._family, self._limits, self._written = process, family, limits, written
-        self._computed = 0.0
-        self._time, self._since, self._late = limits.time, 0.0, "it takes longer than the limit of {:g} s"
+        self._taken = Taken()
+        self._time, self._late = limits.time, "it takes longer than the limit of {:g} s"
+        self._since: tuple[float, float] | None = (0.0, math.inf)  # of `Taken`; None: that of the next look
         self._lock, self._over = threading.Lock(), threading.Event()
         self._thread: threading.Thread | None = None
         if math.isfinite(min(limits.time, limits.memory, limits.output)):
             self._start()
 
+    @property
+    def spent(self) -> float:
+        """[s] of its own time."""
+        return self._taken.own
+
     def allow(self, seconds: float | None) -> None:
         """From now on it may take so much time, whatever it has taken; None: as much as it likes."""
         with self._lock:
             self.reached = None
-            self._time, self._since = math.inf if seconds is None else seconds, math.nan
+            self._time, self._since = math.inf if seconds is None else seconds, None
             self._late = "it takes more than the time limit of {:g} s"
         if seconds is not None and self._thread is None:
             self._start()
@@ -70,7 +76,7 @@ class Watch:
         last, before, pause = time.monotonic(), self._family.members(), self._pause(0.0)
         while not self._over.wait(pause):
             now, members = time.monotonic(), self._family.members()
-            self._count(before, members, now - last)
+            self._taken.count(before, members, now - last)
             last, before = now, members
             with self._lock:
                 if self._process.poll() is None:
@@ -83,18 +89,9 @@ class Watch:
     def _pause(self, cost: float) -> float:
         return max(min(_POLL, _SHARE * self._time), cost / _EFFORT)
 
-    def _count(self, before: Mapping[int, Member], now: Mapping[int, Member], passed: float) -> None:
-        if any(each.limited for each in now.values()):
-            return
-        known = [(each, before.get(pid)) for pid, each in now.items()]
-        self._computed += sum(each.processor - (0.0 if old is None else old.processor) for each, old in known)
-        waited = sum(each.waited - (0.0 if old is None else old.waited) for each, old in known)
-        self.spent = max(self.spent + passed - waited, self._computed)
-
     def _too_much(self, memory: int) -> str | None:
-        if math.isnan(self._since):
-            self._since = self.spent
-        self.out_of_time = self.spent - self._since > self._time
+        own, processor = self._since = self._since or (self._taken.own, self._taken.processor)
+        self.out_of_time = max(self._taken.own - own, self._taken.processor - processor) > self._time
         if self.out_of_time:
             return self._late.format(self._time)
         if self._written() > self._limits.output * 1e6:
