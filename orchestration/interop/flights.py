@@ -1,5 +1,6 @@
 """The flights of one system: by tools, in processes of their own, and by this project's master."""
 
+import threading
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -53,12 +54,15 @@ class Flights:
         self.steps = round(system.stop_time / self.step)
         self._own: dict[tuple[str, str], Floats] = {}
         self._flying: list[Child] = []
+        self._lock, self._over = threading.Lock(), False
         np.save(folder / "recorded.npy", self.rows_of_master("gauss-seidel", {})[:-1])
 
     def __enter__(self) -> "Flights":
         return self
 
     def __exit__(self, *exception: object) -> None:
+        with self._lock:
+            self._over = True
         for child in self._flying:
             child.close()
 
@@ -94,17 +98,23 @@ class Flights:
             folder=folder,
         )
         (folder / "job.json").write_text(job.to_json(), encoding="utf-8")
-        child = Child(
-            tool.command(folder / "job.json", folder / "rows.npy"),
-            environment=subprocesses.environment(**dict.fromkeys(_TEMPORARY, str(folder))),
-            folder=folder,  # not this process's: fmpy changes that while it loads an FMU, in another thread
-            talks=False,
-        )
-        self._flying.append(child)
-        ending = child.ending()
+        ending = self._started(tool.command(folder / "job.json", folder / "rows.npy"), folder).ending()
         if ending.code != 0:
             raise QuadcosimError(f"{tool.name}: {ending.said or ending.described.removeprefix('ended with ')}")
         return np.asarray(np.load(folder / "rows.npy"))
+
+    def _started(self, command: Sequence[str], folder: Path) -> Child:
+        with self._lock:
+            if self._over:  # copies were made meanwhile
+                raise QuadcosimError("the flights have ended")
+            child = Child(
+                command,
+                environment=subprocesses.environment(**dict.fromkeys(_TEMPORARY, str(folder))),
+                folder=folder,  # not this process's: fmpy changes that while it loads an FMU, in another thread
+                talks=False,
+            )
+            self._flying.append(child)
+        return child
 
     def rows_of_master(self, order: str, start: Start) -> Floats:
         """This project's flight: the time, the signals; a command is the one computed at the row's time."""

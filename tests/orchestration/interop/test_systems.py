@@ -13,7 +13,7 @@ from orchestration.interop.table import AIM
 from orchestration.runs.simulation import run
 from orchestration.system.model import System
 from orchestration.system.paths import changed
-from quadcosim import UsageError
+from quadcosim import QuadcosimError, UsageError
 from tests.commands import Main
 from tests.examples.common import EXAMPLES, example
 from tests.orchestration.studies.common import one_line
@@ -94,6 +94,16 @@ def test_the_rows_that_are_compared_are_those_of_a_run_of_the_system_in_that_ord
         for i, name in enumerate(flights.loop.signals, start=1):
             assert compared[:, i].tobytes() == signals[name].tobytes()
     assert (flights.rows_of_master("jacobi", {}) != flights.rows_of_master("gauss-seidel", {})).any()
+
+
+def test_no_tool_is_started_once_the_flights_have_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As by a thread that was still making its copies then."""
+    flights = Flights(carried("double_integrator"), tmp_path, None)
+    with flights:
+        pass
+    monkeypatch.setattr("orchestration.interop.flights.Child", lambda *_, **__: pytest.fail("a process is started"))
+    with pytest.raises(QuadcosimError, match=r"^the flights have ended$"):
+        flights.flown(TOOLS["fmpy, SSP"])
 
 
 def test_the_command_takes_any_system_and_leaves_out_tools_for_components_that_it_has_not(
