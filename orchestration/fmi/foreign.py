@@ -25,7 +25,7 @@ def computed(fmus: Iterable[Path], function: Callable[..., T], *arguments: objec
     """
     if all(read_model(path).is_of_this_kit for path in fmus):
         return function(*arguments)
-    command = subprocesses.command("orchestration.processes.call_process")
+    command = subprocesses.command("orchestration.fmi.foreign_process")
     try:
         with Child(command, limits=replace(UNLIMITED, memory=Limits.memory)) as child:
             child.say((function, arguments))

@@ -1,5 +1,6 @@
 """What a process and the one that started it say to each other: frames, over the child's standard streams."""
 
+import math
 import os
 import pickle
 import signal
@@ -10,25 +11,39 @@ from collections.abc import Callable, Iterator
 from typing import IO, Any
 
 _HEADER = struct.Struct("<Q")
-_NO_FRAME = (struct.error, OverflowError, MemoryError, ValueError, pickle.UnpicklingError)
-"""What comes of a stream that is cut off or closed, or of bytes that somebody else has written"""
 _POLL = 0.5
 """[s] between two looks at whether the parent lives"""
 
 
-def send(stream: IO[bytes], content: object) -> None:
-    """A frame; raises `OSError` if nobody reads."""
+class LongError(EOFError):
+    """A frame is longer than it may be."""
+
+
+def framed(content: object) -> bytes:
+    """As a frame; raises what `pickle` does for what cannot be one."""
     data = pickle.dumps(content, pickle.HIGHEST_PROTOCOL)
-    stream.write(_HEADER.pack(len(data)) + data)
+    return _HEADER.pack(len(data)) + data
+
+
+def send(stream: IO[bytes], frame: bytes) -> None:
+    """To who receives it; raises `OSError` if nobody reads, `ValueError` if the stream is closed."""
+    stream.write(frame)
     stream.flush()
 
 
-def receive(stream: IO[bytes]) -> Any:
-    """The next frame; raises `EOFError` if there is none, or if what comes is none."""
+def receive(stream: IO[bytes], most: float = math.inf) -> Any:
+    """What the next frame says; raises `EOFError` if there is none, or if what comes is none that can be understood.
+
+    Raises `LongError`, before it is read, if it has more than `most` bytes.
+    """
     try:
-        header = stream.read(_HEADER.size)
-        return pickle.loads(stream.read(*_HEADER.unpack(header)))
-    except _NO_FRAME as error:
+        (length,) = _HEADER.unpack(stream.read(_HEADER.size))
+        if length > most:
+            raise LongError
+        return pickle.loads(stream.read(length))
+    except EOFError:
+        raise
+    except Exception as error:  # what is cut off, or written by somebody else, may raise anything
         raise EOFError from error
 
 
@@ -52,9 +67,10 @@ class Parent:
         threading.Thread(target=self._leave_after, args=(os.getppid(),), daemon=True).start()
 
     def say(self, content: object) -> None:
-        """One frame."""
+        """One frame; raises what `pickle` does for what cannot be one."""
+        frame = framed(content)
         try:
-            send(self._answers, content)
+            send(self._answers, frame)
         except OSError:  # nobody listens
             self.leave()
 

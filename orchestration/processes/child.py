@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from orchestration.processes.channel import receive, send
+from orchestration.processes.channel import LongError, framed, receive, send
 from orchestration.processes.family import Family
 from orchestration.processes.limits import UNLIMITED, Limits
 from orchestration.processes.subprocesses import environment as usual_environment
@@ -21,6 +21,8 @@ from orchestration.processes.watch import Watch
 
 _KEPT = 16_384
 """Bytes of what the process prints that are kept, of the end"""
+_LONGEST = 64.0
+"""[MB] said at once by one whose output is limited, at most"""
 _OUT_OF_PROCESSOR = "it takes more time of a processor than the system gives it (ulimit -t)"
 _PATIENCE = 60.0
 """[s] for one that says no more, and so is about to end: why it did is asked for"""
@@ -45,7 +47,7 @@ class Ending:
         if self.code is None:
             return "does not answer" if self.reached is None else f"was stopped: {self.reached}"
         if self.code < 0:
-            return f"ended by {signal.Signals(-self.code).name}"
+            return f"ended by {_signal(-self.code)}"
         return f"ended with exit code {self.code:#x}" if self.code > 255 else f"ended with exit code {self.code}"
 
 
@@ -93,7 +95,8 @@ class Child:
         self.pid = process.pid
         self._is_limited = math.isfinite(limits.time)
         self._output = None if process.stderr is None else _Output(process.stderr)
-        self._watch = Watch(process, family, limits, self._written)
+        self._longest = math.inf if math.isinf(limits.output) else _LONGEST * 1e6
+        self._watch = Watch(process, family, limits, self._output)
         self._end = weakref.finalize(self, _ended, process, family, self._watch)
 
     @property
@@ -111,19 +114,24 @@ class Child:
             self._process.send_signal(signal.SIGINT if sys.platform != "win32" else signal.SIGTERM)
 
     def say(self, content: object) -> None:
-        """One frame; raises `Died`."""
+        """One frame; raises `Died`, and what `pickle` does for what cannot be one."""
         assert self._process.stdin is not None
+        frame = framed(content)
         try:
-            send(self._process.stdin, content)
-        except OSError:
+            send(self._process.stdin, frame)
+        except (OSError, ValueError):  # it has ended, or was closed by another thread
             raise Died(self._last()) from None
 
     def hear(self) -> Any:
         """The next frame; raises `Died`."""
         assert self._process.stdout is not None
         try:
-            return receive(self._process.stdout)
-        except (EOFError, ValueError):
+            return receive(self._process.stdout, self._longest)
+        except LongError:
+            self.close()
+            self._watch.reached = self._watch.reached or f"it says more than {_LONGEST:g} MB at once"
+            raise Died(self._last()) from None
+        except EOFError:
             raise Died(self._last()) from None
 
     def heard_by(self, hear: Callable[[Any], None]) -> Ending:
@@ -170,9 +178,6 @@ class Child:
     def _last(self) -> Ending:
         return self.ending(None if self._is_limited else _PATIENCE)
 
-    def _written(self) -> int:
-        return 0 if self._output is None else self._output.count
-
 
 class _Output:
     """What a process prints, read as it comes, of which only the end is kept."""
@@ -195,6 +200,14 @@ class _Output:
             self.count += len(block)
             self._tail = (self._tail + block)[-_KEPT:]
         self._stream.close()
+
+
+def _signal(number: int) -> str:
+    """Its name, if it has one: those of real time have none."""
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
 
 
 def _limit_processor_time(process: "subprocess.Popen[bytes]", limits: Limits) -> None:

@@ -4,7 +4,7 @@ import math
 import subprocess
 import threading
 import time
-from collections.abc import Callable
+from typing import Protocol
 
 from orchestration.processes.family import Family
 from orchestration.processes.limits import Limits
@@ -16,6 +16,13 @@ _SHARE = 0.1
 """of a limit of time that passes between two looks, at most"""
 _EFFORT = 0.05
 """of a processor that looking takes, at most"""
+
+
+class Counted(Protocol):
+    """What is read as it comes."""
+
+    count: int
+    """Bytes so far"""
 
 
 class Watch:
@@ -32,14 +39,14 @@ class Watch:
         process: "subprocess.Popen[bytes]",
         family: Family,
         limits: Limits,
-        written: Callable[[], int],
+        output: Counted | None,
     ) -> None:
-        """`written` tells the bytes of output so far."""
+        """`output` is what it prints, if that is read."""
         self.reached: str | None = None
         """The limit at which it was ended, in words"""
         self.out_of_time = False
         """Whether that is a limit of time"""
-        self._process, self._family, self._limits, self._written = process, family, limits, written
+        self._process, self._family, self._limits, self._output = process, family, limits, output
         self._taken = Taken()
         self._time, self._late = limits.time, "it takes longer than the limit of {:g} s"
         self._since: tuple[float, float] | None = (0.0, math.inf)  # of `Taken`; None: that of the next look
@@ -94,7 +101,7 @@ class Watch:
         self.out_of_time = max(self._taken.own - own, self._taken.processor - processor) > self._time
         if self.out_of_time:
             return self._late.format(self._time)
-        if self._written() > self._limits.output * 1e6:
+        if self._output is not None and self._output.count > self._limits.output * 1e6:
             return f"it writes more than the limit of {self._limits.output:g} MB to its standard output and error"
         if memory > self._limits.memory * 1e6:
             return f"it takes more memory than the limit of {self._limits.memory:g} MB"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.basics.errors import UsageError
+from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.fmi.foreign import LostError, computed
 from orchestration.limits.limit import find
 from orchestration.system.model import Component, Connection, Criterion, Sampling, System
@@ -16,6 +16,21 @@ pytestmark = needs_compiler
 
 def refused() -> None:
     raise UsageError("not so")
+
+
+class PickyError(Exception):
+    """It cannot be made again from its text alone."""
+
+    def __init__(self, name: str, value: int) -> None:
+        super().__init__(f"{name} = {value}")
+
+
+def picky() -> None:
+    raise PickyError("x", 1)
+
+
+def unnameable() -> object:
+    return lambda: None
 
 
 def test_it_is_computed_here_by_fmus_of_this_kit_alone(built: dict[str, Path], tmp_path: Path) -> None:
@@ -30,6 +45,10 @@ def test_what_it_raises_and_how_its_process_ends_is_told(tmp_path: Path) -> None
         computed([other], refused)
     with pytest.raises(LostError, match=r"^the process of the FMUs ended by SIGABRT$"):
         computed([other], os.abort)
+    with pytest.raises(QuadcosimError, match=r"^PickyError: x = 1; it cannot be passed on by its process: "):
+        computed([other], picky)
+    with pytest.raises(QuadcosimError, match=r"^the result of unnameable; it cannot be passed on by its process: "):
+        computed([other], unnameable)
 
 
 def test_a_limit_is_measured_though_an_fmu_ends_the_process_of_the_local_one(tmp_path: Path) -> None:

@@ -2,9 +2,11 @@
 
 import dataclasses
 import os
+import pickle
 import subprocess
 import sys
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -202,6 +204,8 @@ def test_a_child_that_is_asked_no_more_ends_itself_if_there_is_patience(
     [
         ("import sys; sys.exit(3)", "ended with exit code 3"),
         ("import os; os.kill(os.getpid(), 11)", "ended by SIGSEGV"),
+        pytest.param("import os; os.kill(os.getpid(), 40)", "ended by signal 40", marks=linux_only),
+        ("parent.say(Unknown())", "ended with exit code 0"),
         ("import os; os.write(parent._answers.fileno(), b'not a frame, but as long')", "ended with exit code 0"),
         ("parent._answers.write(bytes([200, 0, 0, 0, 0, 0, 0, 0, 1]))", "ended with exit code 0"),
         ("import os, time; os.close(parent._answers.fileno()); time.sleep(600)", "does not answer"),
@@ -212,11 +216,50 @@ def test_how_a_child_dies_is_told_to_who_waits_for_its_answer(
 ) -> None:
     if told == "does not answer":
         monkeypatch.setattr("orchestration.processes.child._PATIENCE", 0.1)
-    one = child(program)
+    one = child(f"class Unknown: pass\n{program}")
     with pytest.raises(Died) as death:
         one.hear()
     assert str(death.value) == told
     assert gone(one.pid)
+
+
+def test_what_is_said_to_a_child_that_another_thread_has_closed_is_told_as_its_death(
+    child: Callable[..., Child],
+) -> None:
+    one = child(ANSWERS)
+    one.close()
+    with pytest.raises(Died, match=r"^ended by SIGKILL$"):
+        one.say(0)
+
+
+def test_what_cannot_be_said_is_no_death(child: Callable[..., Child]) -> None:
+    one = child(ANSWERS)
+    with pytest.raises((pickle.PicklingError, AttributeError, TypeError)):
+        one.say(lambda: None)
+    one.say(0)
+    assert one.hear() == 0
+
+
+def test_a_child_whose_output_is_limited_is_ended_before_it_is_heard_at_too_great_a_length(
+    child: Callable[..., Child], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("orchestration.processes.child._LONGEST", 0.001)
+    for limits in ({}, {"output": 1.0}):
+        one = child("parent.say(bytes(2000)); parent.hear()", **limits)
+        if not limits:
+            assert one.hear() == bytes(2000)
+            continue
+        with pytest.raises(Died, match=r"^was stopped: it says more than 0.001 MB at once$"):
+            one.hear()
+        assert gone(one.pid)
+
+
+def test_a_limited_child_that_is_no_longer_known_ends() -> None:
+    one = Child([sys.executable, "-c", f"{TALKS}\n{ANSWERS}"], limits=Limits())
+    pid, known = one.pid, weakref.ref(one)
+    del one
+    assert known() is None
+    assert gone(pid)
 
 
 def test_what_a_child_may_take_counts_from_when_it_is_allowed(child: Callable[..., Child]) -> None:
