@@ -1,0 +1,58 @@
+"""What counts of the time of a process: for a limit that it starts with, and for what it is allowed later."""
+
+import subprocess
+import threading
+from types import SimpleNamespace
+from typing import cast
+
+import pytest
+
+from orchestration.processes.family import Family, Member
+from orchestration.processes.limits import UNLIMITED, Limits
+from orchestration.processes.watch import Watch
+from tests.patience import PATIENCE
+
+LOOKS = 4
+
+
+class Busy:
+    """A family whose threads have an hour of a processor from one look to the next."""
+
+    def __init__(self) -> None:
+        self.looks = 0
+        self.seen, self.killed = threading.Event(), threading.Event()
+
+    def members(self) -> dict[int, Member]:
+        self.looks += 1
+        if self.looks > LOOKS:
+            self.seen.set()
+        return {1: Member(limited=False, processor=3600.0 * self.looks, waits={}, memory=0)}
+
+    def kill(self, first: object) -> None:
+        self.killed.set()
+
+
+@pytest.fixture
+def busy(monkeypatch: pytest.MonkeyPatch) -> Busy:
+    monkeypatch.setattr("os.cpu_count", lambda: 1_000_000)
+    return Busy()
+
+
+def watch(busy: Busy, limits: Limits) -> Watch:
+    process = cast("subprocess.Popen[bytes]", SimpleNamespace(poll=lambda: None))
+    return Watch(process, cast(Family, busy), limits, None)
+
+
+def test_a_limit_is_one_of_elapsed_time_however_many_threads_compute_in_it(busy: Busy) -> None:
+    one = watch(busy, Limits(time=600.0))
+    assert busy.seen.wait(PATIENCE)
+    one.close()
+    assert one.reached is None
+
+
+def test_what_is_allowed_later_is_time_of_a_processor_of_all_threads(busy: Busy) -> None:
+    one = watch(busy, UNLIMITED)
+    one.allow(600.0)
+    assert busy.killed.wait(PATIENCE)
+    one.close()
+    assert one.reached == "it takes more than the time limit of 600 s"
