@@ -2,7 +2,8 @@
    0 where both do the same operations of IEEE 754, some rounding where a root or a source is in it. What the bounds do
    not decide, Python does. */
 
-enum { NUMBER, TIME, SIGNAL, SOURCE };
+enum { NUMBER, TIME, SIGNAL, SOURCE, OPERATOR }; /* leaves, and the first operator */
+enum { DEEPEST = 256 };                          /* numbers that there is room for */
 
 typedef struct {
     int64_t code, operands; /* an operator of operators.h, or a leaf: of SIGNAL and SOURCE the place */
@@ -13,7 +14,6 @@ typedef struct {
     double value, error;
 } Known;
 
-#define DEEPEST 256
 #define SOURCES_AGREE 1e-9 /* a source over many times with the same at one time */
 
 static Known known(double value, double error) {
@@ -67,7 +67,7 @@ static int may_hold(const Operation *program, int64_t length, double t, const do
     int64_t top = 0;
     for (const Operation *o = program; o < program + length; o++) {
         int64_t n = o->operands;
-        if (o->code <= SOURCE) {
+        if (o->code < OPERATOR) {
             stack[top++] = o->code == NUMBER ? known(o->number, 0.0)
                 : o->code == TIME            ? known(t, 0.0)
                 : o->code == SIGNAL          ? known(row[n], 0.0)

@@ -1,10 +1,12 @@
 """The condition by which a run has diverged as a program for the compiled loop, which asks Python where it is close."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TypeAlias
 
 from orchestration.engines.board import Board
 from orchestration.engines.sources import Values
+from orchestration.engines.structures import constants
 from orchestration.engines.watch import is_wanted
 from orchestration.expressions.operators import OPERATORS
 from orchestration.expressions.scalars import scalars
@@ -13,12 +15,11 @@ from orchestration.expressions.syntax import Call, Name, Node, Number, Operation
 Step: TypeAlias = tuple[int, int, float]
 """What is done, how many operands it takes (of a signal, its place), and the number that it is"""
 
-_LEAVES = ("number", "time", "signal", "source")
-"""As condition.h counts them"""
+HEADER = Path(__file__).with_name("condition.h")
+_OF_C = constants(HEADER.read_text(encoding="utf-8"))
 _BOUNDED = {word: made.bounded for word, made in OPERATORS.items() if made.bounded is not None}
-_CODES = {word: code for code, word in enumerate((*_LEAVES, *_BOUNDED))}
-_DEEPEST = 256
-"""Numbers that it has room for"""
+_CODES = {word: _OF_C[word.upper()] for word in ("number", "time", "signal", "source")}
+_CODES |= {word: code for code, word in enumerate(_BOUNDED, start=_OF_C["OPERATOR"])}
 
 
 class _Unknown(Exception):
@@ -59,7 +60,7 @@ def program(
         steps = [(_CODES[word], operands, number) for word, operands, number in _words(scalar, leaves)]
     except _Unknown:
         return None, ()
-    return (steps if len(steps) < _DEEPEST else None), [sources[name] for name in used]
+    return (steps if len(steps) < _OF_C["DEEPEST"] else None), [sources[name] for name in used]
 
 
 _Words: TypeAlias = list[tuple[str, int, float]]

@@ -44,11 +44,6 @@ def exchange(group: Sequence[int], pass_on: PassOn, runs: tuple[int, ...] = ()) 
     return np.asarray(open_)
 
 
-def is_loop(group: Sequence[int], connections: Sequence[Connection], dependencies: Dependencies) -> bool:
-    """Whether the values of a group have to be found by iteration."""
-    return len(group) > 1 or _needs(connections[group[0]], connections[group[0]], dependencies)
-
-
 def _needs(x: Connection, other: Connection, dependencies: Dependencies) -> bool:
     """Whether what `x` carries depends on what `other` delivers."""
     if other.receiver != x.sender:

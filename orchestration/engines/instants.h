@@ -8,8 +8,6 @@
 #define NANOSECONDS 1e9
 #define EVERY (L == 64 ? ~(uint64_t)0 : (((uint64_t)1 << (L & 63)) - 1))
 
-enum { SAMPLED, SENT, ARRIVED, LOST, MEASURED };
-
 typedef struct { /* of tracks that have any, rows of a table that begin with an index */
     Lanes tracks;
     const int64_t *next[L], *end[L];
@@ -30,7 +28,7 @@ typedef struct {
 } Instant;
 
 static void set(Loop *l, Channel *c, Lanes lanes, const double *value, const Instant *now);
-static int has_room(Channel *c, int lane);
+static int make_room(Channel *c, int lane);
 static void step(Loop *l, int64_t index, Lanes lanes, q_real begin, q_real length, int64_t until, const Instant *now);
 static void read_outputs(Loop *l, int64_t index, Lanes lanes, const Instant *now);
 static void feed(Loop *l, const Component *c, Lanes lanes, const Instant *now);
@@ -202,7 +200,7 @@ static void dispatch(Loop *l, Channel *c, Lanes lanes) {
     int together = lanes == EVERY;
     take(c, lanes);
     EACH(lane, lanes) {
-        if (c->last[lane] - c->first[lane] == c->capacity && !has_room(c, lane)) {
+        if (c->last[lane] - c->first[lane] == c->capacity && !make_room(c, lane)) {
             l->no_memory = 1;
             return;
         }

@@ -139,7 +139,7 @@ static void set(Loop *l, Channel *c, Lanes lanes, const double *value, const Ins
     end_if(l, write_all(l, &c->write), now);
 }
 
-static int has_room(Channel *c, int lane) { return 0; } /* there always is: for all messages of a schedule */
+static int make_room(Channel *c, int lane) { return 0; } /* there always is: for all messages of a schedule */
 
 static void step(Loop *l, int64_t index, Lanes lanes, q_real begin, q_real length, int64_t until, const Instant *now) {
     Component *c = &l->components[index];

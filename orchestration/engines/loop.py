@@ -9,22 +9,22 @@ from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
 from fmu_kit.compiler.runtime import FOLDER
 from orchestration.basics.errors import QuadcosimError
 from orchestration.basics.libraries import kept
-from orchestration.engines.condition import operators
+from orchestration.engines import condition
 from orchestration.engines.structures import HEADER, declared, expect_same_sizes, shared
 
 INSTANTS = Path(__file__).with_name("instants.h")
 """What happens at an instant, of a run of FMUs and of kernels in lanes"""
-FILES = (*(Path(__file__).with_name(name) for name in ("loop.c", "condition.h")), INSTANTS, HEADER)
-"""What it is made of, beside a header of native FMUs and what is written of operators"""
-Operation: Any = declared(FILES[1].read_text(encoding="utf-8"))["Operation"]
+FILES = (Path(__file__).with_name("loop.c"), condition.HEADER, INSTANTS, HEADER, FOLDER / "lanes.h")
+"""What it is made of, beside what is written of operators"""
+Operation: Any = declared(condition.HEADER.read_text(encoding="utf-8"))["Operation"]
 """One step of a condition"""
 
 
 @functools.cache
 def library() -> Any:
     """The function `run` of loop.c; raises `QuadcosimError` that says what stands in the way."""
-    sources = {path.name: path.read_bytes() for path in (*FILES, FOLDER / "lanes.h")}
-    sources["operators.h"] = operators().encode()
+    sources = {path.name: path.read_bytes() for path in FILES}
+    sources["operators.h"] = condition.operators().encode()
     path = kept("loop", sources, OPTIONS, lambda: compiled_here(sources, "loop.c", mathematics="libm"))
     try:
         made = ctypes.CDLL(str(path))

@@ -16,6 +16,9 @@ enum { RUNNING, FAILED, REFUSED, STOPPED, OVER, NOT_FINITE, DIVERGED, AT_END, FU
 enum { FLOAT64, FLOAT32, INT8, UINT8, INT16, UINT16, INT32, UINT32, INT64, UINT64, BOOL, BOOLEAN32 };
 enum { REAL, TRUTH, WHOLE };
 
+/* What happens to a message, as recording.py has it; MEASURED is not recorded. */
+enum { SAMPLED, SENT, ARRIVED, LOST, MEASURED };
+
 /* -- what happens when, as orchestration/schedule/schedule.py has it ----------------------------------------------- */
 
 typedef struct {

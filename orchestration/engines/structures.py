@@ -45,8 +45,15 @@ def shared(lanes: int) -> Mapping[str, Any]:
 
 def constants(text: str) -> dict[str, int]:
     """What the enumerations in a text of C count, by name."""
-    found = (enumeration.split(",") for enumeration in _CONSTANTS.findall(_COMMENT.sub("", text)))
-    return {name.strip(): i for names in found for i, name in enumerate(names)}
+    found: dict[str, int] = {}
+    for enumeration in _CONSTANTS.findall(_COMMENT.sub("", text)):
+        number = 0
+        for each in enumeration.split(","):
+            name, _, value = each.partition("=")
+            number = int(value) if value else number
+            found[name.strip()] = number
+            number += 1
+    return found
 
 
 def declared(text: str, lanes: int = 1) -> dict[str, Any]:

@@ -12,8 +12,13 @@ from orchestration.engines import loop
 from orchestration.engines.batch import kernels
 from orchestration.requests import request
 
-ROOTS = ("orchestration.runs.simulation", "orchestration.workers.task")
-"""Where the code that flies begins."""
+ROOTS = (
+    "orchestration.runs.simulation",
+    "orchestration.workers.task",
+    "orchestration.fmi.isolated_process",
+    "orchestration.runs.apart_process",
+)
+"""Where the code that flies begins; the last two are started by their names, as processes of their own."""
 _ASIDE = (
     "orchestration.building.fmus",
     "orchestration.figures.gallery",

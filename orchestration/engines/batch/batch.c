@@ -42,16 +42,16 @@ Q_ONE q_real highest(q_real a, q_real b) { return q_select(q_gt(a, b) | q_isnan(
 
 /* -- what an instant asks for -------------------------------------------------------------------------------------- */
 
-static int has_room(Channel *c, int of) {
+static int make_room(Channel *c, int lane) {
     int64_t capacity = c->capacity ? 2 * c->capacity : 4;
     size_t bytes = (size_t)(capacity * c->size) * sizeof(q_real);
     double *flight = aligned_alloc(64, bytes);
     if (!flight) return 0;
-    for (int lane = 0; lane < L; lane++)
-        for (int64_t k = c->first[lane]; k < c->last[lane]; k++)
+    for (int each = 0; each < L; each++)
+        for (int64_t k = c->first[each]; k < c->last[each]; k++)
             for (int64_t i = 0; i < c->size; i++)
-                flight[((k & (capacity - 1)) * c->size + i) * L + lane] =
-                    c->flight[((k & (c->capacity - 1)) * c->size + i) * L + lane];
+                flight[((k & (capacity - 1)) * c->size + i) * L + each] =
+                    c->flight[((k & (c->capacity - 1)) * c->size + i) * L + each];
     free(c->flight);
     c->flight = flight, c->capacity = capacity;
     return 1;

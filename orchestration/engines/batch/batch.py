@@ -321,8 +321,8 @@ class Batch:
         return values
 
     def _taken(self, i: int, values: Floats) -> Floats:
-        kinds = self._ends[i].kinds[:, None]
-        taken_: Floats = np.where(kinds == 1, values != 0.0, np.where(kinds == 2, np.rint(values), values))
+        c, kinds = self._c, self._ends[i].kinds[:, None]
+        taken_: Floats = np.where(kinds == c.TRUTH, values != 0.0, np.where(kinds == c.WHOLE, np.rint(values), values))
         return taken_
 
     def _begin(self, lane: int, system: System) -> None:

@@ -19,9 +19,8 @@ from orchestration.engines.loop import INSTANTS
 from orchestration.engines.structures import HEADER, expect_same_sizes, shared
 from orchestration.fmi.model import Model
 
-FILES = (Path(__file__).with_name("batch.c"), INSTANTS, HEADER)
-"""What it is made of, beside what is written for a system and headers of native FMUs"""
-_HEADERS = ("lanes.h", "mathematics.h")
+FILES = (Path(__file__).with_name("batch.c"), INSTANTS, HEADER, FOLDER / "lanes.h", FOLDER / "mathematics.h")
+"""What it is made of, beside what is written for a system"""
 _SOURCES = "sources/"
 
 
@@ -74,8 +73,7 @@ def _compiled(sources: tuple[tuple[str, bytes], ...], lanes: int) -> Kernel:
 @functools.lru_cache(maxsize=256)
 def batch(sizes: str, expressions: str, lanes: int) -> Any:
     """The functions of batch.c with the expressions of a system."""
-    headers = [FOLDER / name for name in _HEADERS]
-    sources = {path.name: path.read_bytes() for path in (*FILES, *headers)}
+    sources = {path.name: path.read_bytes() for path in FILES}
     sources |= {"sizes.h": sizes.encode(), "expressions.h": expressions.encode()}
     options = (*FOR_THIS_PROCESSOR, f"-DQUADCOSIM_LANES={lanes}", "-Wno-psabi")
     compile_ = lambda: compiled_here(sources, "batch.c", options=options)  # noqa: E731

@@ -14,6 +14,7 @@ from orchestration.engines.batch.kernels import Kernel, batch, component
 from orchestration.engines.batch.writing import Kind, Leaf
 from orchestration.engines.board import Board
 from orchestration.engines.channel import of_each
+from orchestration.engines.structures import structures
 from orchestration.engines.wires import Wires
 from orchestration.expressions.over_run import inlined, reductions
 from orchestration.expressions.recorded import STOP_TIME, TIME, vectors
@@ -26,7 +27,9 @@ from orchestration.system.check import recorded
 from orchestration.system.model import Connection, Source, System, component_of, variable_of
 
 Places = npt.NDArray[np.int64]
-_WHOLE = ("Integer", "Enumeration")
+c = structures(1)
+_TAKES = {"Boolean": c.TRUTH, "Integer": c.WHOLE, "Enumeration": c.WHOLE}
+"""By kind of an input that is no Real"""
 
 
 def outline(system: System) -> Hashable:
@@ -278,7 +281,7 @@ def ends_of(shape: Shape, x: Connection) -> Ends:
     return Ends(
         start=np.array([shape.place(start)[1] for start in x.start], dtype=np.int64),
         end=np.array([variable.reference for variable in receivers], dtype=np.int64),
-        kinds=np.array([1 if v.kind == "Boolean" else 2 if v.kind in _WHOLE else 0 for v in receivers], dtype=np.int64),
+        kinds=np.array([_TAKES.get(v.kind, c.REAL) for v in receivers], dtype=np.int64),
         low=np.full(len(receivers), float(bounds.min)), high=np.full(len(receivers), float(bounds.max)),
     )  # fmt: skip
 

@@ -11,6 +11,7 @@ from orchestration.basics.errors import QuadcosimError
 from orchestration.engines import loop
 from orchestration.engines.batch import kernels
 from orchestration.engines.structures import constants, declared, shared, structures
+from orchestration.recording.recording import ARRIVED, LOST, SAMPLED, SENT
 from tests.orchestration.engines.batch.lanes import shape_of
 from tests.orchestration.engines.moving import moving
 from tests.orchestration.engines.test_compiled import LOOP, of
@@ -80,3 +81,12 @@ def test_a_structure_that_a_library_does_not_have_is_refused(monkeypatch: pytest
     loop.library.cache_clear()
     with pytest.raises(QuadcosimError, match="Another has no bytes in C: expected 16"):
         loop.library()
+
+
+def test_numbers_that_a_header_gives_are_counted_on_from() -> None:
+    assert constants("enum { A, B = 7, C };") == {"A": 0, "B": 7, "C": 8}
+
+
+def test_c_counts_what_happens_to_messages_as_recordings_do() -> None:
+    c = structures(1)
+    assert (c.SAMPLED, c.SENT, c.ARRIVED, c.LOST) == (SAMPLED, SENT, ARRIVED, LOST)

@@ -2,7 +2,7 @@
 
 import sys
 
-from orchestration.engines.initial import groups, is_loop
+from orchestration.engines.initial import groups
 from orchestration.schedule.order import ranked
 from tests.orchestration.engines.stubs import wire
 
@@ -31,7 +31,6 @@ def test_outputs_that_depend_on_each_other_are_one_group():
     there, back = wire("a.y", "b.u"), wire("b.y", "a.u")
     everything = lambda component, output: None  # noqa: E731
     assert groups([there, back], everything) == ((0, 1),)
-    assert is_loop((0, 1), [there, back], everything)
 
 
 def test_a_chain_of_many_needs_no_deep_stack():

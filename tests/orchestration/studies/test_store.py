@@ -7,6 +7,7 @@ import functools
 import json
 import math
 import random
+import re
 import shutil
 import signal
 import sqlite3
@@ -516,6 +517,22 @@ def test_an_edited_source_on_the_path_of_the_flight_is_other_software(module: st
     edited = tmp_path / "edited.py"
     edited.write_bytes(sources[module].read_bytes() + b"\n")
     assert sources_hash({**sources, module: edited}) != sources_hash(sources) == versions()["sources"]
+
+
+def test_every_header_that_c_on_the_path_of_the_flight_includes_is_one_of_its_sources() -> None:
+    sources = flight_sources()
+    written = {"operators.h", "sizes.h", "expressions.h"}  # by Python, for a system
+    texts = [path.read_text(encoding="utf-8") for path in sources.values() if path.suffix in (".c", ".h")]
+    included = {name for text in texts for name in re.findall(r'#include "(.+)"', text)}
+    assert {"lanes.h", "mathematics.h"} < included <= written | {*sources}
+
+
+def test_what_is_started_by_its_name_is_one_of_the_flights_sources() -> None:
+    sources = flight_sources()
+    texts = [path.read_text(encoding="utf-8") for path in sources.values() if path.suffix == ".py"]
+    started = {name for text in texts for name in re.findall(r'command\(\s*"(orchestration\.[\w.]+)"', text)}
+    assert {"orchestration.fmi.isolated_process", "orchestration.runs.apart_process"} <= started
+    assert started - {"orchestration.fmi.repeatability_process"} <= {*sources}  # which flies nothing that is kept
 
 
 def test_every_import_of_the_flights_sources_is_seen() -> None:
