@@ -2,7 +2,9 @@
 
 Lanes and native FMUs are compiled of the same text: a mistake in that would agree with itself. It would not agree with
 Python. Where runs are chaotic the last bits of the mathematics are enough for other metrics: a twin tells, the same run
-in lanes with its parameters off by their last bit.
+in lanes with each Real parameter of its FMUs, given or not, off by its last bit. One of 0.0 stays: that may switch
+something off which the number next to it switches on. A run of which nothing moves is not known to be chaotic, and is
+compared.
 """
 
 import math
@@ -13,6 +15,7 @@ from typing import Any
 
 from orchestration.building.fmus import looked_up, python_twin, python_twins
 from orchestration.building.inputs import Files
+from orchestration.fmi.model import Model, Variable
 from orchestration.system.model import Component
 from orchestration.workers.batching import TOLERATED, Agreement, Pair, sample
 from orchestration.workers.pool import Package
@@ -41,7 +44,7 @@ def vouched(
     begun = [_begun(task) for task in chosen if paths.keys() & python_twins(task.system).fmus.values()]
     tasks: list[Task | Chunk] = [*chosen, *map(_in_python_too, begun)]
     if begun:
-        tasks.append(Chunk(tasks=(*begun, *map(_nudged, begun))))
+        tasks.append(Chunk(tasks=(*begun, *(_nudged(one, files.models_of(one.system)) for one in begun))))
     package = Package.of(Files(fmus={**files.fmus, **paths}, tables=files.tables))
     rows = {outcome.row.key: outcome.row for some in flying(package)(tasks) for outcome in some}
 
@@ -75,15 +78,20 @@ def _in_python_too(task: Task) -> Task:
     return replace(task, key=_PYTHON + task.key, system=python_twins(task.system))
 
 
-def _nudged(task: Task) -> Task:
-    """The same with each parameter that is set off by its last bit."""
-    components = {name: _off(component) for name, component in task.system.components.items()}
+def _nudged(task: Task, models: Mapping[str, Model]) -> Task:
+    """The same with each parameter off by its last bit."""
+    components = {name: _off(component, models[name]) for name, component in task.system.components.items()}
     return replace(task, key=_NUDGED + task.key, system=replace(task.system, components=components))
 
 
-def _off(component: Component) -> Component:
-    parameters = {
-        name: math.nextafter(value, 0.0) if isinstance(value, float) else value
-        for name, value in component.parameters.items()
-    }
-    return replace(component, parameters=parameters)
+def _off(component: Component, model: Model) -> Component:
+    parameters = [v for v in model.variables.values() if v.kind == "Real" and v.causality == "parameter"]
+    values = {v.name: component.parameters.get(v.name, v.start) for v in parameters}
+    moved = {v.name: _beside(float(value), v) for v in parameters if float(value := values[v.name] or 0.0) != 0.0}
+    return replace(component, parameters={**component.parameters, **moved})
+
+
+def _beside(value: float, variable: Variable) -> float:
+    """The next number above, or below where that is beyond what the parameter may be."""
+    above = math.nextafter(value, math.inf)
+    return above if variable.maximum is None or above <= variable.maximum else math.nextafter(value, -math.inf)

@@ -1,5 +1,6 @@
 """What vouches for lanes: FMUs flown alone, and FMUs in Python for the beginning of the same runs."""
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
@@ -8,6 +9,7 @@ import pytest
 from orchestration.basics.errors import QuadcosimError
 from orchestration.studies.study import Study
 from orchestration.studies.vouching import vouched
+from orchestration.system.model import System
 from orchestration.workers.batching import Agreement
 from orchestration.workers.pool import Package
 from orchestration.workers.row import Row
@@ -80,10 +82,8 @@ def test_what_was_compiled_wrongly_contradicts_python(chosen: Study) -> None:
 
 
 def test_a_chaotic_run_which_its_own_last_bits_change_contradicts_nothing(chosen: Study) -> None:
-    masses = {run.components["plant"].parameters["mass"] for run in (chosen.system(0, {}),)}
-
     def error(task: Task, chunk: bool) -> float:
-        nudged = task.system.components["plant"].parameters["mass"] not in masses
+        nudged = task.key.startswith("nudged ")
         return 1e-6 * (in_python(task) + 2.0 * nudged) * (task.index == 0)
 
     found = agreement(chosen, error)
@@ -91,3 +91,27 @@ def test_a_chaotic_run_which_its_own_last_bits_change_contradicts_nothing(chosen
     assert found.python is not None
     assert found.python.runs == 1
     found.expect()
+
+
+def test_a_nudged_run_has_each_real_parameter_of_its_fmus_beside_itself_but_zeros(chosen: Study) -> None:
+    given = {"plant.mass": 1, "controller.coupling": True, "plant.drag.x": 0.0}
+    base = chosen.base.with_changes(parameters=given)  # type: ignore[attr-defined]
+    seen: dict[str, System] = {}
+
+    def error(task: Task, chunk: bool) -> float:
+        seen[task.key] = task.system
+        return 0.0
+
+    study = replace(chosen, base=base)
+    agreement(study, error)
+    begun, nudged = seen["begun 0"], seen["nudged begun 0"]
+    models = study.files().models_of(begun)
+    for name, model in models.items():
+        before, after = (system.components[name].parameters for system in (begun, nudged))
+        for v in model.variables.values():
+            if v.causality == "parameter" and v.start is not None:
+                value = before.get(v.name, v.start)
+                moves = v.kind == "Real" and float(value) != 0.0
+                assert (float(after[v.name]) != float(value)) if moves else (after.get(v.name, value) == value), v.name
+                assert not moves or v.maximum is None or float(after[v.name]) <= v.maximum
+    assert nudged.components["plant"].parameters["mass"] == math.nextafter(1.0, math.inf)
