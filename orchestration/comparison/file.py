@@ -12,7 +12,7 @@ from orchestration.basics.records import record
 from orchestration.basics.typed_tables import table_of
 from orchestration.comparison.design import FMU, Comparison, Condition, Controller, Craft, Front
 from orchestration.expressions.at_instant import compiled
-from orchestration.expressions.syntax import parse
+from orchestration.expressions.syntax import is_truth, names, parse
 from orchestration.studies.axes import Value
 from orchestration.studies.linked_settings import Key
 from orchestration.studies.study_file import AxisTable, axis_of, load, loop_of
@@ -151,7 +151,13 @@ def _followed(text: Value, axis: str, place: str) -> Callable[[Value], float]:
         return found
 
     try:
-        at = compiled(parse(text), {axis: 0})
+        node = parse(text)
+        for name in names(node):
+            if name != axis:
+                raise UsageError(f"there is no {name}; expected {axis}")
+        if is_truth(node):
+            raise UsageError(f"it is true or false; expected a number over {axis}")
+        at = compiled(node, {axis: 0})
     except UsageError as error:
         raise UsageError(f"{place} = {text}: {error}") from None
     return follows

@@ -124,6 +124,11 @@ def is_number(node: Node) -> bool:
     return isinstance(node, Number) and node.value not in (0.0, 1.0)
 
 
+def is_truth(node: Node) -> bool:
+    """Whether an expression is true or false by the way it is written, so that it can be no number."""
+    return isinstance(node, Operation) and OPERATORS[node.sign].gives_truth
+
+
 def parts(node: Node) -> Iterator[Node]:
     """What a condition joins by and, or and not; itself if it joins nothing."""
     if isinstance(node, Operation) and node.sign in ("and", "or", "not"):

@@ -184,7 +184,16 @@ def test_scheduled_parameters_follow_the_axis_on_top_of_all_others(file: Path) -
             "scheduled.gain.eta = 4.0\n[[vehicles]]",
             "controllers.tuned.scheduled.gain.eta = 4.0: expected",
         ),
-        ("[[vehicles]]", 'scheduled.gain.eta = "1 / perod"\n[[vehicles]]', "gain.eta = 1 / perod: there is no perod"),
+        (
+            "[[vehicles]]",
+            'scheduled.gain.eta = "1 / perod"\n[[vehicles]]',
+            "gain.eta = 1 / perod: there is no perod; expected period",
+        ),
+        (
+            "[[vehicles]]",
+            'scheduled.gain.eta = "period > 1"\n[[vehicles]]',
+            "period > 1: it is true or false; expected a",
+        ),
         ("[[vehicles]]", 'scheduled.gain.eta = "1 / (period - period)"\n[[vehicles]]', "at period = 0.01; expected a"),
     ],
 )
