@@ -97,7 +97,10 @@ def read_json(path: Path, what: str) -> Any:
 
 
 def plain(value: object) -> Any:
-    """`value` in the types of JSON: dataclasses as tables, paths as text, numbers that are not finite as None."""
+    """`value` in the types of JSON: dataclasses as tables, paths as text, numbers that are not finite as None.
+
+    Numbers and truths of NumPy are those of Python.
+    """
     from pydantic_core import to_jsonable_python  # not before: `--help` loads nothing of it
 
     return to_jsonable_python(value, inf_nan_mode="null", fallback=_other)
@@ -108,6 +111,8 @@ def _other(value: object) -> Any:
         return dict(value)
     if isinstance(value, PurePath):
         return str(value)
+    if getattr(value, "shape", None) == ():  # a number or truth of NumPy
+        return value.item()  # type: ignore[attr-defined]
     raise TypeError(f"{type(value).__name__}: no type that JSON has")
 
 
