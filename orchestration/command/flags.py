@@ -38,7 +38,8 @@ def _of_record(
     **options: Any,
 ) -> Any:  # fmt: skip
     said = attribute_docs(f"orchestration.quadrotor.{module}", name).get(key, Said("", ""))
-    text = f"{said.text[:-1]}; default: {said.default}." if tells_default else said.text
+    text = said.text.replace(" [s]", "")  # the flag says SECONDS
+    text = f"{text[:-1]}; default: {said.default}." if tells_default else text
     if words is not None:
         options["metavar"] = "|".join(get_args(words))
     flag = f"--{key.replace('_', '-')}"

@@ -66,7 +66,7 @@ class Scenario:
     """
 
     stop_time: float = 30.0
-    """The end of the flight."""
+    """The end of the flight [s]."""
     seed: int = 0
     """The seed of all random numbers of the flight."""
     model_mismatch: bool = False

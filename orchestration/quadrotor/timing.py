@@ -32,11 +32,11 @@ class Timing:
     """Keys of `[timing]` in a file that stand for others"""
 
     period: float = 0.01
-    """The sampling period T of the controller, in its own time: sample k is at offset + kT."""
+    """The sampling period T of the controller [s], in its own time: sample k is at offset + kT."""
     offset: float = 0.0
-    """The time of the first sample."""
+    """The time of the first sample [s]."""
     plant_interval: float = 0.001
-    """The distance of the plant's own communication points, each of which is recorded."""
+    """The distance of the plant's own communication points [s], each of which is recorded."""
     order: Order = "gauss-seidel"
     """Whether a command can be applied at the instant of its sample (gauss-seidel) or at the next one (jacobi)."""
     hold: Hold = "zero"
@@ -44,11 +44,11 @@ class Timing:
     clock: Clock = "master"
     """Who decides when the controller samples: the master, or the FMU by its own sample_period."""
     delay: float = 0.0
-    """The time d from a sample to the application of its command; it may exceed the period."""
+    """The time d from a sample to the application of its command [s]; it may exceed the period."""
     delay_jitter: float = 0.0
-    """The largest random addition J_d to the delay, drawn for each command."""
+    """The largest random addition J_d to the delay [s], drawn for each command."""
     jitter: float = 0.0
-    """The largest lateness J of a sampling instant, drawn for each; it is less than the period."""
+    """The largest lateness J of a sampling instant [s], drawn for each; it is less than the period."""
     jitter_distribution: Distribution = "uniform"
     """How both are drawn over [0, J]; normal is centred at J/2 with standard deviation J/6, cut to the range."""
     measurement_loss: float = 0.0
@@ -91,12 +91,6 @@ class Timing:
         if self.delay >= stop_time:
             return (f"timing.delay = {shown(self.delay)}: {end}, so no command arrives",)
         return ()
-
-    def is_deterministic(self) -> bool:
-        """Whether no random number is drawn."""
-        return not (
-            self.jitter or self.delay_jitter or self.measurement_loss or self.command_loss or any(self.noise.values())
-        )
 
 
 TIMING_KEYS = tuple(f.name for f in fields(Timing))

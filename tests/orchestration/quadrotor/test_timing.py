@@ -396,15 +396,6 @@ def test_every_key_has_the_name_of_its_flag() -> None:
         assert timing != Timing()
 
 
-@pytest.mark.parametrize("cause", [*({key: value} for key, value in CAUSES.items()), {"noise": {"position": 0.1}}])
-def test_a_timing_with_anything_random_is_not_deterministic(cause: dict[str, Any]) -> None:
-    assert not Timing(**cause).is_deterministic()
-
-
-def test_delay_and_quantisation_are_deterministic() -> None:
-    assert Timing(delay=0.1, order="jacobi", quantisation={"position": 0.1}, noise={"velocity": 0.0}).is_deterministic()
-
-
 @given(st.integers(0, 10**12), st.integers(1, 10**6))
 def test_seconds_are_read_as_the_decimal_that_is_written(whole: int, part: int) -> None:
     text = f"{whole}e-9"
