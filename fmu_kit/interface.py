@@ -9,9 +9,9 @@
             self.u = -self.gain * self.x
 
 The type of the start value is the type of the attribute: a float, a `Vec3` (an FMI variable for each of .x, .y, .z), a
-`Quaternion` (.x, .y, .z, .w), an `Inertia` (.xx, .yy, .zz, .xy, .xz, .yz), a bool, a member of an `IntEnum`, or an int
-if `unit` is None. Units are in SI, as in `fmu_kit.units`. What several slaves have in common is declared in a class
-that they inherit.
+`Quaternion` (.x, .y, .z, .w), an `Inertia` (.xx, .yy, .zz, .xy, .xz, .yz), a bool, a member of an `IntEnum`, which is
+read as its number, or an int if `unit` is None. Units are in SI, as in `fmu_kit.units`. What several slaves have in
+common is declared in a class that they inherit.
 """
 
 from collections.abc import Callable, Iterable
