@@ -13,13 +13,13 @@ from orchestration.basics.simulator import Floats
 from orchestration.building.inputs import files_of
 from orchestration.figures.palette import BLUE, GREY, ORANGE, RED
 from orchestration.figures.style import SCREEN, Style
-from orchestration.fmi.foreign import computed
+from orchestration.fmi.foreign import LostError, computed
 from orchestration.limits.evaluation import RELIABILITY, Evaluation
 from orchestration.limits.found import Found
 from orchestration.results import display_names as labels
 from orchestration.results import quantities
 from orchestration.results.quantities import Quantity
-from orchestration.stability.known_loops import LOOPS
+from orchestration.stability.known_loops import LOOPS, KnownLoop
 from orchestration.studies import figures
 from orchestration.system.request import Request, system_meant
 
@@ -142,7 +142,7 @@ def draw_limit(request: Request, found: Found, folder: Path, style: Style = SCRE
     """Draw what was measured, with both limits, and the spectral radius where a loop is known over the quantity."""
     name = "limit_" + re.sub(r"[^A-Za-z0-9]+", "_", found.of).strip("_")
     written = figures.save(lambda how: measured(found, how), folder / name, style)
-    with contextlib.suppress(UsageError):  # where linear theory does not apply
+    with contextlib.suppress(UsageError, LostError):  # where linear theory does not apply, or its process is lost
         written += draw_spectral_radius(request, found, folder, style)
     return written
 
@@ -150,12 +150,15 @@ def draw_limit(request: Request, found: Found, folder: Path, style: Style = SCRE
 def draw_spectral_radius(request: Request, found: Found, folder: Path, style: Style = SCREEN) -> list[Path]:
     """Draw the spectral radius of the loop over the quantity; the paths of the figure, none where no loop is known.
 
-    Raises `UsageError` where linear theory does not apply.
+    Raises `UsageError` where linear theory does not apply, and `LostError` as `computed` does.
     """
+    known = LOOPS.of(request.kind)
+    if known is None:
+        return []
     ends = [limit for limit in (found.local_limit, found.large_signal_limit) if limit is not None]
     last = 1.3 * max(ends, default=0.1)
     values = np.array([0.001 + i / 199.0 * (last - 0.001) for i in range(200)])
-    radii = computed(files_of(system_meant(request)).fmus.values(), _radii, request, found.of, values)
+    radii = computed(files_of(system_meant(request)).fmus.values(), _radii, known, request, found.of, values)
     return (
         []
         if radii is None
@@ -174,8 +177,7 @@ def draw_spectral_radius(request: Request, found: Found, folder: Path, style: St
     )
 
 
-def _radii(request: Request, of: str, values: Floats) -> Floats | None:
-    """The spectral radius at each value; None where no loop is known."""
-    known = LOOPS.of(request.kind)
-    radius = None if known is None else known.radius_over(request, of)
+def _radii(known: KnownLoop, request: Request, of: str, values: Floats) -> Floats | None:
+    """The spectral radius at each value; None for a quantity that the loop is not known over."""
+    radius = known.radius_over(request, of)
     return None if radius is None else np.array([radius(value) for value in values])

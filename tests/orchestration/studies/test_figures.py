@@ -12,8 +12,10 @@ import pytest
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
+from orchestration.basics.by_kind import ByKind
 from orchestration.basics.statistics import wilson
 from orchestration.figures import cells
+from orchestration.fmi.foreign import LostError
 from orchestration.limits import figure as limit_figure
 from orchestration.limits.evaluation import Evaluation
 from orchestration.limits.figure import draw_limit
@@ -291,6 +293,24 @@ def test_a_limit_is_drawn_with_the_radius_that_crosses_one_there(tmp_path: Path,
 
 def test_a_limit_that_linear_theory_does_not_have_is_drawn_without_the_radius(tmp_path: Path) -> None:
     assert draw_limit(short(), limit("timing.loss"), tmp_path) == [tmp_path / "limit_timing_loss.png"]
+
+
+def test_where_no_loop_is_known_no_process_is_started_for_its_radius(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(limit_figure, "LOOPS", ByKind[Any]())
+    monkeypatch.setattr(limit_figure, "computed", lambda *_: pytest.fail("it computes"))
+    assert draw_limit(short(), limit("period"), tmp_path) == [tmp_path / "limit_period.png"]
+
+
+def test_a_limit_whose_fmus_lose_their_process_is_drawn_without_the_radius(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def lost(*_: Any) -> None:
+        raise LostError("the process of the FMUs ended")
+
+    monkeypatch.setattr(limit_figure, "computed", lost)
+    assert draw_limit(short(), limit("period"), tmp_path) == [tmp_path / "limit_period.png"]
 
 
 def xs(line: Line2D) -> list[float]:
