@@ -28,7 +28,6 @@ class Table(pydantic.BaseModel):
     model_config = pydantic.ConfigDict(
         extra="forbid",
         strict=True,
-        populate_by_name=True,
         frozen=True,
         protected_namespaces=(),
         json_schema_extra=_explained,

@@ -7,7 +7,7 @@ import pytest
 
 from orchestration.basics.attribute_docs import attribute_docs
 from orchestration.basics.errors import UsageError
-from orchestration.basics.typed_tables import docs_of_keys, fields_of
+from orchestration.basics.typed_tables import docs_of_keys, fields_of, parsed
 from orchestration.quadrotor.timing import TIMING_KEYS
 from orchestration.studies.axes import Axis
 from orchestration.studies.study_file import DesignTable
@@ -75,3 +75,9 @@ def test_whether_a_time_is_at_least_so_many_nanoseconds_is_decided_by_decimals()
             exact = exact_nanoseconds(float(seconds)) >= Fraction(repr(nanoseconds))
             assert is_at_least(float(seconds), nanoseconds) == exact
     Sampling(period=1.3e-9, clock_ratio=1.3)
+
+
+def test_a_key_has_one_name_and_no_schema_has_another() -> None:
+    with pytest.raises(UsageError, match=r"^design_seed: no such key; expected one of method, samples, seed"):
+        parsed({"design_seed": 3}, DesignTable)
+    assert parsed({"seed": 3}, DesignTable).design_seed == 3
