@@ -149,14 +149,15 @@ class Child:
         with contextlib.suppress(subprocess.TimeoutExpired):
             code = self._process.wait(patience)
         self.close()
-        reached = self._watch.reached
+        said = "" if self._output is None else self._output.last_line()
+        reached = self._watch.reached or self._watch.said_too_much  # it may have ended before anybody looked
         if self._is_limited and sys.platform == "linux" and code == -signal.SIGXCPU:
             reached = reached or _OUT_OF_PROCESSOR
         return Ending(
             code=code if reached is None else None,
             reached=reached,
             out_of_time=self._watch.reached is not None and self._watch.out_of_time,
-            said="" if self._output is None else self._output.last_line(),
+            said=said,
         )
 
     def close(self, patience: float = 0.0) -> None:

@@ -60,6 +60,13 @@ class Watch:
         """[s] of its own time."""
         return self._taken.own
 
+    @property
+    def said_too_much(self) -> str | None:
+        """The limit of output that is passed by what it has printed so far, in words; None: it is not."""
+        if self._output is None or self._output.count <= self._limits.output * 1e6:
+            return None
+        return f"it writes more than the limit of {self._limits.output:g} MB to its standard output and error"
+
     def allow(self, seconds: float | None) -> None:
         """From now on it may take so much time, whatever it has taken; None: as much as it likes."""
         with self._lock:
@@ -101,8 +108,8 @@ class Watch:
         self.out_of_time = max(self._taken.own - own, self._taken.processor - processor) > self._time
         if self.out_of_time:
             return self._late.format(self._time)
-        if self._output is not None and self._output.count > self._limits.output * 1e6:
-            return f"it writes more than the limit of {self._limits.output:g} MB to its standard output and error"
+        if self.said_too_much is not None:
+            return self.said_too_much
         if memory > self._limits.memory * 1e6:
             return f"it takes more memory than the limit of {self._limits.memory:g} MB"
         return None

@@ -68,6 +68,10 @@ def test_a_process_that_keeps_its_limits_ends_itself() -> None:
             "while True: print('x' * 1000)", {"output": 0.5},
             "it writes more than the limit of 0.5 MB to its standard output and error",
         ),
+        (  # that ends before anybody looks
+            "print('x' * 600_000)", {"output": 0.5},
+            "it writes more than the limit of 0.5 MB to its standard output and error",
+        ),
         pytest.param(
             "a = bytearray(b'x' * 300_000_000)\nwhile True: pass", {"memory": 200.0},
             "it takes more memory than the limit of 200 MB", marks=linux_only,
