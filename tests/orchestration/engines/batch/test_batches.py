@@ -1,6 +1,6 @@
 """What runs in lanes come to is what the same runs come to alone: sums to 1e-12, all else to the last bit."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,25 +16,12 @@ from orchestration.runs.in_lanes import fly
 from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
 from orchestration.system.paths import changed
 from tests.orchestration.engines.batch.lanes import in_lanes, located, shape_of
-from tests.orchestration.engines.moving import moving
 from tests.orchestration.engines.test_compiled import Kept, of, ran
 from tests.orchestration.fmi.small import needs_compiler, small
 
 pytestmark = needs_compiler
 SUMS = ("rmse", "iae", "itae", "effort", "variation", "mean", "rms", "integral", "saturation_share", "share_", "near")
 """What is in the name of an objective that is a sum, or made of functions that have no one value to the last bit"""
-
-
-@pytest.fixture(scope="module")
-def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return moving(tmp_path_factory.mktemp("moving"))
-
-
-@pytest.fixture(scope="module")
-def kept() -> Iterator[Kept]:
-    instances = Kept()
-    yield instances
-    instances.close()
 
 
 def assert_the_same_numbers(found: Mapping[str, Any], alone: Mapping[str, Any]) -> None:

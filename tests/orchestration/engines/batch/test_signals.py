@@ -1,6 +1,5 @@
 """Runs in lanes have the signals of the same runs flown one after the other, to the byte."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +10,6 @@ from hypothesis import strategies as st
 from orchestration.system.model import System
 from orchestration.system.system_file import load_system
 from tests.orchestration.engines.batch.lanes import assert_the_same_signals, in_lanes, located, shape_of
-from tests.orchestration.engines.moving import moving
 from tests.orchestration.engines.random_systems import TIMES, systems
 from tests.orchestration.engines.test_compiled import Kept, of, ran
 from tests.orchestration.fmi.small import needs_compiler
@@ -20,18 +18,6 @@ from tests.orchestration.quadrotor.signals_table import flights, scenario_of
 pytestmark = needs_compiler
 FLIGHTS = dict(flights())
 EXAMPLES = sorted(Path(__file__).parents[4].glob("examples/*/system.toml"))
-
-
-@pytest.fixture(scope="module")
-def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return moving(tmp_path_factory.mktemp("moving"))
-
-
-@pytest.fixture(scope="module")
-def kept() -> Iterator[Kept]:
-    instances = Kept()
-    yield instances
-    instances.close()
 
 
 def plain(system: System) -> System:
