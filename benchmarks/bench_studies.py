@@ -11,7 +11,7 @@ from orchestration.quadrotor.scenario import Scenario
 from orchestration.studies.axes import Axis
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import sweep
-from orchestration.workers.task import Hangar, Task
+from orchestration.workers.task import Runner, RunTask
 
 RUNS, SECONDS = 200, 10.0
 """of the study that two workers are compared on"""
@@ -33,10 +33,10 @@ def many_short_runs() -> tuple[float, float]:
     """Median time of a run of one plant step [ms], FMUs loaded, and growth of memory over the last half [KiB]."""
     system = Scenario(stop_time=0.001).as_system()
     system = with_files(system, files_of(system).fmus)
-    task = Task(index=0, key="", settings={}, system=system, keep_signals=False)
-    durations, memory, hangar = [], [], Hangar()
+    task = RunTask(index=0, key="", settings={}, system=system, keep_signals=False)
+    durations, memory, runner = [], [], Runner()
     for i in range(MANY):
-        durations.append(hangar.fly(dataclasses.replace(task, index=i)).row.duration)
+        durations.append(runner.fly(dataclasses.replace(task, index=i)).row.duration)
         memory.append(resident())
     return statistics.median(durations) * 1e3, memory[-1] - memory[MANY // 2]
 

@@ -39,7 +39,7 @@ from orchestration.studies.study_file import load_study
 from orchestration.studies.sweep import AGREEMENT, sweep
 from orchestration.studies.table import frame
 from orchestration.workers.batching import Agreement
-from orchestration.workers.executors import Pool
+from orchestration.workers.executors import RunEvaluator
 from orchestration.workers.provenance import versions
 
 ROOT = Path(__file__).parent.parent
@@ -405,7 +405,7 @@ def _in_processes(function: Callable[[Any], Any], arguments: Any) -> list[Any]:
 
 def _flown(scenarios: list[Scenario], *, in_lanes: bool) -> list[Any]:
     systems = [scenario.as_system() for scenario in scenarios]
-    with Pool(files_of(systems[0]), WORKERS) as pool:
+    with RunEvaluator(files_of(systems[0]), WORKERS) as pool:
         return pool.fly_all(systems, in_lanes=in_lanes)
 
 

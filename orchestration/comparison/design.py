@@ -8,7 +8,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.basics.records import record
 from orchestration.building import fmus
 from orchestration.studies.axes import Axis, Value
-from orchestration.studies.linked_settings import Key, Together
+from orchestration.studies.linked_settings import Key, LinkedSettings
 from orchestration.studies.study import Study
 from orchestration.system.paths import value_at
 from orchestration.system.request import ControlLoop, Ensemble, Start, Values
@@ -136,15 +136,15 @@ class Comparison:
                 Axis(name=START, targets=(), values=tuple(range(len(self.drawn)))),
             ),
             together=(
-                Together(axes=(VEHICLE, CONTROLLER), sets=self._told()),
-                Together(axes=(CONTROLLER,), sets={(one.name,): one.sets for one in self.controllers}),
-                Together(axes=(CONTROLLER, VEHICLE, self.axis.name), sets=self._tuned()),
-                Together(
+                LinkedSettings(axes=(VEHICLE, CONTROLLER), sets=self._told()),
+                LinkedSettings(axes=(CONTROLLER,), sets={(one.name,): one.sets for one in self.controllers}),
+                LinkedSettings(axes=(CONTROLLER, VEHICLE, self.axis.name), sets=self._tuned()),
+                LinkedSettings(
                     axes=(CONDITION,),
                     sets={(one.name,): one.sets for one in self.conditions},
                     multiplies={(one.name,): one.multiplies for one in self.conditions},
                 ),
-                Together(axes=(START,), sets={(i,): self._begun(i, start) for i, start in enumerate(self.drawn)}),
+                LinkedSettings(axes=(START,), sets={(i,): self._begun(i, start) for i, start in enumerate(self.drawn)}),
             ),
         )
 

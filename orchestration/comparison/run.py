@@ -24,7 +24,7 @@ from orchestration.studies.swept import Swept
 from orchestration.studies.table import export, frame, units_in
 from orchestration.system.request import in_its_own_words
 from orchestration.workers.batching import TOLERATED
-from orchestration.workers.executors import Pool
+from orchestration.workers.executors import RunEvaluator
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -131,7 +131,7 @@ def cell_again(
     with in_its_own_words(comparison.base):
         systems = [study.system(i, starts) for i in runs]
         checked(systems[0], files.models_of(systems[0]))
-    with Pool(files, workers, engine) as pool:
+    with RunEvaluator(files, workers, engine) as pool:
         flights = pool.fly_all(systems, in_lanes=in_lanes)
     (found,) = results(comparison, frame_of(comparison, zip(runs, flights)))
     return found

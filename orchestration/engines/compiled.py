@@ -18,8 +18,8 @@ from orchestration.engines.backlog import Backlog
 from orchestration.engines.board import Board
 from orchestration.engines.condition import Step
 from orchestration.engines.loop import Operation, library
-from orchestration.engines.memory import Memory
 from orchestration.engines.room import Room, loop_in, private
+from orchestration.engines.run_structures import RunStructures
 from orchestration.engines.shared_tables import SharedTables
 from orchestration.engines.sources import Values
 from orchestration.engines.structures import address, structures
@@ -72,14 +72,14 @@ class CompiledLoop:
         self._failure: BaseException | None = None
         names = work.wires.names
         instances = cast(Mapping[str, NativeInstance], work.simulators)
-        self._memory = memory = Memory([instances[name] for name in names])
+        self._structures = structures = RunStructures([instances[name] for name in names])
         self._loop = loop = loop_in(room)
         self._tables = SharedTables(work, loop, room)
         self.backlog = Backlog(work, self._tables, recorder)
         program, watched = condition(work.board)
         self._watched = list(watched)
         self._feed_table = (c.Feed * len(work.feeds))(
-            *(memory.feed(names.index(feed.component), feed) for feed in work.feeds)
+            *(structures.feed(names.index(feed.component), feed) for feed in work.feeds)
         )
         self._channel_table = (c.Channel * len(work.channels))(*map(self._channel_of, range(len(work.channels))))
         self._components = (c.Component * len(names))(*map(self._component_of, range(len(names))))
@@ -89,8 +89,8 @@ class CompiledLoop:
             "components": ctypes.addressof(self._components),
             "channels": ctypes.addressof(self._channel_table),
             "feeds": ctypes.addressof(self._feed_table),
-            "continuous": memory.indices(work.wires.continuous),
-            "sampled": memory.indices(work.wires.sampled),
+            "continuous": structures.indices(work.wires.continuous),
+            "sampled": structures.indices(work.wires.sampled),
             "tracks": ctypes.addressof(self._track),
             "track_count": 1,
             "channel_count": len(work.channels),
@@ -99,7 +99,7 @@ class CompiledLoop:
             "settles": work.settles,
             "look": _Look(self._look_for_c),
             "stopped": _Stopped(self._stopped_for_c),
-            "collect": _Collect(lambda index: memory.instances[index].collect_warnings()),
+            "collect": _Collect(lambda index: structures.instances[index].collect_warnings()),
             "calling": -1,
         }
         for name, value in begun.items():
@@ -153,7 +153,7 @@ class CompiledLoop:
 
     def _hear_of_moves(self) -> None:
         """Instances whose FMUs have changed how numbers are rounded, which C has put back."""
-        for instance, component in zip(self._memory.instances, self._components):
+        for instance, component in zip(self._structures.instances, self._components):
             if component.moved:
                 component.moved = 0
                 instance.has_changed(ROUNDING)
@@ -162,9 +162,9 @@ class CompiledLoop:
         """Raise what C has come back with."""
         index, part = self._loop.outcome_component[0], self._loop.failed
         if code in (c.FAILED, c.REFUSED):
-            function, transfer = self._memory.calls[part]
+            function, transfer = self._structures.calls[part]
             if code == c.FAILED:
-                raise self._memory.instances[index].failure(function)
+                raise self._structures.instances[index].failure(function)
             transfer()
         elif code == c.NOT_FINITE:
             self._work.component(index).expect_finite(self._work.now / NANOSECONDS)
@@ -186,7 +186,7 @@ class CompiledLoop:
     def _stopped_for_c(self, status: int, until: int) -> int:
         """Whether a step to `until` [ns] that was not simply done is not whole either; no exception goes through C."""
         try:
-            error = self._memory.instances[self._loop.component].step_error(status, self._loop.end)
+            error = self._structures.instances[self._loop.component].step_error(status, self._loop.end)
             self._work.stopped(error, until)
         except BaseException as error:
             self._failure = error
@@ -235,19 +235,19 @@ class CompiledLoop:
         x = work.system.connections[index]
         places = [work.board.place[start] for start in x.start]
         receiver = work.wires.names.index(x.receiver)
-        made = self._memory.channel(x, work.channels[index], receiver, work.board.row, places)
+        made = self._structures.channel(x, work.channels[index], receiver, work.board.row, places)
         made.read_ahead = index in work.wires.plan.read_ahead
         return made
 
     def _component_of(self, index: int) -> Any:
-        work, memory, name = self._work, self._memory, self._work.wires.names[index]
+        work, structures, name = self._work, self._structures, self._work.wires.names[index]
         component, into = work.component(index), work.wires.into(name)
-        made = memory.component(index, component.read, work.outputs(name), len(component.outputs))
+        made = structures.component(index, component.read, work.outputs(name), len(component.outputs))
         made.rank = work.wires.rank(index)
-        made.feeds = memory.indices([work.feeds.index(feed) for feed in component.feeds])
-        made.held, made.ahead, made.behind = map(memory.indices, (into.held, into.ahead, into.behind))
+        made.feeds = structures.indices([work.feeds.index(feed) for feed in component.feeds])
+        made.held, made.ahead, made.behind = map(structures.indices, (into.held, into.ahead, into.behind))
         if isinstance(component, SampledComponent):
-            made.ratio, made.by_itself = memory.address(np.array([component.ratio])), component.by_itself
+            made.ratio, made.by_itself = structures.address(np.array([component.ratio])), component.by_itself
         return made
 
 

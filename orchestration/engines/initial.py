@@ -1,18 +1,16 @@
 """In which order outputs reach inputs before a run begins: that of what depends on what at initialisation."""
 
 from collections.abc import Callable, Collection, Sequence
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from orchestration.basics.simulator import Floats
+from orchestration.basics.simulator import Booleans, Floats
 from orchestration.system.model import Connection, variable_of
 
 ITERATIONS, CONVERGED = 100, 1e-12
 """How often values go around a loop, until they change by less, relative to what they are"""
-Marks: TypeAlias = npt.NDArray[np.bool_]
-PassOn = Callable[[int, Marks], tuple[Floats, Floats]]
+PassOn = Callable[[int, Booleans], tuple[Floats, Floats]]
 """Carries out a connection in the runs that are open; gives what its receiver had before, and has now"""
 Dependencies = Callable[[str, str], Collection[str] | None]
 """The inputs of a component that one of its outputs depends on at initialisation; None: on all of them"""
@@ -27,7 +25,7 @@ def groups(connections: Sequence[Connection], dependencies: Dependencies) -> tup
     return _components(before)
 
 
-def exchange(group: Sequence[int], pass_on: PassOn, runs: tuple[int, ...] = ()) -> Marks:
+def exchange(group: Sequence[int], pass_on: PassOn, runs: tuple[int, ...] = ()) -> Booleans:
     """Pass on what the connections of a group carry; again and again until it stays, if they form a loop.
 
     `runs` is the shape of the runs that go on together. Gives those in which no values were found.

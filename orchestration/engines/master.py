@@ -6,14 +6,13 @@ from typing import Any, Protocol
 import numpy as np
 
 from orchestration.basics.errors import SimulatorError
-from orchestration.basics.simulator import Floats, Simulator
+from orchestration.basics.simulator import Booleans, Floats, Simulator
 from orchestration.engines import initial
 from orchestration.engines.at_work import AtWork, Diverged, Sources, Terminated
 from orchestration.engines.backlog import Backlog
 from orchestration.engines.board import Board
 from orchestration.engines.channel import Channel
 from orchestration.engines.feeds import Feed
-from orchestration.engines.initial import Marks
 from orchestration.engines.instants import PythonLoop
 from orchestration.engines.watch import Watch
 from orchestration.engines.wires import clock_of
@@ -212,7 +211,7 @@ class Master:
     def _exchange(self, group: Sequence[int]) -> None:
         work, connections = self._work, self._work.system.connections
 
-        def pass_on(index: int, open_: Marks) -> tuple[Floats, Floats]:
+        def pass_on(index: int, open_: Booleans) -> tuple[Floats, Floats]:
             work.readers[connections[index].sender]()
             before = work.channels[index].received.copy()
             work.channels[index].pass_on()

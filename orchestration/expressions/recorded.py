@@ -9,13 +9,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeAlias
 
-import numpy as np
-import numpy.typing as npt
-
-from orchestration.basics.simulator import Floats
+from orchestration.basics.simulator import Booleans, Floats
 
 TIME, STOP_TIME = "time", "stop_time"
-Marks: TypeAlias = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +25,7 @@ class Recorded:
     others are in continuous time, known at the rows and taken as linear between them"""
     numbers: Mapping[str, float] = field(default_factory=dict)
     """what has one value in the run, such as parameters, by name"""
-    arrivals: Mapping[str, Marks] = field(default_factory=dict)
+    arrivals: Mapping[str, Booleans] = field(default_factory=dict)
     """by connection, the rows at which a message arrived, shape (n,)"""
     stop_time: float
     """[s], at which the run ended"""

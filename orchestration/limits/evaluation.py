@@ -10,7 +10,7 @@ from orchestration.basics.statistics import refutes, wilson
 from orchestration.requests.ranges import Varied
 from orchestration.results.criterion import judged, unmet
 from orchestration.system.model import System
-from orchestration.workers.executors import Pool
+from orchestration.workers.executors import RunEvaluator
 
 RELIABILITY = 0.9
 """For random quantities: the share of seeds that are good, which the stated confidence is in."""
@@ -61,7 +61,7 @@ class Evaluator:
         seeds: int,
         confidence: float | None,
         units: Mapping[str, str],
-        pool: Pool,
+        pool: RunEvaluator,
         announce: Callable[[str], None],
         progress: Callable[[float], None],
     ) -> None:

@@ -22,7 +22,7 @@ from orchestration.results.criterion import edge, judged
 from orchestration.stability.known_loops import Local
 from orchestration.stability.local_limit import local_limits
 from orchestration.system.request import Request, in_its_own_words, system_meant
-from orchestration.workers.executors import Pool
+from orchestration.workers.executors import RunEvaluator
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -117,7 +117,7 @@ def find(
     random = is_random(varied.at(span.last))
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
     local = _local(varied, span, files)
-    with of_share(progress, "longest search") as hear, Pool(files, workers, engine) as pool:
+    with of_share(progress, "longest search") as hear, RunEvaluator(files, workers, engine) as pool:
         tell = announce or (lambda line: None)
         trials = Evaluator(varied, span, seeds, confidence if random else None, units[0], pool, tell, hear)
         values = span.values()
@@ -191,7 +191,7 @@ def _refuted(trials: Evaluator, bracket: Bracket | None, above: list[float]) -> 
     return None
 
 
-def _flown(near: Request, pool: Pool) -> Continuous:
+def _flown(near: Request, pool: RunEvaluator) -> Continuous:
     """What comes of a run near continuous time."""
     (metrics,) = pool.fly([system_meant(near)], stop=lambda metrics: False)
     return Continuous(period=CONTINUOUS, outcome=metrics["outcome"], settling_time=metrics["settling_time"])

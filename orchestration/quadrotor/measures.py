@@ -1,15 +1,12 @@
 """Quantities of a flight that figures and studies share with the objectives of the system file."""
 
 from collections.abc import Mapping, Sequence
-from typing import Literal, TypeAlias, get_args
+from typing import Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
 
-from orchestration.basics.simulator import Floats
+from orchestration.basics.simulator import Booleans, Floats
 from orchestration.quadrotor.wiring import COMMAND, POSITION, POSITION_REFERENCE
-
-Marks: TypeAlias = npt.NDArray[np.bool_]
 
 SETTLED = 0.05
 """[m] of position error in the last third of a flight, below which it counts as settled; as in system.toml"""
@@ -31,7 +28,7 @@ def position_error(signals: Mapping[str, Floats]) -> Floats:
     return error
 
 
-def saturated(signals: Mapping[str, Floats], parameters: Mapping[str, float]) -> dict[str, Marks]:
+def saturated(signals: Mapping[str, Floats], parameters: Mapping[str, float]) -> dict[str, Booleans]:
     """By command as the plant gets it, where a limit of the plant changes it, shape (n,) each.
 
     A limit of a motor changes all of them. Of a plant that does not tell its limits, nowhere.
@@ -43,7 +40,7 @@ def saturated(signals: Mapping[str, Floats], parameters: Mapping[str, float]) ->
     return found | {name: (np.abs(t) > most_torque) | motors for name, t in zip(COMMAND[1:], torques, strict=True)}
 
 
-def _motors_saturated(thrust: Floats, torques: Sequence[Floats], parameters: Mapping[str, float]) -> Marks:
+def _motors_saturated(thrust: Floats, torques: Sequence[Floats], parameters: Mapping[str, float]) -> Booleans:
     """Where any of four motors on an X frame would have to give more or less than it can."""
     most = parameters.get("plant.motor.thrust_max", 0.0)
     if most <= 0.0:
@@ -53,5 +50,5 @@ def _motors_saturated(thrust: Floats, torques: Sequence[Floats], parameters: Map
     motors = [
         thrust + turn * z / drag + way * (x / arm_y - turn * y / arm_x) for turn in (1.0, -1.0) for way in (1.0, -1.0)
     ]
-    found: Marks = np.any([(one > 4.0 * most) | (one < 4.0 * least) for one in motors], axis=0)
+    found: Booleans = np.any([(one > 4.0 * most) | (one < 4.0 * least) for one in motors], axis=0)
     return found

@@ -10,9 +10,9 @@ from orchestration.comparison.design import START, Comparison
 from orchestration.report.flights import Progress
 from orchestration.report.model import Cell, Compared, Report, Share
 from orchestration.report.number_format import number
-from orchestration.report.of_study import Stored, read, report_of, ways_of
+from orchestration.report.of_study import Stored, axes_of, read, report_of
 from orchestration.report.subset import evenly
-from orchestration.report.tables import Way
+from orchestration.report.tables import ColumnAxis
 from orchestration.results import display_names as labels
 from orchestration.results.quantities import Quantity
 from orchestration.studies.table import frame
@@ -35,11 +35,11 @@ def comparison_report(
     stored = _with_sizes(read(path, study), comparison)
     found = report_of(
         comparison.name, stored, study, command, wanted=wanted, most=most, progress=progress,
-        ways=[*ways_of(stored, study), Way(name=SIZE, quantity=Quantity(name=SIZE))],
+        axes=[*axes_of(stored, study), ColumnAxis(name=SIZE, quantity=Quantity(name=SIZE))],
         choose=_from_each_cell(comparison, stored),
     )  # fmt: skip
     cells = results(comparison, frame(path))
-    axis = next(way for way in ways_of(stored, study) if way.name == comparison.axis.name)
+    axis = next(one for one in axes_of(stored, study) if one.name == comparison.axis.name)
     return replace(
         found,
         kind="comparison",

@@ -14,7 +14,7 @@ from orchestration.report.flights import Flight, Progress, fly, in_lanes
 from orchestration.report.model import Report, Run, Setting, Share
 from orchestration.report.number_format import percent
 from orchestration.report.subset import ALONE, MOST, chosen, points_for
-from orchestration.report.tables import Row, Way, share_of, shares_along, table_of
+from orchestration.report.tables import ColumnAxis, Row, share_of, shares_along, table_of
 from orchestration.report.tracks import Tracks
 from orchestration.results import display_names as labels
 from orchestration.results.column_info import described
@@ -77,17 +77,17 @@ def report_of(
     wanted: Sequence[int] = (),
     most: int | None = None,
     progress: Progress | None = None,
-    ways: Sequence[Way] | None = None,
+    axes: Sequence[ColumnAxis] | None = None,
     choose: Choose | None = None,
 ) -> Report:
     """The report of a store; of a `study` that is known, runs are flown again for their signals.
 
-    `wanted` are runs that are among them in any case, `most` is how many, which `choose` picks. `ways` are the axes,
-    default: those of the study. Raises `UsageError` for a run that the study does not have.
+    `wanted` are runs that are among them in any case, `most` is how many, which `choose` picks. `axes` are
+    those of the study if none are given. Raises `UsageError` for a run that the study does not have.
     """
     blobs = Blobs()
     tracks = Tracks(blobs)
-    ways = ways_of(stored, study) if ways is None else ways
+    axes = axes_of(stored, study) if axes is None else axes
     metric = metric_of(stored, study)
     indices = [row["design_index"] for row in stored.rows if row["status"] == "done"]
     embedded = embed(
@@ -104,7 +104,7 @@ def report_of(
         layouts=tuple(tracks.layouts),
         runs=tuple(embedded.runs),
         table=table_of(
-            stored.rows, ways, stored.metrics, stored.units, blobs,
+            stored.rows, axes, stored.metrics, stored.units, blobs,
             tracks=embedded.places, messages=messages_of(stored.rows, embedded.places),
             is_grid=json.loads(stored.about.get("grid", "null")) is not None,
         ),
@@ -114,7 +114,7 @@ def report_of(
         metric=metric,
         overall=overall,
         shares=tuple(
-            found for way in ways if (found := shares_along(stored.rows, way, by_chance=by_chance)) is not None
+            found for axis in axes if (found := shares_along(stored.rows, axis, by_chance=by_chance)) is not None
         ),
         contents=tuple(embedded.contents),
         provenance=tuple(provenance_of(stored.about)),
@@ -122,15 +122,15 @@ def report_of(
     )  # fmt: skip
 
 
-def ways_of(stored: Stored, study: Study | None) -> list[Way]:
+def axes_of(stored: Stored, study: Study | None) -> list[ColumnAxis]:
     """The axes, with the units of the store, and with scales where the study is known."""
     if study is None:
         return [
-            Way(name=name, quantity=quantity(labels.words(name), stored.units.get(name), _values(stored, name)))
+            ColumnAxis(name=name, quantity=quantity(labels.words(name), stored.units.get(name), _values(stored, name)))
             for name in json.loads(stored.about["axes"])
         ]
     return [
-        Way(name=axis.name, quantity=quantity_of(axis, stored.units), logarithmic=axis.scale == "logarithmic")
+        ColumnAxis(name=axis.name, quantity=quantity_of(axis, stored.units), logarithmic=axis.scale == "logarithmic")
         for axis in study.axes
     ]
 

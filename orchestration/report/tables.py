@@ -27,7 +27,7 @@ Row = Mapping[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Way:
+class ColumnAxis:
     """An axis as the page draws it."""
 
     name: str
@@ -39,7 +39,7 @@ class Way:
 
 def table_of(
     rows: Sequence[Row],
-    ways: Sequence[Way],
+    axes: Sequence[ColumnAxis],
     metrics: Sequence[str],
     units: Mapping[str, str],
     blobs: Blobs,
@@ -56,7 +56,7 @@ def table_of(
             name="design_index", label="run", unit=None, kind="index",
             values=blobs.exact([row["design_index"] for row in kept]),
         ),
-        *(_axis(way, [row["settings"][way.name] for row in kept], blobs) for way in ways),
+        *(_axis(axis, [row["settings"][axis.name] for row in kept], blobs) for axis in axes),
         _words(OUTCOME, [row[OUTCOME] for row in kept], blobs, "metric"),
         *_metrics(kept, metrics, units, blobs),
     ]  # fmt: skip
@@ -70,12 +70,12 @@ def table_of(
     )
 
 
-def _axis(way: Way, values: Sequence[Any], blobs: Blobs) -> Column:
+def _axis(axis: ColumnAxis, values: Sequence[Any], blobs: Blobs) -> Column:
     if any(isinstance(value, str | bool) for value in values):
-        return _words(way.name, values, blobs, "axis")
+        return _words(axis.name, values, blobs, "axis")
     return Column(
-        name=way.name, label=way.quantity.name, unit=labels.unit(way.quantity.unit), kind="axis",
-        values=blobs.exact(way.quantity.of(values)), logarithmic=way.logarithmic,
+        name=axis.name, label=axis.quantity.name, unit=labels.unit(axis.quantity.unit), kind="axis",
+        values=blobs.exact(axis.quantity.of(values)), logarithmic=axis.logarithmic,
     )  # fmt: skip
 
 
@@ -114,9 +114,9 @@ def share_of(label: str, value: float | None, rows: Sequence[Row], *, by_chance:
     return Share(label=label, value=value, good=good, runs=len(rows), low=low, high=high)
 
 
-def shares_along(rows: Sequence[Row], way: Way, *, by_chance: bool) -> Shares | None:
+def shares_along(rows: Sequence[Row], axis: ColumnAxis, *, by_chance: bool) -> Shares | None:
     """Shares by value of an axis, or by part of its range; None for an axis of one value."""
-    values = [row["settings"][way.name] for row in rows]
+    values = [row["settings"][axis.name] for row in rows]
     distinct = list(dict.fromkeys(values))
     if len(distinct) < 2:
         return None
@@ -124,25 +124,25 @@ def shares_along(rows: Sequence[Row], way: Way, *, by_chance: bool) -> Shares | 
         groups: dict[Any, list[Row]] = {value: [] for value in _ordered(distinct)}
         for row, value in zip(rows, values):
             groups[value].append(row)
-        read = {value: _read(value, way.quantity) for value in groups}
+        read = {value: _read(value, axis.quantity) for value in groups}
         found = [share_of(_text(read[v]), _number(read[v]), some, by_chance=by_chance) for v, some in groups.items()]
     else:
-        found = [*_by_part(rows, way.quantity.of(values), way, by_chance=by_chance)]
-    unit = labels.unit(way.quantity.unit)
-    return Shares(axis=way.quantity.name, unit=unit, logarithmic=way.logarithmic, shares=tuple(found))
+        found = [*_by_part(rows, axis.quantity.of(values), axis, by_chance=by_chance)]
+    unit = labels.unit(axis.quantity.unit)
+    return Shares(axis=axis.quantity.name, unit=unit, logarithmic=axis.logarithmic, shares=tuple(found))
 
 
-def _by_part(rows: Sequence[Row], values: Floats, way: Way, *, by_chance: bool) -> Iterator[Share]:
-    scaled = np.log(values) if way.logarithmic else values
+def _by_part(rows: Sequence[Row], values: Floats, axis: ColumnAxis, *, by_chance: bool) -> Iterator[Share]:
+    scaled = np.log(values) if axis.logarithmic else values
     edges = np.linspace(scaled.min(), scaled.max(), PARTS + 1)
     part = np.clip(np.digitize(scaled, edges) - 1, 0, PARTS - 1)
-    ends = np.exp(edges) if way.logarithmic else edges
+    ends = np.exp(edges) if axis.logarithmic else edges
     for i in range(PARTS):
         some = [rows[k] for k in np.flatnonzero(part == i).tolist()]
         if some:
             middle = 0.5 * (edges[i] + edges[i + 1])
             label = f"{ends[i]:.3g} to {ends[i + 1]:.3g}"
-            value = float(np.exp(middle) if way.logarithmic else middle)
+            value = float(np.exp(middle) if axis.logarithmic else middle)
             yield share_of(label, value, some, by_chance=by_chance)
 
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from orchestration.basics.errors import UsageError
-from orchestration.basics.simulator import Floats
+from orchestration.basics.simulator import Booleans, Floats
 from orchestration.expressions.over_run import evaluate, expect_names
-from orchestration.expressions.recorded import Marks, Recorded, Spans, vectors
+from orchestration.expressions.recorded import Recorded, Spans, vectors
 from orchestration.expressions.syntax import names, parse
 from orchestration.recording.recording import Events, Recording
 from orchestration.system.model import DIVERGED, TERMINATED, System, expressions
@@ -115,7 +115,7 @@ def spans(system: System, recording: Recording, parameters: Mapping[str, float],
         before = rows[-1:]
 
 
-def _arrivals(system: System, time: Floats, events: Events) -> dict[str, Marks]:
+def _arrivals(system: System, time: Floats, events: Events) -> dict[str, Booleans]:
     """By connection, the rows at which a message of it arrived, or was measured and not lost."""
     instants = np.round(time * NANOSECONDS).astype(np.int64)
     found = {}
@@ -151,7 +151,7 @@ def known(system: System, signals: set[str], numbers: set[str]) -> System:
 
 
 def _ends(
-    system: System, signals: Mapping[str, Floats], arrivals: Mapping[str, Marks], lines: Mapping[str, "_Line"]
+    system: System, signals: Mapping[str, Floats], arrivals: Mapping[str, Booleans], lines: Mapping[str, "_Line"]
 ) -> dict[str, Floats]:
     """Of every signal that is held between rows, what it has become just before the next."""
     ends: dict[str, Floats] = {}
@@ -176,11 +176,11 @@ class _Line:
     def __init__(self) -> None:
         self._last: dict[str, list[tuple[float, float]]] = {}
 
-    def ends(self, time: Floats, values: Mapping[str, Floats], arrived: Marks) -> dict[str, Floats]:
+    def ends(self, time: Floats, values: Mapping[str, Floats], arrived: Booleans) -> dict[str, Floats]:
         """What is on the line just before each next row."""
         return {name: self._end(name, time, held, arrived) for name, held in values.items()}
 
-    def _end(self, name: str, time: Floats, held: Floats, arrived: Marks) -> Floats:
+    def _end(self, name: str, time: Floats, held: Floats, arrived: Booleans) -> Floats:
         past = self._last.get(name)
         rows = np.flatnonzero(arrived)
         if past is None:  # that of initialisation is the first

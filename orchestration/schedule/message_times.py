@@ -2,21 +2,17 @@
 
 import math
 from collections.abc import Callable
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
+from orchestration.basics.simulator import Booleans, Integers
 from orchestration.schedule.streams import cut_normal
-
-Integers: TypeAlias = npt.NDArray[np.int64]
-Flags: TypeAlias = npt.NDArray[np.bool_]
 
 Stream = Callable[[], np.random.Generator]
 """Gives the generator; called only if something is drawn"""
 Lateness = Callable[[int], Integers]
 """The next so many latenesses [ns]"""
-Losses = Callable[[int], Flags]
+Losses = Callable[[int], Booleans]
 """Whether the next so many messages are lost"""
 
 

@@ -51,7 +51,7 @@ class Link:
         return times
 
 
-class Task:
+class SampledComponent:
     """A sampled component: its samples that are drawn and not past, a row each.
 
     Columns: k, time, time of the next, then for each incoming link when it is measured and arrives, and for each
@@ -135,4 +135,4 @@ class Task:
 
 
 TIME, NEXT, MESSAGES = 1, 2, 3
-"""Columns of a row of `Task`"""
+"""Columns of a row of `SampledComponent`"""

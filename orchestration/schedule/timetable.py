@@ -12,11 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from orchestration.basics.errors import UsageError
-from orchestration.basics.simulator import Integers
+from orchestration.basics.simulator import Booleans, Integers
 from orchestration.schedule.fixed_step import FixedStep, Refusal
-from orchestration.schedule.message_times import Flags
 from orchestration.schedule.plan import Plan
-from orchestration.schedule.random_timing import MESSAGES, NEXT, TIME, Link, Task
+from orchestration.schedule.random_timing import MESSAGES, NEXT, TIME, Link, SampledComponent
 from orchestration.schedule.schedule import Schedule
 from orchestration.schedule.streams import Streams
 from orchestration.system.model import System
@@ -86,7 +85,7 @@ class Timetable:
             i: Grid(Fraction(0), exact_nanoseconds(system.components[names[i]].step or 0.0))
             for i in sorted(self._continuous.tolist())
         }
-        self._tasks = [Task(name, plan, links, streams, fixed, self._refused) for name in plan.sampled]
+        self._tasks = [SampledComponent(name, plan, links, streams, fixed, self._refused) for name in plan.sampled]
         self.first_samples = {
             name: task.first for name, task in zip(plan.sampled, self._tasks) if task.first < self.stop
         }
@@ -291,7 +290,7 @@ class _Sent(NamedTuple):
     whom: int
     place: int
 
-    def table(self, which: Flags | None = None) -> Integers:
+    def table(self, which: Booleans | None = None) -> Integers:
         """All of them, or these: a row each."""
         rows = np.empty((len(self.k) if which is None else int(which.sum()), _ORDER + 4), dtype=np.int64)
         rows[:, 0], rows[:, 5], rows[:, 6], rows[:, 7] = self.link.index, self.phase, self.whom, self.place

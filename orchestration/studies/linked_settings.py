@@ -10,7 +10,7 @@ Key = tuple[Value, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Together:
+class LinkedSettings:
     """Targets that values of one axis, or of several, set together."""
 
     axes: tuple[str, ...]

@@ -82,7 +82,7 @@ def expect_columns(objectives: Iterable[str]) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Place:
+class DesignPoint:
     """One place of a design: which run, and with which value of each axis."""
 
     index: int
@@ -110,7 +110,7 @@ class Store:
         with _explained(self.path):
             return dict(self._connection.execute("SELECT name, value FROM about"))
 
-    def describe(self, about: Mapping[str, str], design: Iterable[Place] | None = None) -> None:
+    def describe(self, about: Mapping[str, str], design: Iterable[DesignPoint] | None = None) -> None:
         """Write what the store is about, and which runs its design has; those that are there stay."""
         with _explained(self.path), self._connection:
             self._insert("about", about.items())

@@ -13,7 +13,7 @@ from orchestration.building.fmus import native_twin, native_twins
 from orchestration.building.inputs import Files, files_of
 from orchestration.requests.ranges import paths_in
 from orchestration.studies.axes import Axis, Method, Points, Value
-from orchestration.studies.linked_settings import Together
+from orchestration.studies.linked_settings import LinkedSettings
 from orchestration.studies.store import is_column
 from orchestration.system.model import System
 from orchestration.system.paths import changed, names_table, value_at
@@ -30,7 +30,7 @@ class Study:
     """The scenario or the system that is varied."""
     axes: tuple[Axis, ...]
     """What is varied: every combination of the listed values, each with every sampled point."""
-    together: tuple[Together, ...] = ()
+    together: tuple[LinkedSettings, ...] = ()
     """What values of the axes stand for beside their own targets, each on top of what was before."""
     method: Method = "sobol"
     """How axes without values are sampled; morris and saltelli are for sensitivity."""

@@ -24,10 +24,10 @@ from orchestration.studies.swept import Swept
 from orchestration.studies.vouching import Fly, vouched
 from orchestration.workers.batching import chunks, expect_lanes
 from orchestration.workers.executors import expect_scheduler, run_locally, run_on_dask
-from orchestration.workers.pool import Package
+from orchestration.workers.pool import Inputs
 from orchestration.workers.provenance import versions
 from orchestration.workers.row import Row
-from orchestration.workers.task import Outcome, Task
+from orchestration.workers.task import Outcome, RunTask
 
 Announce = Callable[[str], None]
 """Hears of a run that failed."""
@@ -79,7 +79,7 @@ def sweep(
         _describe(opened, study, files)
         missing = _missing(opened, study, retry_failed)
         counted = _Counted(len(study.points), opened, hear, announce)
-        fly = _flying(Package.of(files), workers, dask)
+        fly = _flying(Inputs.of(files), workers, dask)
         alone = None if engine == "batch" else engine
         tasks = (_task(study, index, files, alone, time_limit) for index in missing)
         lanes: dict[str, Row] = {}
@@ -91,7 +91,7 @@ def sweep(
                     lanes |= {each.row.key: each.row for each in some if each.in_lanes}
             agreement = vouched(
                 lanes, files, lambda index: _task(study, index, files, None, time_limit),
-                lambda package: _flying(package, workers, dask),
+                lambda inputs: _flying(inputs, workers, dask),
             )  # fmt: skip
         except KeyboardInterrupt:
             raise Interrupted(f"with {counted.done} of {counted.total} runs done") from None
@@ -111,11 +111,11 @@ def _expect_workers(workers: int, dask: str | None) -> None:
         expect_scheduler(dask)
 
 
-def _flying(package: Package, workers: int, dask: str | None) -> Fly:
+def _flying(inputs: Inputs, workers: int, dask: str | None) -> Fly:
     """Flies tasks in worker processes, here or on a cluster."""
     if dask is not None:
-        return lambda tasks: run_on_dask(tasks, package, dask)
-    return lambda tasks: run_locally(tasks, package, workers)
+        return lambda tasks: run_on_dask(tasks, inputs, dask)
+    return lambda tasks: run_locally(tasks, inputs, workers)
 
 
 def expect_current(opened: store.Store, study: Study) -> None:
@@ -159,9 +159,9 @@ class _Counted:
         self._hear(self.done, self.total)
 
 
-def _task(study: Study, index: int, files: Files, engine: Engine | None, time_limit: float | None) -> Task:
+def _task(study: Study, index: int, files: Files, engine: Engine | None, time_limit: float | None) -> RunTask:
     system = study.system(index, files.starts_of(study.origin))
-    return Task(
+    return RunTask(
         index=index, key=run_key(system, files), settings=dict(study.points[index]), system=system,
         keep_signals=study.keeps_signals(index), engine=engine, time_limit=time_limit,
     )  # fmt: skip
@@ -243,8 +243,8 @@ def _units(study: Study, files: Files) -> dict[str, str]:
     return {name: unit for name, unit in of_axes.items() if unit} | checked(first, models).units
 
 
-def _places(study: Study, files: Files) -> Iterator[store.Place]:
+def _places(study: Study, files: Files) -> Iterator[store.DesignPoint]:
     starts = files.starts_of(study.origin)
     for index, point in enumerate(study.points):
         key = run_key(study.system(index, starts), files)
-        yield store.Place(index=index, key=key, settings=point)
+        yield store.DesignPoint(index=index, key=key, settings=point)

@@ -18,11 +18,11 @@ from orchestration.building.inputs import Files
 from orchestration.fmi.model import Model, Variable
 from orchestration.system.model import Component
 from orchestration.workers.batching import TOLERATED, Agreement, Pair, sample
-from orchestration.workers.pool import Package
+from orchestration.workers.pool import Inputs
 from orchestration.workers.row import Row
-from orchestration.workers.task import Chunk, Outcome, Task
+from orchestration.workers.task import Chunk, Outcome, RunTask
 
-Fly = Callable[[Iterable[Task | Chunk]], Generator[list[Outcome], None, None]]
+Fly = Callable[[Iterable[RunTask | Chunk]], Generator[list[Outcome], None, None]]
 """The outcomes of tasks as they come."""
 BEGINNING, SHARE = 1.0, 0.05
 """[s] that FMUs in Python fly, and the least of a run: whole, one of theirs costs as much as hundreds in lanes"""
@@ -31,7 +31,7 @@ _BEGUN, _NUDGED, _PYTHON = "begun ", "nudged ", "in Python "
 
 
 def vouched(
-    lanes: Mapping[str, Row], files: Files, task_of: Callable[[int], Task], flying: Callable[[Package], Fly]
+    lanes: Mapping[str, Row], files: Files, task_of: Callable[[int], RunTask], flying: Callable[[Inputs], Fly]
 ) -> Agreement | None:
     """How a sample of the runs that were flown in lanes compares with other ways to fly them; None if there were none.
 
@@ -42,13 +42,13 @@ def vouched(
         return None
     paths = _in_python({fmu for task in chosen for fmu in task.system.fmus.values()})
     begun = [_begun(task) for task in chosen if paths.keys() & python_twins(task.system).fmus.values()]
-    tasks: list[Task | Chunk] = [*chosen, *map(_in_python_too, begun)]
+    tasks: list[RunTask | Chunk] = [*chosen, *map(_in_python_too, begun)]
     if begun:
         tasks.append(Chunk(tasks=(*begun, *(_nudged(one, files.models_of(one.system)) for one in begun))))
-    package = Package.of(Files(fmus={**files.fmus, **paths}, tables=files.tables))
-    rows = {outcome.row.key: outcome.row for some in flying(package)(tasks) for outcome in some}
+    inputs = Inputs.of(Files(fmus={**files.fmus, **paths}, tables=files.tables))
+    rows = {outcome.row.key: outcome.row for some in flying(inputs)(tasks) for outcome in some}
 
-    def pairs(tasks: Iterable[Task], one: Mapping[str, Row], prefix: str) -> list[Pair]:
+    def pairs(tasks: Iterable[RunTask], one: Mapping[str, Row], prefix: str) -> list[Pair]:
         return [(task.index, _told(one[task.key]), _told(rows[prefix + task.key])) for task in tasks]
 
     steady = [one for one in begun if Agreement.of(pairs([one], rows, _NUDGED)).difference <= TOLERATED]
@@ -66,19 +66,19 @@ def _in_python(natives: set[str]) -> dict[str, Path]:
     return {twin: path for twin in twins if (path := looked_up(twin)) is not None}
 
 
-def _begun(task: Task) -> Task:
+def _begun(task: RunTask) -> RunTask:
     """The beginning of a run."""
     horizon = task.system.stop_time
     system = replace(task.system, stop_time=min(horizon, max(BEGINNING, SHARE * horizon)))
     return replace(task, key=_BEGUN + task.key, system=system, keep_signals=False)
 
 
-def _in_python_too(task: Task) -> Task:
+def _in_python_too(task: RunTask) -> RunTask:
     """The same by FMUs in Python."""
     return replace(task, key=_PYTHON + task.key, system=python_twins(task.system))
 
 
-def _nudged(task: Task, models: Mapping[str, Model]) -> Task:
+def _nudged(task: RunTask, models: Mapping[str, Model]) -> RunTask:
     """The same with each parameter off by its last bit."""
     components = {name: _off(component, models[name]) for name, component in task.system.components.items()}
     return replace(task, key=_NUDGED + task.key, system=replace(task.system, components=components))

@@ -16,7 +16,7 @@ from orchestration.engines.engine import Engine
 from orchestration.results import html
 from orchestration.tuning.tuning import Fly, Found, Tuning, best_by_period, search
 from orchestration.tuning.tuning_file import gains_text
-from orchestration.workers.executors import Pool
+from orchestration.workers.executors import RunEvaluator
 from orchestration.workers.provenance import versions
 
 if TYPE_CHECKING:
@@ -93,7 +93,10 @@ def tune(
     in_lanes = engine == "batch"
     asked = dataclasses.replace(tuning, native=True) if in_lanes else tuning
     files = asked.files()
-    with of_share(progress, "searching") as hear, Pool(files, workers, None if engine == "batch" else engine) as pool:
+    with (
+        of_share(progress, "searching") as hear,
+        RunEvaluator(files, workers, None if engine == "batch" else engine) as pool,
+    ):
         done = searched(
             asked, files, Path(folder or Path("results") / asked.name),
             lambda systems: pool.fly_all(systems, in_lanes=in_lanes), pool.fly_all,

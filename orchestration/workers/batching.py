@@ -15,7 +15,7 @@ from orchestration.engines.batch.shape import Shape, outline
 from orchestration.engines.wiring import checked
 from orchestration.schedule.schedule_cache import timing
 from orchestration.system.model import System
-from orchestration.workers.task import Chunk, Task
+from orchestration.workers.task import Chunk, RunTask
 
 SAMPLE = 8
 """Runs that are flown by FMUs too"""
@@ -33,7 +33,7 @@ def expect_lanes(system: System, files: Files) -> None:
     assert shape.library
 
 
-def chunks(tasks: Iterable[Task], total: int, workers: int) -> Iterator[Task | Chunk]:
+def chunks(tasks: Iterable[RunTask], total: int, workers: int) -> Iterator[RunTask | Chunk]:
     """Tasks in chunks, of which each of so many workers gets a few; those whose signals are kept by themselves."""
     size = max(lanes_here(), min(CHUNK, total // (4 * workers) // lanes_here() * lanes_here()))
     waiting = iter(tasks)

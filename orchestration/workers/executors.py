@@ -17,10 +17,10 @@ from orchestration.building.inputs import Files
 from orchestration.engines.engine import Engine
 from orchestration.system.model import System
 from orchestration.workers.batching import chunks
-from orchestration.workers.pool import Crew, InterruptedWorker, Package
-from orchestration.workers.task import Chunk, Outcome, Task
+from orchestration.workers.pool import Inputs, InterruptedWorker, Pool
+from orchestration.workers.task import Chunk, Outcome, RunTask
 
-Submit = Callable[[Task | Chunk], "Future[list[Outcome]]"]
+Submit = Callable[[RunTask | Chunk], "Future[list[Outcome]]"]
 _PATIENCE = 10.0
 """[s], for a scheduler that is there"""
 _WORKERS_PATIENCE = 60.0
@@ -28,7 +28,7 @@ _WORKERS_PATIENCE = 60.0
 _ADDRESS = re.compile(r"(?:(?:tcp|tls|ws|wss)://)?(\[[0-9a-fA-F:.]+\]|[^\s:/\[\]]+):(\d{1,5})")
 
 
-class Pool:
+class RunEvaluator:
     """Flies a few runs at a time for someone who decides by their metrics what to fly next."""
 
     def __init__(self, files: Files, workers: int, engine: Engine | None = None) -> None:
@@ -37,8 +37,8 @@ class Pool:
         self._files, self._workers, self._engine = files, workers, engine
         self._stack = ExitStack()
 
-    def __enter__(self) -> "Pool":
-        self._submit = _local_submit(self._stack, Package.of(self._files), self._workers)
+    def __enter__(self) -> "RunEvaluator":
+        self._submit = _local_submit(self._stack, Inputs.of(self._files), self._workers)
         return self
 
     def __exit__(self, *exception: object) -> None:
@@ -79,8 +79,8 @@ class Pool:
                 future.cancel()
         return found
 
-    def _task(self, index: int, system: System) -> Task:
-        return Task(index=index, key="", settings={}, system=system, keep_signals=False, engine=self._engine)
+    def _task(self, index: int, system: System) -> RunTask:
+        return RunTask(index=index, key="", settings={}, system=system, keep_signals=False, engine=self._engine)
 
 
 def _metrics(outcome: Outcome) -> Any:
@@ -90,19 +90,19 @@ def _metrics(outcome: Outcome) -> Any:
     return outcome.row.metrics
 
 
-def run_locally(tasks: Iterable[Task | Chunk], package: Package, workers: int) -> Generator[list[Outcome], None, None]:
+def run_locally(tasks: Iterable[RunTask | Chunk], inputs: Inputs, workers: int) -> Generator[list[Outcome], None, None]:
     """Outcomes of `tasks` from `workers` processes, in any order.
 
     Raises `QuadcosimError` for what is not a run's own failure, `KeyboardInterrupt` if a worker is interrupted.
     """
     with ExitStack() as stack:
         try:
-            yield from _drain(tasks, _local_submit(stack, package, workers), 2 * workers)
+            yield from _drain(tasks, _local_submit(stack, inputs, workers), 2 * workers)
         except InterruptedWorker as error:
             raise KeyboardInterrupt from error
 
 
-def run_on_dask(tasks: Iterable[Task | Chunk], package: Package, address: str) -> Generator[list[Outcome], None, None]:
+def run_on_dask(tasks: Iterable[RunTask | Chunk], inputs: Inputs, address: str) -> Generator[list[Outcome], None, None]:
     """Outcomes of `tasks` from the workers of a dask scheduler, in any order.
 
     Raises `QuadcosimError` if the scheduler cannot be reached or has no workers, or for what is not a run's own
@@ -117,7 +117,7 @@ def run_on_dask(tasks: Iterable[Task | Chunk], package: Package, address: str) -
         except (OSError, TimeoutError, asyncio.TimeoutError, ValueError) as error:  # two of a name before Python 3.11
             raise QuadcosimError(f"--dask {address}: expected a dask scheduler with workers there: {error}") from error
         # The files travel once, by the hash of their content.
-        scattered = client.scatter(package, broadcast=True, hash=True)
+        scattered = client.scatter(inputs, broadcast=True, hash=True)
         executor = stack.enter_context(client.get_executor(pure=False))
         slots = sum(client.nthreads().values())
         try:
@@ -140,32 +140,32 @@ def expect_scheduler(address: str) -> None:
         raise QuadcosimError(f"--dask {address}: expected a dask scheduler with workers there: {error}") from error
 
 
-def fly_on_cluster(task: Task | Chunk, package: Package) -> list[Outcome]:
+def fly_on_cluster(task: RunTask | Chunk, inputs: Inputs) -> list[Outcome]:
     """The outcomes of runs, called in a dask worker: flown in a process of its own there too."""
-    with _CREWS_LOCK:
-        if package.digest not in _CREWS:
-            _CREWS[package.digest] = crew = Crew(package)
-            atexit.register(crew.remove)  # last
-            atexit.register(crew.close)
-    return _CREWS[package.digest].fly(task)
+    with _POOLS_LOCK:
+        if inputs.digest not in _POOLS:
+            _POOLS[inputs.digest] = pool = Pool(inputs)
+            atexit.register(pool.remove)  # last
+            atexit.register(pool.close)
+    return _POOLS[inputs.digest].fly(task)
 
 
-_CREWS: dict[str, Crew] = {}
-_CREWS_LOCK = threading.Lock()
+_POOLS: dict[str, Pool] = {}
+_POOLS_LOCK = threading.Lock()
 
 
-def _local_submit(stack: ExitStack, package: Package, workers: int) -> Submit:
+def _local_submit(stack: ExitStack, inputs: Inputs, workers: int) -> Submit:
     """Submits to threads that each wait for a worker process, until `stack` is closed."""
-    crew = Crew(package)
-    stack.callback(crew.remove)  # last: a thread may still have been starting a process
+    pool = Pool(inputs)
+    stack.callback(pool.remove)  # last: a thread may still have been starting a process
     executor = ThreadPoolExecutor(workers)
     stack.callback(executor.shutdown, cancel_futures=True)
-    stack.callback(crew.close)  # first: it ends what the threads wait for
+    stack.callback(pool.close)  # first: it ends what the threads wait for
     stack.callback(executor.shutdown, wait=False, cancel_futures=True)
-    return lambda task: executor.submit(crew.fly, task)
+    return lambda task: executor.submit(pool.fly, task)
 
 
-def _drain(tasks: Iterable[Task | Chunk], submit: Submit, most: int) -> Generator[list[Outcome], None, None]:
+def _drain(tasks: Iterable[RunTask | Chunk], submit: Submit, most: int) -> Generator[list[Outcome], None, None]:
     """Keep `most` tasks under way until none is left; yield what is finished."""
     waiting = iter(tasks)
     under_way = {submit(task) for task in islice(waiting, most)}

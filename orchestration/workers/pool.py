@@ -19,7 +19,15 @@ from orchestration.building.inputs import Files, all_with_files, with_files
 from orchestration.processes import subprocesses
 from orchestration.processes.child import Child, Died
 from orchestration.workers.provenance import versions
-from orchestration.workers.task import Broken, BrokenPlaceError, Chunk, Outcome, Ready, Task, row_of
+from orchestration.workers.task import (
+    Chunk,
+    EnvironmentFailure,
+    Outcome,
+    Ready,
+    RunTask,
+    WorkerEnvironmentError,
+    row_of,
+)
 
 ATTEMPTS = 3
 """How often a run is flown, the later times first in a new process, before the death of its worker is its result."""
@@ -28,7 +36,7 @@ _FROM_OUTSIDE = {-getattr(signal, name) for name in ("SIGKILL", "SIGTERM", "SIGH
 
 
 @dataclass(frozen=True, kw_only=True)
-class Package:
+class Inputs:
     """What every run of a study needs, by content: this is what was hashed, wherever it is flown."""
 
     contents: Mapping[str, bytes]
@@ -36,7 +44,7 @@ class Package:
     versions: dict[str, str]
 
     @classmethod
-    def of(cls, files: Files) -> "Package":
+    def of(cls, files: Files) -> "Inputs":
         """The content of `files`."""
         return cls(contents=files.contents, versions=versions())
 
@@ -61,7 +69,7 @@ class WorkerProcess:
             environment=subprocesses.environment(**dict.fromkeys(("TMPDIR", "TEMP", "TMP"), place)),
         )
 
-    def ask(self, task: Task | Chunk) -> Any:
+    def ask(self, task: RunTask | Chunk) -> Any:
         """The answer to a task, or to many; raises `Died`, also at its time limit."""
         self._child.allow(task.time_limit)
         self._child.say(task)
@@ -79,17 +87,17 @@ class WorkerProcess:
         self._folder.cleanup()
 
 
-class Pilot:
+class Supervisor:
     """Flies one run at a time in a worker process, which is made anew when it dies."""
 
-    def __init__(self, root: Path, package: Package) -> None:
-        self._root, self._package = root, package
+    def __init__(self, root: Path, inputs: Inputs) -> None:
+        self._root, self._inputs = root, inputs
         self._lock = threading.Lock()
         self._closed = False
         self._worker: WorkerProcess | None = None
         self._machine: str | None = None
 
-    def fly(self, task: Task) -> Outcome:
+    def fly(self, task: RunTask) -> Outcome:
         """The outcome of a run; a run that ends its process whenever it is flown alone has failed.
 
         Raises `QuadcosimError` for what is not the run's own failure.
@@ -118,8 +126,8 @@ class Pilot:
                         "little memory; start the sweep again, with fewer workers"
                     ) from None
                 continue
-            if isinstance(answer, Broken):
-                raise BrokenPlaceError(f"no run's own failure: {answer.message}")
+            if isinstance(answer, EnvironmentFailure):
+                raise WorkerEnvironmentError(f"no run's own failure: {answer.message}")
             assert isinstance(answer, Outcome)
             return answer
 
@@ -135,8 +143,8 @@ class Pilot:
             self._drop()
             _expect_no_interrupt(death)
             return [self.fly(task) for task in chunk.tasks]
-        if isinstance(answer, Broken):
-            raise BrokenPlaceError(f"no run's own failure: {answer.message}")
+        if isinstance(answer, EnvironmentFailure):
+            raise WorkerEnvironmentError(f"no run's own failure: {answer.message}")
         assert isinstance(answer, list)
         return answer
 
@@ -167,7 +175,7 @@ class Pilot:
                 self._drop()
                 _expect_no_interrupt(death)
                 if attempt == ATTEMPTS - 1:
-                    raise BrokenPlaceError(f"worker processes cannot start: the last one {death}") from None
+                    raise WorkerEnvironmentError(f"worker processes cannot start: the last one {death}") from None
                 continue
             self._expect_same_software(ready)
             self._machine = ready.machine
@@ -177,9 +185,9 @@ class Pilot:
         raise QuadcosimError("the sweep has ended")
 
     def _expect_same_software(self, ready: Ready) -> None:
-        other = [name for name, version in self._package.versions.items() if ready.versions.get(name) != version]
+        other = [name for name, version in self._inputs.versions.items() if ready.versions.get(name) != version]
         if other:
-            raise BrokenPlaceError(
+            raise WorkerEnvironmentError(
                 f"{os.uname().nodename if hasattr(os, 'uname') else 'a worker'}: has another version of "
                 f"{', '.join(other)} than the coordinator; expected the same"
             )
@@ -190,50 +198,50 @@ def _expect_no_interrupt(death: Died) -> None:
         raise InterruptedWorker("a worker process was interrupted") from None
 
 
-class Crew:
-    """Pilots for one package: as many as fly at once."""
+class Pool:
+    """Supervisors for one inputs: as many as fly at once."""
 
-    def __init__(self, package: Package) -> None:
+    def __init__(self, inputs: Inputs) -> None:
         self._scratch = scratch.temporary()
         self._root = self._scratch.path
-        self._package = package
-        self._idle: queue.SimpleQueue[Pilot] = queue.SimpleQueue()
+        self._inputs = inputs
+        self._idle: queue.SimpleQueue[Supervisor] = queue.SimpleQueue()
         self._lock = threading.Lock()
         self._closed = False
-        self._pilots: list[Pilot] = []
+        self._supervisors: list[Supervisor] = []
         try:
-            self._paths = {name: self._unpack(i, name) for i, name in enumerate(package.contents)}
+            self._paths = {name: self._unpack(i, name) for i, name in enumerate(inputs.contents)}
         except BaseException:
             self._scratch.remove()
             raise
 
-    def fly(self, task: Task | Chunk) -> list[Outcome]:
+    def fly(self, task: RunTask | Chunk) -> list[Outcome]:
         """The outcomes of runs; called from any number of threads, each of which gets a process of its own.
 
         Raises `QuadcosimError` once it is closed.
         """
-        pilot = self._pilot()
+        supervisor = self._supervisor()
         try:
             if isinstance(task, Chunk):
                 systems = all_with_files([each.system for each in task.tasks], self._paths)
                 each = tuple(replace(one, system=system) for one, system in zip(task.tasks, systems))
-                return pilot.fly_chunk(Chunk(tasks=each))
-            return [pilot.fly(replace(task, system=with_files(task.system, self._paths)))]
+                return supervisor.fly_chunk(Chunk(tasks=each))
+            return [supervisor.fly(replace(task, system=with_files(task.system, self._paths)))]
         finally:
-            self._idle.put(pilot)
+            self._idle.put(supervisor)
 
     def close(self) -> None:
         """End all processes, and let none begin."""
         with self._lock:
             self._closed = True
-        for pilot in self._pilots:
-            pilot.close()
+        for supervisor in self._supervisors:
+            supervisor.close()
 
     def remove(self) -> None:
         """Remove what they left, once nobody is in `fly` any more who could still leave something."""
         self._scratch.remove()
 
-    def _pilot(self) -> Pilot:
+    def _supervisor(self) -> Supervisor:
         """One that has nothing to do, or a new one."""
         with self._lock:
             if self._closed:
@@ -241,13 +249,13 @@ class Crew:
             try:
                 return self._idle.get_nowait()
             except queue.Empty:
-                self._pilots.append(Pilot(self._root, self._package))
-                return self._pilots[-1]
+                self._supervisors.append(Supervisor(self._root, self._inputs))
+                return self._supervisors[-1]
 
     def _unpack(self, number: int, name: str) -> Path:
         path = self._root / f"{number}-{Path(name).stem}{'.csv' if Path(name).suffix == '.csv' else '.fmu'}"
         try:
-            path.write_bytes(self._package.contents[name])
+            path.write_bytes(self._inputs.contents[name])
         except OSError as error:
             raise QuadcosimError(f"{path}: expected to be written, for the workers: {error.strerror}") from error
         return path

@@ -21,7 +21,7 @@ from orchestration.workers.row import Row
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task:
+class RunTask:
     """One run of a study, its files where the worker finds them."""
 
     index: int
@@ -39,7 +39,7 @@ class Task:
 class Chunk:
     """Runs of a study that are flown as lanes of a batch; all of native FMUs, of none are signals kept."""
 
-    tasks: tuple[Task, ...]
+    tasks: tuple[RunTask, ...]
 
     @property
     def time_limit(self) -> float | None:
@@ -67,28 +67,28 @@ class Ready:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Broken:
+class EnvironmentFailure:
     """Nothing can be flown here, which is no run's own failure."""
 
     message: str
 
 
-class BrokenPlaceError(QuadcosimError):
+class WorkerEnvironmentError(QuadcosimError):
     """What failed is not the run but where it was to be flown: no space, no file, an FMU that does not load."""
 
 
-class Hangar:
+class Runner:
     """The FMUs of this process, instantiated once; one run at a time."""
 
     def __init__(self, machine: str | None = None) -> None:
-        self._fleet = Instances()
+        self._instances = Instances()
         self._machine = machine
         self._batches: Batches | None = None
 
-    def fly(self, task: Task) -> Outcome:
+    def fly(self, task: RunTask) -> Outcome:
         """Fly one run; what is wrong with it is its row.
 
-        Raises `BrokenPlaceError` for what is not the run's own failure.
+        Raises `WorkerEnvironmentError` for what is not the run's own failure.
         """
         started = time.perf_counter()
         metrics, message, signals = None, None, None
@@ -103,7 +103,7 @@ class Hangar:
         except (SimulatorError, UsageError) as error:
             message = str(error)
         except (QuadcosimError, OSError, MemoryError) as error:
-            raise BrokenPlaceError(str(error) or type(error).__name__) from error
+            raise WorkerEnvironmentError(str(error) or type(error).__name__) from error
         except Exception as error:
             message = f"{type(error).__name__}: {error}"
         return Outcome(
@@ -113,7 +113,7 @@ class Hangar:
     def fly_chunk(self, chunk: Chunk) -> list[Outcome]:
         """Fly many runs at once, those alone that a batch leaves.
 
-        Raises `BrokenPlaceError` for what is no run's own failure.
+        Raises `WorkerEnvironmentError` for what is no run's own failure.
         """
         started = time.perf_counter()
         if self._batches is None:
@@ -122,7 +122,7 @@ class Hangar:
         try:
             flown = self._batches.run([task.system for task in chunk.tasks])
         except (QuadcosimError, OSError, MemoryError) as error:
-            raise BrokenPlaceError(str(error) or type(error).__name__) from error
+            raise WorkerEnvironmentError(str(error) or type(error).__name__) from error
         duration = (time.perf_counter() - started) / len(chunk.tasks)
         return [
             self.fly(task)
@@ -136,32 +136,32 @@ class Hangar:
         """An FMU that does not load has not been told yet what run it is for."""
         with ExitStack() as stack:
             try:
-                fmu = stack.enter_context(self._fleet.load(path, instance_name))
+                fmu = stack.enter_context(self._instances.load(path, instance_name))
             except Exception as error:
-                raise BrokenPlaceError(str(error) or type(error).__name__) from error
+                raise WorkerEnvironmentError(str(error) or type(error).__name__) from error
             yield fmu
 
     def close(self) -> None:
         """Free the FMUs."""
-        self._fleet.close()
+        self._instances.close()
 
 
 def _expect_files(system: System) -> None:
-    """Raise `BrokenPlaceError` if a file of a run is not there, or is not the FMU that the coordinator has read."""
+    """Raise `WorkerEnvironmentError` if a file is not there, or is not the FMU that the coordinator has read."""
     tables = [source.file for source in system.sources.values() if source.file is not None]
     fmus = [Path(component.fmu) for component in system.components.values()]
     for file in (*fmus, *tables):
         if not file.is_file():
-            raise BrokenPlaceError(f"{file}: is no longer there")
+            raise WorkerEnvironmentError(f"{file}: is no longer there")
     try:
         for fmu in fmus:
             read_model(fmu)
     except QuadcosimError as error:
-        raise BrokenPlaceError(str(error)) from error
+        raise WorkerEnvironmentError(str(error)) from error
 
 
 def row_of(
-    task: Task, metrics: dict[str, Any] | None, message: str | None, duration: float, machine: str | None
+    task: RunTask, metrics: dict[str, Any] | None, message: str | None, duration: float, machine: str | None
 ) -> Row:
     """The row of a task; without metrics it has failed."""
     return Row(

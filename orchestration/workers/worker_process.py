@@ -9,7 +9,15 @@ from pathlib import Path
 from orchestration.basics import scratch
 from orchestration.processes.channel import Parent
 from orchestration.workers.provenance import machine, versions
-from orchestration.workers.task import Broken, BrokenPlaceError, Chunk, Hangar, Outcome, Ready, Task
+from orchestration.workers.task import (
+    Chunk,
+    EnvironmentFailure,
+    Outcome,
+    Ready,
+    Runner,
+    RunTask,
+    WorkerEnvironmentError,
+)
 
 
 def main(own_folder: Path) -> None:
@@ -23,17 +31,17 @@ def main(own_folder: Path) -> None:
     # An FMU must not be blamed for an interrupt.
     parent = Parent(interrupt=signal.SIG_DFL, orphaned=orphaned)
     parent.say(Ready(versions=versions(), machine=machine()))
-    hangar = Hangar(machine())
+    runner = Runner(machine())
     for task in parent:
-        parent.say(_fly(hangar, task))
+        parent.say(_fly(runner, task))
     parent.leave()  # the coordinator ends a process otherwise
 
 
-def _fly(hangar: Hangar, task: Task | Chunk) -> Outcome | list[Outcome] | Broken:
+def _fly(runner: Runner, task: RunTask | Chunk) -> Outcome | list[Outcome] | EnvironmentFailure:
     try:
-        return hangar.fly_chunk(task) if isinstance(task, Chunk) else hangar.fly(task)
-    except BrokenPlaceError as error:
-        return Broken(message=str(error))
+        return runner.fly_chunk(task) if isinstance(task, Chunk) else runner.fly(task)
+    except WorkerEnvironmentError as error:
+        return EnvironmentFailure(message=str(error))
 
 
 if __name__ == "__main__":

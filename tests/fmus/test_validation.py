@@ -17,7 +17,7 @@ from orchestration.checks.validation import Finding, confined_process, run_rules
 from orchestration.checks.validation.finding import check
 from orchestration.checks.validation.fmu import Fmu, read_co_simulation, read_fmu
 from orchestration.checks.validation.own_description import differences, elements
-from orchestration.checks.validation.probe import Bench
+from orchestration.checks.validation.probe import Probe
 from orchestration.checks.validation.progress import Frame, Told
 from orchestration.checks.validation.structure import initial_unknowns, known_dependencies, outputs
 from orchestration.checks.validation.units import dimensions, unit_meaning
@@ -264,7 +264,7 @@ def test_whether_a_call_hangs_is_told_by_the_time_of_the_process(
 
 
 def test_the_child_reports_an_error_in_a_rule(low_pass: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    def odd(bench: Bench) -> list[str]:
+    def odd(probe: Probe) -> list[str]:
         raise KeyError(3)
 
     monkeypatch.setattr(run_rules, "FIRST", (odd,))

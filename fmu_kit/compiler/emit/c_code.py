@@ -42,7 +42,7 @@ ERRORS = ("FmuError", "DivergenceError", "ZeroDivisionError", "OverflowError", "
 def c_code(program: Program) -> str:
     """The functions of a program, each after those that it calls."""
     names = place_names(program.places)
-    return "\n\n".join(Writer(function, program, names).text() for function in program.functions) + "\n"
+    return "\n\n".join(FunctionWriter(function, program, names).text() for function in program.functions) + "\n"
 
 
 def place_names(places: Iterable[Place]) -> dict[str, str]:
@@ -55,7 +55,7 @@ def place_names(places: Iterable[Place]) -> dict[str, str]:
     return found
 
 
-class Writer:
+class FunctionWriter:
     """Writes one function, for an FMU: its memory is one array, and its messages are full of numbers."""
 
     def __init__(self, function: Function, program: Program, places: dict[str, str]) -> None:

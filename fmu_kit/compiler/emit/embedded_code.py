@@ -10,7 +10,7 @@ from ctypes import c_float
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from fmu_kit.compiler.emit.c_code import ERRORS, KEYWORDS, Writer, identifier
+from fmu_kit.compiler.emit.c_code import ERRORS, KEYWORDS, FunctionWriter, identifier
 from fmu_kit.compiler.trace.statements import Block, Statement
 from fmu_kit.compiler.trace.tracing import Program
 from fmu_kit.variables import Variable
@@ -76,7 +76,7 @@ def single_number(value: float) -> str:
     return f"{'-' if math.copysign(1.0, value) < 0.0 else ''}{shown}f"
 
 
-class _StructWriter(Writer):
+class _StructWriter(FunctionWriter):
     """Writes one function, for a microcontroller."""
 
     always: ClassVar[tuple[str, ...]] = ("m",)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 from typing import ClassVar
 
-from fmu_kit.compiler.emit.c_code import ERRORS, Writer, c_name, place_names
+from fmu_kit.compiler.emit.c_code import ERRORS, FunctionWriter, c_name, place_names
 from fmu_kit.compiler.trace.statements import Block, Function, Statement, ends
 from fmu_kit.compiler.trace.symbols import Symbol
 from fmu_kit.compiler.trace.tracing import Program
@@ -21,7 +21,7 @@ def lane_code(program: Program) -> str:
     return "\n\n".join(LaneWriter(function, program, names).text() for function in program.functions) + "\n"
 
 
-class LaneWriter(Writer):
+class LaneWriter(FunctionWriter):
     """Writes one function, in lanes.
 
     `masks` has, for each block that is being written, the variable that holds the lanes that it is done in.

@@ -75,7 +75,7 @@ class _Tree:
     end: _Leaf | tuple[Symbol, _Tree, _Tree] | None
 
 
-class Recorder:
+class Explorer:
     """Records what is done on the path that is being run, and explores them all."""
 
     def __init__(self, memory: Memory) -> None:
@@ -88,7 +88,7 @@ class Recorder:
         self._traced: dict[Any, tuple[Function, Any, Any]] = {}
 
     def listen(self) -> None:
-        """Have the symbols tell this recorder."""
+        """Have the symbols tell this explorer."""
         hooks.decide = self._decide
         hooks.fail_if = self.fail_if
         hooks.effects = lambda: sum(_has_effect(each) for each in _statements(self._now.entries))

@@ -197,7 +197,7 @@ class Symbol:
 
 
 class Hooks:
-    """What symbols tell the recorder of the path on which they come up."""
+    """What symbols tell the explorer of the path on which they come up."""
 
     decide: Callable[[Symbol], bool]
     """which way the path goes where this condition is asked for"""

@@ -22,7 +22,7 @@ from pythonfmu.fmi2slave import Fmi2Slave
 from fmu_kit import scalar
 from fmu_kit.compiler.trace import symbolic_builtins as stand_ins
 from fmu_kit.compiler.trace.memory import Memory
-from fmu_kit.compiler.trace.path_exploration import Recorder
+from fmu_kit.compiler.trace.path_exploration import Explorer
 from fmu_kit.compiler.trace.statements import Function, Place, Statement
 from fmu_kit.compiler.trace.symbols import Kind, TraceError, hooks
 from fmu_kit.failure import place_of
@@ -78,8 +78,8 @@ def trace(slave: type[Slave], modules: list[types.ModuleType], *, digits: int = 
 
 def _traced(slave: type[Slave], modules: list[types.ModuleType], memory: Memory) -> Program:
     instance = memory.slave
-    recorder = Recorder(memory)
-    recorder.listen()
+    explorer = Explorer(memory)
+    explorer.listen()
     warnings: list[str] = []
 
     def warn_once(self: Slave, key: str, text: str) -> None:
@@ -87,12 +87,12 @@ def _traced(slave: type[Slave], modules: list[types.ModuleType], memory: Memory)
             warnings.append(key)
         if len(warnings) > MOST_WARNINGS:
             raise TraceError(f"more than {MOST_WARNINGS} keys of warnings")
-        recorder.warn(key, text)
+        explorer.warn(key, text)
 
     _expect_no_override(slave)
-    with _wrapped(slave, modules, recorder, warn_once):
+    with _wrapped(slave, modules, explorer, warn_once):
         made = memory.attributes()
-        initialise, after, _ = recorder.function(
+        initialise, after, _ = explorer.function(
             lambda: Slave._initialise(instance), "enter_stepping", {}, catches=True
         )
         if after is None:
@@ -101,7 +101,7 @@ def _traced(slave: type[Slave], modules: list[types.ModuleType], memory: Memory)
         memory._set_attributes(after)
         instance._phase = Phase.STEPPING
         step = functools.partial(Slave._advance, instance)
-        do_step, stepped, _ = recorder.function(lambda t, h: step(t, h), "do_step", {"t": 0.0, "h": 0.0}, catches=True)
+        do_step, stepped, _ = explorer.function(lambda t, h: step(t, h), "do_step", {"t": 0.0, "h": 0.0}, catches=True)
         if stepped is None:
             raise TraceError(f"{slave.__name__}.step fails whatever it is given")
         memory.expect_as_before(after, stepped, "in a step", may_add=False)
@@ -111,7 +111,7 @@ def _traced(slave: type[Slave], modules: list[types.ModuleType], memory: Memory)
         model=slave.__name__,
         slave=slave,
         places=(*(variables[i] for i in range(len(slave.variables))), *kept),
-        functions=tuple(recorder.functions),
+        functions=tuple(explorer.functions),
         initialise=initialise,
         do_step=do_step,
         warnings=tuple(warnings),
@@ -136,12 +136,12 @@ def _place(error: Exception) -> str:
 
 @contextlib.contextmanager
 def _wrapped(
-    slave: type[Slave], modules: list[types.ModuleType], recorder: Recorder, warn_once: Callable[..., None]
+    slave: type[Slave], modules: list[types.ModuleType], explorer: Explorer, warn_once: Callable[..., None]
 ) -> Iterator[None]:
-    """Have every function that branches, and every method of the slave, tell the recorder."""
+    """Have every function that branches, and every method of the slave, tell the explorer."""
     lineage = slave.__mro__[: slave.__mro__.index(Slave)]
     changed: list[tuple[type, str, Any]] = []
-    extra: dict[Any, Any] = {scalar.repeat: recorder.repeat}
+    extra: dict[Any, Any] = {scalar.repeat: explorer.repeat}
     names = {module.__name__ for module in modules}
 
     def replace(cls: type, name: str, function: Any) -> None:
@@ -153,17 +153,17 @@ def _wrapped(
             if getattr(value, "__module__", None) not in names:
                 continue
             if isinstance(value, types.FunctionType) and value is not scalar.repeat and _branches(value):
-                extra[value] = _as_region(value, recorder)
+                extra[value] = _as_region(value, explorer)
             elif isinstance(value, type) and value.__module__ == module.__name__ and not issubclass(value, Slave):
                 for name, method in list(vars(value).items()):
                     if isinstance(method, types.FunctionType) and not name.startswith("__") and _branches(method):
-                        replace(value, name, _as_region(method, recorder))
+                        replace(value, name, _as_region(method, explorer))
     for cls in lineage:
         for name, method in list(vars(cls).items()):
             if isinstance(method, types.FunctionType) and not name.startswith("__") and name not in _UNTRACED:
-                replace(cls, name, _as_function(method, recorder))
+                replace(cls, name, _as_function(method, explorer))
     for name in _BASE_METHODS:
-        replace(Slave, name, _as_function(vars(Slave)[name], recorder))
+        replace(Slave, name, _as_function(vars(Slave)[name], explorer))
     replace(Slave, "warn_once", warn_once)
     replace(Fmi2Slave, "log", _refuse_log)
     try:
@@ -178,16 +178,16 @@ def _refuse_log(*given: Any, **options: Any) -> None:
     raise TraceError("self.log: expected self.warn_once")
 
 
-def _as_region(function: Callable[..., Any], recorder: Recorder) -> Callable[..., Any]:
+def _as_region(function: Callable[..., Any], explorer: Explorer) -> Callable[..., Any]:
     @functools.wraps(function)
     def region(*args: Any, **kwargs: Any) -> Any:
         _expect_traceable(function)
-        return recorder.region(function, args, kwargs)
+        return explorer.region(function, args, kwargs)
 
     return region
 
 
-def _as_function(method: Callable[..., Any], recorder: Recorder) -> Callable[..., Any]:
+def _as_function(method: Callable[..., Any], explorer: Explorer) -> Callable[..., Any]:
     signature = inspect.signature(method)
 
     own, *_ = signature.parameters
@@ -203,7 +203,7 @@ def _as_function(method: Callable[..., Any], recorder: Recorder) -> Callable[...
             whole = inspect.BoundArguments(signature, OrderedDict({own: self, **given}))
             return method(*whole.args, **whole.kwargs)
 
-        return recorder.call(again, method, given)
+        return explorer.call(again, method, given)
 
     return call
 

@@ -16,7 +16,7 @@ from orchestration.checks.validation.description import standard
 from orchestration.checks.validation.fmu import Fmu, read_co_simulation, read_fmu
 from orchestration.checks.validation.instance import RefusedError
 from orchestration.checks.validation.own_description import own_description
-from orchestration.checks.validation.probe import Bench
+from orchestration.checks.validation.probe import Probe
 from orchestration.checks.validation.progress import Frame, Report
 from orchestration.fmi.archive import UnreadableFmuError, read_archive
 from orchestration.fmi.pythonfmu import expect_readable_place
@@ -36,7 +36,7 @@ def main(path: Path, folder: Path, limits: Limits, say: Callable[[Frame], None])
         if fmu is not None and can_be_unpacked(fmu.archive):
             fmpy.extract(str(path), str(folder))
             expect_readable_place(folder)
-            _run(Bench(fmu, folder, limits.time, report.beat), report)
+            _run(Probe(fmu, folder, limits.time, report.beat), report)
         report.end()
     except Exception as error:
         report.failed(error)
@@ -60,24 +60,24 @@ def look(path: Path, size_limit: float, report: Report) -> Fmu | None:
     return fmu
 
 
-def _run(bench: Bench, report: Report) -> None:
-    fmu = bench.fmu
+def _run(probe: Probe, report: Report) -> None:
+    fmu = probe.fmu
     if fmu.is_ours:
-        report.tried((own_description,), bench, RefusedError)
+        report.tried((own_description,), probe, RefusedError)
     platforms = fmpy.supported_platforms(str(fmu.archive.path))
     if fmpy.platform not in platforms:
         report.rule(PLATFORM)
         missing = f"expected a binary for {fmpy.platform}, found {', '.join(platforms) or 'none'}"
         report.found(f"what the FMU does was not checked: {missing}")
         return
-    if any(report.tried([rule], bench, RefusedError) for rule in run_rules.FIRST):
+    if any(report.tried([rule], probe, RefusedError) for rule in run_rules.FIRST):
         return
-    report.tried(rules.OF_RUNS, bench, RefusedError)
-    if bench.repeats is None:
-        report.tried(rules.OF_EQUAL_RUNS, bench, RefusedError)
-    report.tried(rules.LAST_OF_RUNS, bench, RefusedError)
+    report.tried(rules.OF_RUNS, probe, RefusedError)
+    if probe.repeats is None:
+        report.tried(rules.OF_EQUAL_RUNS, probe, RefusedError)
+    report.tried(rules.LAST_OF_RUNS, probe, RefusedError)
     if fmu.is_ours:
-        report.tried(rules.OUR_RUNS, bench, RefusedError)
+        report.tried(rules.OUR_RUNS, probe, RefusedError)
 
 
 if __name__ == "__main__":

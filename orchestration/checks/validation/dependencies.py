@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from orchestration.checks.validation.fmu import Fmu, Unknown, Variable
 from orchestration.checks.validation.instance import Instance, RefusedError, Row, Value, Values, same
-from orchestration.checks.validation.probe import Bench, Plan
+from orchestration.checks.validation.probe import Plan, Probe
 
 MOST_SWITCHES = 16
 """Boolean parameters that are tried the other way round, each with all inputs"""
@@ -36,9 +36,9 @@ class Mode:
     moved: Moved = field(default_factory=lambda: defaultdict(set))
 
 
-def undeclared_dependency(bench: Bench) -> Iterator[str]:
+def undeclared_dependency(probe: Probe) -> Iterator[str]:
     """No output moves with an input, nor at initialisation with a parameter, that it is declared not to depend on."""
-    for mode in _modes(bench):
+    for mode in _modes(probe):
         for name, outputs in mode.moved.items():
             for output in sorted(outputs):
                 declared = mode.declared.get(output)
@@ -46,55 +46,55 @@ def undeclared_dependency(bench: Bench) -> Iterator[str]:
                     yield f"{output} moves with {name} {mode.where}: expected {name} among its dependencies"
 
 
-def idle_dependency(bench: Bench) -> Iterator[str]:
+def idle_dependency(probe: Probe) -> Iterator[str]:
     """Rule of this project: an input that outputs are declared to depend on moves one of them in some way or other."""
-    if not bench.fmu.is_ours:
+    if not probe.fmu.is_ours:
         return
-    for mode in _modes(bench):
-        for v in bench.inputs:
+    for mode in _modes(probe):
+        for v in probe.inputs:
             declaring = {output for output, inputs in mode.declared.items() if inputs is not None and v.name in inputs}
-            if declaring and not declaring & (mode.moved[v.name] or _moving_far(bench, v)):
+            if declaring and not declaring & (mode.moved[v.name] or _moving_far(probe, v)):
                 names = ", ".join(sorted(declaring))
                 yield f"{v.name} moves none of {names} {mode.where}: expected it not to be among their dependencies"
 
 
-def _modes(bench: Bench) -> Iterator[Mode]:
+def _modes(probe: Probe) -> Iterator[Mode]:
     """What is seen in initialisation mode and, of our FMUs, at communication points, in every configuration.
 
     At a communication point FMI allows no value to be asked for between setting an input and the next step;
     the FMUs of this project answer nevertheless, with what they declare.
     """
-    initial = Mode("in initialisation mode", _declared(bench.fmu, bench.fmu.initial_unknowns))
-    later = Mode("at a communication point", _declared(bench.fmu, bench.fmu.outputs))
-    for values in _configurations(bench):
+    initial = Mode("in initialisation mode", _declared(probe.fmu, probe.fmu.initial_unknowns))
+    later = Mode("at a communication point", _declared(probe.fmu, probe.fmu.outputs))
+    for values in _configurations(probe):
         with contextlib.suppress(RefusedError):  # a configuration that is refused shows nothing
-            _move(bench, bench.inputs, values, None, initial.moved)
-            parameters = [v for v in _parameters(bench) if v.name not in values]
-            _move(bench, parameters, values, None, initial.moved, most_refused=MOST_REFUSED)
-            for steps in _POINTS if bench.fmu.is_ours else ():
-                _move(bench, bench.inputs, values, steps, later.moved)
+            _move(probe, probe.inputs, values, None, initial.moved)
+            parameters = [v for v in _parameters(probe) if v.name not in values]
+            _move(probe, parameters, values, None, initial.moved, most_refused=MOST_REFUSED)
+            for steps in _POINTS if probe.fmu.is_ours else ():
+                _move(probe, probe.inputs, values, steps, later.moved)
     yield initial
-    if bench.fmu.is_ours:
+    if probe.fmu.is_ours:
         yield later
 
 
-def _configurations(bench: Bench) -> Iterator[dict[str, Value]]:
+def _configurations(probe: Probe) -> Iterator[dict[str, Value]]:
     """Inputs a little away from their starts; and with them each Boolean parameter the other way round."""
-    inputs = bench.inputs_at(0)
+    inputs = probe.inputs_at(0)
     yield inputs
-    switches = [v for v in bench.fmu.of_causality("parameter") if v.type == "Boolean"]
+    switches = [v for v in probe.fmu.of_causality("parameter") if v.type == "Boolean"]
     for v in switches[:MOST_SWITCHES]:
         yield {**inputs, v.name: not v.start_value}
 
 
-def _parameters(bench: Bench) -> list[Variable]:
+def _parameters(probe: Probe) -> list[Variable]:
     """Those that may be set in initialisation mode and moved a little; a text may be a path, which has no beside."""
-    found = [v for v in bench.fmu.of_causality("parameter") if v.initial == "exact" and v.type != "String"]
+    found = [v for v in probe.fmu.of_causality("parameter") if v.initial == "exact" and v.type != "String"]
     return found[:MOST_PARAMETERS]
 
 
 def _move(
-    bench: Bench,
+    probe: Probe,
     variables: Iterable[Variable],
     values: Values,
     steps: int | None,
@@ -108,47 +108,47 @@ def _move(
     waiting, refused = deque(variables), -1
     while waiting and refused < most_refused:
         refused += 1
-        with bench.instance() as instance:
-            _prepare(bench, instance, values, steps)
-            before = instance.get(bench.outputs)
+        with probe.instance() as instance:
+            _prepare(probe, instance, values, steps)
+            before = instance.get(probe.outputs)
             with contextlib.suppress(RefusedError):
                 while waiting:
                     v = waiting.popleft()
-                    moved[v.name] |= _moving(bench, instance, v, before)
+                    moved[v.name] |= _moving(probe, instance, v, before)
 
 
-def _moving(bench: Bench, instance: Instance, v: Variable, before: Row) -> set[str]:
+def _moving(probe: Probe, instance: Instance, v: Variable, before: Row) -> set[str]:
     """The outputs that move with a variable, which is put back."""
-    value, *near = bench.around(v)
+    value, *near = probe.around(v)
     outputs = set()
     for other in near:
         instance.set({v.name: other})
-        after = instance.get(bench.outputs)
+        after = instance.get(probe.outputs)
         outputs |= {output for output, old in before.items() if not same(old, after[output])}
     instance.set({v.name: value})
     return outputs
 
 
-def _moving_far(bench: Bench, v: Variable) -> set[str]:
+def _moving_far(probe: Probe, v: Variable) -> set[str]:
     """The outputs that move in initialisation mode with a Real input that is moved far: a switch has a threshold."""
     outputs: set[str] = set()
     for move in _FAR if v.type == "Real" else ():
-        with bench.instance() as instance, contextlib.suppress(RefusedError):
-            values = bench.inputs_at(0)
-            instance.begin(values, bench.start)
-            before = instance.get(bench.outputs)
+        with probe.instance() as instance, contextlib.suppress(RefusedError):
+            values = probe.inputs_at(0)
+            instance.begin(values, probe.start)
+            before = instance.get(probe.outputs)
             instance.set({v.name: float(values[v.name]) + move})
-            after = instance.get(bench.outputs)
+            after = instance.get(probe.outputs)
             outputs |= {output for output, old in before.items() if not same(old, after[output])}
     return outputs
 
 
-def _prepare(bench: Bench, instance: Instance, values: Values, steps: int | None) -> None:
+def _prepare(probe: Probe, instance: Instance, values: Values, steps: int | None) -> None:
     if steps is None:
-        instance.begin(values, bench.start)
+        instance.begin(values, probe.start)
         return
-    instance.initialise(values, bench.start)
-    for t, h in bench.points(Plan(steps=steps))[:steps]:
+    instance.initialise(values, probe.start)
+    for t, h in probe.points(Plan(steps=steps))[:steps]:
         instance.step(t, h)
 
 

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from orchestration.checks.validation.description import SLAVE_MODULE
-from orchestration.checks.validation.probe import Bench
+from orchestration.checks.validation.probe import Probe
 
 _DIFFERS = {"guid", "generationDateAndTime", "generationTool", "version"}
 """Attributes that packaging and the calendar decide."""
@@ -33,13 +33,13 @@ sys.stdout.buffer.write(text.encode("utf-8"))
 """Runs with nothing but the standard library and the resources of the FMU, so no other package can answer."""
 
 
-def own_description(bench: Bench) -> Iterator[str]:
+def own_description(probe: Probe) -> Iterator[str]:
     """The description is the one that the bundled slave gives of itself."""
-    fmu = bench.fmu
+    fmu = probe.fmu
     if SLAVE_MODULE not in fmu.archive.files:
         return  # for which there is a rule
     name = fmu.archive.files[SLAVE_MODULE].decode("utf-8", "replace").strip()
-    command = [sys.executable, "-I", "-c", _PROGRAM, str(bench.folder / "resources"), name]
+    command = [sys.executable, "-I", "-c", _PROGRAM, str(probe.folder / "resources"), name]
     done = subprocess.run(command, capture_output=True, stdin=subprocess.DEVNULL, check=False)
     if done.returncode != 0:
         lines = done.stderr.decode("utf-8", "replace").strip().splitlines() or [f"exit code {done.returncode}"]

@@ -58,7 +58,7 @@ class FirstRun:
 
 
 @dataclass(frozen=True, eq=False)
-class Bench:
+class Probe:
     """An FMU and the folder that it is unpacked in."""
 
     fmu: Fmu

@@ -5,28 +5,28 @@ from collections.abc import Callable, Iterator
 
 from orchestration.checks.validation.fmu import Variable
 from orchestration.checks.validation.instance import RefusedError, Value
-from orchestration.checks.validation.probe import PLAIN, Bench
+from orchestration.checks.validation.probe import PLAIN, Probe
 from orchestration.checks.validation.variables import limits
 
 
-def general_run(bench: Bench) -> Iterator[str]:
+def general_run(probe: Probe) -> Iterator[str]:
     """Parameters near their starts, moving inputs and uneven steps are taken; the other runs rely on it."""
     try:
-        bench.flown(bench.everything)
+        probe.flown(probe.everything)
     except RefusedError as error:
         yield f"with parameters near their starts, moving inputs and uneven steps: {error}"
 
 
-def fixed_parameters(bench: Bench) -> Iterator[str]:
+def fixed_parameters(probe: Probe) -> Iterator[str]:
     """A fixed parameter cannot be set after initialisation, not even to what it is."""
-    for v in bench.fmu.of_causality("parameter"):
-        if v.variability == "fixed" and _accepts(bench, v, v.start_value, initialised=True):
+    for v in probe.fmu.of_causality("parameter"):
+        if v.variability == "fixed" and _accepts(probe, v, v.start_value, initialised=True):
             yield f"{v.name}: set after initialisation, expected a fixed parameter to be refused"
 
 
-def bounds_enforced(bench: Bench) -> Iterator[str]:
+def bounds_enforced(probe: Probe) -> Iterator[str]:
     """A parameter outside its bounds does not get past initialisation, a tunable one not past the next step."""
-    for v in bench.fmu.of_causality("parameter"):
+    for v in probe.fmu.of_causality("parameter"):
         for bound, sign in zip(limits(v), (-1.0, 1.0)):
             if math.isinf(bound):
                 continue
@@ -34,48 +34,48 @@ def bounds_enforced(bench: Bench) -> Iterator[str]:
             value = outside if v.type == "Real" else int(outside)
             moments = (False, True) if v.variability == "tunable" else (False,)
             for initialised in moments:
-                if _accepts(bench, v, value, initialised=initialised):
+                if _accepts(probe, v, value, initialised=initialised):
                     when = "after" if initialised else "before"
                     yield f"{v.name} = {value:g} set {when} initialisation: expected it refused, its bound is {bound:g}"
 
 
-def not_finite_refused(bench: Bench) -> Iterator[str]:
+def not_finite_refused(probe: Probe) -> Iterator[str]:
     """A value that is not finite is refused where it is set, so that the message can name the variable."""
-    for v in bench.fmu.of_causality("input", "parameter"):
+    for v in probe.fmu.of_causality("input", "parameter"):
         if v.type != "Real":
             continue
         cases = [(math.nan, False)]
         if v.causality == "input" or v.variability == "tunable":
             cases += [(math.nan, True), (math.inf, True)]
         for value, initialised in cases:
-            if _takes(bench, v, value, initialised=initialised):
+            if _takes(probe, v, value, initialised=initialised):
                 when = "after" if initialised else "before"
                 yield f"{v.name} = {value} set {when} initialisation: expected the call to be refused"
                 break
 
 
-def consecutive_steps(bench: Bench) -> Iterator[str]:
+def consecutive_steps(probe: Probe) -> Iterator[str]:
     """A step that does not begin where the last one ended is refused: FMI leaves that to the master."""
     for shift, where in ((-1.0, "at the beginning of the step before"), (1.0, "a step after its end")):
-        with bench.instance() as instance:
-            bench.begin(instance, PLAIN)
-            (t, h), (then, _), *_ = bench.points(PLAIN)
+        with probe.instance() as instance:
+            probe.begin(instance, PLAIN)
+            (t, h), (then, _), *_ = probe.points(PLAIN)
             instance.step(t, h)
             if _done(lambda: instance.step(then + shift * h, h)):  # noqa: B023
                 yield f"a second step begins {where}: expected it refused"
 
 
-def stop_before_start(bench: Bench) -> Iterator[str]:
+def stop_before_start(probe: Probe) -> Iterator[str]:
     """A stop time before the start time is refused."""
-    with bench.instance() as instance:
-        if _done(lambda: instance.begin({}, bench.start, stop=bench.start - bench.step)):
-            yield f"stopTime = {bench.start - bench.step} is taken, with startTime = {bench.start}: expected it refused"
+    with probe.instance() as instance:
+        if _done(lambda: instance.begin({}, probe.start, stop=probe.start - probe.step)):
+            yield f"stopTime = {probe.start - probe.step} is taken, with startTime = {probe.start}: expected it refused"
 
 
-def terminated_once(bench: Bench) -> Iterator[str]:
+def terminated_once(probe: Probe) -> Iterator[str]:
     """An instance that has been terminated is not terminated again."""
-    with bench.instance() as instance:
-        bench.begin(instance, PLAIN)
+    with probe.instance() as instance:
+        probe.begin(instance, PLAIN)
         instance.terminate()
         if _done(instance.terminate):
             yield "fmi2Terminate is done twice: expected the second refused"
@@ -90,27 +90,27 @@ def _done(call: Callable[[], object]) -> bool:
     return True
 
 
-def _accepts(bench: Bench, v: Variable, value: Value, *, initialised: bool) -> bool:
+def _accepts(probe: Probe, v: Variable, value: Value, *, initialised: bool) -> bool:
     """Whether the FMU goes on with a value: through initialisation, or through a step."""
     try:
-        with bench.instance() as instance:
+        with probe.instance() as instance:
             if initialised:
-                bench.begin(instance, PLAIN)
+                probe.begin(instance, PLAIN)
                 instance.set({v.name: value})
-                instance.step(bench.start, bench.step)
+                instance.step(probe.start, probe.step)
             else:
                 instance.set({v.name: value})
-                bench.begin(instance, PLAIN)
+                probe.begin(instance, PLAIN)
     except RefusedError:
         return False
     return True
 
 
-def _takes(bench: Bench, v: Variable, value: Value, *, initialised: bool) -> bool:
+def _takes(probe: Probe, v: Variable, value: Value, *, initialised: bool) -> bool:
     """Whether the call that sets the value succeeds."""
-    with bench.instance() as instance:
+    with probe.instance() as instance:
         if initialised:
-            bench.begin(instance, PLAIN)
+            probe.begin(instance, PLAIN)
         try:
             instance.set({v.name: value})
         except RefusedError:

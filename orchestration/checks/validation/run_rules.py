@@ -8,16 +8,16 @@ from dataclasses import replace
 from orchestration.checks.validation.finding import Note
 from orchestration.checks.validation.fmu import Variable
 from orchestration.checks.validation.instance import RefusedError, Row, Value, same
-from orchestration.checks.validation.probe import FEWEST, PLAIN, Bench, Plan
+from orchestration.checks.validation.probe import FEWEST, PLAIN, Plan, Probe
 from orchestration.fmi.messages import WARNING
 
 _DIGITS = 5e-15
 """Relative; what a text of 15 digits may be away from the number that it was made of"""
 
 
-def runs(bench: Bench) -> Iterator[str]:
+def runs(probe: Probe) -> Iterator[str]:
     """From instantiation to its end at start values, by the default experiment, without an error in its log."""
-    first = bench.first
+    first = probe.first
     if not first.whole:
         yield Note(f"slow: {first.steps} steps take {first.seconds:.2g} s; all runs are of as many steps at most")
     for status, message in dict.fromkeys((status, message) for status, _, message in first.messages):
@@ -26,32 +26,32 @@ def runs(bench: Bench) -> Iterator[str]:
             yield f"it logs with status {status} though no call failed: {text}"
 
 
-def getters(bench: Bench) -> Iterator[str]:
+def getters(probe: Probe) -> Iterator[str]:
     """Every variable answers to the call for its type."""
     try:
-        with bench.instance() as instance:
-            bench.begin(instance, PLAIN)
-            instance.get(bench.fmu.variables)
+        with probe.instance() as instance:
+            probe.begin(instance, PLAIN)
+            instance.get(probe.fmu.variables)
     except RefusedError:
-        for v in bench.fmu.variables:
-            with bench.instance() as instance:
-                bench.begin(instance, PLAIN)
+        for v in probe.fmu.variables:
+            with probe.instance() as instance:
+                probe.begin(instance, PLAIN)
                 try:
                     instance.get([v])
                 except RefusedError as error:
                     yield f"{v.name}: declared as {v.type}, but {error}"
 
 
-def start_values(bench: Bench) -> Iterator[str]:
+def start_values(probe: Probe) -> Iterator[str]:
     """What is declared to start at a value has it to 15 digits; in FMUs of this project to the last bit."""
-    declared = [v for v in bench.fmu.variables if v.keeps_start]
-    with bench.instance() as instance:
-        moments = {"freshly instantiated": instance.get(declared)} if bench.fmu.is_ours else {}
-        instance.initialise({}, bench.start)
+    declared = [v for v in probe.fmu.variables if v.keeps_start]
+    with probe.instance() as instance:
+        moments = {"freshly instantiated": instance.get(declared)} if probe.fmu.is_ours else {}
+        instance.initialise({}, probe.start)
         moments["after initialisation"] = instance.get(declared)
     for v in declared:
         for moment, row in moments.items():
-            if not _starts(row[v.name], v.start_value, exactly=bench.fmu.is_ours):
+            if not _starts(row[v.name], v.start_value, exactly=probe.fmu.is_ours):
                 yield f"{v.name}: start = {v.start}, but {moment} it is {row[v.name]!r}"
                 break
 
@@ -63,15 +63,15 @@ def _starts(found: Value, declared: Value, *, exactly: bool) -> bool:
     return math.isclose(found, declared, rel_tol=_DIGITS)
 
 
-def finite_outputs(bench: Bench) -> Iterator[str]:
+def finite_outputs(probe: Probe) -> Iterator[str]:
     """Outputs are finite after initialisation and after every step, with inputs at rest and moving."""
     named: set[str] = set()
-    for plan in (PLAIN, bench.rich):
-        with bench.instance() as instance:
-            bench.begin(instance, plan)
-            rows = [instance.get(bench.outputs), *bench.fly(instance, plan)]
+    for plan in (PLAIN, probe.rich):
+        with probe.instance() as instance:
+            probe.begin(instance, plan)
+            rows = [instance.get(probe.outputs), *probe.fly(instance, plan)]
         for k, row in enumerate(rows):
-            for name, value in _not_finite(row, bench.outputs):
+            for name, value in _not_finite(row, probe.outputs):
                 if name not in named:
                     named.add(name)
                     yield f"{name} = {value} {f'after step {k}' if k else 'after initialisation'}: expected it finite"
@@ -82,51 +82,51 @@ def _not_finite(row: Row, outputs: tuple[Variable, ...]) -> list[tuple[str, floa
     return [(name, value) for name, value in values if not math.isfinite(value)]
 
 
-def variable_steps(bench: Bench) -> Iterator[str]:
+def variable_steps(probe: Probe) -> Iterator[str]:
     """An FMU that declares it takes steps of different lengths does, and a step is as long as its halves."""
-    if not bench.fmu.can("canHandleVariableCommunicationStepSize"):
+    if not probe.fmu.can("canHandleVariableCommunicationStepSize"):
         return
-    whole = bench.points(Plan(uneven=True, steps=20))
+    whole = probe.points(Plan(uneven=True, steps=20))
     halves = [(t + i * 0.5 * h, 0.5 * h) for t, h in whole for i in (0, 1)]
     ends = []
     for points in (whole, halves):
-        with bench.instance() as instance:
-            bench.begin(instance, PLAIN)
+        with probe.instance() as instance:
+            probe.begin(instance, PLAIN)
             for t, h in points:
                 if not instance.step(t, h):
                     return
-            ends.append(instance.get(bench.fmu.variables))
+            ends.append(instance.get(probe.fmu.variables))
     for end in ends:
-        for name, value in _not_finite(end, bench.outputs):
+        for name, value in _not_finite(end, probe.outputs):
             yield f"{name} = {value} after steps of different lengths: expected it finite"
-    for v in bench.fmu.of_causality("independent"):
+    for v in probe.fmu.of_causality("independent"):
         a, b = (float(end[v.name]) for end in ends)
         if not math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-9):
             yield f"{v.name} = {b!r} after halved steps, expected {a!r} as after whole ones"
 
 
-def repeatable(bench: Bench) -> Iterator[str]:
+def repeatable(probe: Probe) -> Iterator[str]:
     """Two fresh instances run the same; without that, as with `rand()`, the rules that compare runs are not tried."""
-    if bench.repeats is not None:
-        text = f"{bench.repeats}, as in an equal run before; what compares runs is not tried"
-        yield text if bench.fmu.is_ours else Note(text)
+    if probe.repeats is not None:
+        text = f"{probe.repeats}, as in an equal run before; what compares runs is not tried"
+        yield text if probe.fmu.is_ours else Note(text)
 
 
-def inputs_set_twice(bench: Bench) -> Iterator[str]:
+def inputs_set_twice(probe: Probe) -> Iterator[str]:
     """Setting an input again to what it is changes nothing."""
-    twice = bench.flown(replace(bench.rich, times_set=2))
-    yield from bench.parted(twice, bench.expected, "{}, as with inputs set once")
+    twice = probe.flown(replace(probe.rich, times_set=2))
+    yield from probe.parted(twice, probe.expected, "{}, as with inputs set once")
 
 
-def reset(bench: Bench) -> Iterator[str]:
+def reset(probe: Probe) -> Iterator[str]:
     """A run after a reset is the run of a fresh instance, whatever was run before."""
     short = Plan(steps=20)
-    fresh = bench.flown(short)
-    with bench.instance() as instance:
-        for plan, expected in ((bench.rich, bench.expected), (short, fresh), (bench.rich, bench.expected)):
-            bench.begin(instance, plan)
+    fresh = probe.flown(short)
+    with probe.instance() as instance:
+        for plan, expected in ((probe.rich, probe.expected), (short, fresh), (probe.rich, probe.expected)):
+            probe.begin(instance, plan)
             texts = list(
-                bench.parted(bench.fly(instance, plan), expected, "{}, as without the run and reset before it")
+                probe.parted(probe.fly(instance, plan), expected, "{}, as without the run and reset before it")
             )
             if texts:
                 yield from texts
@@ -134,60 +134,60 @@ def reset(bench: Bench) -> Iterator[str]:
             instance.reset()
 
 
-def instances(bench: Bench) -> Iterator[str]:
+def instances(probe: Probe) -> Iterator[str]:
     """An instance runs the same beside another one."""
-    if bench.fmu.can("canBeInstantiatedOnlyOncePerProcess"):
+    if probe.fmu.can("canBeInstantiatedOnlyOncePerProcess"):
         return
-    plan, other = bench.rich, Plan(steps=bench.rich.steps)
+    plan, other = probe.rich, Plan(steps=probe.rich.steps)
     rows = []
-    with bench.instance() as first, bench.instance() as second:
-        bench.begin(first, plan)
-        bench.begin(second, other)
-        for k in range(len(bench.expected)):
-            rows += bench.fly(first, plan, k, k + 1)
-            bench.fly(second, other, k, k + 1)
-    yield from bench.parted(rows, bench.expected, "{}, as without a second instance")
+    with probe.instance() as first, probe.instance() as second:
+        probe.begin(first, plan)
+        probe.begin(second, other)
+        for k in range(len(probe.expected)):
+            rows += probe.fly(first, plan, k, k + 1)
+            probe.fly(second, other, k, k + 1)
+    yield from probe.parted(rows, probe.expected, "{}, as without a second instance")
 
 
-def saved_state(bench: Bench) -> Iterator[str]:
+def saved_state(probe: Probe) -> Iterator[str]:
     """A run that goes on from a state that was saved goes on as it did."""
-    if not bench.fmu.can("canGetAndSetFMUstate"):
+    if not probe.fmu.can("canGetAndSetFMUstate"):
         return
-    plan, half = bench.rich, len(bench.expected) // 2
-    with bench.instance() as instance:
-        bench.begin(instance, plan)
-        bench.fly(instance, plan, 0, half)
+    plan, half = probe.rich, len(probe.expected) // 2
+    with probe.instance() as instance:
+        probe.begin(instance, plan)
+        probe.fly(instance, plan, 0, half)
         state = instance.state()
-        after = bench.fly(instance, plan, half)
-        yield from bench.parted(after, bench.expected[half:], f"after the state was taken at step {half}: {{}}")
+        after = probe.fly(instance, plan, half)
+        yield from probe.parted(after, probe.expected[half:], f"after the state was taken at step {half}: {{}}")
         instance.put_back(state)
-        after = bench.fly(instance, plan, half)
-    yield from bench.parted(after, bench.expected[half:], f"from the state of step {half}: {{}}")
+        after = probe.fly(instance, plan, half)
+    yield from probe.parted(after, probe.expected[half:], f"from the state of step {half}: {{}}")
 
 
-def serialised_state(bench: Bench) -> Iterator[str]:
+def serialised_state(probe: Probe) -> Iterator[str]:
     """Another instance goes on from a serialised state as the first one did."""
-    if not (bench.fmu.can("canSerializeFMUstate") and bench.fmu.can("canGetAndSetFMUstate")):
+    if not (probe.fmu.can("canSerializeFMUstate") and probe.fmu.can("canGetAndSetFMUstate")):
         return
-    plan, half = bench.rich, len(bench.expected) // 2
-    with bench.instance() as instance:
-        bench.begin(instance, plan)
-        bench.fly(instance, plan, 0, half)
+    plan, half = probe.rich, len(probe.expected) // 2
+    with probe.instance() as instance:
+        probe.begin(instance, plan)
+        probe.fly(instance, plan, 0, half)
         content = instance.serialised()
-    with bench.instance() as other:
+    with probe.instance() as other:
         other.put_back_bytes(content)
-        after = bench.fly(other, plan, half)
+        after = probe.fly(other, plan, half)
     text = f"another instance, from the bytes of the state of step {half}: {{}}"
-    yield from bench.parted(after, bench.expected[half:], text)
+    yield from probe.parted(after, probe.expected[half:], text)
 
 
-def stop_time(bench: Bench) -> Iterator[str]:
+def stop_time(probe: Probe) -> Iterator[str]:
     """A step past the stop time that was set is an error, or ends the run (FMI 2.0.4, section 2.1.6)."""
-    *allowed, (t, h) = bench.points(Plan(steps=FEWEST))
+    *allowed, (t, h) = probe.points(Plan(steps=FEWEST))
     if not allowed:
         return
-    with bench.instance() as instance:
-        instance.initialise({}, bench.start, stop=t)
+    with probe.instance() as instance:
+        instance.initialise({}, probe.start, stop=t)
         if not all(instance.step(*point) for point in allowed):
             return
         with contextlib.suppress(RefusedError):

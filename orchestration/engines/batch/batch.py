@@ -6,10 +6,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from orchestration.basics.errors import QuadcosimError
-from orchestration.basics.simulator import Floats
+from orchestration.basics.simulator import Booleans, Floats, Integers
 from orchestration.engines import initial
 from orchestration.engines.batch.shape import Ends, Shape, changes_of, ends_of
 from orchestration.engines.sources import Values
@@ -27,8 +26,6 @@ from orchestration.schedule.timetable import Timetable
 from orchestration.system.model import System, component_of, variable_of
 from orchestration.system.times import NANOSECONDS, nanoseconds
 
-Integers = npt.NDArray[np.int64]
-Lanes = npt.NDArray[np.bool_]
 _SAID = 64
 """Windows for which values of sources are kept"""
 
@@ -42,7 +39,7 @@ class BatchResult:
     """[ns] of divergence"""
     component: Integers
     steps: Integers
-    doubtful: Lanes
+    doubtful: Booleans
     """in which a value was not a number: what Python makes of that is not known here"""
     reductions: Mapping[Call, Floats]
     """NaN for what has no value"""
@@ -278,7 +275,7 @@ class Batch:
             for i, call in enumerate(shape.inner):
                 self._numbers[len(shape.numbers) + 1 + i, lane] = known[call][lane] if known else 0.0
 
-    def _initialise(self, runs: Sequence[_Run]) -> Lanes:
+    def _initialise(self, runs: Sequence[_Run]) -> Booleans:
         """The first exchange, as `Master` does it; lanes in which it fails."""
         shape, wrong = self._shape, np.zeros(self._lanes, dtype=np.bool_)
         for lane, run in enumerate(runs):
@@ -299,11 +296,11 @@ class Batch:
                 self._channels[i].applied_time[:] = [0] * (2 * self._lanes)
         return wrong
 
-    def _exchange(self, group: Sequence[int], received: Sequence[Floats]) -> Lanes:
+    def _exchange(self, group: Sequence[int], received: Sequence[Floats]) -> Booleans:
         connections, names = self._shape.system.connections, self._shape.names
         wrong = np.zeros(self._lanes, dtype=np.bool_)
 
-        def pass_on(i: int, open_: Lanes) -> tuple[Floats, Floats]:
+        def pass_on(i: int, open_: Booleans) -> tuple[Floats, Floats]:
             sender, receiver = (names.index(name) for name in (connections[i].sender, connections[i].receiver))
             wrong[:] |= self._compute(sender)
             before, after = received[i].copy(), self._passed(i, self.memories[sender])
@@ -335,7 +332,7 @@ class Batch:
             ratio, sample = clock_of(system, name, first)
             self._begins[index][lane] = 0.0 if name in waits else ratio * sample
 
-    def _compute(self, index: int) -> Lanes:
+    def _compute(self, index: int) -> Booleans:
         """The outputs of a component in initialisation mode; lanes in which that fails."""
         active, start = np.full(self._lanes, 2**64 - 1, dtype=np.uint64), self._begins[index]
         status = np.zeros(self._lanes, dtype=np.int32)
@@ -343,7 +340,7 @@ class Batch:
         kernel.lanes.initialise(
             address(self.memories[index]), address(active), address(start), address(status)
         )  # fmt: skip
-        failed: Lanes = status != 0
+        failed: Booleans = status != 0
         return failed
 
     # -- schedules -------------------------------------------------------------------------------------------------

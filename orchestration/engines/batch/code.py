@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from orchestration.engines.batch.folds import Folds
-from orchestration.engines.batch.writing import Leaf, Section, Writer
+from orchestration.engines.batch.writing import ExpressionWriter, Leaf, Section
 from orchestration.expressions.recorded import TIME
 from orchestration.expressions.syntax import Call, Name, Node
 
@@ -36,7 +36,7 @@ def written(
     `lines` are signals on a line, by the connection that they come by; `reductions` what those that are inside others
     are in C. Raises `UsageError` for what cannot be evaluated.
     """
-    writer = Writer(leaves, reductions)
+    writer = ExpressionWriter(leaves, reductions)
     time = writer.before(Name(TIME))
     folds = Folds(writer)
     for call in calls:
@@ -80,7 +80,7 @@ def written(
 class _Slopes:
     """Of signals on a line: what arrived last, when, and how steep it goes on."""
 
-    def __init__(self, writer: Writer, lines: Mapping[str, int]) -> None:
+    def __init__(self, writer: ExpressionWriter, lines: Mapping[str, int]) -> None:
         self.first: list[str] = []
         self.next: list[str] = []
         for name, slope in writer.slopes.items():

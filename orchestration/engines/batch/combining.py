@@ -4,20 +4,17 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from orchestration.basics.simulator import Floats
+from orchestration.basics.simulator import Booleans, Floats
 from orchestration.expressions.over_run import reductions
 from orchestration.expressions.over_span import SpanValues
 from orchestration.expressions.recorded import Recorded
 from orchestration.expressions.syntax import Call, Node
 
-Marks = npt.NDArray[np.bool_]
-
 
 def combined(
     node: Node, known: Mapping[Call, Floats], numbers: Mapping[str, Floats], count: int
-) -> tuple[Floats, Marks]:
+) -> tuple[Floats, Booleans]:
     """The value of an expression in each of `count` runs, and in which it has none.
 
     `known` are the reductions in it, NaN where there is none; `numbers` parameters and the stop time by name.

@@ -12,7 +12,7 @@ import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
-from orchestration.engines.batch.writing import Kind, Place, Section, Writer
+from orchestration.engines.batch.writing import ExpressionWriter, Kind, Moment, Section
 from orchestration.expressions.syntax import Call, Name, Node, Sampled
 
 Value: TypeAlias = Callable[[Floats, Floats], Floats]
@@ -36,7 +36,7 @@ class Rows:
 class Folds:
     """Writes reductions, and knows what they come to."""
 
-    def __init__(self, writer: Writer) -> None:
+    def __init__(self, writer: ExpressionWriter) -> None:
         self.writer = writer
         self.rows: dict[str | None, Rows] = {None: Rows(section=writer.now, mask="m")}
         """by connection; None: all"""
@@ -86,7 +86,7 @@ class _Fold:
         mask = f"({self.rows.mask} & {where})" if where else self.rows.mask
         return f"{state} = q_select({mask}, {value}, {state});"
 
-    def _at(self, place: Place) -> str:
+    def _at(self, place: Moment) -> str:
         return self.folds.writer.value(self.node, place, self.folds.writer.step)
 
     @property

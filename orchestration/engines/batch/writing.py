@@ -8,7 +8,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.expressions.operators import OPERATORS
 from orchestration.expressions.syntax import Call, Name, Node, Number, Operation, Sampled
 
-Place: TypeAlias = Literal["row", "end", "middle"]
+Moment: TypeAlias = Literal["row", "end", "middle"]
 Kind: TypeAlias = Literal["number", "continuous", "held", "line"]
 """What a value does from row to row: it is the same in the whole run, moves, stays, or follows a line"""
 
@@ -42,7 +42,7 @@ class Section:
         return self._found.get(key, before)
 
 
-class Writer:
+class ExpressionWriter:
     """Writes expressions of one number at an instant, as `scalars` makes them; what they need is kept from row to row.
 
     Its C calls `row` states STATE(i), and constants of a run CONSTANT(i).
@@ -89,7 +89,7 @@ class Writer:
         parts = node.operands if isinstance(node, Operation) else getattr(node, "arguments", ())
         return {kind for part in parts for kind in self.kinds(part)}
 
-    def value(self, node: Node, place: Place, into: Section) -> str:
+    def value(self, node: Node, place: Moment, into: Section) -> str:
         """The name, in C, of the value of an expression."""
         kinds = self.kinds(node)
         if isinstance(node, Number):
@@ -103,7 +103,7 @@ class Writer:
             return self.before(node)
         return into.named((node, place), lambda: self._code(node, place, into))
 
-    def truth(self, node: Node, place: Place, into: Section) -> str:
+    def truth(self, node: Node, place: Moment, into: Section) -> str:
         """The mask of the lanes in which it is not zero."""
         is_here = place == "row" or self.kinds(node) - {"number", "held"}
         if (
@@ -123,7 +123,7 @@ class Writer:
             )
         return self._leaves[name]
 
-    def _code(self, node: Node, place: Place, into: Section) -> str:
+    def _code(self, node: Node, place: Moment, into: Section) -> str:
         match node:
             case Name(name):
                 return self._at(node, self.leaf(name), place)
@@ -136,7 +136,7 @@ class Writer:
                 return OPERATORS[word].lanes(*(self.value(operand, place, into) for operand in operands))
         return self._reductions[node]
 
-    def _at(self, node: Name, leaf: Leaf, place: Place) -> str:
+    def _at(self, node: Name, leaf: Leaf, place: Moment) -> str:
         if place == "row":
             return leaf.code
         before = self.before(node)
@@ -147,6 +147,6 @@ class Writer:
         end = f"({before} + {self.slopes[node.text]} * dt)"
         return end if place == "end" else f"0.5 * ({before} + {end})"
 
-    def _truth(self, node: Operation, place: Place, into: Section) -> str:
+    def _truth(self, node: Operation, place: Moment, into: Section) -> str:
         write = self.truth if OPERATORS[node.sign].takes_truths else self.value
         return OPERATORS[node.sign].lanes(*(write(operand, place, into) for operand in node.operands))

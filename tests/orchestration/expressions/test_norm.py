@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestration.engines.batch.writing import Leaf, Section, Writer
+from orchestration.engines.batch.writing import ExpressionWriter, Leaf, Section
 from orchestration.expressions.at_instant import compiled
 from orchestration.expressions.over_run import evaluate
 from orchestration.expressions.recorded import Recorded
@@ -31,7 +31,7 @@ def over_rows(node: Node, values: tuple[float, ...]) -> float:
 
 def in_lanes(node: Node, values: tuple[float, ...]) -> float:
     """As the C has it that is written for lanes, read as Python."""
-    writer = Writer({name: Leaf(code=f"v{place}", kind="held") for name, place in PLACES.items()}, {})
+    writer = ExpressionWriter({name: Leaf(code=f"v{place}", kind="held") for name, place in PLACES.items()}, {})
     (one,) = scalars(node, VECTORS)
     section = Section("x")
     name = writer.value(one, "row", section)

@@ -12,7 +12,7 @@ from orchestration.report.blobs import Blobs
 from orchestration.report.flights import Flight
 from orchestration.report.of_study import Stored, _difference, is_sample
 from orchestration.report.subset import LEAST_POINTS, MOST_POINTS, chosen, evenly, points_for
-from orchestration.report.tables import Way, share_of, shares_along, table_of
+from orchestration.report.tables import ColumnAxis, share_of, shares_along, table_of
 from orchestration.results.quantities import quantity
 from orchestration.studies.axes import Axis
 from orchestration.studies.study import Study
@@ -31,14 +31,14 @@ def row(index: int, good: bool, **settings: Any) -> dict[str, Any]:
 ROWS = [row(i, i < 6, period=0.01 * (i % 4), law="ab"[i % 2]) for i in range(8)]
 
 
-def way(name: str, unit: str | None = None) -> Way:
-    return Way(name=name, quantity=quantity(name, unit, [each["settings"].get(name) for each in ROWS]))
+def column_axis(name: str, unit: str | None = None) -> ColumnAxis:
+    return ColumnAxis(name=name, quantity=quantity(name, unit, [each["settings"].get(name) for each in ROWS]))
 
 
 def test_a_table_has_axes_words_and_the_metrics_that_some_run_has() -> None:
     blobs = Blobs()
     made = table_of(
-        [{**each, "never": None} for each in ROWS], [way("period", "s"), way("law")],
+        [{**each, "never": None} for each in ROWS], [column_axis("period", "s"), column_axis("law")],
         ["good", "error", "never", "steps"], {"error": "N.m"}, blobs, tracks={5: 0}, messages={7: "fell"}, is_grid=True,
     )  # fmt: skip
     columns = {column.name: column for column in made.columns}
@@ -92,14 +92,14 @@ def test_runs_are_a_sample_where_axes_or_seeds_are_drawn(chosen: Study, by_chanc
 
 
 def test_shares_are_by_value_or_by_part_of_the_range() -> None:
-    by_value = shares_along(ROWS, way("period"), by_chance=True)
+    by_value = shares_along(ROWS, column_axis("period"), by_chance=True)
     assert by_value is not None
     assert [share.runs for share in by_value.shares] == [2, 2, 2, 2]
     many = [row(i, i % 2 == 0, period=10.0 ** (i / 100)) for i in range(100)]
-    by_part = shares_along(many, dataclasses.replace(way("period"), logarithmic=True), by_chance=True)
+    by_part = shares_along(many, dataclasses.replace(column_axis("period"), logarithmic=True), by_chance=True)
     assert by_part is not None
     assert sorted(share.runs for share in by_part.shares) == [12, 12, 12, 12, 13, 13, 13, 13]
-    assert shares_along([ROWS[0], ROWS[4]], way("period"), by_chance=True) is None
+    assert shares_along([ROWS[0], ROWS[4]], column_axis("period"), by_chance=True) is None
 
 
 @pytest.mark.parametrize(("count", "wanted"), [(10, 3), (10, 10), (3, 10), (10_000, 1000)])

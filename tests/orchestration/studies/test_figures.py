@@ -20,7 +20,7 @@ from orchestration.limits import figure as limit_figure
 from orchestration.limits.evaluation import Evaluation
 from orchestration.limits.figure import draw_limit
 from orchestration.limits.limit import Limit
-from orchestration.report.of_study import read, ways_of
+from orchestration.report.of_study import axes_of, read
 from orchestration.studies import figures
 from orchestration.studies.axes import Axis
 from orchestration.studies.drawing import draw_study, study_figures
@@ -369,7 +369,7 @@ def test_the_axes_of_a_study_have_the_units_of_its_store(tmp_path: Path) -> None
         "inertia xx [kg·m²]", "period [ms]",
     )  # fmt: skip
     for known in (chosen, None):
-        found = {way.name: way.quantity for way in ways_of(read(store_path(chosen.name, tmp_path)), known)}
+        found = {way.name: way.quantity for way in axes_of(read(store_path(chosen.name, tmp_path)), known)}
         assert found["inertia xx"].title == "inertia xx [kg·m²]"
         assert (found["timing.period"].unit, found["timing.period"].factor) == ("ms", 1e3)
 

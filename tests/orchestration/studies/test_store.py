@@ -28,7 +28,7 @@ from orchestration.quadrotor.signals import ReferenceChoice
 from orchestration.quadrotor.wiring import DEFAULT_PLANT
 from orchestration.studies import store as stores
 from orchestration.studies.run_key import run_key
-from orchestration.studies.store import TEXTS, Place, open_for_reading, open_for_writing
+from orchestration.studies.store import TEXTS, DesignPoint, open_for_reading, open_for_writing
 from orchestration.workers.provenance import flight_sources, imported, sources_hash, versions
 from orchestration.workers.row import Row
 from quadcosim import QuadcosimError, Scenario, UsageError
@@ -122,7 +122,7 @@ def test_a_row_of_the_same_run_is_replaced_and_one_of_another_run_takes_its_plac
 def test_a_design_that_changes_keeps_the_rows_of_its_runs_wherever_they_are_in_it_now(path: Path) -> None:
     with open_for_writing(path, OBJECTIVES) as store:
         store.add([row(0, seed=10), row(1, seed=11, metrics=None)])
-        places = [Place(index=i, key=key, settings={}) for i, key in enumerate(["new", "key 1", "key 0", "new"])]
+        places = [DesignPoint(index=i, key=key, settings={}) for i, key in enumerate(["new", "key 1", "key 0", "new"])]
         store.describe({"name": "value"}, places)
         assert [(found["design_index"], found["seed"]) for found in store.rows()] == [(1, 11), (2, 10)]
         assert store.missing() == [0]

@@ -21,7 +21,7 @@ from orchestration.studies.study_file import load_study
 from orchestration.studies.sweep import sweep
 from orchestration.workers import executors as engine
 from orchestration.workers.provenance import machine, versions
-from orchestration.workers.task import Hangar, Task
+from orchestration.workers.task import Runner, RunTask
 from quadcosim import QuadcosimError, UsageError, run
 from tests.native import NATIVE
 from tests.orchestration.studies.common import (
@@ -58,11 +58,11 @@ def test_two_workers_make_the_same_rows_as_one(folder: Path, reference: list[dic
 
 
 def test_the_order_of_runs_does_not_change_them(folder: Path, reference: list[dict[str, Any]]) -> None:
-    chosen, hangar = load_study(folder / "study.toml"), Hangar()
+    chosen, runner = load_study(folder / "study.toml"), Runner()
     files = chosen.files()
     for index in (15, 3, 8, 0):
         system = with_files(chosen.system(index, starts()), files.fmus)
-        metrics = hangar.fly(Task(index=0, key="", settings={}, system=system, keep_signals=False)).row.metrics
+        metrics = runner.fly(RunTask(index=0, key="", settings={}, system=system, keep_signals=False)).row.metrics
         assert metrics is not None
         assert metrics["position_rmse"].hex() == reference[index]["position_rmse"]
         assert metrics["control_effort.torque"].hex() == reference[index]["control_effort.torque"]
@@ -315,7 +315,7 @@ def test_workers_leave_no_files_behind(tmp_path: Path, monkeypatch: pytest.Monke
 def test_a_pool_flies_in_order_up_to_the_first_that_stops_it() -> None:
     periods = (0.01, 0.02, 0.03)
     scenarios = [short(period=period).as_system() for period in periods]
-    with engine.Pool(files_in(), 1) as pool:
+    with engine.RunEvaluator(files_in(), 1) as pool:
         everything = pool.fly(scenarios, stop=lambda metrics: False)
         first = pool.fly(scenarios, stop=lambda metrics: True)
     assert [metrics["position_rmse"] for metrics in everything] == [
@@ -328,14 +328,14 @@ def test_a_pool_of_two_workers_has_the_same_results_in_some_order() -> None:
     scenarios = [short(period=period).as_system() for period in (0.01, 0.02, 0.03)]
     found = []
     for workers in (1, 2):
-        with engine.Pool(files_in(), workers) as pool:
+        with engine.RunEvaluator(files_in(), workers) as pool:
             found.append(sorted(m["position_rmse"] for m in pool.fly(scenarios, stop=lambda metrics: False)))
     assert found[0] == found[1]
 
 
 def test_a_pool_raises_what_a_run_failed_with() -> None:
     bad = short().with_changes(parameters={"plant.mass": -1.0}).as_system()
-    with engine.Pool(files_in(), 1) as pool, pytest.raises(QuadcosimError, match=r"mass = -1.0: expected"):
+    with engine.RunEvaluator(files_in(), 1) as pool, pytest.raises(QuadcosimError, match=r"mass = -1.0: expected"):
         pool.fly([bad], stop=lambda metrics: False)
 
 

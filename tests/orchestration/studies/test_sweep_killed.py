@@ -13,7 +13,7 @@ from orchestration.building import fmus
 from orchestration.quadrotor.scenario import FmuChoice
 from orchestration.studies.store import open_for_reading, store_path
 from orchestration.studies.sweep import sweep
-from orchestration.workers.pool import Crew
+from orchestration.workers.pool import Pool
 from orchestration.workers.provenance import versions
 from quadcosim import QuadcosimError
 from tests.orchestration.studies.common import (
@@ -157,17 +157,17 @@ def test_an_fmu_that_is_moved_away_meanwhile_changes_nothing(folder: Path, refer
 def test_a_place_where_nothing_can_be_flown_stops_the_sweep_without_a_row(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
-    genuine = Crew._unpack
+    genuine = Pool._unpack
 
-    def unpack(crew: Crew, number: int, name: str) -> Path:
-        path = genuine(crew, number, name)
+    def unpack(pool: Pool, number: int, name: str) -> Path:
+        path = genuine(pool, number, name)
         if what == "no file":
             path.unlink()
         else:
             path.write_bytes(path.read_bytes()[:-2000])  # as much as there was room for
         return path
 
-    monkeypatch.setattr(Crew, "_unpack", unpack)
+    monkeypatch.setattr(Pool, "_unpack", unpack)
     with pytest.raises(QuadcosimError, match="no run's own failure: ") as caught:
         sweep(study(PERIODS), folder=tmp_path, workers=2)
     one_line(caught.value)

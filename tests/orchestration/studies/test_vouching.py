@@ -11,15 +11,15 @@ from orchestration.studies.study import Study
 from orchestration.studies.vouching import vouched
 from orchestration.system.model import System
 from orchestration.workers.batching import Agreement
-from orchestration.workers.pool import Package
+from orchestration.workers.pool import Inputs
 from orchestration.workers.row import Row
-from orchestration.workers.task import Chunk, Outcome, Task
+from orchestration.workers.task import Chunk, Outcome, RunTask
 from tests.orchestration.fmi.small import needs_compiler
 from tests.orchestration.studies.common import axis, short, study
 
 pytestmark = needs_compiler
 LENGTH = 5.0
-Error = Callable[[Task, bool], float]
+Error = Callable[[RunTask, bool], float]
 """Of a task, in a chunk or alone, by which its metric is off"""
 
 
@@ -33,18 +33,18 @@ def agreement(chosen: Study, error: Error) -> Agreement | None:
     """What two runs are vouched for by, if each way to fly is off by so much."""
     files = chosen.files()
 
-    def row(task: Task, chunk: bool) -> Row:
+    def row(task: RunTask, chunk: bool) -> Row:
         metrics = {"x": 1.0 + error(task, chunk)}
         return Row(index=task.index, key=task.key, settings={}, seed=0, metrics=metrics, message=None, duration=0.0)
 
-    def task(index: int) -> Task:
-        return Task(index=index, key=str(index), settings={}, system=chosen.system(index, {}), keep_signals=False)
+    def task(index: int) -> RunTask:
+        return RunTask(index=index, key=str(index), settings={}, system=chosen.system(index, {}), keep_signals=False)
 
-    def flying(package: Package) -> Callable[[Iterable[Task | Chunk]], Iterator[list[Outcome]]]:
-        def fly(tasks: Iterable[Task | Chunk]) -> Iterator[list[Outcome]]:
+    def flying(inputs: Inputs) -> Callable[[Iterable[RunTask | Chunk]], Iterator[list[Outcome]]]:
+        def fly(tasks: Iterable[RunTask | Chunk]) -> Iterator[list[Outcome]]:
             for each in tasks:
                 for one in each.tasks if isinstance(each, Chunk) else (each,):
-                    assert package.contents.keys() >= {*one.system.fmus.values()}
+                    assert inputs.contents.keys() >= {*one.system.fmus.values()}
                     yield [Outcome(row=row(one, isinstance(each, Chunk)))]
 
         return fly
@@ -52,14 +52,14 @@ def agreement(chosen: Study, error: Error) -> Agreement | None:
     return vouched({str(i): row(task(i), True) for i in range(2)}, files, task, flying)  # type: ignore[arg-type]
 
 
-def in_python(task: Task) -> bool:
+def in_python(task: RunTask) -> bool:
     return not any(fmu.startswith("native/") for fmu in task.system.fmus.values())
 
 
 def test_whole_runs_are_compared_with_native_fmus_and_their_beginning_with_python(chosen: Study) -> None:
     seen: list[tuple[bool, bool, float]] = []
 
-    def error(task: Task, chunk: bool) -> float:
+    def error(task: RunTask, chunk: bool) -> float:
         seen.append((in_python(task), chunk, task.system.stop_time))
         return 0.0
 
@@ -82,7 +82,7 @@ def test_what_was_compiled_wrongly_contradicts_python(chosen: Study) -> None:
 
 
 def test_a_chaotic_run_which_its_own_last_bits_change_contradicts_nothing(chosen: Study) -> None:
-    def error(task: Task, chunk: bool) -> float:
+    def error(task: RunTask, chunk: bool) -> float:
         nudged = task.key.startswith("nudged ")
         return 1e-6 * (in_python(task) + 2.0 * nudged) * (task.index == 0)
 
@@ -98,7 +98,7 @@ def test_a_nudged_run_has_each_real_parameter_of_its_fmus_beside_itself_but_zero
     base = chosen.base.with_changes(parameters=given)  # type: ignore[attr-defined]
     seen: dict[str, System] = {}
 
-    def error(task: Task, chunk: bool) -> float:
+    def error(task: RunTask, chunk: bool) -> float:
         seen[task.key] = task.system
         return 0.0
 

@@ -13,8 +13,8 @@ from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
 from orchestration.studies.sweep import AGREEMENT, sweep
 from orchestration.workers.batching import SAMPLE, Agreement, chunks, sample
-from orchestration.workers.pool import Package, Pilot
-from orchestration.workers.task import Chunk, Task
+from orchestration.workers.pool import Inputs, Supervisor
+from orchestration.workers.task import Chunk, RunTask
 from tests.commands import Main
 from tests.orchestration.fmi.small import needs_compiler, small
 from tests.orchestration.studies.common import NOISY, RUNS, axis, bits, short, study, swept
@@ -117,17 +117,17 @@ def test_a_sample_is_chosen_by_content_alone() -> None:
     assert sample(keys) != set(keys[:SAMPLE])
 
 
-def tasks(count: int, keep: tuple[int, ...] = ()) -> list[Task]:
+def tasks(count: int, keep: tuple[int, ...] = ()) -> list[RunTask]:
     chosen = study(axis("timing.period", 0.01, 0.02), base=short())
     return [
-        Task(index=i, key=str(i), settings={}, system=chosen.system(i % 2, {}), keep_signals=i in keep)
+        RunTask(index=i, key=str(i), settings={}, system=chosen.system(i % 2, {}), keep_signals=i in keep)
         for i in range(count)
     ]
 
 
 def test_chunks_have_runs_that_are_alike_and_leave_alone_whose_signals_are_kept() -> None:
     found = list(chunks(tasks(64, keep=(5,)), 64, 1))
-    assert [each.index for each in found if isinstance(each, Task)] == [5]
+    assert [each.index for each in found if isinstance(each, RunTask)] == [5]
     lanes = [each.tasks for each in found if isinstance(each, Chunk)]
     assert sorted(task.index for each in lanes for task in each) == [i for i in range(64) if i != 5]
     assert [len({task.index % 2 for task in each}) for each in lanes].count(2) <= 1
@@ -141,7 +141,7 @@ def test_runs_that_end_their_process_together_are_flown_one_by_one(
             raise Died(Ending(code=-6))
 
     flown: list[int] = []
-    monkeypatch.setattr(Pilot, "_ready", lambda self: Dying())
-    monkeypatch.setattr(Pilot, "fly", lambda self, task: flown.append(task.index))
-    Pilot(tmp_path, Package(contents={}, versions={})).fly_chunk(Chunk(tasks=tuple(tasks(3))))
+    monkeypatch.setattr(Supervisor, "_ready", lambda self: Dying())
+    monkeypatch.setattr(Supervisor, "fly", lambda self, task: flown.append(task.index))
+    Supervisor(tmp_path, Inputs(contents={}, versions={})).fly_chunk(Chunk(tasks=tuple(tasks(3))))
     assert flown == [0, 1, 2]

@@ -1,4 +1,4 @@
-"""A crew of worker processes leaves nothing behind, whatever ends its sweep."""
+"""A pool of worker processes leaves nothing behind, whatever ends its sweep."""
 
 import tempfile
 import threading
@@ -13,8 +13,8 @@ from orchestration.studies.sweep import sweep
 from orchestration.system.model import Component, System
 from orchestration.workers import pool
 from orchestration.workers.executors import _local_submit
-from orchestration.workers.pool import Crew, Package
-from orchestration.workers.task import Outcome, Task
+from orchestration.workers.pool import Inputs, Pool
+from orchestration.workers.task import Outcome, RunTask
 from quadcosim import QuadcosimError, UsageError
 from tests.orchestration.fmi.small import needs_compiler, small
 
@@ -31,13 +31,13 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def package(**contents: bytes) -> Package:
-    return Package(contents={f"{name}.fmu": content for name, content in contents.items()}, versions={})
+def inputs(**contents: bytes) -> Inputs:
+    return Inputs(contents={f"{name}.fmu": content for name, content in contents.items()}, versions={})
 
 
-def task() -> Task:
+def task() -> RunTask:
     system = System(stop_time=1.0, components={"it": Component(fmu="a.fmu", step=0.1)})
-    return Task(index=0, key="", settings={}, system=system, keep_signals=False)
+    return RunTask(index=0, key="", settings={}, system=system, keep_signals=False)
 
 
 def study(folder: Path, *habits: str, objective: str = "max(it.y)") -> Study:
@@ -76,18 +76,18 @@ def test_an_interrupted_sweep_leaves_nothing(temporary: Path, tmp_path: Path) ->
 
 def test_fmus_that_cannot_be_written_are_one_line_and_leave_nothing(temporary: Path) -> None:
     with pytest.raises(QuadcosimError, match=r"expected to be written, for the workers: .*too long") as caught:
-        Crew(package(**{"a": b"first", "x" * 250: b"second"}))  # with a number before it too long for a file
+        Pool(inputs(**{"a": b"first", "x" * 250: b"second"}))  # with a number before it too long for a file
     assert str(temporary) in str(caught.value)
     assert len(str(caught.value).splitlines()) == 1
     assert not list(temporary.iterdir())
 
 
 def test_a_crew_that_is_closed_starts_no_process_any_more(temporary: Path) -> None:
-    crew = Crew(package(a=b"content"))
-    crew.close()
+    pool = Pool(inputs(a=b"content"))
+    pool.close()
     with pytest.raises(QuadcosimError, match="the sweep has ended"):
-        crew.fly(task())
-    crew.remove()
+        pool.fly(task())
+    pool.remove()
     assert not list(temporary.iterdir())
 
 
@@ -96,8 +96,8 @@ def test_what_workers_leave_is_removed_after_the_last_thread_that_could_leave_mo
 ) -> None:
     begun, closed = threading.Event(), threading.Event()
 
-    class Slow(pool.Pilot):
-        def fly(self, task: Task) -> Outcome:
+    class Slow(pool.Supervisor):
+        def fly(self, task: RunTask) -> Outcome:
             begun.set()
             closed.wait()
             (self._root / "late").mkdir(parents=True)
@@ -106,9 +106,9 @@ def test_what_workers_leave_is_removed_after_the_last_thread_that_could_leave_mo
         def close(self) -> None:
             closed.set()
 
-    monkeypatch.setattr(pool, "Pilot", Slow)
+    monkeypatch.setattr(pool, "Supervisor", Slow)
     with ExitStack() as stack:
-        flown = _local_submit(stack, package(a=b"content"), 1)(task())
+        flown = _local_submit(stack, inputs(a=b"content"), 1)(task())
         begun.wait()
     assert isinstance(flown.exception(), QuadcosimError)
     assert not list(temporary.iterdir())

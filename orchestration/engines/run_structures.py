@@ -17,7 +17,7 @@ c = structures(1)
 """What C has of one run"""
 
 
-class Memory:
+class RunStructures:
     """What the structures of one run point at, and what a call in them is in Python."""
 
     def __init__(self, instances: Sequence[NativeInstance]) -> None:
