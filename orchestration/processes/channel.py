@@ -25,6 +25,15 @@ def framed(content: object) -> bytes:
     return _HEADER.pack(len(data)) + data
 
 
+def sayable(error: BaseException) -> BaseException:
+    """An error as a frame takes it: itself, or its name and its words where it cannot be pickled or read again."""
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        return RuntimeError(f"{type(error).__name__}: {error}")
+    return error
+
+
 def send(stream: IO[bytes], frame: bytes) -> None:
     """To who receives it; raises `OSError` if nobody reads, `ValueError` if the stream is closed."""
     stream.write(frame)

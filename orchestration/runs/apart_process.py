@@ -14,7 +14,7 @@ from typing import Any
 from orchestration.engines.room import Shared
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_instance
-from orchestration.processes.channel import Parent
+from orchestration.processes.channel import Parent, sayable
 from orchestration.recording.recording import About, Chunk, InMemory, Recording
 from orchestration.runs.apart import Order
 from orchestration.runs.simulation import looked_after, prepared
@@ -74,7 +74,7 @@ def main(room: Path) -> None:
         _fly(order, said, room)
     except BaseException as error:
         if not said.is_over:
-            said.say("error", error)
+            said.say("error", sayable(error))
     said.say("end")
 
 
