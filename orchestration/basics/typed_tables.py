@@ -118,28 +118,32 @@ def parsed(tables: Mapping[str, Any], shape: type[Shape]) -> Shape:
         return pydantic.TypeAdapter(shape).validate_json(json.dumps(tables, default=str))
     except pydantic.ValidationError as error:
         raise UsageError(_first_problem(error, shape)) from error
+    except RecursionError:
+        raise UsageError("nested too deeply; expected the tables of a file of this kind") from None
 
 
 _MISSING = ("missing", "missing_argument", "missing_keyword_only_argument")
-UNREAD = ("unexpected_keyword_argument", "extra_forbidden")
+_UNREAD = ("unexpected_keyword_argument", "extra_forbidden")
 """What pydantic calls a key that nobody reads"""
+_OF_TYPES = ("float", "dict[")
+"""Parts of a place that say by which type of several a value was read"""
 
 
-def telling(error: pydantic.ValidationError) -> Any:
+def _telling(error: pydantic.ValidationError) -> Any:
     """The first thing wrong with a document; where a key is missing, one beside it that nobody reads: it was meant."""
     problems = error.errors()
     first = problems[0]
     if first["type"] not in _MISSING:
         return first
-    beside = [each for each in problems if each["type"] in UNREAD and each["loc"][:-1] == first["loc"][:-1]]
+    beside = [each for each in problems if each["type"] in _UNREAD and each["loc"][:-1] == first["loc"][:-1]]
     return next(iter(beside), first)
 
 
 def _first_problem(error: pydantic.ValidationError, file: type) -> str:
     """The first thing wrong with a document of the shape `file`, in one line that says what is valid."""
-    problem = telling(error)
-    place = ".".join(str(part) for part in problem["loc"])
-    if problem["type"] in UNREAD:
+    problem = _telling(error)
+    place = ".".join(str(part) for part in problem["loc"] if not str(part).startswith(_OF_TYPES))
+    if problem["type"] in _UNREAD:
         key = str(problem["loc"][-1])
         return no_such_key(place.removesuffix(key), key, keys_at(file, problem["loc"][:-1]))
     if problem["type"] in _MISSING:

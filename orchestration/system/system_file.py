@@ -1,15 +1,12 @@
 """Reads and writes system files (TOML), and gives the JSON schema that editors complete them from."""
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-import pydantic
-
 from orchestration.basics.documents import read_toml
-from orchestration.basics.errors import UsageError, no_such_key
-from orchestration.basics.typed_tables import UNREAD, fields_of, keys_at, table_of, telling
+from orchestration.basics.errors import UsageError
+from orchestration.basics.typed_tables import fields_of, parsed, table_of
 from orchestration.system.choices import Order
 from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
 from orchestration.system.parameters import flattened, parameters_in
@@ -67,10 +64,7 @@ def is_system(tables: Mapping[str, Any]) -> bool:
 
 def system_from_tables(tables: Mapping[str, Any], folder: Path) -> System:
     """The system of a TOML document whose relative paths start at `folder`; raises `UsageError`."""
-    try:
-        table = SystemTable.model_validate_json(json.dumps(tables, default=str))
-    except (pydantic.ValidationError, RecursionError) as error:
-        raise UsageError(_first_problem(error)) from None
+    table = parsed(tables, SystemTable)
     given = {key: getattr(table, key) for key in fields_of(SystemTable) if key != "order"}
     system = System(
         **given
@@ -128,20 +122,3 @@ def _made(place: str, kind: type[Made], keys: Mapping[str, Any]) -> Made:
         return kind(**keys)
     except UsageError as error:
         raise UsageError(f"{place}.{error}") from error
-
-
-def _first_problem(error: Exception) -> str:
-    """The first thing wrong with a document, in one line that names the place and what is valid there."""
-    if not isinstance(error, pydantic.ValidationError):
-        return "nested too deeply; expected the tables of a system file"
-    problem = telling(error)
-    place = ".".join(str(part) for part in problem["loc"] if not str(part).startswith(("float", "dict[")))
-    if problem["type"] in UNREAD:
-        key = str(problem["loc"][-1])
-        return no_such_key(place.removesuffix(key), key, keys_at(SystemTable, problem["loc"][:-1]))
-    if problem["type"] == "missing":
-        return f"{place}: expected to be given"
-    message = problem["msg"]
-    shown = str(problem["input"])
-    shown = shown if len(shown) <= 60 else f"{shown[:57]}..."
-    return f"{place} = {shown}: expected {message.removeprefix('Input should be ').removeprefix('Input should ')}"

@@ -88,7 +88,7 @@ def refusal(folder: Path, text: str) -> str:
         ("noise = 0.1", "nois = 0.1", "sources.rain.nois: no such key; expected one of to, constant, file, interp"),
         ("good =", "god =", "criterion.god: no such key; expected one of good, diverged, outcomes"),
         ("seed = 3", "sead = 3", "sead: no such key; expected one of stop_time, seed, components, "),
-        ("step = 0.01", 'step = "fast"', "components.tank.step = fast: expected a valid number"),
+        ("step = 0.01", 'step = "fast"', "components.tank.step = 'fast': expected a valid number"),
         ("step = 0.01", "step = -1.0", "components.tank.step = -1.0: expected a positive number"),
         (
             "step = 0.01",
@@ -99,7 +99,7 @@ def refusal(folder: Path, text: str) -> str:
         (
             '"normal"',
             '"gauss"',
-            "components.controller.sampling.jitter_distribution = gauss: expected 'uniform'",
+            "components.controller.sampling.jitter_distribution = 'gauss': expected 'uniform'",
         ),
         ("area = 2.0", "area = [1]", "components.tank.parameters.area = [1]: expected a number, true, false or a text"),
         ('"tank.level"]', '"tnk.level"]', "connections.0.from: tnk.level: no such component; expected one of tank, "),
@@ -119,7 +119,7 @@ def refusal(folder: Path, text: str) -> str:
             "quantisation = { lvl = 1.0 }",
             "connections.0.quantisation: lvl is no signal of it; expecte",
         ),
-        ('hold = "first"', 'hold = "last"', "connections.1.hold = last: expected 'zero' or 'first'"),
+        ('hold = "first"', 'hold = "last"', "connections.1.hold = 'last': expected 'zero' or 'first'"),
         ("period = 0.5", "", "sources.rain.period = none: expected how long each value is held, in seconds"),
         (
             "noise = 0.1\n",
@@ -130,7 +130,7 @@ def refusal(folder: Path, text: str) -> str:
         ('"peak < 2.5"', '"open(1)"', "criterion.good: "),
         ('"abs(tank.level) > 100"', '"__import__(1)"', "criterion.diverged: "),
         ("stop_time = 60.0", "stop_time = 0.0", "stop_time = 0.0: expected a positive number"),
-        ("stop_time = 60.0", "", "stop_time: expected to be given"),
+        ("stop_time = 60.0", "", "stop_time: expected a value"),
         ("seed = 3", "seed = 0.5", "seed = 0.5: "),
         ('name = "valve"', 'name = "0"', "connections = 0: expected a name of its own for each"),
         ("[sources.rain]", '[sources."a.b"]', "sources = a.b: expected a name in printable characters without a dot"),
