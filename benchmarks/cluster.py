@@ -12,16 +12,17 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.studies.axes import Axis
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import sweep
+from orchestration.workers.choice import EngineChoice
 
 RUNS = 400
 WORKERS = 2
-ENGINES: dict[str, Literal["batch"] | None] = {"one by one": None, "in lanes": "batch"}
+ENGINES: dict[str, EngineChoice] = {"one by one": "compiled", "in lanes": "batch"}
 STOP_TIME = 10.0
 """[s] of a flight"""
 
@@ -59,7 +60,7 @@ def cluster() -> Iterator[str]:
                 process.wait()
 
 
-def seconds(chosen: Study, engine: Literal["batch"] | None, dask: str | None) -> float:
+def seconds(chosen: Study, engine: EngineChoice, dask: str | None) -> float:
     """Wall time of a sweep [s], the smaller of two, each into a store of its own."""
     found = []
     for _ in range(2):

@@ -6,7 +6,7 @@ import os
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
@@ -19,7 +19,7 @@ from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.building import consent
 from orchestration.building.models import MODELS
 from orchestration.processes import subprocesses
-from orchestration.system.model import System
+from orchestration.system.request import Twin
 
 _NOTES = logging.getLogger("quadcosim")
 
@@ -139,22 +139,14 @@ def python_twin(fmu: str) -> str:
     return str(path.parents[len(Path(packing.folder).parts)] / path.name)
 
 
-def native_twins(system: System) -> System:
-    """`system` with the native twins of its FMUs."""
-    return _with_twins(system, native_twin)
+def native_twins(request: Twin) -> Twin:
+    """A system, or what means one, with the native twins of its FMUs."""
+    return request.with_twins(native_twin)
 
 
-def python_twins(system: System) -> System:
-    """`system` with the twins of its FMUs that have Python inside."""
-    return _with_twins(system, python_twin)
-
-
-def _with_twins(system: System, twin: Callable[[str], str]) -> System:
-    twins = {name: twin(fmu) for name, fmu in system.fmus.items()}
-    if twins == system.fmus:
-        return system
-    components = {name: replace(each, fmu=twins[name]) for name, each in system.components.items()}
-    return replace(system, components=components)
+def python_twins(request: Twin) -> Twin:
+    """The same with the twins of its FMUs that have Python inside."""
+    return request.with_twins(python_twin)
 
 
 def _slave_of(path: Path) -> tuple[Packing, Target | None]:

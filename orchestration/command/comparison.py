@@ -1,7 +1,7 @@
 """`quadcosim compare`: what it prints and where it ends."""
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.terminal import say
@@ -11,7 +11,7 @@ from orchestration.command.figure_flags import FigureFlags
 from orchestration.comparison import run
 from orchestration.comparison.design import Comparison
 from orchestration.comparison.outcome import as_json as to_json
-from orchestration.engines.engine import Engine
+from orchestration.workers.choice import EngineChoice
 
 
 def all_cells(
@@ -19,7 +19,7 @@ def all_cells(
     out: Path | None,
     *,
     workers: int,
-    engine: Engine | Literal["batch"] | None,
+    engine: EngineChoice,
     time_limit: float | None,
     figures: bool,
     look: FigureFlags,
@@ -33,7 +33,7 @@ def all_cells(
     summary = found.summary
     say(f"{summary.path}: {summary.total} runs, {summary.flown} flown now; tables and pictures beside it")
     if summary.agreement is not None:
-        say(f"--engine batch: {summary.agreement}")
+        say(f"engine batch: {summary.agreement}")
     say(f"one cell again, by its number in cells.csv: {again} K")
     if summary.failed:
         say(f"{summary.failed} runs failed: runs.csv shows why")
@@ -45,7 +45,7 @@ def all_cells(
     )
 
 
-def cell(comparison: Comparison, index: int, out: Path | None, *, workers: int, engine: Engine | None) -> Answer:
+def cell(comparison: Comparison, index: int, out: Path | None, *, workers: int, engine: EngineChoice) -> Answer:
     """Fly one cell again, and tell whether the store has the same."""
     found = run.cell_again(comparison, index, workers=workers, engine=engine)
     stored = run.stored_cell(comparison, index, out)
@@ -56,7 +56,7 @@ def cell(comparison: Comparison, index: int, out: Path | None, *, workers: int, 
     return Answer(document={**found.row("value"), "same_as_stored": same}, lines=lines)
 
 
-def flight(comparison: Comparison, index: int | None, start: int, out: Path | None, *, engine: Engine | None) -> Answer:
+def flight(comparison: Comparison, index: int | None, start: int, out: Path | None, *, engine: EngineChoice) -> Answer:
     """Keep one flight of a cell; raises `UsageError` without a cell or a directory."""
     if index is None or out is None:
         raise UsageError("--start: expected --cell K, whose start it is, and --out DIR for the flight")

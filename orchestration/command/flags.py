@@ -153,7 +153,7 @@ class FlightFlags:
 
     def applied_to(self, scenario: "Scenario") -> "Scenario":
         """`scenario` with what was given; raises `UsageError` for what cannot be."""
-        from orchestration.building.fmus import native_twin
+        from orchestration.building.fmus import native_twins
         from orchestration.quadrotor.presets import preset_timing
         from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice, chosen
         from orchestration.quadrotor.timing import TIMING_KEYS
@@ -183,16 +183,14 @@ class FlightFlags:
             top["disturbance"] = DisturbanceChoice(**chosen(self.disturbance))
         parameters = {key: _value(text) for key, text in _pairs("set", self.set or [])}
         changed = scenario.with_changes(timing=timing, parameters=parameters, **top)
-        if not (self.native or self.controller or self.plant):
-            return changed
-        plant, controller = self.plant or changed.plant.fmu, self.controller or changed.controller.fmu
-        if self.native:
-            plant, controller = native_twin(plant), native_twin(controller)
-        return changed.with_fmus(plant=plant, controller=controller)
+        if self.controller or self.plant:
+            plant, controller = self.plant or changed.plant.fmu, self.controller or changed.controller.fmu
+            changed = changed.with_fmus(plant=plant, controller=controller)
+        return native_twins(changed) if self.native else changed
 
     def applied_to_system(self, system: "System") -> "System":
         """`system` with what was given; raises `UsageError` for flags that are for the quadrotor only."""
-        from orchestration.building.fmus import native_twin
+        from orchestration.building.fmus import native_twins
         from orchestration.system.paths import changed
 
         of_systems = ("seed", "stop_time", "set", "native")
@@ -205,8 +203,7 @@ class FlightFlags:
             raise UsageError(
                 f"{flags}: for the quadrotor only; expected --set PATH=V for a system, as connections.NAME.delay"
             )
-        if self.native:
-            top |= {f"components.{name}.fmu": native_twin(each.fmu) for name, each in system.components.items()}
+        system = native_twins(system) if self.native else system
         return changed(system, {**top, **{key: _value(text) for key, text in _pairs("set", self.set or [])}})
 
 

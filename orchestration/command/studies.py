@@ -2,7 +2,7 @@
 
 import dataclasses
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated
 
 import typer
 
@@ -13,24 +13,20 @@ from orchestration.command import registry as registering
 from orchestration.command.answer import Answer, of_files
 from orchestration.command.build_flag import builds
 from orchestration.command.figure_flags import FigureFlags
-from orchestration.command.flags import EngineFlag, FlightFlags, Timing, flies, request_from
+from orchestration.command.flags import FlightFlags, Timing, flies, request_from
 from orchestration.command.limit_flags import TimeLimit
 from orchestration.command.shared_flags import takes
-
-if TYPE_CHECKING:
-    from orchestration.engines.engine import Engine
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file.", metavar="STUDY.toml", show_default=False)]
 Out = Annotated[Path | None, typer.Option("--out", help="Folder of the store; default: results/NAME.", metavar="DIR")]
 
-BatchFlag = Annotated[
-    str | None,
+StudyEngineFlag = Annotated[
+    str,
     typer.Option(
         "--engine",
-        help="Simulation loop; batch: native FMUs, several runs at once in a SIMD batch.",
-        metavar="python|compiled|batch",
-        autocompletion=completion.among("python", "compiled", "batch"),
-        show_default=False,
+        help="What flies; batch: native FMUs, several runs at once in a SIMD batch; auto: the fastest that can be had.",
+        metavar="auto|python|compiled|batch",
+        autocompletion=completion.among("auto", "python", "compiled", "batch"),
     ),
 ]
 
@@ -44,22 +40,23 @@ def sweep(
         str | None, typer.Option("--dask", help="A dask scheduler instead, e.g. tcp://host:8786.", metavar="URL")
     ] = None,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Repeat failed runs.")] = False,
-    engine: BatchFlag = None,
+    engine: StudyEngineFlag = "auto",
     time_limit: TimeLimit = None,
 ) -> Answer:
     """Run what is missing of a study; it may be stopped and started again at any time."""
     from orchestration.studies.study_file import load_study
     from orchestration.studies.sweep import sweep as fly
+    from orchestration.workers.choice import choice_named
 
     summary = fly(
-        load_study(study), folder=out, workers=workers, dask=dask, retry_failed=retry_failed, engine=_batch_or(engine),
-        time_limit=time_limit,
+        load_study(study), folder=out, workers=workers, dask=dask, retry_failed=retry_failed,
+        engine=choice_named(engine), time_limit=time_limit,
     )  # fmt: skip
     failed = f", {summary.failed} failed (quadcosim export shows why; --retry-failed)" if summary.failed else ""
     lines = [f"{summary.path}: {summary.total} runs, {summary.flown} flown now{failed}"]
     if summary.agreement is not None:
-        lines.append(f"--engine batch: {summary.agreement}")
-    document = {name: getattr(summary, name) for name in ("total", "flown", "failed", "path", "agreement")}
+        lines.append(f"engine batch: {summary.agreement}")
+    document = {name: getattr(summary, name) for name in ("total", "flown", "failed", "path", "engine", "agreement")}
     return Answer(document=document, lines=lines, good=not summary.failed)
 
 
@@ -81,7 +78,7 @@ def status(study: StudyFile, out: Out = None) -> Answer:
     agreement = Agreement.from_text(about[AGREEMENT]) if AGREEMENT in about else None
     lines = [f"{path}: {done + failed} of {total} runs, {failed} failed, {missing} missing"]
     if agreement is not None:
-        lines.append(f"--engine batch: {agreement}")
+        lines.append(f"engine batch: {agreement}")
     numbers = {"total": total, "done": done, "failed": failed, "missing": missing}
     return Answer(document={"path": path, **numbers, "agreement": agreement}, lines=lines)
 
@@ -143,14 +140,15 @@ def tune(
     ],
     out: Annotated[Path, typer.Option("--out", help="Folder for the files of tuned parameters.", metavar="DIR")],
     workers: Annotated[int, typer.Option("--workers", help="Processes on this machine.", metavar="N")] = 1,
-    engine: BatchFlag = None,
+    engine: StudyEngineFlag = "auto",
 ) -> Answer:
     """Tune a controller on some initial conditions and judge it on others; it resumes where it was stopped."""
     from orchestration.tuning.tune import tune as search_all
     from orchestration.tuning.tuning_file import load_tuning
+    from orchestration.workers.choice import choice_named
 
-    command = f"quadcosim tune {tuning} --out {out}" + (f" --engine {engine}" if engine else "")
-    found = search_all(load_tuning(tuning), out=out, workers=workers, engine=_batch_or(engine), command=command)
+    command = f"quadcosim tune {tuning} --out {out}" + (f" --engine {engine}" if engine != "auto" else "")
+    found = search_all(load_tuning(tuning), out=out, workers=workers, engine=choice_named(engine), command=command)
     return of_files(found.written)
 
 
@@ -165,7 +163,7 @@ def compare(
     native: Annotated[
         bool, typer.Option("--native", help="The native twins of this project's FMUs, built if need be.")
     ] = False,
-    engine: BatchFlag = None,
+    engine: StudyEngineFlag = "auto",
     time_limit: TimeLimit = None,
     cell: Annotated[
         int | None,
@@ -182,21 +180,20 @@ def compare(
     """Compare controllers from the same initial conditions: survival, settling, limits, error and effort."""
     from orchestration.command import comparison as command
     from orchestration.comparison.file import load_comparison
-    from orchestration.engines.engine import engine_named
+    from orchestration.workers.choice import choice_named
 
-    native = native or engine == "batch"
+    how = choice_named(engine)
     chosen = dataclasses.replace(load_comparison(comparison), native=native)
     if time_limit is not None and (cell is not None or start is not None):
         raise UsageError("--time-limit: expected without --cell; it is of the runs of a whole comparison")
-    alone = None if engine == "batch" else engine_named(engine, "batch")
     if start is not None:
-        return command.flight(chosen, cell, start, out, engine=alone)
+        return command.flight(chosen, cell, start, out, engine=how)
     if cell is not None:
-        return command.cell(chosen, cell, out, workers=workers, engine=alone)
+        return command.cell(chosen, cell, out, workers=workers, engine=how)
+    flags = (" --native" if native else "") + (f" --engine {engine}" if engine != "auto" else "")
     return command.all_cells(
-        chosen, out, workers=workers, engine="batch" if engine == "batch" else alone, time_limit=time_limit,
-        figures=figures, look=look,
-        again=f"quadcosim compare {comparison}{' --native' if native else ''} --cell",
+        chosen, out, workers=workers, engine=how, time_limit=time_limit, figures=figures, look=look,
+        again=f"quadcosim compare {comparison}{flags} --cell",
     )  # fmt: skip
 
 
@@ -248,7 +245,15 @@ def limit(
         bool, typer.Option("--continuous", help="Run near continuous time too (takes as long as ten runs at 1 ms).")
     ] = False,
     workers: Annotated[int, typer.Option("--workers", help="Processes for the seeds.", metavar="N")] = 1,
-    engine: EngineFlag = None,
+    engine: Annotated[
+        str,
+        typer.Option(
+            "--engine",
+            help="Simulation loop; auto: native twins of the FMUs where these can be had, compiled where possible.",
+            metavar="auto|python|compiled",
+            autocompletion=completion.among("auto", "python", "compiled"),
+        ),
+    ] = "auto",
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for the figure; default: beside the file.", metavar="DIR")
     ] = None,
@@ -260,10 +265,11 @@ def limit(
     from orchestration.engines.engine import engine_named
     from orchestration.limits import limit as limits
 
+    how = "auto" if engine == "auto" else engine_named(engine, "auto")
     chosen = request_from(scenario, flags, timing)
     found = limits.find(
         chosen, of, first=first, last=last, tolerance=tolerance, scan=scan, confidence=confidence,
-        continuous=continuous, workers=workers, engine=engine_named(engine), announce=say,
+        continuous=continuous, workers=workers, engine=how or "auto", announce=say,
     )  # fmt: skip
     where = out or (None if scenario is None else scenario.parent)
     if figures and where is not None:
@@ -298,12 +304,6 @@ def margin(
         shown = " ".join(f"{share:g}" for share in value) if isinstance(value, tuple) else value
         lines.append(f"{name:<17}  {f'{value:.6g} s' if isinstance(value, float) else '-' if value is None else shown}")
     return Answer(document=found, lines=lines)
-
-
-def _batch_or(engine: str | None) -> "Engine | Literal['batch'] | None":
-    from orchestration.engines.engine import engine_named
-
-    return "batch" if engine == "batch" else engine_named(engine, "batch")
 
 
 def _current_store(study: Path, out: Path | None) -> Path:

@@ -9,11 +9,11 @@ from orchestration.basics.errors import UsageError
 from orchestration.basics.extras import explained
 from orchestration.basics.progress import CountHeard
 from orchestration.basics.terminal import say
+from orchestration.building.inputs import Files
 from orchestration.comparison.bandwidth import Bandwidths, bandwidths
 from orchestration.comparison.cells import CellSummary, frame_of, results
 from orchestration.comparison.design import Comparison
 from orchestration.comparison.outcome import Outcome, concluded, write
-from orchestration.engines.engine import Engine
 from orchestration.engines.wiring import checked
 from orchestration.results import html
 from orchestration.runs.run_directory import keep_flight
@@ -22,8 +22,10 @@ from orchestration.studies.store import store_path
 from orchestration.studies.sweep import sweep
 from orchestration.studies.swept import Swept
 from orchestration.studies.table import export, frame, units_in
+from orchestration.system.model import System
 from orchestration.system.request import in_its_own_words
 from orchestration.workers.batching import TOLERATED
+from orchestration.workers.choice import Chosen, EngineChoice, chosen
 from orchestration.workers.executors import RunEvaluator
 
 if TYPE_CHECKING:
@@ -85,7 +87,7 @@ def compare(
     *,
     folder: str | Path | None = None,
     workers: int = 1,
-    engine: Engine | Literal["batch"] | None = None,
+    engine: EngineChoice = "auto",
     time_limit: float | None = None,
     figures: bool = True,
     style: "Style | None" = None,
@@ -94,15 +96,14 @@ def compare(
 ) -> Compared:
     """Fly what is missing of a comparison, conclude, and write its tables and pictures beside its store.
 
-    `folder`, `workers`, `time_limit`, `progress` and `announce` are those of `sweep`, which raises what this does. By
-    the engine `batch` the native twins of its FMUs are flown as lanes; pictures are left out unless `figures`, drawn
-    in a `style`, by default for a screen.
+    `folder`, `workers`, `engine`, `time_limit`, `progress` and `announce` are those of `sweep`, which raises what this
+    does. Pictures are left out unless `figures`, drawn in a `style`, by default for a screen.
     """
-    comparison = replace(comparison, native=True) if engine == "batch" else comparison
     summary = sweep(
         comparison.study, folder=folder, workers=workers, engine=engine, time_limit=time_limit, progress=progress,
         announce=announce,
     )  # fmt: skip
+    comparison = replace(comparison, native=summary.study.native)
     known = bandwidths(comparison)  # after the design has been checked, which names the run that cannot be
     place = summary.path.parent
     table = frame(summary.path)
@@ -118,21 +119,15 @@ def compare(
     )
 
 
-def cell_again(
-    comparison: Comparison, index: int, *, workers: int = 1, engine: Engine | None = None, in_lanes: bool = False
-) -> CellSummary:
-    """Fly all runs of one cell, whatever a store has of it, by native FMUs many at once if they are to fly `in_lanes`.
-
-    Raises `UsageError` for a cell that there is not.
-    """
-    cell, study = comparison.cell(index), comparison.study
-    files = study.files()
-    starts, runs = files.starts_of(study.origin), comparison.runs_of(cell)
-    with in_its_own_words(comparison.base):
-        systems = [study.system(i, starts) for i in runs]
-        checked(systems[0], files.models_of(systems[0]))
-    with RunEvaluator(files, workers, engine) as pool:
-        flights = pool.fly_all(systems, in_lanes=in_lanes)
+def cell_again(comparison: Comparison, index: int, *, workers: int = 1, engine: EngineChoice = "auto") -> CellSummary:
+    """Fly all runs of one cell, whatever a store has of it; raises `UsageError` for a cell that there is not."""
+    runs = comparison.runs_of(comparison.cell(index))
+    comparison, files, how = _ready(comparison, runs[0], engine)
+    study = comparison.study
+    starts = files.starts_of(study.origin)
+    systems = [study.system(i, starts) for i in runs]
+    with RunEvaluator(files, workers, how.engine) as pool:
+        flights = pool.fly_all(systems, in_lanes=how.in_lanes)
     (found,) = results(comparison, frame_of(comparison, zip(runs, flights)))
     return found
 
@@ -154,11 +149,28 @@ def stored_cell(comparison: Comparison, index: int, folder: Path | None) -> Cell
     return next((cell for cell in found if cell.cell == index), None)
 
 
-def flight(comparison: Comparison, index: int, start: int, out: Path, *, engine: Engine | None = None) -> None:
-    """Fly one start of a cell and keep all of it in a directory of a run."""
+def flight(comparison: Comparison, index: int, start: int, out: Path, *, engine: EngineChoice = "auto") -> None:
+    """Fly one start of a cell, alone, and keep all of it in a directory of a run."""
     runs = comparison.runs_of(comparison.cell(index))
     if not 0 <= start < len(runs):
         raise UsageError(f"--start {start}: expected a number from 0 to {len(runs) - 1}")
-    study = comparison.study
-    request = comparison.request(runs[start], study.files().starts_of(study.origin))
-    keep_flight(out, lambda to: fly(request, recorder=to, engine=engine))
+    comparison, files, how = _ready(comparison, runs[start], engine)
+    request = comparison.request(runs[start], files.starts_of(comparison.study.origin))
+    keep_flight(out, lambda to: fly(request, recorder=to, engine=how.engine))
+
+
+def _ready(comparison: Comparison, index: int, engine: EngineChoice) -> tuple[Comparison, Files, Chosen]:
+    """A comparison as one of its runs is flown by an engine, its files and how; raises `UsageError` for one that cannot
+    be.
+    """
+
+    def first(native: bool) -> tuple[System, Files]:
+        study = replace(comparison, native=native).study
+        files = study.files()
+        with in_its_own_words(comparison.base):
+            system = study.system(index, files.starts_of(study.origin))
+            checked(system, files.models_of(system))
+        return system, files
+
+    how = chosen(engine, comparison.native, first)
+    return replace(comparison, native=how.native), first(how.native)[1], how

@@ -22,6 +22,7 @@ from orchestration.results.criterion import edge, judged
 from orchestration.stability.known_loops import Local
 from orchestration.stability.local_limit import local_limits
 from orchestration.system.request import Request, in_its_own_words, system_meant
+from orchestration.workers.choice import alone
 from orchestration.workers.executors import RunEvaluator
 
 if TYPE_CHECKING:
@@ -92,7 +93,7 @@ def find(
     confidence: float = 0.95,
     continuous: bool = False,
     workers: int = 1,
-    engine: Engine | None = None,
+    engine: Engine | Literal["auto"] = "auto",
     progress: ShareHeard = "bar",
     announce: Callable[[str], None] | None = say,
 ) -> Limit:
@@ -100,11 +101,13 @@ def find(
 
     `of` is a path, or of the quadrotor `period`, `delay`, `jitter` or `loss`; it is looked for from `first` to `last`,
     `scan` is the step, `continuous` adds that flight (of the quadrotor). The seeds of a random quantity are flown by
-    `workers` processes. `progress` hears the share that is done of a search in which nothing fails before the end of
-    the scan, `announce` a line for each value that was tried; None for silence.
+    `workers` processes. The engine `auto` takes native twins of the FMUs where they can be had. `progress` hears the
+    share that is done of a search in which nothing fails before the end of the scan, `announce` what flies and a line
+    for each value that was tried; None for silence.
 
     Raises `UsageError` for a quantity, range, tolerance, step or confidence that cannot be.
     """
+    request, how = alone(request, engine)
     varied, files = _checked(request, of, confidence)
     near = request.near_continuous(CONTINUOUS) if continuous else None
     if continuous and near is None:
@@ -117,8 +120,10 @@ def find(
     random = is_random(varied.at(span.last))
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
     local = _local(varied, span, files)
-    with of_share(progress, "longest search") as hear, RunEvaluator(files, workers, engine) as pool:
+    with of_share(progress, "longest search") as hear, RunEvaluator(files, workers, how.engine) as pool:
         tell = announce or (lambda line: None)
+        if engine == "auto":
+            tell(str(how))
         trials = Evaluator(varied, span, seeds, confidence if random else None, units[0], pool, tell, hear)
         values = span.values()
         bracket = first_failure(

@@ -1,7 +1,7 @@
 """What a run is, as one frozen value."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -142,6 +142,10 @@ class Scenario:
             plant=dataclasses.replace(self.plant, fmu=str(plant)),
             controller=dataclasses.replace(self.controller, fmu=str(controller)),
         )
+
+    def with_twins(self, twin: Callable[[str], str]) -> "Scenario":
+        """The same with other FMUs, each what `twin` makes of it."""
+        return self.with_fmus(plant=twin(self.plant.fmu), controller=twin(self.controller.fmu))
 
     def resolved(self) -> "Scenario":
         """The same flight with the parameters of its vehicle as its own."""

@@ -5,7 +5,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.extras import explained
@@ -22,7 +22,9 @@ from orchestration.studies.run_key import design_parts, difference, place_parts,
 from orchestration.studies.study import Study
 from orchestration.studies.swept import Swept
 from orchestration.studies.vouching import Fly, vouched
-from orchestration.workers.batching import chunks, expect_lanes
+from orchestration.system.model import System
+from orchestration.workers.batching import chunks
+from orchestration.workers.choice import Chosen, EngineChoice, chosen
 from orchestration.workers.executors import expect_scheduler, run_locally, run_on_dask
 from orchestration.workers.pool import Inputs
 from orchestration.workers.provenance import versions
@@ -47,7 +49,7 @@ def sweep(
     workers: int = 1,
     dask: str | None = None,
     retry_failed: bool = False,
-    engine: Engine | Literal["batch"] | None = None,
+    engine: EngineChoice = "auto",
     time_limit: float | None = None,
     progress: CountHeard = "bar",
     announce: Announce | None = say,
@@ -56,10 +58,11 @@ def sweep(
 
     The store is in `folder`, default `results/NAME`: what is there is not flown again, so that a sweep may be
     stopped and called again. Runs are flown by `workers` processes of this machine, which need no guard of the main
-    module and work from a notebook, or by those of a `dask` scheduler at that address; by the engine `batch` they are
-    flown as lanes of native FMUs, and some of them by the FMUs too, to compare. A run that takes more than `time_limit`
-    [s] of the processor has failed, and says so. `progress` hears how many of how many
-    are done, `announce` of runs that failed; None for silence.
+    module and work from a notebook, or by those of a `dask` scheduler at that address. The engine `batch` flies them as
+    lanes of native FMUs, and some of them by the FMUs too, to compare; `auto` does so where it can, takes native FMUs
+    where there are lanes of none, and else the FMUs as they are. A run that takes more than `time_limit` [s] of the
+    processor has failed, and says so. `progress` hears how many of how many are done, `announce` what flies and of runs
+    that failed; None for silence.
 
     Raises `UsageError`, before anything is flown, for a design with a run that cannot be, or if the store holds
     another study, saying what differs; `QuadcosimError` for what is not a run's own failure, without a row;
@@ -68,23 +71,19 @@ def sweep(
     _expect_workers(workers, dask)
     if time_limit is not None and not time_limit > 0.0:
         raise UsageError(f"--time-limit {time_limit:g}: expected a positive number of seconds")
-    in_lanes = engine == "batch"
-    study = replace(study, native=True) if in_lanes else study
+    study, files, how = ready(study, engine)
     path = store.store_path(study.name, folder)
-    files = study.files()
-    expect_flyable(study, files)
-    if in_lanes:
-        expect_lanes(study.system(0, files.starts_of(study.origin)), files)
     with of_runs(progress) as hear, store.open_for_writing(path, study.origin.objectives) as opened:
         _describe(opened, study, files)
         missing = _missing(opened, study, retry_failed)
         counted = _Counted(len(study.points), opened, hear, announce)
         fly = _flying(Inputs.of(files), workers, dask)
-        alone = None if engine == "batch" else engine
-        tasks = (_task(study, index, files, alone, time_limit) for index in missing)
+        if announce is not None and missing and engine == "auto":
+            announce(str(how))
+        tasks = (_task(study, index, files, how.engine, time_limit) for index in missing)
         lanes: dict[str, Row] = {}
         try:
-            with contextlib.closing(fly(chunks(tasks, len(missing), workers) if in_lanes else tasks)) as outcomes:
+            with contextlib.closing(fly(chunks(tasks, len(missing), workers) if how.in_lanes else tasks)) as outcomes:
                 for some in outcomes if missing else ():
                     _keep(some, opened)
                     counted.add(some)
@@ -100,8 +99,26 @@ def sweep(
             agreement.expect()
         failed = opened.counts().get("failed", 0)
     return Swept(
-        study=study, total=counted.total, flown=len(missing), failed=failed, path=path, agreement=agreement
+        study=study, total=counted.total, flown=len(missing), failed=failed, path=path, engine=how.name,
+        agreement=agreement,
     )  # fmt: skip
+
+
+def ready(study: Study, engine: EngineChoice) -> tuple[Study, Files, Chosen]:
+    """A study as it is flown by an engine, its files and how; raises `UsageError` for a run that cannot be."""
+    found: dict[bool, tuple[Study, Files]] = {}
+
+    def first(native: bool) -> tuple[System, Files]:
+        asked = replace(study, native=native)
+        files = asked.files()
+        expect_flyable(asked, files)
+        found[native] = asked, files
+        return asked.system(0, files.starts_of(asked.origin)), files
+
+    how = chosen(engine, study.native, first)
+    if how.native not in found:
+        first(how.native)
+    return *found[how.native], how
 
 
 def _expect_workers(workers: int, dask: str | None) -> None:

@@ -33,6 +33,8 @@ class Swept:
     """What was flown."""
     path: Path
     """The store of the study."""
+    engine: str
+    """What flew, as `--engine` has it."""
     agreement: Agreement | None = None
     """How runs flown as lanes agree with the same flown by FMUs; None if none were."""
 

@@ -1,8 +1,8 @@
 """What a system is: frozen values, checked for what they mean by themselves; no FMU is opened here."""
 
 import functools
-from collections.abc import Iterable, Mapping
-from dataclasses import field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -368,6 +368,14 @@ class System:
 
     def range_of(self, quantity: str) -> None:
         """No quantity has a name."""
+
+    def with_twins(self, twin: Callable[[str], str]) -> "System":
+        """The same with other FMUs, each what `twin` makes of it."""
+        twins = {name: twin(fmu) for name, fmu in self.fmus.items()}
+        if twins == self.fmus:
+            return self
+        components = {name: replace(each, fmu=twins[name]) for name, each in self.components.items()}
+        return replace(self, components=components)
 
     def near_continuous(self, period: float) -> None:
         """What of it is digital, and where, it does not say."""

@@ -1,6 +1,6 @@
 """What can be asked to run: a system, or what means one and speaks of it in words of its own."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +12,7 @@ from orchestration.basics.records import called
 from orchestration.system.model import Parameter, System
 
 Self = TypeVar("Self", bound="ControlLoop")
+Twin = TypeVar("Twin", bound="Request")
 Values = Mapping[str, Parameter]
 """By target, as axes of studies name them"""
 
@@ -43,6 +44,9 @@ class Request(Protocol):
 
     def range_of(self, quantity: str) -> Range | None:
         """Where a quantity that has a name is looked for; None for a name that says nothing here."""
+
+    def with_twins(self: Twin, twin: Callable[[str], str]) -> Twin:
+        """The same with other FMUs, each what `twin` makes of it."""
 
     def near_continuous(self, period: float) -> "Request | None":
         """The same sampled every `period` [s] and nothing late, lost or noisy; None where that cannot be known."""

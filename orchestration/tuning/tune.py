@@ -6,16 +6,16 @@ import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from orchestration.basics.extras import explained
 from orchestration.basics.progress import ShareHeard, of_share
 from orchestration.basics.terminal import say
 from orchestration.building.inputs import Files
-from orchestration.engines.engine import Engine
 from orchestration.results import html
 from orchestration.tuning.tuning import Fly, Found, Tuning, best_by_period, search
 from orchestration.tuning.tuning_file import gains_text
+from orchestration.workers.choice import EngineChoice, chosen
 from orchestration.workers.executors import RunEvaluator
 from orchestration.workers.provenance import versions
 
@@ -76,7 +76,7 @@ def tune(
     out: str | Path,
     folder: str | Path | None = None,
     workers: int = 1,
-    engine: Engine | Literal["batch"] | None = None,
+    engine: EngineChoice = "auto",
     command: str = "quadcosim.tune",
     progress: ShareHeard = "bar",
     announce: Callable[[str], None] | None = say,
@@ -85,22 +85,22 @@ def tune(
 
     For each period of the tuning a file of parameters is written into `out`; it says that it was made by `command`.
     What each search has found is kept in `folder`, default `results/NAME`, so that no search is done twice. Runs
-    are flown by `workers` processes, by the engine `batch` many at once as lanes of native FMUs. `progress` hears the
+    are flown by `workers` processes and an engine as in `sweep`. `progress` hears the
     share that is done, `announce` a line for each search; None for silence.
 
     Raises `UsageError` for what cannot be, `QuadcosimError` if a run fails, `KeyboardInterrupt` after Ctrl-C.
     """
-    in_lanes = engine == "batch"
-    asked = dataclasses.replace(tuning, native=True) if in_lanes else tuning
+    how = chosen(engine, tuning.native, lambda native: dataclasses.replace(tuning, native=native).first())
+    asked = dataclasses.replace(tuning, native=how.native)
     files = asked.files()
-    with (
-        of_share(progress, "searching") as hear,
-        RunEvaluator(files, workers, None if engine == "batch" else engine) as pool,
-    ):
+    announce = announce or (lambda line: None)
+    if engine == "auto":
+        announce(str(how))
+    with of_share(progress, "searching") as hear, RunEvaluator(files, workers, how.engine) as pool:
         done = searched(
             asked, files, Path(folder or Path("results") / asked.name),
-            lambda systems: pool.fly_all(systems, in_lanes=in_lanes), pool.fly_all,
-            progress=hear, announce=announce or (lambda line: None),
+            lambda systems: pool.fly_all(systems, in_lanes=how.in_lanes), pool.fly_all,
+            progress=hear, announce=announce,
         )  # fmt: skip
     return Tuned(searches=tuple(done), written=tuple(write(asked, done, Path(out), command)))
 

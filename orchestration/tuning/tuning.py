@@ -19,7 +19,6 @@ from orchestration.studies.axes import Axis
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.request import ControlLoop, Ensemble, in_its_own_words, system_meant
-from orchestration.workers.batching import expect_lanes
 
 Fly = Callable[[Sequence[System]], Sequence[dict[str, Any]]]
 """The metrics of runs, in their order"""
@@ -91,11 +90,12 @@ class Tuning:
 
     def files(self) -> Files:
         """The files of all flights, FMUs built if need be."""
-        found = files_of(self.origin)
-        if self.native:
-            middle = self.values([0.5] * len(self.parameters))
-            expect_lanes(self.systems(self.periods[0], middle, self.starts.some(self.starts.first, 1))[0], found)
-        return found
+        return files_of(self.origin)
+
+    def first(self) -> tuple[System, Files]:
+        """One of the flights, and the files of all."""
+        middle = self.values([0.5] * len(self.parameters))
+        return self.systems(self.periods[0], middle, self.starts.some(self.starts.first, 1))[0], self.files()
 
     def values(self, shares: Sequence[float]) -> dict[str, float]:
         """What each target is set to, at a share in [0, 1] of the range of each parameter."""

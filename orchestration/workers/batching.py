@@ -110,7 +110,7 @@ class Agreement:
         """Raise `QuadcosimError` naming run and metric if they differ by more than is tolerated."""
         if self.difference > TOLERATED:
             raise QuadcosimError(
-                f"run {self.index}: {self.metric} by --engine batch differs by {self.difference:.3g} "
+                f"run {self.index}: {self.metric} by the engine batch differs by {self.difference:.3g} "
                 f"from that by {by}; expected at most {TOLERATED:g}"
             )
         if self.python is not None:

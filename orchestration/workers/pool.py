@@ -111,7 +111,7 @@ class Supervisor:
                 self._drop()
                 if death.ending.reached is not None:
                     message = f"it was ended: {death.ending.reached}"
-                    return Outcome(row=row_of(task, None, message, 0.0, self._machine))
+                    return Outcome(row=row_of(task, None, message, 0.0, self._machine), ended=True)
                 _expect_no_interrupt(death)
                 if death.ending.code in _FROM_OUTSIDE:
                     killed += 1

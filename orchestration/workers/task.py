@@ -56,6 +56,8 @@ class Outcome:
     signals: bytes | None = None
     in_lanes: bool = False
     """whether a batch has flown it"""
+    ended: bool = False
+    """whether it was ended at a limit"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -41,7 +41,7 @@ def test_one_cell_in_a_hundred_is_what_is_flown_again(name: str) -> None:
     """What `quadcosim compare studies/comparisons/NAME.toml --cell K` flies, here in lanes."""
     comparison, kept = comparisons.loaded(name), comparisons.kept(name)["cells"]
     for cell in random.Random(name).sample(kept, math.ceil(len(kept) / 100)):
-        row = cell_again(comparison, cell["cell"], in_lanes=True).row("value")
+        row = cell_again(comparison, cell["cell"], engine="batch").row("value")
         for key in ("count", "survives", "settles", "diverged", "diverged_late"):
             assert row[key] == cell[key], key
         for key in comparisons.TOLD:

@@ -19,11 +19,11 @@ from orchestration.requests.request import load_request
 from orchestration.requests.ssp import package, writing
 from orchestration.studies.store import open_for_reading, store_path
 from orchestration.studies.study_file import load_study
-from orchestration.studies.sweep import sweep
 from orchestration.system.model import System
 from quadcosim import SimulatorError, UsageError, changed, load_run, load_system, run
 from tests.commands import Main
 from tests.fmu_kit.compiler.probes import Mode
+from tests.orchestration.studies.common import sweep
 
 SLAVE = """
 import dataclasses

@@ -51,7 +51,7 @@ def component(name: str, model: Model, lanes: int) -> Kernel:
     if MAIN not in sources or model.version != 2:
         raise UsageError(
             f"components.{name}: {model.path.name}: expected a native FMU of this project's kit, as quadcosim build "
-            "--native makes them, for --engine batch"
+            "--native makes them, to be one of many at once"
         )
     return _compiled(tuple(sorted(sources.items())), lanes)
 

@@ -423,7 +423,7 @@ class StubPool:
 
 @pytest.fixture
 def stubbed(monkeypatch: pytest.MonkeyPatch) -> type[StubPool]:
-    monkeypatch.setattr(limits, "Pool", StubPool)
+    monkeypatch.setattr(limits, "RunEvaluator", StubPool)
     monkeypatch.setattr(limits, "local_limits", known_local_limits)
     monkeypatch.setattr(local, "about_rest", lambda at, span: Local(reason="not looked for"))
     return StubPool

@@ -11,10 +11,9 @@ import pytest
 from orchestration.report.writing import report
 from orchestration.runs.simulation import run
 from orchestration.studies.study import Study
-from orchestration.studies.sweep import sweep
 from quadcosim import Scenario, Timing
 from tests.native import NATIVE
-from tests.orchestration.studies.common import axis
+from tests.orchestration.studies.common import axis, sweep
 from tests.patience import PATIENCE
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")

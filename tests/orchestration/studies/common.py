@@ -15,10 +15,11 @@ from typing import Any
 
 from orchestration.building.inputs import Files, files_of
 from orchestration.quadrotor.translation import paths_of, quadrotor
+from orchestration.studies import sweep as sweeping
 from orchestration.studies.axes import Axis
 from orchestration.studies.store import metrics_with, open_for_reading, store_path
 from orchestration.studies.study import Study
-from orchestration.studies.sweep import sweep
+from orchestration.studies.swept import Swept
 from orchestration.system.model import System
 from orchestration.system.paths import value_at
 from orchestration.workers.row import Row
@@ -89,6 +90,11 @@ STORE = Path("results") / "study" / "study.sqlite"
 
 def study(*axes: Axis, base: Scenario | None = None, **fields: Any) -> Study:
     return Study(name="study", base=base or short(), axes=axes, **fields)
+
+
+def sweep(chosen: Study, **options: Any) -> Swept:
+    """Flown by its FMUs as they are unless a test asks for another engine: then rows are those of `run` to the byte."""
+    return sweeping.sweep(chosen, **{"engine": "compiled", **options})
 
 
 def swept(chosen: Study, folder: Path, **options: Any) -> Path:

@@ -28,9 +28,8 @@ from orchestration.studies.maps import heat_map
 from orchestration.studies.sensitivity import Index
 from orchestration.studies.store import open_for_writing, store_path
 from orchestration.studies.study import Study
-from orchestration.studies.sweep import sweep
 from quadcosim import UsageError
-from tests.orchestration.studies.common import OBJECTIVES, axis, row, short, study
+from tests.orchestration.studies.common import OBJECTIVES, axis, row, short, study, sweep
 
 PERIODS = axis("timing.period", 0.01, 0.02, 0.03, 0.04)
 WORDS = ("settled", "bounded")

@@ -18,7 +18,6 @@ from orchestration.studies.axes import Axis
 from orchestration.studies.store import open_for_reading, store_path
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
-from orchestration.studies.sweep import sweep
 from orchestration.workers import executors as engine
 from orchestration.workers.provenance import machine, versions
 from orchestration.workers.task import Runner, RunTask
@@ -39,6 +38,7 @@ from tests.orchestration.studies.common import (
     short,
     starts,
     study,
+    sweep,
     swept,
 )
 

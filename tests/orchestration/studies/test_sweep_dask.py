@@ -9,7 +9,6 @@ import pytest
 from orchestration.studies.axes import Axis
 from orchestration.studies.store import open_for_reading
 from orchestration.studies.study import Study
-from orchestration.studies.sweep import sweep
 from orchestration.system.model import Component, System
 from quadcosim import QuadcosimError
 from tests.orchestration.fmi.small import needs_compiler, small
@@ -24,6 +23,7 @@ from tests.orchestration.studies.common import (
     rows_in,
     start,
     study,
+    sweep,
     wait_for_rows,
 )
 from tests.patience import PATIENCE

@@ -12,7 +12,6 @@ import pytest
 from orchestration.building import fmus
 from orchestration.quadrotor.scenario import FmuChoice
 from orchestration.studies.store import open_for_reading, store_path
-from orchestration.studies.sweep import sweep
 from orchestration.workers.pool import Pool
 from orchestration.workers.provenance import versions
 from quadcosim import QuadcosimError
@@ -31,6 +30,7 @@ from tests.orchestration.studies.common import (
     short,
     start,
     study,
+    sweep,
     wait_for_rows,
     wait_until,
     workers_of,

@@ -20,13 +20,12 @@ from orchestration.studies.drawing import draw_study
 from orchestration.studies.store import expect_columns, is_column, open_for_reading, store_path
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
-from orchestration.studies.sweep import sweep
 from orchestration.studies.table import frame
 from orchestration.system.model import Criterion, System
 from orchestration.system.paths import changed
 from quadcosim import Scenario, Timing, UsageError, run
 from tests.commands import Main
-from tests.orchestration.studies.common import bits, error_line, one_line
+from tests.orchestration.studies.common import bits, error_line, one_line, sweep
 
 FILE = Path(__file__).resolve().parents[3] / "examples" / "double_integrator" / "system.toml"
 PERIOD, DELAY = "components.controller.sampling.period", "connections.command.delay"

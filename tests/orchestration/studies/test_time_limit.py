@@ -8,10 +8,10 @@ import pytest
 from orchestration.studies.axes import Axis
 from orchestration.studies.store import open_for_reading
 from orchestration.studies.study import Study
-from orchestration.studies.sweep import sweep
 from orchestration.system.model import Component, System
 from tests.commands import Main
 from tests.orchestration.fmi.small import needs_compiler, small
+from tests.orchestration.studies.common import sweep
 
 pytestmark = [needs_compiler, pytest.mark.skipif(sys.platform != "linux", reason="/proc of Linux")]
 

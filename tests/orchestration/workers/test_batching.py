@@ -11,13 +11,13 @@ from orchestration.processes.child import Died, Ending
 from orchestration.studies.store import open_for_reading
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
-from orchestration.studies.sweep import AGREEMENT, sweep
+from orchestration.studies.sweep import AGREEMENT
 from orchestration.workers.batching import SAMPLE, Agreement, chunks, sample
 from orchestration.workers.pool import Inputs, Supervisor
 from orchestration.workers.task import Chunk, RunTask
 from tests.commands import Main
 from tests.orchestration.fmi.small import needs_compiler, small
-from tests.orchestration.studies.common import NOISY, RUNS, axis, bits, short, study, swept
+from tests.orchestration.studies.common import NOISY, RUNS, axis, bits, short, study, sweep, swept
 
 pytestmark = needs_compiler
 OWN = ("duration", "machine")

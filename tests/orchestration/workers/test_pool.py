@@ -9,7 +9,6 @@ import pytest
 
 from orchestration.studies.axes import Axis
 from orchestration.studies.study import Study
-from orchestration.studies.sweep import sweep
 from orchestration.system.model import Component, System
 from orchestration.workers import pool
 from orchestration.workers.executors import _local_submit
@@ -17,6 +16,7 @@ from orchestration.workers.pool import Inputs, Pool
 from orchestration.workers.task import Outcome, RunTask
 from quadcosim import QuadcosimError, UsageError
 from tests.orchestration.fmi.small import needs_compiler, small
+from tests.orchestration.studies.common import sweep
 
 GAIN = "components.it.parameters.gain"
 
