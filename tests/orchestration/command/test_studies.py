@@ -43,7 +43,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Done]:
     """A folder with that study, flown, and what the command said."""
     elsewhere = tmp_path_factory.mktemp("swept")
     (elsewhere / "study.toml").write_text(GRID)
-    return elsewhere, quadcosim("sweep", "study.toml", cwd=elsewhere)
+    return elsewhere, quadcosim("sweep", "study.toml", "--engine", "compiled", cwd=elsewhere)
 
 
 @pytest.fixture
@@ -80,7 +80,7 @@ def test_a_store_goes_where_it_is_told_and_figures_beside_it(folder: Path, main:
 
 def test_status_tells_how_far_a_sweep_in_another_process_is(folder: Path, main: Main) -> None:
     (folder / "study.toml").write_text(LONG)
-    with start("sweep", "study.toml", cwd=folder) as running:
+    with start("sweep", "study.toml", "--engine", "compiled", cwd=folder) as running:
         wait_for_rows(folder / STORE, 1)
         told = main("status", "study.toml").stdout
         assert running.poll() is None
@@ -94,22 +94,22 @@ def test_status_tells_how_far_a_sweep_in_another_process_is(folder: Path, main: 
 
 def test_failed_runs_are_told_at_once_and_fail_the_command(folder: Path, main: Main) -> None:
     (folder / "study.toml").write_text(GRID + '[[axes]]\nname = "plant.mass"\nvalues = [1.0, 0.0]\n')
-    done = main("sweep", "study.toml", code=1)
+    done = main("sweep", "study.toml", "--engine", "compiled", code=1)
     assert "12 runs, 12 flown now, 6 failed (quadcosim export shows why; --retry-failed)" in done.stdout
     told = done.stderr.splitlines()
     assert len(told) == 3
     assert told[0].startswith("run 1 (period = 0.02, delay = 0.0, plant.mass = 0.0) failed: plant.mass = 0.0: ")
     assert told[2].endswith("; further ones are not told")
     assert "12 of 12 runs, 6 failed, 0 missing" in main("status", "study.toml").stdout
-    again = main("sweep", "study.toml", "--retry-failed", code=1)
+    again = main("sweep", "study.toml", "--engine", "compiled", "--retry-failed", code=1)
     assert "12 runs, 6 flown now, 6 failed" in again.stdout
 
 
 def test_two_sweeps_at_once_are_refused_in_one_line(folder: Path, main: Main) -> None:
     (folder / "study.toml").write_text(LONG)
-    with start("sweep", "study.toml", cwd=folder) as running:
+    with start("sweep", "study.toml", "--engine", "compiled", cwd=folder) as running:
         wait_for_rows(folder / STORE, 1)
-        refused = main("sweep", "study.toml", code=1)
+        refused = main("sweep", "study.toml", "--engine", "compiled", code=1)
         kill(running.pid)
     assert error_line(refused) == f"{STORE}: another sweep is writing into it; expected to be the only one"
 

@@ -629,7 +629,8 @@ def test_where_nothing_is_random_one_run_decides_and_there_is_no_confidence() ->
 def test_each_value_is_announced() -> None:
     said: list[str] = []
     find(scenario_of(), "period", announce=said.append)
-    assert said[0] == "period 0.001 s: settled"
+    assert said[0] == "engine compiled: native FMUs, one run at a time"
+    assert said[1] == "period 0.001 s: settled"
     assert "period 0.03 s: settled" in said
     assert "period 0.035 s: fails, bounded: ultimate_bound = 1 m, expected < 0.05 m" in said
 

@@ -266,5 +266,5 @@ class Cluster:
 def reference_store(folder: Path, text: str = NOISY) -> Path:
     """The store of a study flown without interruption by one worker, through the command."""
     (folder / "study.toml").write_text(text)
-    quadcosim("sweep", "study.toml", cwd=folder)
+    quadcosim("sweep", "study.toml", "--engine", "compiled", cwd=folder)
     return store_path("study", folder / "results" / "study")

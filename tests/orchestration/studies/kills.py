@@ -45,7 +45,16 @@ class Tally:
 
 
 def sweep_in(folder: Path, workers: int) -> "subprocess.Popen[str]":
-    return start("sweep", "study.toml", "--workers", str(workers), cwd=folder, temporary=folder / TEMPORARY)
+    return start(
+        "sweep",
+        "study.toml",
+        "--engine",
+        "compiled",
+        "--workers",
+        str(workers),
+        cwd=folder,
+        temporary=folder / TEMPORARY,
+    )
 
 
 def disturbed(folder: Path, reference: list[dict[str, Any]], *, workers: int, kills: int, seed: int = 0) -> Tally:

@@ -52,7 +52,7 @@ def test_the_runs_of_the_reference_differ_from_each_other(reference: list[dict[s
 
 
 def test_two_workers_make_the_same_rows_as_one(folder: Path, reference: list[dict[str, Any]]) -> None:
-    done = quadcosim("sweep", "study.toml", "--workers", "2", cwd=folder)
+    done = quadcosim("sweep", "study.toml", "--engine", "compiled", "--workers", "2", cwd=folder)
     assert done.stdout == f"{STORE}: {RUNS} runs, {RUNS} flown now\n"
     assert bits(folder / STORE) == reference
 
@@ -304,7 +304,9 @@ def test_workers_leave_no_files_behind(tmp_path: Path, monkeypatch: pytest.Monke
     file.write_text(GRID)
     environment = {**os.environ, "TMPDIR": str(temporary)}
     subprocess.run(
-        [str(SCRIPT), "sweep", file, "--workers", "2", "--out", tmp_path / "out"], env=environment, check=True
+        [str(SCRIPT), "sweep", file, "--engine", "compiled", "--workers", "2", "--out", tmp_path / "out"],
+        env=environment,
+        check=True,
     )
     assert list(temporary.iterdir()) == []
 

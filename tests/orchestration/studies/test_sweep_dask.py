@@ -46,7 +46,7 @@ def cluster(tmp_path: Path) -> Iterator[Callable[[int], Cluster]]:
 def test_a_dask_cluster_makes_the_same_rows(
     folder: Path, reference: list[dict[str, Any]], cluster: Callable[[int], Cluster]
 ) -> None:
-    quadcosim("sweep", "study.toml", "--dask", cluster(1).address, cwd=folder)
+    quadcosim("sweep", "study.toml", "--engine", "compiled", "--dask", cluster(1).address, cwd=folder)
     assert bits(folder / STORE) == reference
 
 
@@ -54,7 +54,7 @@ def test_the_death_of_a_dask_worker_loses_nothing(
     folder: Path, reference: list[dict[str, Any]], cluster: Callable[[int], Cluster]
 ) -> None:
     made = cluster(2)
-    with start("sweep", "study.toml", "--dask", made.address, cwd=folder) as coordinator:
+    with start("sweep", "study.toml", "--engine", "compiled", "--dask", made.address, cwd=folder) as coordinator:
         wait_for_rows(folder / STORE, 1)
         made.workers[0].kill()
         assert rows_in(folder / STORE) < RUNS

@@ -45,14 +45,14 @@ from tests.patience import PATIENCE
 def test_a_killed_sweep_flies_only_what_is_missing_and_ends_with_the_same_rows(
     folder: Path, reference: list[dict[str, Any]]
 ) -> None:
-    with start("sweep", "study.toml", cwd=folder) as coordinator:
+    with start("sweep", "study.toml", "--engine", "compiled", cwd=folder) as coordinator:
         wait_for_rows(folder / STORE, 2)
         coordinator.kill()
     there = rows_in(folder / STORE)
     assert 2 <= there < RUNS
     with open_for_reading(folder / STORE) as store:
         before = {found["design_index"]: found["duration"] for found in store.rows()}
-    done = quadcosim("sweep", "study.toml", "--workers", "2", cwd=folder)
+    done = quadcosim("sweep", "study.toml", "--engine", "compiled", "--workers", "2", cwd=folder)
     assert done.stdout == f"{STORE}: {RUNS} runs, {RUNS - there} flown now\n"
     assert bits(folder / STORE) == reference
     with open_for_reading(folder / STORE) as store:
@@ -61,7 +61,7 @@ def test_a_killed_sweep_flies_only_what_is_missing_and_ends_with_the_same_rows(
 
 
 def test_workers_end_when_the_coordinator_is_killed(folder: Path) -> None:
-    with start("sweep", "study.toml", "--workers", "2", cwd=folder) as coordinator:
+    with start("sweep", "study.toml", "--engine", "compiled", "--workers", "2", cwd=folder) as coordinator:
         wait_for_rows(folder / STORE, 1)
         workers = workers_of(coordinator.pid)
         coordinator.kill()
@@ -70,7 +70,7 @@ def test_workers_end_when_the_coordinator_is_killed(folder: Path) -> None:
 
 
 def test_the_death_of_a_worker_loses_nothing(folder: Path, reference: list[dict[str, Any]]) -> None:
-    with start("sweep", "study.toml", "--workers", "2", cwd=folder) as coordinator:
+    with start("sweep", "study.toml", "--engine", "compiled", "--workers", "2", cwd=folder) as coordinator:
         wait_for_rows(folder / STORE, 1)
         kill(workers_of(coordinator.pid)[0])
         assert rows_in(folder / STORE) < RUNS
@@ -81,7 +81,7 @@ def test_the_death_of_a_worker_loses_nothing(folder: Path, reference: list[dict[
 
 def test_a_run_whose_worker_is_killed_from_outside_stops_the_sweep_and_has_no_row(tmp_path: Path) -> None:
     (tmp_path / "study.toml").write_text('[base]\nstop_time = 2.0\n[[axes]]\nname = "seed"\nvalues = [1]\n')
-    with start("sweep", "study.toml", cwd=tmp_path) as coordinator:
+    with start("sweep", "study.toml", "--engine", "compiled", cwd=tmp_path) as coordinator:
         while coordinator.poll() is None:
             for process in workers_of(coordinator.pid):
                 kill(process)
@@ -89,7 +89,10 @@ def test_a_run_whose_worker_is_killed_from_outside_stops_the_sweep_and_has_no_ro
     assert coordinator.returncode == 1
     assert len(err.splitlines()) == 1, err
     assert rows_in(tmp_path / STORE) == 0
-    assert quadcosim("sweep", "study.toml", cwd=tmp_path).stdout == f"{STORE}: 1 runs, 1 flown now\n"
+    assert (
+        quadcosim("sweep", "study.toml", "--engine", "compiled", cwd=tmp_path).stdout
+        == f"{STORE}: 1 runs, 1 flown now\n"
+    )
 
 
 @pytest.mark.parametrize(("workers", "kills"), [(1, 1), (2, 3)])
@@ -104,7 +107,7 @@ def test_whatever_is_killed_the_table_is_that_of_an_undisturbed_sweep(
 def test_an_interrupt_is_one_line_that_says_how_far_the_sweep_is(
     folder: Path, reference: list[dict[str, Any]], whom: str
 ) -> None:
-    with start("sweep", "study.toml", cwd=folder) as coordinator:
+    with start("sweep", "study.toml", "--engine", "compiled", cwd=folder) as coordinator:
         wait_for_rows(folder / STORE, 1)
         os.kill(coordinator.pid if whom == "the coordinator" else workers_of(coordinator.pid)[0], signal.SIGINT)
         out, err = coordinator.communicate(timeout=PATIENCE)
@@ -144,7 +147,7 @@ def test_an_fmu_that_is_moved_away_meanwhile_changes_nothing(folder: Path, refer
     shutil.copy(fmus.locate("QuadrotorPlant"), plant)
     text = NOISY.replace("[base.timing]", '[base.plant]\nfmu = "plant.fmu"\n[base.timing]')
     (folder / "study.toml").write_text(text)
-    with start("sweep", "study.toml", cwd=folder) as coordinator:
+    with start("sweep", "study.toml", "--engine", "compiled", cwd=folder) as coordinator:
         wait_for_rows(folder / STORE, 1)
         plant.unlink()
         kill(workers_of(coordinator.pid)[0])

@@ -55,7 +55,9 @@ def test_the_command_limits_each_run(tmp_path: Path, main: Main) -> None:
     small(tmp_path, "ENDS=if (m->s.gain == 3.0) for (;;)")
     (tmp_path / "system.toml").write_text(SYSTEM)
     (tmp_path / "study.toml").write_text(STUDY)
-    done = main("sweep", tmp_path / "study.toml", "--out", tmp_path / "out", "--time-limit", "2", code=1)
+    done = main(
+        "sweep", tmp_path / "study.toml", "--out", tmp_path / "out", "--time-limit", "2", "--engine", "compiled", code=1
+    )
     assert "failed: it was ended: it takes more than the time limit of 2 s" in done.stderr
     assert "3 runs, 3 flown now, 1 failed" in done.stdout
     done = main("sweep", tmp_path / "study.toml", "--out", tmp_path / "out", "--time-limit", "-1", code=2)
