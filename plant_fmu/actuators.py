@@ -30,7 +30,9 @@ class Box:
     """Limits of thrust and of each torque, then a first-order lag of each: no motor has part in it."""
 
     thrust_max: float = 1e6
-    """[N]; thrust is limited to [0, thrust_max]"""
+    """[N]; thrust is limited to [thrust_min, thrust_max]"""
+    thrust_min: float = 0.0
+    """[N]; negative where propellers can push downwards"""
     torque_max: float = 1e6
     """[N·m]; each torque is limited to ±torque_max"""
     time_constant: float = 0.0
@@ -40,7 +42,7 @@ class Box:
         """`command` within the limits."""
         highest = self.torque_max
         return Wrench(
-            min(max(command.thrust, 0.0), self.thrust_max),
+            min(max(command.thrust, self.thrust_min), self.thrust_max),
             command.torque.map(lambda component: min(max(component, -highest), highest)),
         )
 

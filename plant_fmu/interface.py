@@ -47,7 +47,8 @@ class PlantInterface(Slave):
         "a of the wind force a cos(w t), inertial frame", "N", _WIND.amplitude, name="wind.amplitude"
     )
     wind_frequency = Parameter("w of the wind force a cos(w t)", "rad/s", _WIND.frequency, name="wind.frequency")
-    thrust_max = FixedParameter("thrust is limited to [0, thrust_max]", "N", _BOX.thrust_max, minimum=0.0)
+    thrust_max = FixedParameter("thrust is limited to [thrust_min, thrust_max]", "N", _BOX.thrust_max, minimum=0.0)
+    thrust_min = FixedParameter("least thrust; negative: propellers can push downwards", "N", _BOX.thrust_min)
     torque_max = FixedParameter("each torque is limited to +-torque_max", "N.m", _BOX.torque_max, minimum=0.0)
     actuator_time_constant = FixedParameter(
         "first-order lag of thrust and torques, or of the motors, after the limits; 0: none",

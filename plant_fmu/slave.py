@@ -98,7 +98,9 @@ class QuadrotorPlant(PlantInterface):
 
     def _read_actuators(self) -> Actuators:
         lag, motors = self.actuator_time_constant, gathered(self, Motors, "motor_")
-        box = Box(thrust_max=self.thrust_max, torque_max=self.torque_max, time_constant=lag)
+        highest, lowest = self.thrust_max, self.thrust_min
+        require(lowest <= highest, "thrust_min", lowest, f"at most {highest}, the largest")
+        box = Box(thrust_max=highest, thrust_min=lowest, torque_max=self.torque_max, time_constant=lag)
         motors = replace(motors, up=_unless_zero(motors.up, lag), down=_unless_zero(motors.down, lag))
         if motors.thrust_max > 0.0:
             highest = motors.thrust_max

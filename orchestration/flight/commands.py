@@ -73,7 +73,7 @@ def _mark_limits(panel: Axes, runs: Sequence[Run], name: str) -> None:
     bottom, top = panel.get_ylim()
     for run in runs:
         most = run.parameters.get("plant.thrust_max" if name == COMMAND[0] else "plant.torque_max", np.inf)
-        for limit in (0.0 if name == COMMAND[0] else -most, most):
+        for limit in (run.parameters.get("plant.thrust_min", 0.0) if name == COMMAND[0] else -most, most):
             if bottom <= limit <= top:
                 panel.axhline(limit, color=BLACK, linestyle=":", label="limit of the plant")
 

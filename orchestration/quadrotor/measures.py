@@ -36,7 +36,7 @@ def saturated(signals: Mapping[str, Floats], parameters: Mapping[str, float]) ->
     thrust, *torques = (signals[f"plant.{name}"] for name in COMMAND)
     most_thrust, most_torque = (parameters.get(f"plant.{name}", np.inf) for name in ("thrust_max", "torque_max"))
     motors = _motors_saturated(thrust, torques, parameters)
-    found = {COMMAND[0]: (thrust < 0.0) | (thrust > most_thrust) | motors}
+    found = {COMMAND[0]: (thrust < parameters.get("plant.thrust_min", 0.0)) | (thrust > most_thrust) | motors}
     return found | {name: (np.abs(t) > most_torque) | motors for name, t in zip(COMMAND[1:], torques, strict=True)}
 
 

@@ -64,6 +64,7 @@ PLANT = (
     *row("wind.amplitude", "parameter tunable", "N", 0.01, axes=XYZ),
     *row("wind.frequency", "parameter tunable", "rad/s", 0.1),
     *row("thrust_max", "parameter fixed", "N", 1e6),
+    *row("thrust_min", "parameter fixed", "N", 0.0),
     *row("torque_max", "parameter fixed", "N.m", 1e6),
     *row("actuator_time_constant", "parameter fixed", "s", 0.0),
     *row("max_internal_step", "parameter fixed", "s", 0.002),

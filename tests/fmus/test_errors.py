@@ -111,6 +111,7 @@ BAD_PARAMETERS = [
     ),
     Bad(PLANT, {"actuator_time_constant": -0.1}, f"actuator_time_constant = -0.1: {NOT_NEGATIVE}"),
     Bad(PLANT, {"thrust_max": -1.0}, f"thrust_max = -1.0: {NOT_NEGATIVE}"),
+    Bad(PLANT, {"thrust_max": 2.0, "thrust_min": 3.0}, "thrust_min = 3.0: expected at most 2.0, the largest"),
     Bad(PLANT, {"torque_max": -1.0}, f"torque_max = -1.0: {NOT_NEGATIVE}"),
     Bad(PLANT, {"motor.thrust_max": -1.0}, f"motor.thrust_max = -1.0: {NOT_NEGATIVE}"),
     Bad(PLANT, {"motor.arm.y": 0.0}, f"motor.arm.y = 0.0: {POSITIVE}"),

@@ -41,6 +41,11 @@ def test_the_box_cuts_thrust_and_each_torque(command: Wrench, limited: Wrench) -
     assert Box(thrust_max=20.0, torque_max=0.5).limited(command) == limited
 
 
+@pytest.mark.parametrize(("thrust", "limited"), [(-30.0, -5.0), (-4.0, -4.0), (12.0, 12.0), (30.0, 20.0)])
+def test_the_least_thrust_of_the_box_may_be_negative(thrust: float, limited: float) -> None:
+    assert Box(thrust_max=20.0, thrust_min=-5.0).limited(Wrench(thrust, ZERO)) == Wrench(limited, ZERO)
+
+
 def test_defaults_limit_and_delay_nothing_that_flies() -> None:
     command, ideal = Wrench(12.0, Vec3(143.0, -22.0, 8.0)), Actuators()
     target = ideal.limited(command)

@@ -70,7 +70,7 @@ def measured(
     system = changed(quadrotor(), {"stop_time": planned or end or 1.0, "connections.command.hold": hold})
     recording = recorded(signals, sorted(events), cuts)
     motors = {"thrust_max": motor_max, "thrust_min": 0.1, "arm.x": 0.2, "arm.y": 0.1, "drag_to_thrust": 0.02}
-    limits = {"plant.thrust_max": thrust_max, "plant.torque_max": torque_max}
+    limits = {"plant.thrust_max": thrust_max, "plant.thrust_min": 0.0, "plant.torque_max": torque_max}
     limits |= {f"plant.motor.{name}": value for name, value in motors.items()}
     return objectives.compute(
         system,
