@@ -19,6 +19,7 @@ import numpy as np
 
 from orchestration.building import fmus
 from orchestration.engines.batch.batch import Batch
+from orchestration.engines.batch.batches import Batches
 from orchestration.engines.batch.kernels import lanes_here
 from orchestration.engines.batch.shape import Shape
 from orchestration.engines.structures import address
@@ -26,6 +27,7 @@ from orchestration.engines.wiring import checked
 from orchestration.fmi.model import read_model
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
+from orchestration.runs.in_lanes import fly, located
 from orchestration.runs.simulation import prepared
 from orchestration.schedule.schedule_cache import ScheduleCache, timing
 from orchestration.studies.axes import Axis
@@ -108,6 +110,19 @@ def end_to_end(period: float, runs: int) -> float:
         return _cpu() - begin
 
 
+def from_arrays(period: float, runs: int) -> tuple[float, float]:
+    """CPU time of so many flights of 20 s as lanes, their systems given, and of `fly` with the same as an array [s]."""
+    flight = Scenario(timing=Timing(period=period), stop_time=20.0)
+    system, places = located(flight.as_system()), np.linspace(0.0, 1.0, runs)
+    given, batches = [changed(system, {X: place}) for place in places.tolist()], Batches()
+    batches.run(given[: lanes_here()])
+    begin = time.process_time()
+    batches.run(given)
+    between = time.process_time()
+    fly(flight, {"plant.initial.position.x": places})
+    return between - begin, time.process_time() - between
+
+
 def _cpu() -> float:
     """Of this process and of those that it has waited for [s]."""
     whose = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
@@ -131,6 +146,12 @@ def main() -> None:
         print(
             f"{case:<14} batch {1e-6 / batch:6.2f} M steps/s   bare kernels {1e-6 / kernels:6.2f} M steps/s   "
             f"{100 * kernels / batch:3.0f} % of them   {loop / batch:5.1f} times the compiled loop"
+        )
+    for period in (0.02, 0.01):
+        lanes, arrays = map(min, zip(*(from_arrays(period, RUNS) for _ in range(2))))
+        print(
+            f"fly with {RUNS} flights of 20 s at {1 / period:.0f} Hz as an array: {RUNS / arrays:6.0f} runs/s of CPU "
+            f"time, {100 * (arrays / lanes - 1):+.0f} % against the same lanes with a system for each"
         )
     for case, period in (("20 ms / 1 ms", 0.02), ("10 ms / 1 ms", 0.01)):
         all_runs, few_runs = (min(end_to_end(period, runs) for _ in range(2)) for runs in (RUNS, FEW))

@@ -15,6 +15,7 @@ Where to begin:
 
 - `run` takes a `Scenario` of the quadrotor, with its `Timing`, or a `System` of any FMUs, and gives a `Result`;
 - `load_scenario` and `load_system` read files of them, and the constructors refuse what the files refuse, in one line;
+- `fly` takes arrays of initial conditions, or of anything else, and gives arrays: many runs at once, without a store;
 - `limit` finds the largest period, delay, loss or anything else that is still good;
 - `sweep` flies a `Study` over axes, `compare` controllers against each other, `tune` searches for gains: what is there
   is not flown again, and what they give becomes a table with `to_pandas`;
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from orchestration.quadrotor.timing import Timing
     from orchestration.quadrotor.vehicle import Vehicle, load_vehicle
     from orchestration.report.writing import report
+    from orchestration.runs.in_lanes import Flights, fly
     from orchestration.runs.meant import RunInterrupted, RunLost
     from orchestration.runs.pause import fly_until, resume
     from orchestration.runs.result import Result
@@ -90,6 +92,8 @@ _HOMES = {
     "read_model": "orchestration.fmi.model",
     "Model": "orchestration.fmi.model",
     # many runs
+    "fly": "orchestration.runs.in_lanes",
+    "Flights": "orchestration.runs.in_lanes",
     "limit": "orchestration.limits.limit",
     "Limit": "orchestration.limits.limit",
     "sweep": "orchestration.studies.sweep",
@@ -123,6 +127,7 @@ __all__ = [
     "Connection",
     "Criterion",
     "DisturbanceChoice",
+    "Flights",
     "FmuChoice",
     "Limit",
     "Model",
@@ -146,6 +151,7 @@ __all__ = [
     "Vehicle",
     "changed",
     "compare",
+    "fly",
     "fly_until",
     "limit",
     "load_comparison",

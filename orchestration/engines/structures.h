@@ -177,7 +177,7 @@ typedef struct {
     Lanes doubtful; /* in which a value was not a number */
     Kept *kept;
     int32_t *status;
-    int64_t recorded_count, record_limit; /* columns that are kept row by row, for who wants to see them */
+    int64_t recorded_count, record_limit; /* columns that are kept row by row, and of how many rows: 0 for none */
     const double **recorded;
     double *records[L];
     int64_t record_counts[L];

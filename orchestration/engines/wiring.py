@@ -6,6 +6,7 @@ from fractions import Fraction
 
 from fmu_kit.trajectory import Trajectory
 from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats
 from orchestration.engines.sources import (
     BuiltIn,
     Constant,
@@ -109,6 +110,16 @@ def source_values(system: System, name: str, parameters: Mapping[str, float], st
     own = {f"{source.trajectory}.{name}": field for name, field in TRAJECTORY.items()}
     given = {field: parameters[name] for name, field in own.items() if name in parameters}
     return BuiltIn(Trajectory(**given))
+
+
+def source_signals(system: System, parameters: Mapping[str, float], t: Floats) -> dict[str, Floats]:
+    """What the sources of a run say at instants t [s], by signal, each of the shape of t; `parameters` as above."""
+    streams = Streams(system.seed, system.streams)
+    found: dict[str, Floats] = {}
+    for name, source in system.sources.items():
+        values = source_values(system, name, parameters, streams).over(t)
+        found |= dict(zip(source.signals(name), values.T))
+    return found
 
 
 def _of_file_or_signal(system: System, name: str, streams: Streams) -> Values:

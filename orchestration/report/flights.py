@@ -7,12 +7,11 @@ from orchestration.basics.errors import QuadcosimError
 from orchestration.basics.simulator import Floats
 from orchestration.building.inputs import Files, all_with_files
 from orchestration.engines.batch.batches import Batches
-from orchestration.engines.wiring import columns_of, source_values
+from orchestration.engines.wiring import columns_of, source_signals
 from orchestration.report.known_layouts import layout_for
 from orchestration.report.tracks import Signals
 from orchestration.results.objectives import Metrics
 from orchestration.runs.simulation import run
-from orchestration.schedule.streams import Streams
 from orchestration.studies.study import Study
 from orchestration.system.model import System
 from orchestration.workers.batching import expect_lanes
@@ -74,13 +73,15 @@ def _flown(systems: Sequence[System], starts: Mapping[str, float], batches: Batc
         return
     wanted = _columns(systems[0])
     columns = [name for name in wanted if name.partition(".")[0] in systems[0].components]
-    rows: dict[int, Floats] = {}
-    for place, flown in enumerate(batches.run(systems, columns, rows.__setitem__)):
+    found: dict[int, Found | None] = {}
+    for place, flown, rows in batches.each(systems, columns):
         if flown is None:
-            yield _alone(systems[place])
+            found[place] = _alone(systems[place])
             continue
-        signals = dict(zip(("time", *columns), rows[place].T))
-        yield signals | _of_sources(systems[place], starts, signals["time"]), flown.metrics, flown.message
+        signals = dict(zip(("time", *columns), rows.T.copy()))
+        sources = _of_sources(systems[place], starts, signals["time"])
+        found[place] = signals | sources, flown.metrics, flown.message
+    yield from (found[place] for place in range(len(systems)))
 
 
 def _alone(system: System) -> Found | None:
@@ -105,12 +106,6 @@ def _columns(system: System) -> list[str]:
 
 def _of_sources(system: System, starts: Mapping[str, float], t: Floats) -> dict[str, Floats]:
     """What the sources said, which lanes do not record."""
-    streams = Streams(system.seed, system.streams)
-    found: dict[str, Floats] = {}
-    for name, source in system.sources.items():
-        component = source.trajectory
-        given = {} if component is None else system.components[component].parameters
-        numbers = {f"{component}.{key}": float(value) for key, value in given.items() if not isinstance(value, str)}
-        values = source_values(system, name, {**starts, **numbers}, streams).over(t)
-        found |= dict(zip(source.signals(name), values.T))
-    return found
+    given = {f"{name}.{key}": value for name, one in system.components.items() for key, value in one.parameters.items()}
+    numbers = {name: float(value) for name, value in given.items() if not isinstance(value, str)}
+    return source_signals(system, {**starts, **numbers}, t)

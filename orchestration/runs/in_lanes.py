@@ -1,31 +1,212 @@
-"""Flies many systems as lanes of runs, and alone what cannot be."""
+"""Many runs of one system from arrays into arrays: in lanes where those can be had, alone where not."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+import logging
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from orchestration.basics.errors import QuadcosimError, UsageError, expected_name
+from orchestration.basics.simulator import Floats
 from orchestration.building import fmus
+from orchestration.engines.batch.batch import MOST_ROWS
 from orchestration.engines.batch.batches import Batches
-from orchestration.results.objectives import Metrics
+from orchestration.engines.batch.kernels import lanes_here
+from orchestration.engines.batch.shape import Shape
+from orchestration.engines.wiring import checked, columns_of, source_signals
+from orchestration.fmi.model import Model, read_model
+from orchestration.results.objectives import FIXED, Metrics
+from orchestration.runs.columns import Columns, columns
 from orchestration.runs.simulation import run
-from orchestration.system.model import System
+from orchestration.system.check import recorded
+from orchestration.system.model import System, component_of, variable_of
+from orchestration.system.request import Request, in_its_own_words
+
+BATCH = "batch"
+_NOTES = logging.getLogger("quadcosim")
 
 
-def fly(systems: Sequence[System]) -> Iterator[Metrics]:
-    """The metrics of systems in their order, by native FMUs, built if need be; divergence is a result.
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Flights(Mapping[str, Floats]):
+    """What many runs came to, as arrays by name: `flights["position_rmse"]` has a value for each run."""
 
-    Raises `UsageError` for a system that cannot be flown in lanes, naming the component and what it lacks, and what
-    `run` raises for one that cannot be flown at all.
+    arrays: Mapping[str, Floats]
+    """By name: of an output shape (runs,), NaN where it has no value; of `time` and what was recorded shape
+    (runs, rows), NaN after the last row of a run that has fewer."""
+    engine: str
+    """What flew them: `batch`, which is lanes, or else `compiled` or `python`; the numbers are the same."""
+    reason: str | None
+    """Why they were not flown in lanes, in a line; None: they were."""
+    units: Mapping[str, str]
+    """The units of the outputs that have one, by name, as FMI writes them (`N.m`)."""
+
+    def __getitem__(self, name: str) -> Floats:
+        """The array of a name."""
+        return self.arrays[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Over the names."""
+        return iter(self.arrays)
+
+    def __len__(self) -> int:
+        """How many arrays there are."""
+        return len(self.arrays)
+
+    def __repr__(self) -> str:
+        count = len(next(iter(self.arrays.values())))
+        return f"<Flights: {count} runs by {self.engine}; {', '.join(self.arrays)}>"
+
+
+def fly(
+    asked: Request, values: Mapping[str, Any], *, outputs: Sequence[str] | None = None, record: Sequence[str] = ()
+) -> Flights:
+    """Fly many runs of a system, or a scenario, from arrays into arrays, without a store or a result for each.
+
+    `values` are arrays of shape (runs,) by path, as axes of a study name them (`plant.initial.position.x`,
+    `timing.period`, `seed`), or one value for all runs. `outputs` are names of objectives, or of `good`, `horizon` [s],
+    `diverged`, `divergence_time` [s] and `steps`; without it, all of them. `record` are columns whose rows are kept,
+    with their `time` [s]. All arrays are of float64; truths are 0.0 and 1.0.
+
+    It flies native FMUs as lanes of vector registers where this machine has a C compiler and the FMUs have code for
+    lanes, else each run as `run` does. Raises `UsageError` for a path, an output or a column that there is not, arrays
+    of different lengths and values that cannot be; and what `run` raises for a run that cannot be flown, saying which.
     """
-    twins = [fmus.native_twins(system) for system in systems]
-    paths: dict[str, str] = {}
-    for system in twins:
-        if not paths.keys() >= {*system.fmus.values()}:
-            paths |= {system.fmus[name]: str(path) for name, path in fmus.of_components(system.fmus).items()}
-    located = [_with_fmus(system, paths) for system in twins]
-    for system, flown in zip(located, Batches().run(located)):
-        yield run(system).metrics if flown is None else flown.metrics
+    with in_its_own_words(asked):
+        system = located(asked.as_system())
+        models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
+        fits = checked(_recording(system, models, record), models)
+        names = _outputs(fits.system, outputs)
+        given = columns(asked, fits.system, models, values)
+        reason = _reason_unavailable(fits.system, models)
+        table = _Table(given.count, names, record)
+        for flown in _alone(given, range(given.count), record) if reason else _in_lanes(given, fits.parameters, record):
+            table.put(flown)
+    engine = table.engine if reason else BATCH
+    _NOTES.debug("%d runs by the engine %s%s", given.count, engine, f": {reason}" if reason else "")
+    known = {"time": "s", "horizon": "s", "divergence_time": "s", **fits.units}
+    units = {name: known[name] for name in table.arrays if name in known}
+    return Flights(arrays=table.arrays, engine=engine, reason=reason, units=units)
 
 
-def _with_fmus(system: System, paths: Mapping[str, str]) -> System:
-    components = {name: replace(each, fmu=paths[each.fmu]) for name, each in system.components.items()}
+@dataclass(frozen=True, kw_only=True)
+class _Flown:
+    """What one run came to, for as long as it takes to note it."""
+
+    place: int
+    metrics: Metrics
+    rows: Sequence[Floats]
+    """the time, then what is recorded"""
+    engine: str = BATCH
+
+
+class _Table:
+    """Arrays that fill with runs."""
+
+    def __init__(self, count: int, outputs: Sequence[str], record: Sequence[str]) -> None:
+        self._outputs = {name: np.full(count, np.nan) for name in outputs}
+        self._recorded = ("time", *(name for name in record if name != "time")) if record else ()
+        self._rows: Floats = np.full((len(self._recorded), count, 0), np.nan)
+        self.engine = BATCH
+
+    @property
+    def arrays(self) -> dict[str, Floats]:
+        """All of them by name."""
+        return {**self._outputs, **dict(zip(self._recorded, self._rows))}
+
+    def put(self, flown: _Flown) -> None:
+        """Note a run."""
+        self.engine = flown.engine
+        for name, column in self._outputs.items():
+            value = flown.metrics[name]
+            column[flown.place] = np.nan if value is None else float(value)
+        if self._recorded:
+            longer = len(flown.rows[0]) - self._rows.shape[2]
+            if longer > 0:
+                self._rows = np.pad(self._rows, ((0, 0), (0, 0), (0, longer)), constant_values=np.nan)
+            self._rows[:, flown.place, : len(flown.rows[0])] = flown.rows
+
+
+def _in_lanes(given: Columns, parameters: Mapping[str, float], record: Sequence[str]) -> Iterator[_Flown]:
+    """All runs, in lanes but for those that are to be flown alone; `parameters` are those of all components."""
+    places = {name: i for i, name in enumerate(_of_components(given.system, record), 1)}
+    for place, summary, rows in Batches().each(given.systems, list(places) if record else None, given.parameters):
+        if len(rows) == MOST_ROWS:
+            raise UsageError(f"record: run {place} has more than {MOST_ROWS} rows; expected runs of fewer")
+        if summary is None:
+            yield from _alone(given, [place], record)
+            continue
+        signals = {"time": rows[:, 0], **{name: rows[:, i] for name, i in places.items()}} if record else {}
+        if record and len(places) < len(record):
+            numbers = {**parameters, **{name: float(column[place]) for name, column in given.parameters.items()}}
+            signals |= source_signals(given.systems[place], numbers, signals["time"])
+        yield _Flown(place=place, metrics=summary.metrics, rows=_rows(signals, record))
+
+
+def _alone(given: Columns, places: Iterable[int], record: Sequence[str]) -> Iterator[_Flown]:
+    """Runs one by one, as `run` flies them."""
+    for place in places:
+        try:
+            result = run(given.alone(place))
+        except QuadcosimError as error:
+            raise type(error)(f"run {place}: {error}") from error
+        rows = _rows(result.signals, record)
+        yield _Flown(place=place, metrics=result.metrics, rows=rows, engine=result.provenance["engine"])
+
+
+def _rows(signals: Mapping[str, Floats], record: Sequence[str]) -> list[Floats]:
+    return [signals[name] for name in ("time", *(name for name in record if name != "time"))] if record else []
+
+
+def _of_components(system: System, record: Sequence[str]) -> list[str]:
+    """What is recorded that is of components: lanes have no other."""
+    return [name for name in record if component_of(name) in system.components]
+
+
+def located(system: System) -> System:
+    """With its FMUs as files: native twins where they can be built, else those that it names."""
+    try:
+        twins = fmus.native_twins(system)
+        paths = fmus.of_components(twins.fmus)
+    except QuadcosimError as error:
+        _NOTES.debug("no native twins: %s", error)
+        paths = fmus.of_components(system.fmus)
+    components = {name: replace(each, fmu=str(paths[name])) for name, each in system.components.items()}
     return replace(system, components=components)
+
+
+def _recording(system: System, models: Mapping[str, Model], record: Sequence[str]) -> System:
+    """The system that records these columns too; raises `UsageError` for one that cannot be recorded."""
+    there, usual = {"time", *columns_of(system)}, recorded(system, models)
+    components = dict(system.components)
+    for column in record:
+        name, variable = component_of(column), variable_of(column)
+        if column in there or variable in usual.get(name, ()):
+            continue
+        if name not in components:
+            listed = [*components, *system.sources]
+            raise UsageError(f"record: {column}: expected COMPONENT.VARIABLE of {', '.join(listed)}")
+        usual[name] = (*usual[name], variable)
+        components[name] = replace(components[name], record=usual[name])
+    return replace(system, components=components)
+
+
+def _outputs(system: System, asked: Sequence[str] | None) -> tuple[str, ...]:
+    """The names of numbers that a run comes to; raises `UsageError` for one that there is not."""
+    there = [name for name in (*system.objectives, *system.optional, *FIXED) if name != "outcome"]
+    for name in asked or ():
+        if name not in there:
+            raise UsageError(f"outputs: {name}: {expected_name(name, there)}")
+    return tuple(dict.fromkeys(there if asked is None else asked))
+
+
+def _reason_unavailable(system: System, models: Mapping[str, Model]) -> str | None:
+    """Why a system that its FMUs fit cannot be flown in lanes here, in a line; None: it can be."""
+    try:
+        shape = Shape(system=system, models=models, lanes=lanes_here())
+        assert shape.kernels
+        assert shape.library
+    except QuadcosimError as error:
+        return str(error)
+    return None

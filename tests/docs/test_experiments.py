@@ -11,8 +11,11 @@ import quadcosim
 from docs import experiments
 from docs.make_findings import flying_up_to, with_python_inside
 from fmu_kit.trajectory import Trajectory
+from orchestration.engines.batch.batches import Batches
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.runs.in_lanes import fly
+from orchestration.results.objectives import Metrics
+from orchestration.runs.in_lanes import located
+from orchestration.runs.simulation import run
 from orchestration.workers.batching import Agreement
 
 PAGES = "\n".join(
@@ -21,8 +24,15 @@ PAGES = "\n".join(
 DECIMAL = re.compile(r"-?\d+\.?\d*")
 
 
+def metrics_of(scenarios: list[Scenario]) -> list[Metrics]:
+    """Of flights in lanes, those alone that lanes leave."""
+    systems = [located(scenario.as_system()) for scenario in scenarios]
+    found = zip(systems, Batches().run(systems))
+    return [run(system).metrics if flown is None else flown.metrics for system, flown in found]
+
+
 def flown(scenarios: list[Scenario]) -> list[str]:
-    return [str(metrics["outcome"]) for metrics in fly([scenario.as_system() for scenario in scenarios])]
+    return [str(metrics["outcome"]) for metrics in metrics_of(scenarios)]
 
 
 def rows(section: str) -> dict[str, list[str]]:
@@ -34,7 +44,7 @@ def rows(section: str) -> dict[str, list[str]]:
 
 def test_flights_in_lanes_are_those_of_the_fmus_with_python_inside() -> None:
     chosen = [scenario.with_changes(stop_time=1.0) for scenario in experiments.some_flights(3)]
-    lanes = fly([scenario.as_system() for scenario in chosen])
+    lanes = metrics_of(chosen)
     alone = [quadcosim.run(with_python_inside(scenario)).metrics for scenario in chosen]
     found = Agreement.of((i, *pair) for i, pair in enumerate(zip(lanes, alone, strict=True)))
     assert found.runs == 3

@@ -177,7 +177,7 @@ static void pass_and_sum_up(Loop *l, Instant *now, Lanes tracks) {
     Lanes lanes = now->lanes & l->alive;
     if (!lanes) return;
     if (!(first ? begin_row(l, now, mask_of(lanes)) : next_row(l, now, mask_of(lanes)))) l->no_memory = 1;
-    if (l->recorded_count) record(l, now, lanes);
+    if (l->record_limit) record(l, now, lanes);
 }
 
 static int samples_next(const Track *track) {

@@ -3,6 +3,7 @@
 import ctypes
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,11 @@ from orchestration.schedule.timetable import Timetable
 from orchestration.system.model import System, component_of, variable_of
 from orchestration.system.times import NANOSECONDS, nanoseconds
 
+MOST_ROWS = 2**20
+"""of a run that are kept"""
+Columns = Mapping[str, Floats]
+"""Real parameters as COMPONENT.NAME, a value for each run"""
+NOTHING: Columns = MappingProxyType({})
 _SAID = 64
 """Windows for which values of sources are kept"""
 
@@ -44,7 +50,7 @@ class BatchResult:
     reductions: Mapping[Call, Floats]
     """NaN for what has no value"""
     signals: Sequence[Floats]
-    """rows of what was to be recorded, with the time [s] first, of each run"""
+    """rows of what was to be recorded, with the time [s] first, of each run; none if nothing was"""
 
 
 @dataclass(kw_only=True)
@@ -53,6 +59,8 @@ class _Run:
 
     system: System
     streams: Streams
+    numbers: Mapping[str, float]
+    """as `Batch.parameters`"""
     seen: list[Values]
     given: list[Values]
     noise: dict[int, np.random.Generator] = field(default_factory=dict)
@@ -81,6 +89,7 @@ class Batch:
         self._shape, self._schedules, self._lanes = shape, schedules, shape.lanes
         self._library = shape.library
         self._said: dict[Hashable, tuple[Floats, Floats]] = {}
+        self._own = NOTHING
         self._written = shape.written
         self._kept_arrays: list[Any] = []
         owners = [source.trajectory for source in shape.system.sources.values() if source.trajectory is not None]
@@ -127,8 +136,18 @@ class Batch:
 
     # -- a group of runs -------------------------------------------------------------------------------------------
 
-    def run(self, systems: Sequence[System], timings: Sequence[Hashable], record: Sequence[str] = ()) -> BatchResult:
-        """Go through at most as many runs as there are lanes; `record` are columns that are kept of each row."""
+    def run(
+        self,
+        systems: Sequence[System],
+        timings: Sequence[Hashable],
+        record: Sequence[str] | None = None,
+        own: Columns = NOTHING,
+    ) -> BatchResult:
+        """Go through at most as many runs as there are lanes; `record` are columns that are kept of each row, with t.
+
+        `own` are parameters of each run on top of those of its system.
+        """
+        self._own = own
         found: dict[Call, Floats] = {}
         for _ in range(self._shape.passes):
             result = self._once(systems, timings, found, record)
@@ -140,10 +159,10 @@ class Batch:
         systems: Sequence[System],
         timings: Sequence[Hashable],
         known: Mapping[Call, Floats],
-        record: Sequence[str],
+        record: Sequence[str] | None,
     ) -> BatchResult:
         batch, count = self._batch, len(systems)
-        runs = [self._run(system) for system in systems]
+        runs = [self._run(lane, system) for lane, system in enumerate(systems)]
         self._library.clear(ctypes.addressof(batch))
         self._state[:] = np.array(self._written.states)[:, None]
         batch.doubtful = 0
@@ -205,10 +224,10 @@ class Batch:
 
     # -- values at the start ---------------------------------------------------------------------------------------
 
-    def _run(self, system: System) -> _Run:
+    def _run(self, lane: int, system: System) -> _Run:
         shape = self._shape
         streams = Streams(system.seed, system.streams)
-        parameters = self.parameters(system)
+        parameters = self.parameters(lane, system)
         at_work = {name: source_values(system, name, parameters, streams) for name in system.sources}
         noisy = {
             i: streams.of(f"connections.{x.name}", NOISE)
@@ -216,19 +235,21 @@ class Batch:
             if any(x.noise.values())
         }
         given = [at_work[name] for name, source in system.sources.items() if source.to]
-        return _Run(
-            system=system, streams=streams, seen=[at_work[name] for name in shape.seen], given=given, noise=noisy
-        )
+        seen = [at_work[name] for name in shape.seen]
+        return _Run(system=system, streams=streams, numbers=parameters, seen=seen, given=given, noise=noisy)
 
     def numbers(self, systems: Sequence[System]) -> dict[str, Floats]:
-        """What has one value in a run, of each of some runs."""
-        found = {name: np.array([self._number(system, name) for system in systems]) for name in self._shape.numbers}
+        """What has one value in a run, of each of those that were run last."""
+        found = {
+            name: np.array([self._number(lane, system, name) for lane, system in enumerate(systems)])
+            for name in self._shape.numbers
+        }
         return {**found, STOP_TIME: np.array([nanoseconds(system.stop_time) / NANOSECONDS for system in systems])}
 
-    def parameters(self, system: System) -> dict[str, float]:
-        """Those that its look-out or its sources may name."""
+    def parameters(self, lane: int, system: System) -> dict[str, float]:
+        """Those that the look-out or the sources of a run may name."""
         names = [*self._shape.numbers, *(each for names in self._trajectories.values() for each in names)]
-        return {name: self._number(system, name) for name in names}
+        return {name: self._number(lane, system, name) for name in names}
 
     def value(self, column: str, lane: int) -> float:
         """The value of a column in a run, where it has ended."""
@@ -239,7 +260,9 @@ class Batch:
         variables = self._shape.models[component].variables
         return [f"{component}.{name}" for name in variables if name.startswith("trajectory.")]
 
-    def _number(self, system: System, name: str) -> float:
+    def _number(self, lane: int, system: System, name: str) -> float:
+        if name in self._own:
+            return float(self._own[name][lane])
         owner, parameter, variable, start = self._starts[name]
         given = system.components[owner].parameters.get(parameter)
         return start if given is None else number_of(variable, given)
@@ -262,6 +285,9 @@ class Batch:
                         own = sampling.clock == "fmu"
                         memory[variables[SAMPLE_PERIOD].reference, lane] = sampling.period if own else 0.0
                         memory[variables[SAMPLE_OFFSET].reference, lane] = sampling.offset if own else 0.0
+        for name, values in self._own.items():
+            index, place = shape.place(name)
+            self.memories[index][place, : len(values)] = values
         for i, arrays in enumerate(self._of_channels):
             for lane, system in enumerate(systems):
                 x = system.connections[i]
@@ -269,7 +295,7 @@ class Batch:
                 arrays["scale"][0, lane], arrays["offset"][0, lane] = x.scale, x.offset
         for lane, system in enumerate(systems):
             for i, name in enumerate(shape.numbers):
-                self._numbers[i, lane] = self._number(system, name)
+                self._numbers[i, lane] = self._number(lane, system, name)
             self._begin(lane, system)
             self._numbers[len(shape.numbers), lane] = nanoseconds(system.stop_time) / NANOSECONDS
             for i, call in enumerate(shape.inner):
@@ -352,20 +378,21 @@ class Batch:
         tracks = []
         for timing, lanes in found.items():
             windows = self._schedules.of((timing, id(self._shape)), runs[lanes[0]].system)
-            keys = {self._sources_of(runs[lane].system) for lane in lanes}
+            keys = {self._sources_of(runs[lane]) for lane in lanes}
             tracks.append(
                 _Track(lanes=lanes, timing=timing, windows=windows, ahead=next(windows, None), alike=len(keys) == 1)
             )
         return tracks
 
-    def _sources_of(self, system: System) -> Hashable:
+    def _sources_of(self, run: _Run) -> Hashable:
         """What the values of the sources follow from, where it is not the structure."""
         found: list[Any] = []
+        system = run.system
         for name, source in system.sources.items():
             if name in self._shape.seen or source.to:
                 found += [source, system.seed if source.is_random else None]
             if source.trajectory is not None:
-                found.append(tuple(self._number(system, each) for each in self._trajectories[source.trajectory]))
+                found.append(tuple(run.numbers[each] for each in self._trajectories[source.trajectory]))
         return tuple(map(repr, found))
 
     def _next_window(self, number: int, track: _Track, runs: Sequence[_Run]) -> None:
@@ -395,7 +422,7 @@ class Batch:
 
     def _values_over(self, run: _Run, t: Floats, track: _Track, window: Schedule) -> tuple[Floats, Floats]:
         """What sources say at the instants of a window; what many runs have in common is found once."""
-        key = (track.timing, self._sources_of(run.system), int(window.times[0]), len(window))
+        key = (track.timing, self._sources_of(run), int(window.times[0]), len(window))
         if key not in self._said:
             while len(self._said) >= _SAID:
                 del self._said[next(iter(self._said))]
@@ -412,18 +439,18 @@ class Batch:
             run.arrays.append(noise)
             self._channels[i].noise[lane] = address(noise)
 
-    def _record(self, columns: Sequence[str], tracks: Sequence[_Track]) -> list[Floats]:
-        """Room for the rows of some columns."""
+    def _record(self, columns: Sequence[str] | None, tracks: Sequence[_Track]) -> list[Floats]:
+        """Room for the rows of some columns; None: no rows are kept."""
         batch = self._batch
-        batch.recorded_count = len(columns)
-        if not columns:
+        batch.recorded_count, batch.record_limit = len(columns or ()), 0 if columns is None else MOST_ROWS
+        if columns is None:
             return []
         places = [self._shape.place(column) for column in columns]
         self._recorded = np.array(
             [address(self.memories[i]) + 8 * self._lanes * place for i, place in places], dtype=np.int64
         )
-        batch.recorded, batch.record_limit = address(self._recorded), 2**20
-        rows = [np.empty((2**20, len(columns) + 1)) for _ in range(sum(len(track.lanes) for track in tracks))]
+        batch.recorded = address(self._recorded)
+        rows = [np.empty((MOST_ROWS, len(columns) + 1)) for _ in range(sum(len(track.lanes) for track in tracks))]
         for lane, table in enumerate(rows):
             batch.records[lane] = address(table)
         return rows

@@ -1,13 +1,13 @@
 """Flies many systems as lanes of runs, and says of each what it came to, or that it is to be flown alone."""
 
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from orchestration.basics.simulator import Floats
-from orchestration.engines.batch.batch import Batch, BatchResult
+from orchestration.engines.batch.batch import NOTHING, Batch, BatchResult, Columns
 from orchestration.engines.batch.combining import combined
 from orchestration.engines.batch.kernels import lanes_here
 from orchestration.engines.batch.shape import Shape, outline
@@ -21,9 +21,6 @@ from orchestration.schedule.streams import Streams
 from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS, nanoseconds
 
-Take = Callable[[int, Floats], None]
-"""Hears of a run, by its place among those that were asked for, the rows of what was recorded."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class RunSummary:
@@ -34,6 +31,11 @@ class RunSummary:
     """what diverged"""
 
 
+Landed = tuple[int, RunSummary | None, Floats]
+"""The place of a run among those that were asked for, what it came to, its rows"""
+_NO_ROWS: Floats = np.zeros((0, 0))
+
+
 class Batches:
     """The batches of this process, by the shape of what they run; their FMUs are files."""
 
@@ -42,29 +44,36 @@ class Batches:
         self._lanes = lanes_here()
         self._batches: dict[Hashable, tuple[Shape, Batch]] = {}
 
-    def run(
-        self, systems: Sequence[System], record: Sequence[str] = (), take: Take | None = None
-    ) -> list[RunSummary | None]:
-        """What runs came to; None for one that is to be flown alone, by what flies anything.
-
-        `record` are columns whose rows, the time [s] first, `take` is given of each run. Raises `UsageError` for what
-        cannot be flown in lanes.
-        """
+    def run(self, systems: Sequence[System]) -> list[RunSummary | None]:
+        """What runs came to, in their order; None for one that is to be flown alone. Raises as `each`."""
         found: list[RunSummary | None] = [None] * len(systems)
-        shapes: dict[Hashable, list[int]] = {}
-        for index, system in enumerate(systems):
-            shapes.setdefault(outline(system), []).append(index)
-        for key, indices in shapes.items():
-            shape, batch = self._batch(key, systems[indices[0]])
-            timings = {index: timing(systems[index]) for index in indices}
-            for group in _groups(indices, timings, self._lanes):
-                result = batch.run([systems[i] for i in group], [timings[i] for i in group], record)
-                for index, flown in zip(group, _told(shape, batch, result, [systems[i] for i in group])):
-                    found[index] = flown
-                for index, rows in zip(group, result.signals if take is not None else ()):
-                    assert take is not None
-                    take(index, rows)
+        for place, summary, _ in self.each(systems):
+            found[place] = summary
         return found
+
+    def each(
+        self, systems: Sequence[System], record: Sequence[str] | None = None, own: Columns = NOTHING
+    ) -> Iterator[Landed]:
+        """Runs as they end: their places among `systems`, what they came to, and the rows of columns, if to `record`.
+
+        What it came to is None for one that is to be flown alone, by what flies anything; rows have the time [s] first,
+        and are there until the next run. `own` are parameters of each run on top of those of its system, which many
+        may share. Raises `UsageError` for what cannot be flown in lanes.
+        """
+        known = {id(system): (outline(system), timing(system)) for system in systems}
+        shapes: dict[Hashable, list[int]] = {}
+        for place, system in enumerate(systems):
+            shapes.setdefault(known[id(system)][0], []).append(place)
+        for key, places in shapes.items():
+            shape, batch = self._batch(key, systems[places[0]])
+            timings = {place: known[id(systems[place])][1] for place in places}
+            for group in _groups(places, timings, self._lanes):
+                some = [systems[i] for i in group]
+                result = batch.run(
+                    some, [timings[i] for i in group], record, {name: values[group] for name, values in own.items()}
+                )
+                rows = result.signals or [_NO_ROWS] * len(group)
+                yield from zip(group, [*_told(shape, batch, result, some)], rows)
 
     def _batch(self, key: Hashable, system: System) -> tuple[Shape, Batch]:
         if key not in self._batches:
@@ -116,7 +125,7 @@ def _told(shape: Shape, batch: Batch, result: BatchResult, systems: Sequence[Sys
 
 def _complaint(shape: Shape, batch: Batch, system: System, lane: int, t: float) -> str | None:
     """How the values of a lane have diverged, as the look-out of a single run says it; None: it says they have not."""
-    streams, parameters = Streams(system.seed, system.streams), batch.parameters(system)
+    streams, parameters = Streams(system.seed, system.streams), batch.parameters(lane, system)
     sources = {name: source_values(system, name, parameters, streams) for name in system.sources}
     signals = {name: system.sources[name].signals(name) for name in sources}
     look = watch(system.criterion.diverged, shape.board, sources, signals, parameters)

@@ -12,10 +12,10 @@ from orchestration.building import fmus
 from orchestration.engines.batch.batches import Batches
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.runs.in_lanes import fly
+from orchestration.runs.in_lanes import located as with_files
 from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
 from orchestration.system.paths import changed
-from tests.orchestration.engines.batch.lanes import in_lanes, located, shape_of
+from tests.orchestration.engines.batch.lanes import in_lanes, shape_of
 from tests.orchestration.engines.test_compiled import Kept, of, ran
 from tests.orchestration.fmi.small import needs_compiler, small
 
@@ -133,7 +133,8 @@ def test_components_that_are_told_of_their_first_sample_need_no_timetable_to_beg
 
     monkeypatch.setattr("orchestration.engines.batch.batch.Timetable", drawn)
     late = Scenario(timing=Timing(jitter=0.002), stop_time=0.05).as_system()
-    assert len(list(fly([replace(late, seed=seed) for seed in range(2)]))) == 2
+    found = Batches().run([with_files(replace(late, seed=seed)) for seed in range(2)])
+    assert None not in found
 
 
 @pytest.mark.parametrize("lanes", [2, 4])
@@ -157,12 +158,14 @@ def test_more_runs_than_lanes_of_many_timings_come_back_in_their_order() -> None
         )
         for i, period in enumerate(periods)
     ]
-    for what, found in zip(systems, fly(systems)):
-        assert_the_same_numbers(found, ran(located(what), "compiled").metrics)
+    there = [*map(with_files, systems)]
+    for what, found in zip(there, Batches().run(there)):
+        assert found is not None
+        assert_the_same_numbers(found.metrics, ran(what, "compiled").metrics)
 
 
 def test_a_component_that_cannot_be_flown_in_lanes_is_named(tmp_path: Path) -> None:
     parts = {"one": Component(fmu=str(small(tmp_path)), step=0.01)}
     with pytest.raises(UsageError, match=r"components.one: small.fmu: expected a native FMU of this project's kit"):
-        list(fly([System(stop_time=0.1, components=parts)]))
+        Batches().run([System(stop_time=0.1, components=parts)])
     assert fmus.native_twin(parts["one"].fmu) == parts["one"].fmu
