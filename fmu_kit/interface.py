@@ -10,8 +10,9 @@
 
 The type of the start value is the type of the attribute: a float, a `Vec3` (an FMI variable for each of .x, .y, .z), a
 `Quaternion` (.x, .y, .z, .w), an `Inertia` (.xx, .yy, .zz, .xy, .xz, .yz), a bool, a member of an `IntEnum`, which is
-read as its number, or an int if `unit` is None. Units are in SI, as in `fmu_kit.units`. What several slaves have in
-common is declared in a class that they inherit.
+read as its number, or an int if `unit` is None. Beside an Enumeration NAME, which such a member makes, there is an
+Integer NAME_index with the numbers of its items, for tools that set no Enumeration. Units are in SI, as in
+`fmu_kit.units`. What several slaves have in common is declared in a class that they inherit.
 """
 
 from collections.abc import Callable, Iterable
@@ -21,7 +22,7 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 from fmu_kit.algebra import Inertia, Quaternion, Vec3, is_positive_definite
 from fmu_kit.errors import require
 from fmu_kit.units import base_unit_exponents
-from fmu_kit.variables import Causality, Variability, Variable
+from fmu_kit.variables import INDEX, Causality, Variability, Variable
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,6 +172,22 @@ class Declared(property):
             return put_vec3
         return put_parts if kind.axes else put_real if kind.is_real else put_other
 
+    def index(self) -> list[Variable]:
+        """Of an Enumeration, the Integer by which tools may set it too; nothing for other types."""
+        return [
+            Variable(
+                name=f"{each.name}{INDEX}",
+                description=f"{each.name} by its number, for tools that set no Enumeration; 0: as {each.name} says",
+                causality=each.causality,
+                variability=each.variability,
+                start=0,
+                minimum=0,
+                maximum=len(each.items),
+            )
+            for each in self.variables()
+            if each.items
+        ]
+
     def _refuse(self, value: Any) -> None:
         raise TypeError(f"self.{self.attribute} = {value}: expected {self._kind.expected}")
 
@@ -244,11 +261,15 @@ def declared_in(slave: type) -> list[Declared]:
 
 
 def variables_of(declared: Iterable[Declared]) -> tuple[Variable, ...]:
-    """Their FMI variables: as declared, then the starts of states; Reals first, among them locals last."""
+    """Their FMI variables: as declared, then the starts of states; Reals first, among them locals last.
+
+    After all of them come the Integers beside Enumerations.
+    """
     listed = list(declared)
     found = [variable for each in listed for variable in each.variables()]
     found += [variable for each in listed if isinstance(each, State) for variable in each.initial()]
-    return tuple(sorted(found, key=lambda each: 2 if each.type != "Real" else each.causality == "local"))
+    found = sorted(found, key=lambda each: 2 if each.type != "Real" else each.causality == "local")
+    return (*found, *(index for each in listed for index in each.index()))
 
 
 def initial_values(declared: Iterable[Declared]) -> dict[str, str]:

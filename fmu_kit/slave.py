@@ -24,8 +24,9 @@ from fmu_kit.errors import DivergenceError, FmuError, require
 from fmu_kit.failure import Failure, printf_safe, report
 from fmu_kit.interface import Declared, declared_in, initial_values, variables_of
 from fmu_kit.saved_state import State, expect_state, parsed, serialised
+from fmu_kit.scalar import FLOAT
 from fmu_kit.unloading import release_at_exit
-from fmu_kit.variables import Variable
+from fmu_kit.variables import INDEX, Variable
 
 
 class Phase(enum.IntEnum):
@@ -102,6 +103,9 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             return  # as its base has them: pythonfmu 0.7.0 keeps the class of each instance for ever, so it has little
         cls.variables, cls._initial = variables_of(declared), initial_values(declared)
         cls._index = {v.name: i for i, v in enumerate(cls.variables)}
+        for i, variable in enumerate(cls.variables):
+            if cls._index[variable.name] != i:
+                raise TypeError(f"{cls.__name__}.{variable.name}: expected one variable of this name")
         for each in declared:
             setattr(cls, each.attribute, each.at(cls._index[each.first]))
         cls._declared = declared_in(cls)
@@ -111,6 +115,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         cls._given = frozenset(i for i, v in enumerate(cls.variables) if v.has_start)
         cls._inputs = frozenset(i for i, v in enumerate(cls.variables) if v.causality == "input")
         cls._tunable = frozenset(i for i, v in enumerate(cls.variables) if v.variability == "tunable")
+        cls._indices = {i: cls._index[f"{v.name}{INDEX}"] for i, v in enumerate(cls.variables) if v.items}
 
     _declared: ClassVar[list[Declared]]
     _own: ClassVar[tuple[str, ...]]
@@ -122,6 +127,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     _given: ClassVar[frozenset[int]]
     _inputs: ClassVar[frozenset[int]]
     _tunable: ClassVar[frozenset[int]]
+    _indices: ClassVar[dict[int, int]]
+    """of each Enumeration, the Integer beside it"""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**{"instance_name": type(self).__name__, **kwargs})
@@ -385,6 +392,9 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     def _take_parameters(self) -> None:
         self._check_parameters()
+        for place, index in self._indices.items():
+            given = self._others[index]
+            self._others[place] = FLOAT.where(given > 0, given, self._others[place])
         self.read_parameters()
         self._stale = False
 

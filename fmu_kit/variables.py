@@ -10,6 +10,8 @@ from fmu_kit.errors import require
 Causality = Literal["input", "output", "parameter", "local"]
 Variability = Literal["continuous", "discrete", "fixed", "tunable"]
 Type = Literal["Real", "Integer", "Boolean", "Enumeration"]
+INDEX = "_index"
+"""Behind the name of an Enumeration, in that of the Integer beside it"""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

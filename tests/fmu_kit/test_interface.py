@@ -55,7 +55,7 @@ def test_attributes_are_fmi_variables_in_order_reals_first():
     assert [v.name for v in Law.variables] == [
         "position.x", "position.y", "position.z", "attitude.x", "attitude.y", "attitude.z", "attitude.w", "x", "angle",
         "place.x", "place.y", "place.z", "force.x", "force.y", "force.z", "gain", "initial.force", "initial.angle",
-        "initial.place.x", "initial.place.y", "initial.place.z", "is_on", "samples", "mode",
+        "initial.place.x", "initial.place.y", "initial.place.z", "is_on", "samples", "mode", "mode_index",
     ]  # fmt: skip
     found = {v.name: v for v in Law.variables}
     assert {name: found[name].type for name in ("gain", "is_on", "samples", "mode")} == {
@@ -93,11 +93,34 @@ class Both(Turned):
 def test_what_is_inherited_comes_first_and_real_locals_after_all_other_reals():
     assert [v.name for v in Both.variables] == [
         "body.weight", *(f"body.inertia.{axis}" for axis in ("xx", "yy", "zz", "xy", "xz", "yz")),
-        "force.x", "force.y", "force.z", "drift", "is_shown", "mode",
+        "force.x", "force.y", "force.z", "drift", "is_shown", "mode", "mode_index",
     ]  # fmt: skip
     found = {v.name: v for v in Both.variables}
     assert (found["body.weight"].variability, found["mode"].variability) == ("fixed", "tunable")
     assert [found[f"body.inertia.{axis}"].start for axis in ("yy", "xy", "yz")] == [2.0, 0.5, 0.0]
+
+
+def test_an_enumeration_may_be_set_by_the_integer_beside_it_in_any_order_and_is_read_back_as_set():
+    place, index = (Law._index[name] for name in ("mode", "mode_index"))
+    for settings, found in [([], Mode.ON), ([(index, 1), (place, 2)], Mode.OFF), ([(place, 1), (index, 0)], Mode.OFF)]:
+        law = Law()
+        for variable, value in settings:
+            law.set_integer([variable], [value])
+        ready(law).do_step(0.0, 0.1)
+        assert (law.get_integer([place]), law.is_on) == ([found], found == Mode.ON)
+
+
+def test_the_integer_beside_an_enumeration_is_refused_where_it_is_no_item():
+    law = Law()
+    law.set_integer([Law._index["mode_index"]], [3])
+    with pytest.raises(Failure, match="mode_index = 3: expected a whole number >= 0 and <= 2"):
+        ready(law)
+
+
+def test_a_name_that_two_variables_have_is_refused():
+    taken = {"mode": Parameter(start=Mode.ON), "mode_index": Parameter(unit=None, start=1)}
+    with pytest.raises(TypeError, match=r"Named\.mode_index: expected one variable of this name"):
+        type("Named", (Slave,), taken)
 
 
 def test_an_inertia_is_read_whole_and_refused_unless_it_is_positive_definite():

@@ -108,13 +108,17 @@ _COMMON = (
     *row("sample_count", "local discrete", None, type="Integer"),
 )
 
-_SCALING = (*row("gain_scaling", "parameter fixed", None, 1.0, type="Enumeration"),)
+_SCALING = (
+    *row("gain_scaling", "parameter fixed", None, 1.0, type="Enumeration"),
+    *row("gain_scaling_index", "parameter fixed", None, 0, type="Integer"),
+)
 
 _REDESIGN = (
     *row("hold_period", "parameter fixed", "s", 0.0),
     *row("weight", "parameter fixed", "1", 1.0),
     *row("prediction", "parameter fixed", "s", 0.0),
     *row("discretisation", "parameter fixed", None, 1.0, type="Enumeration"),
+    *row("discretisation_index", "parameter fixed", None, 0, type="Integer"),
     *row("stages", "parameter fixed", None, 3, type="Integer"),
 )
 

@@ -98,6 +98,8 @@ def test_the_description_names_the_items_and_no_rule_is_broken(maker: Path, syst
 def test_it_is_given_by_name_or_by_number_and_starts_as_declared(system: System) -> None:
     assert made(system) == 2.0
     assert [made(system, shape=value) for value in ("flat", "line", 3)] == [0.0, 1.0, 2.0]
+    assert made(system, shape_index=3) == made(system, shape="flat", shape_index=3) == 2.0
+    assert made(system, shape="flat", shape_index=0) == 0.0
     without = dataclasses.replace(system.components["maker"], parameters={})
     assert made(dataclasses.replace(system, components={"maker": without})) == 1.0
 
@@ -175,7 +177,13 @@ def test_its_type_and_its_range_follow_from_the_items() -> None:
     class Chooses(Slave):
         mode = FixedParameter("how", start=Mode.TURNED)
 
-    (mode,) = Chooses.variables
+    mode, index = Chooses.variables
+    assert (index.name, index.type, index.start, index.bounds) == (
+        "mode_index",
+        "Integer",
+        0,
+        "a whole number >= 0 and <= 3",
+    )
     assert (mode.type, mode.declared_type) == ("Enumeration", "Mode")
     assert mode.items == {"as_it_is": 1, "turned": 2, "doubled": 3}
     for value in (0, 4):

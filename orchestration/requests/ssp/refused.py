@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from fmu_kit.variables import INDEX
 from orchestration.requests.ssp.carried import Carried, Part
 from orchestration.system.model import Parameter, variable_of
 
@@ -13,8 +14,8 @@ def refused(given: Carried) -> Iterator[str]:
         for name, value in part.parameters.items():
             masters = _masters_without(part, name, value)
             if masters is not None:
-                kind = part.variable(name).kind
-                yield f"components.{part.name}.parameters.{name} = {value}: of type {kind}; {masters}"
+                kind, instead = part.variable(name).kind, _integer_instead(part, name, value)
+                yield f"components.{part.name}.parameters.{name} = {value}: of type {kind}; {masters}{instead}"
     for x in given.system.connections:
         for start, end in zip(x.start, x.end, strict=True):
             kinds = [
@@ -22,6 +23,14 @@ def refused(given: Carried) -> Iterator[str]:
             ]
             if kinds[0] != kinds[1] or "Enumeration" in kinds:
                 yield f"{start} to {end}: from {kinds[0]} to {kinds[1]}; libcosim and ecos refuse the SSP"
+
+
+def _integer_instead(part: Part, name: str, value: Parameter) -> str:
+    """What to set that all masters take: the Integer that this project's FMUs have beside an Enumeration."""
+    index, choices = f"{name}{INDEX}", part.variable(name).choices
+    if index not in part.model.variables or not choices:
+        return ""
+    return f"; all take {index} = {choices.get(str(value), value)}"
 
 
 def _masters_without(part: Part, name: str, value: Parameter) -> str | None:

@@ -136,8 +136,10 @@ def test_nothing_is_said_of_a_scenario_that_an_ssp_can_say(short: Scenario, tmp_
 def test_an_enumeration_that_other_masters_do_not_take_is_said(short: Scenario, tmp_path: Path) -> None:
     given = short.with_changes(parameters={"controller.discretisation": "match"})
     assert heard(given, tmp_path) == [
-        "controller.discretisation = match: of type Enumeration; libcosim crashes, ecos and fmpy refuse the SSP"
+        "controller.discretisation = match: of type Enumeration; libcosim crashes, ecos and fmpy refuse the SSP; "
+        "all take discretisation_index = 5"
     ]
+    assert heard(short.with_changes(parameters={"controller.discretisation_index": 5}), tmp_path) == []
 
 
 MIXED = """\

@@ -106,3 +106,13 @@ def test_a_lag_and_a_late_first_sample_depend_on_the_inputs_of_initialisation(sh
     )
     for agreement in agreements(scenario, one_of_each()):
         assert farthest(agreement, agreement.same_start) <= AIM, agreement.tool.name
+
+
+def test_a_redesign_given_by_the_integer_beside_its_enumeration_flies_in_every_tool(short: Scenario) -> None:
+    """libcosim and ecos leave the Enumeration itself as it starts."""
+    redesign = {"controller.discretisation_index": 4, "controller.stages": 2}
+    scenario = short.with_changes(parameters=redesign, timing={"period": 0.05, "plant_interval": 0.01}, stop_time=0.4)
+    explicit = short.with_changes(timing={"period": 0.05, "plant_interval": 0.01}, stop_time=0.4)
+    assert np.abs(states_of_master(scenario) - states_of_master(explicit)).max() > 1e-3
+    for agreement in agreements(scenario, chosen(FROM_SSP, LOOP.ports)):
+        assert farthest(agreement, agreement.same_start) <= AIM, agreement.tool.name
