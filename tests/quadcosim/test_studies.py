@@ -74,7 +74,8 @@ import quadcosim
 from quadcosim import Axis, Scenario, Study
 base = Scenario(stop_time={stop}).with_fmus(plant="native/QuadrotorPlant", controller="native/UnifiedController")
 study = Study(name="seeds", base=base, axes=(Axis(name="seed", values=tuple(range({runs}))),))
-quadcosim.sweep(study, folder={folder!r}, workers=2, progress=lambda done, total: print("done", done, flush=True))
+say = lambda done, total: print("done", done, flush=True)
+quadcosim.sweep(study, folder={folder!r}, workers=2, engine="compiled", progress=say)
 """
 
 
