@@ -14,7 +14,7 @@ from orchestration.results.objectives import Metrics
 from orchestration.runs.simulation import run
 from orchestration.studies.study import Study
 from orchestration.system.model import System
-from orchestration.workers.batching import expect_lanes
+from orchestration.workers.choice import chosen
 
 SOME = 64
 """Runs that are flown at once, so that of no more the whole signals are held"""
@@ -35,15 +35,17 @@ class Flight:
     message: str | None
 
 
-def in_lanes(study: Study) -> tuple[Study, Files] | None:
-    """The study by the native twins of its FMUs, if it can be flown in lanes on this machine."""
-    native = replace(study, native=True)
-    try:
-        files = native.files()
-        expect_lanes(native.system(0, files.starts_of(native.origin)), files)
-    except QuadcosimError:  # no compiler, or FMUs of other makers
-        return None
-    return native, files
+def fastest(study: Study) -> tuple[Study, Files, bool]:
+    """A study as it is flown fastest on this machine, its files, and whether that is in lanes."""
+
+    def first(native: bool) -> tuple[System, Files]:
+        asked = replace(study, native=native)
+        files = asked.files()
+        return asked.system(0, files.starts_of(asked.origin)), files
+
+    how = chosen("auto", study.native, first)
+    flown = replace(study, native=how.native)
+    return flown, flown.files(), how.in_lanes
 
 
 def fly(

@@ -10,7 +10,7 @@ from typing import Any
 from orchestration.basics.errors import UsageError
 from orchestration.expressions.syntax import names, parse
 from orchestration.report.blobs import Blobs
-from orchestration.report.flights import Flight, Progress, fly, in_lanes
+from orchestration.report.flights import Flight, Progress, fastest, fly
 from orchestration.report.model import Report, Run, Setting, Share
 from orchestration.report.number_format import percent
 from orchestration.report.subset import ALONE, MOST, chosen, points_for
@@ -213,15 +213,14 @@ def embed(
             runs=[], places={},
             contents=["No flight is in this file: a store has none. Make the report from the study file to see some."],
         )  # fmt: skip
-    native = in_lanes(study)
-    limit = (MOST if native else ALONE) if most is None else most
+    flown_study, files, lanes = fastest(study)
+    limit = (MOST if lanes else ALONE) if most is None else most
     some = chosen(indices, wanted, limit) if choose is None else sorted({*wanted, *choose(limit)})
-    flown_study, files = native or (study, study.files())
     runs: list[Run] = []
     places: dict[int, int] = {}
     differing = 0
     points = points_for(len(some), COLUMNS)
-    for flight in fly(flown_study, files, some, lanes=native is not None, progress=progress):
+    for flight in fly(flown_study, files, some, lanes=lanes, progress=progress):
         note = _difference(flight, known[flight.index], metric)
         differing += note is not None
         about = described(flight.system, files.models_of(flown_study.origin), flight.signals)

@@ -13,8 +13,7 @@ from orchestration.basics.simulator import Floats
 from orchestration.building import fmus
 from orchestration.engines.batch.batch import MOST_ROWS
 from orchestration.engines.batch.batches import Batches
-from orchestration.engines.batch.kernels import lanes_here
-from orchestration.engines.batch.shape import Shape
+from orchestration.engines.batch.shape import expect_lanes
 from orchestration.engines.wiring import checked, columns_of, source_signals
 from orchestration.fmi.model import Model, read_model
 from orchestration.results.objectives import FIXED, Metrics
@@ -204,9 +203,7 @@ def _outputs(system: System, asked: Sequence[str] | None) -> tuple[str, ...]:
 def _reason_unavailable(system: System, models: Mapping[str, Model]) -> str | None:
     """Why a system that its FMUs fit cannot be flown in lanes here, in a line; None: it can be."""
     try:
-        shape = Shape(system=system, models=models, lanes=lanes_here())
-        assert shape.kernels
-        assert shape.library
+        expect_lanes(system, models)
     except QuadcosimError as error:
         return str(error)
     return None

@@ -9,12 +9,9 @@ from itertools import islice
 from typing import Any
 
 from orchestration.basics.errors import QuadcosimError
-from orchestration.building.inputs import Files
 from orchestration.engines.batch.kernels import lanes_here
-from orchestration.engines.batch.shape import Shape, outline
-from orchestration.engines.wiring import checked
+from orchestration.engines.batch.shape import outline
 from orchestration.schedule.schedule_cache import timing
-from orchestration.system.model import System
 from orchestration.workers.task import Chunk, RunTask
 
 SAMPLE = 8
@@ -23,14 +20,6 @@ TOLERATED = 1e-9
 """relative difference of a metric"""
 CHUNK, SORTED = 256, 4096
 """Runs of a chunk, at most, and runs that are put in order so that those of a chunk are alike"""
-
-
-def expect_lanes(system: System, files: Files) -> None:
-    """Compile what flies a system in lanes; raises `UsageError` for one that cannot be, naming what it lacks."""
-    models = files.models_of(system)
-    shape = Shape(system=checked(system, models).system, models=models, lanes=lanes_here())
-    assert shape.kernels
-    assert shape.library
 
 
 def chunks(tasks: Iterable[RunTask], total: int, workers: int) -> Iterator[RunTask | Chunk]:

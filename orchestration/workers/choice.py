@@ -7,10 +7,11 @@ from typing import Literal, cast, get_args
 from orchestration.basics.errors import QuadcosimError, UsageError, expected_name
 from orchestration.building.fmus import native_twins
 from orchestration.building.inputs import Files, files_of
+from orchestration.engines.batch.shape import expect_lanes
 from orchestration.engines.engine import Engine
+from orchestration.engines.wiring import checked
 from orchestration.system.model import System
 from orchestration.system.request import Twin, system_meant
-from orchestration.workers.batching import expect_lanes
 
 EngineChoice = Literal["auto", "python", "compiled", "batch"]
 """`auto`: `batch` where it can be had, else native FMUs one at a time, else the FMUs as they are"""
@@ -60,17 +61,22 @@ def chosen(engine: EngineChoice, native: bool, first: Callable[[bool], tuple[Sys
     if engine in ("python", "compiled"):
         return Chosen(native=native, in_lanes=False, engine=engine)
     if engine == "batch":
-        expect_lanes(*first(True))
+        _expect_lanes(*first(True))
         return Chosen(native=True, in_lanes=True, engine=None)
     try:
         system, files = first(True)
     except QuadcosimError as error:  # what is wrong with the request is said by whoever flies it
         return Chosen(native=native, in_lanes=False, engine=None, reason=str(error))
     try:
-        expect_lanes(system, files)
+        _expect_lanes(system, files)
     except QuadcosimError as error:
         return Chosen(native=True, in_lanes=False, engine=None, reason=str(error))
     return Chosen(native=True, in_lanes=True, engine=None)
+
+
+def _expect_lanes(system: System, files: Files) -> None:
+    models = files.models_of(system)
+    expect_lanes(checked(system, models).system, models)
 
 
 def alone(request: Twin, engine: Engine | Literal["auto"]) -> tuple[Twin, Chosen]:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from orchestration.engines import initial
 from orchestration.engines.batch.code import Written, written
-from orchestration.engines.batch.kernels import Kernel, batch, component
+from orchestration.engines.batch.kernels import Kernel, batch, component, lanes_here
 from orchestration.engines.batch.writing import Kind, Leaf
 from orchestration.engines.board import Board
 from orchestration.engines.channel import of_each
@@ -289,3 +289,13 @@ def ends_of(shape: Shape, x: Connection) -> Ends:
 def changes_of(x: Connection) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Standard deviations of the noise and quanta, of each variable."""
     return of_each(x, x.noise), of_each(x, x.quantisation)
+
+
+def expect_lanes(system: System, models: Mapping[str, Model]) -> None:
+    """Compile what flies a system in lanes, after it was checked against its models.
+
+    Raises `UsageError` for one that cannot be, naming what it lacks; `QuadcosimError` without a compiler.
+    """
+    shape = Shape(system=system, models=models, lanes=lanes_here())
+    assert shape.kernels
+    assert shape.library
