@@ -8,9 +8,9 @@ import pytest
 
 import quadcosim
 from orchestration.basics.errors import QuadcosimError
+from orchestration.engines.batch import shape
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.runs import in_lanes
 from orchestration.system.model import Component, System
 from tests.native import NATIVE
 from tests.orchestration.fmi.small import needs_compiler, small
@@ -85,7 +85,7 @@ def test_where_no_lanes_can_be_had_the_next_engine_flies_the_same_and_it_is_said
     def none() -> int:
         raise QuadcosimError("no compiler")
 
-    monkeypatch.setattr(in_lanes, "lanes_here", none)
+    monkeypatch.setattr(shape, "lanes_here", none)
     found = quadcosim.fly(SHORT, {X: [0.0, 1.0]}, record=RECORDED)
     assert (found.engine, found.reason) == ("compiled", "no compiler")
     assert list(found) == list(lanes)
