@@ -1,5 +1,7 @@
 """An FMU driven by plain FMI calls through fmpy, without the project's own adapter in between."""
 
+import atexit
+import functools
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
@@ -7,6 +9,14 @@ from typing import Any, NamedTuple
 
 import fmpy
 from fmpy import fmi2
+
+
+@functools.cache
+def _unpacked(path: Path, changed: int) -> Path:
+    """Once in a process for each content of a file."""
+    folder = Path(fmpy.extract(str(path)))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
 
 
 class Message(NamedTuple):
@@ -26,17 +36,19 @@ class Instance:
         path: Path,
         *,
         unpacked: Path | None = None,
+        anew: bool = False,
         default_logger: bool = False,
         name: str = "instance",
         logging: bool = True,
     ) -> None:
+        """From the folder where it is `unpacked`; else from one that is this process's, or, `anew`, this instance's."""
         self.description = fmpy.read_model_description(str(path), validate=False)
         self.variables = {v.name: v for v in self.description.modelVariables}
         self.messages: list[Message] = []
-        self._own_folder = None if unpacked is not None else Path(fmpy.extract(str(path)))
+        self._own_folder = Path(fmpy.extract(str(path))) if anew else None
         self.fmu = fmi2.FMU2Slave(
             guid=self.description.guid,
-            unzipDirectory=str(unpacked or self._own_folder),
+            unzipDirectory=str(unpacked or self._own_folder or _unpacked(path, path.stat().st_mtime_ns)),
             modelIdentifier=self.description.coSimulation.modelIdentifier,
             instanceName=name,
         )

@@ -2,22 +2,26 @@
 
 import functools
 import json
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from orchestration.building import fmus
 from orchestration.building.models import MODELS
-from orchestration.checks.validation import Finding, description, rules, validate
+from orchestration.checks.validation import Finding, rules, validate
 from orchestration.checks.validation.confined_process import PLATFORM, READABLE, look
 from orchestration.checks.validation.finding import name_of
 from orchestration.checks.validation.progress import Report, Told
 from orchestration.checks.validation.validator import PROCESS
 from orchestration.command import cli
 from orchestration.processes.limits import Limits
-from tests.fmus.damage import Mutant
+from tests.fmus.damage import Mutant, every
+from tests.fmus.making import PAIR
 from tests.fmus.mutants import MUTANTS
+from tests.fmus.process import run_script
+from tests.fmus.scripts.find_mutants import WITHOUT_INSTANCES
 from tests.fmus.verdicts import as_markdown, fmpy_finds, fmutool_finds, verdicts
 
 BY_NAME = {mutant.name: mutant for mutant in MUTANTS}
@@ -26,35 +30,45 @@ Findings = Callable[[Mutant], list[Finding]]
 Make = Callable[[str], Path]
 
 
-STATIC: list[Callable[..., object]] = [*rules.OF_ARCHIVES, description.standard, *rules.OF_DESCRIPTIONS]
-WITHOUT_INSTANCES = {READABLE, *map(name_of, [*STATIC, *rules.OUR_DESCRIPTIONS])}
-"""Rules that look at the archive and the description: for their mutants nothing needs to run"""
+@pytest.fixture(scope="module")
+def findings(built: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Findings:
+    """What is found wrong with each mutant; those that run are run when the first of them is asked for."""
+    folder = tmp_path_factory.mktemp("mutants")
+    ends = [mutant for mutant in MUTANTS if mutant.rule == PROCESS]
+    run = [mutant for mutant in MUTANTS if mutant.rule not in {*WITHOUT_INSTANCES, PROCESS}]
+
+    @functools.cache
+    def of_those_that_run() -> dict[str, list[Finding]]:
+        said = run_script("find_mutants", folder, os.pathsep.join(map(str, built.values())), *(m.name for m in run))
+        return {name: [Finding(*finding) for finding in found] for name, found in said.items()}
+
+    @functools.cache
+    def found(mutant: Mutant) -> list[Finding]:
+        if mutant in run:
+            return of_those_that_run()[mutant.name]
+        path = mutant.write(built[mutant.model], folder)
+        return validate(path, limits=Limits(time=mutant.time_limit)) if mutant in ends else looked_at(path)
+
+    return found
+
+
+def looked_at(path: Path) -> list[Finding]:
+    """What is found wrong with an FMU before it runs."""
+    told = Told()
+    look(path, Limits().size, Report(told.hear))
+    return told.findings
 
 
 @pytest.fixture(scope="module")
-def findings(built: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Findings]:
-    """What is found wrong with each mutant; of those that run two are under way at a time, each in its process."""
-    folder = tmp_path_factory.mktemp("mutants")
-
-    def found(mutant: Mutant) -> list[Finding]:
-        return validate(mutant.write(built[mutant.model], folder), limits=Limits(time=mutant.time_limit))
-
-    @functools.cache
-    def seen(mutant: Mutant) -> list[Finding]:
-        told = Told()
-        look(mutant.write(built[mutant.model], folder), Limits().size, Report(told.hear))
-        return told.findings
-
-    with ThreadPoolExecutor(2) as pool:
-        under_way = {m: pool.submit(found, m) for m in MUTANTS if m.rule not in WITHOUT_INSTANCES}
-        yield lambda m: under_way[m].result() if m in under_way else seen(m)
-        pool.shutdown(cancel_futures=True)
+def native() -> dict[str, Path]:
+    """The FMUs without Python inside, which are looked through in less time."""
+    return {model: fmus.locate(f"native/{model}") for model in PAIR}
 
 
 @pytest.fixture
-def make(built: dict[str, Path], tmp_path: Path) -> Make:
-    """Makes the mutant of a name."""
-    return lambda name: BY_NAME[name].write(built[BY_NAME[name].model], tmp_path)
+def make(native: dict[str, Path], tmp_path: Path) -> Make:
+    """Makes the mutant of a name, of which the damage is not to the Python inside."""
+    return lambda name: BY_NAME[name].write(native[BY_NAME[name].model], tmp_path)
 
 
 # -- each of them ---------------------------------------------------------------------------------------
@@ -88,11 +102,16 @@ def test_only_mutants_of_the_guid_are_given_away_by_it(findings: Findings) -> No
 
 
 @pytest.mark.parametrize(
-    "name", ["start not a number", "name twice", "GUID of another content", "unit without base units"]
+    "names", [("start not a number",), ("name twice", "GUID of another content", "unit without base units")]
 )
-def test_what_a_look_finds_the_whole_validation_finds_too(name: str, make: Make, findings: Findings) -> None:
-    whole = validate(make(name))
-    assert whole[: len(findings(BY_NAME[name]))] == findings(BY_NAME[name])
+def test_what_a_look_finds_the_whole_validation_finds_too(
+    names: tuple[str, ...], built: dict[str, Path], tmp_path: Path
+) -> None:
+    damage = every(*(BY_NAME[name].damage for name in names))
+    path = Mutant(name="it", rule="", words=(), damage=damage, keeps_guid=True).write(built["QuadrotorPlant"], tmp_path)
+    found = looked_at(path)
+    assert {BY_NAME[name].rule for name in names} <= {finding.rule for finding in found}
+    assert validate(path)[: len(found)] == found
 
 
 # -- on the command line --------------------------------------------------------------------------------
@@ -100,9 +119,9 @@ def test_what_a_look_finds_the_whole_validation_finds_too(name: str, make: Make,
 
 @pytest.mark.parametrize("name", ["date in local time", "process crashes", "archive cut short", "FMI 3"])
 def test_the_command_names_what_it_finds_and_ends_with_1(
-    name: str, make: Make, capsys: pytest.CaptureFixture[str]
+    name: str, built: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = make(name)
+    path = BY_NAME[name].write(built["QuadrotorPlant"], tmp_path)
     with pytest.raises(SystemExit) as end:
         cli.main(["validate", str(path)])
     assert end.value.code == 1
@@ -113,9 +132,9 @@ def test_the_command_names_what_it_finds_and_ends_with_1(
 
 
 def test_the_command_gives_findings_as_json(
-    make: Make, built: dict[str, Path], capsys: pytest.CaptureFixture[str]
+    make: Make, native: dict[str, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    damaged, sound = make("needs a tool"), built["QuadrotorPlant"]
+    damaged, sound = make("needs a tool"), native["QuadrotorPlant"]
     with pytest.raises(SystemExit) as end:
         cli.main(["validate", "--json", str(damaged), str(sound)])
     assert end.value.code == 1
@@ -126,9 +145,12 @@ def test_the_command_gives_findings_as_json(
     assert second == {"fmu": str(sound), "findings": []}
 
 
-def test_the_command_stops_an_fmu_at_the_time_limit(make: Make, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_stops_an_fmu_at_the_time_limit(
+    built: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = BY_NAME["step without end"].write(built["QuadrotorPlant"], tmp_path)
     with pytest.raises(SystemExit) as end:
-        cli.main(["validate", "--time-limit", "2", str(make("step without end"))])
+        cli.main(["validate", "--time-limit", "2", str(path)])
     assert end.value.code == 1
     assert "it takes longer than the limit of 2 s" in capsys.readouterr().out
 
@@ -148,9 +170,9 @@ def test_an_empty_guid_passes_the_checkers_of_others(make: Make) -> None:
     assert fmutool_finds(path) == []
 
 
-def test_the_table_says_who_notices_what(built: dict[str, Path], tmp_path: Path) -> None:
+def test_the_table_says_who_notices_what(native: dict[str, Path], tmp_path: Path) -> None:
     chosen = [BY_NAME[name] for name in ("name twice", "empty GUID", "description not XML")]
-    table = verdicts(chosen, built, tmp_path)
+    table = verdicts(chosen, native, tmp_path)
     assert [(bool(verdict.fmpy), bool(verdict.fmutool)) for verdict in table] == [
         (True, True), (False, False), (True, True),
     ]  # fmt: skip

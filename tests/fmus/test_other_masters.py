@@ -1,5 +1,6 @@
 """What other masters do: the flight is the same, whatever number, order and form of calls a tool prefers."""
 
+import json
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -365,25 +366,33 @@ def test_an_instance_may_have_any_name(model: str, called: str, built: dict[str,
         second.step(0.0, 0.01)
 
 
-@pytest.mark.parametrize(
-    ("folder", "form"),
-    [
-        ("folder with spaces", "URI"),
-        ("folder with spaces", "URI with a slash at its end"),
-        ("folder with spaces", "path"),
-        ("Jürgen", "path"),
-        ("Jürgen", "URI"),
-        ("copy (2)", "URI"),
-        ("copy (2)", "path with escapes"),
-        ("100% [四旋翼]", "URI"),
-        ("100% [四旋翼]", "path"),
-        ("folder", "URI with one slash"),
-        ("folder", "URI with a host"),
-    ],
-)
-def test_an_fmu_finds_its_resources(folder: str, form: str, built: dict[str, Path], tmp_path: Path) -> None:
-    command = run_script("fly_from", built[CONTROLLER], tmp_path / folder, form)
-    assert command == pytest.approx(law_command(0.0), rel=1e-12)
+PLACES = [
+    ("folder with spaces", "URI"),
+    ("folder with spaces", "URI with a slash at its end"),
+    ("folder with spaces", "path"),
+    ("Jürgen", "path"),
+    ("Jürgen", "URI"),
+    ("copy (2)", "URI"),
+    ("copy (2)", "path with escapes"),
+    ("100% [四旋翼]", "URI"),
+    ("100% [四旋翼]", "path"),
+    ("folder", "URI with one slash"),
+    ("folder", "URI with a host"),
+]
+"""A folder, and the form in which an FMU is told where that is."""
+
+
+@pytest.fixture(scope="module")
+def commands(built: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], list[float]]:
+    """Of the controller in each place."""
+    folder = tmp_path_factory.mktemp("places")
+    asked = [(str(folder / str(k) / name), form) for k, (name, form) in enumerate(PLACES)]
+    return dict(zip(PLACES, run_script("fly_from", built[CONTROLLER], json.dumps(asked)), strict=True))
+
+
+@pytest.mark.parametrize("place", PLACES, ids="-".join)
+def test_an_fmu_finds_its_resources(place: tuple[str, str], commands: dict[tuple[str, str], list[float]]) -> None:
+    assert commands[place] == pytest.approx(law_command(0.0), rel=1e-12)
 
 
 def test_without_logging_a_failure_is_a_status_and_no_message(making: Making, built: dict[str, Path]) -> None:

@@ -18,7 +18,7 @@ from orchestration.checks.validation.finding import check
 from orchestration.checks.validation.fmu import Fmu, read_co_simulation, read_fmu
 from orchestration.checks.validation.own_description import differences, elements
 from orchestration.checks.validation.probe import Probe
-from orchestration.checks.validation.progress import Frame, Told
+from orchestration.checks.validation.progress import Frame, Report, Told
 from orchestration.checks.validation.structure import initial_unknowns, known_dependencies, outputs
 from orchestration.checks.validation.units import dimensions, unit_meaning
 from orchestration.checks.validation.variables import aliases, names
@@ -271,7 +271,7 @@ def test_the_child_reports_an_error_in_a_rule(low_pass: Path, monkeypatch: pytes
     monkeypatch.setattr(confined_process, "restrict", lambda size: None)  # which would hold for the process of the test
     told = Told()
     with pytest.raises(KeyError):
-        confined_process.main(low_pass, tmp_path, Limits(), told.hear)
+        confined_process.main(low_pass, tmp_path, Limits(), Report(told.hear))
     assert (told.rule, told.error, told.ended) == ("odd", "KeyError: 3", False)
 
 

@@ -5,7 +5,6 @@ empty one, and says what it finds (see `progress`).
 """
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import fmpy
@@ -17,7 +16,7 @@ from orchestration.checks.validation.fmu import Fmu, read_co_simulation, read_fm
 from orchestration.checks.validation.instance import RefusedError
 from orchestration.checks.validation.own_description import own_description
 from orchestration.checks.validation.probe import Probe
-from orchestration.checks.validation.progress import Frame, Report
+from orchestration.checks.validation.progress import Report
 from orchestration.fmi.archive import UnreadableFmuError, read_archive
 from orchestration.fmi.pythonfmu import expect_readable_place
 from orchestration.processes.channel import Parent
@@ -27,10 +26,9 @@ READABLE, PLATFORM = "readable", "platform"
 """Rules that are kept here: there is an FMI 2.0 FMU to look at, and this machine can run it"""
 
 
-def main(path: Path, folder: Path, limits: Limits, say: Callable[[Frame], None]) -> None:
+def main(path: Path, folder: Path, limits: Limits, report: Report) -> None:
     """Try every rule that is meant for the FMU."""
     restrict(limits.size)
-    report = Report(say)
     try:
         fmu = look(path, limits.size, report)
         if fmu is not None and can_be_unpacked(fmu.archive):
@@ -82,4 +80,4 @@ def _run(probe: Probe, report: Report) -> None:
 
 if __name__ == "__main__":
     _path, _folder, _time, _size = sys.argv[1:]
-    main(Path(_path), Path(_folder), Limits(time=float(_time), size=float(_size)), Parent().say)
+    main(Path(_path), Path(_folder), Limits(time=float(_time), size=float(_size)), Report(Parent().say))

@@ -20,7 +20,9 @@ def main(fmus: dict[str, Path], shared: bool) -> dict[str, list[list[str]]]:
             folders[model] = Path(stack.enter_context(TemporaryDirectory()))
             fmpy.extract(str(fmu), str(folders[model]))
         instances = {
-            name: stack.enter_context(Instance(fmus[flight.model], unpacked=folders.get(flight.model)))
+            name: stack.enter_context(
+                Instance(fmus[flight.model], unpacked=folders.get(flight.model), anew=not folders)
+            )
             for name, flight in FLIGHTS.items()
         }
         for name, instance in instances.items():

@@ -1,6 +1,7 @@
-"""Unpack the controller FMU into a folder, tell it in some form where its resources are, and print its command."""
+"""Unpack the controller FMU into folders, tell it in some form where its resources are; print its command in each."""
 
 import ctypes
+import functools
 import json
 import sys
 from collections.abc import Callable
@@ -10,6 +11,7 @@ import fmpy
 from fmpy import fmi2
 
 from tests.fmus.expected import COMMAND, MEASUREMENT
+from tests.fmus.process import in_a_copy
 
 FORMS: dict[str, Callable[[Path], str]] = {
     "URI": Path.as_uri,
@@ -21,7 +23,7 @@ FORMS: dict[str, Callable[[Path], str]] = {
 }
 
 
-def main(fmu: Path, folder: Path, form: str) -> list[float]:
+def command(fmu: Path, folder: Path, form: str) -> list[float]:
     description = fmpy.read_model_description(str(fmu))
     references = {v.name: v.valueReference for v in description.modelVariables}
     fmpy.extract(str(fmu), str(folder))
@@ -49,5 +51,10 @@ def main(fmu: Path, folder: Path, form: str) -> list[float]:
     return [float(value) for value in command]
 
 
+def main(fmu: Path, places: list[tuple[str, str]]) -> list[list[float]]:
+    """The folder and the form of each place; in processes that have loaded no other."""
+    return [in_a_copy(functools.partial(command, fmu, Path(folder), form)) for folder, form in places]
+
+
 if __name__ == "__main__":
-    print(json.dumps(main(Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3])))
+    print(json.dumps(main(Path(sys.argv[1]), json.loads(sys.argv[2]))))

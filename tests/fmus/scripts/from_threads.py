@@ -74,7 +74,7 @@ def main(fmus: dict[str, Path], way: str) -> dict[str, list[list[str]]]:
         instances = {}
         for name, flight in FLIGHTS.items():  # the first two share a library, the third has its own
             for number, folder in enumerate([folders[flight.model], folders[flight.model], None]):
-                instance = stack.enter_context(Instance(fmus[flight.model], unpacked=folder))
+                instance = stack.enter_context(Instance(fmus[flight.model], unpacked=folder, anew=folder is None))
                 flight.begin(instance)
                 instances[f"{name} {number}"] = instance
         return WAYS[way](instances)

@@ -24,8 +24,8 @@ def failure(instance: Instance) -> str:
 
 
 def main(fmus: dict[str, Path]) -> dict[str, object]:
-    first = {name: Instance(fmus[flight.model]) for name, flight in FLIGHTS.items()}
-    second = {name: Instance(fmus[flight.model]) for name, flight in FLIGHTS.items()}
+    first = {name: Instance(fmus[flight.model], anew=True) for name, flight in FLIGHTS.items()}
+    second = {name: Instance(fmus[flight.model], anew=True) for name, flight in FLIGHTS.items()}
     rows: dict[str, Rows] = {}
     for instances in (first, second):
         for name, instance in instances.items():
