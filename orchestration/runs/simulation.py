@@ -31,7 +31,6 @@ from orchestration.fmi.native import NativeInstance
 from orchestration.fmi.surroundings import FOLDER, sentence
 from orchestration.processes.limits import Limits
 from orchestration.recording.recording import InMemory, Recorder
-from orchestration.requests.request import usual
 from orchestration.runs import apart
 from orchestration.runs.meant import (
     Announce,
@@ -142,8 +141,12 @@ def run(
     refuses a call for another reason than divergence, `RunLost` with what was recorded if an FMU or a limit ends
     the process, `RunInterrupted` after Ctrl-C.
     """
+    if asked is None:
+        from orchestration.requests.request import usual  # the readers of files load only where nobody has read one
+
+        asked = usual()
     result = flown(
-        asked or usual(), whole, recorder=recorder, progress=progress, announce=announce, engine=engine,
+        asked, whole, recorder=recorder, progress=progress, announce=announce, engine=engine,
         in_process=in_process, time_limit=time_limit, memory_limit=memory_limit,
     )  # fmt: skip
     assert result is not None

@@ -6,6 +6,7 @@ fifth to the eighth, since that is where the integral is least. What minimum sna
 (Mellinger and Kumar 2011), this is to curves with four.
 """
 
+import functools
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -64,7 +65,7 @@ def _coefficients(spans: Floats, derivatives: Floats) -> Floats:
     begin = scaled[:, 0].copy()
     for each in (scaled, ends):
         each[:, 0] -= begin  # from where the piece begins, which costs no digits far from the origin
-    result: Floats = np.einsum("ij,njk->nik", HERMITE, np.concatenate([scaled, ends], axis=1))
+    result: Floats = np.einsum("ij,njk->nik", _exact_matrices()[0], np.concatenate([scaled, ends], axis=1))
     result[:, 0] += begin
     return result
 
@@ -98,10 +99,11 @@ def _derivatives(spans: Floats, points: Floats) -> Floats:
 def _energy(span: float) -> Floats:
     """∫ (d⁵p/dt⁵)² dt over a piece, as the matrix of the quadratic form in its derivatives at both ends."""
     weights = np.tile(span ** np.arange(ORDERS), 2)
-    result: Floats = ENERGY * weights[:, None] * weights * span ** -float(DEGREE)
+    result: Floats = _exact_matrices()[1] * weights[:, None] * weights * span ** -float(DEGREE)
     return result
 
 
+@functools.cache
 def _exact_matrices() -> tuple[Floats, Floats]:
     """Coefficients of a piece from its derivatives at 0 and 1, and the integral of its fifth derivative squared."""
     size = DEGREE + 1
@@ -143,6 +145,3 @@ def _inverse(rows: list[list[Fraction]]) -> list[list[Fraction]]:
                 factor = work[k][i]
                 work[k] = [a - factor * b for a, b in zip(work[k], work[i])]
     return [row[size:] for row in work]
-
-
-HERMITE, ENERGY = _exact_matrices()

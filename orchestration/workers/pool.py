@@ -18,7 +18,7 @@ from orchestration.basics.errors import QuadcosimError
 from orchestration.building.inputs import Files, all_with_files, with_files
 from orchestration.processes import subprocesses
 from orchestration.processes.child import Child, Died
-from orchestration.workers.provenance import versions
+from orchestration.workers.provenance import sources, versions
 from orchestration.workers.task import (
     Chunk,
     EnvironmentFailure,
@@ -77,9 +77,12 @@ class WorkerProcess:
         self._child.allow(None)
         return answer
 
-    def listen(self) -> Any:
-        """What it says next; raises `Died`."""
-        return self._child.hear()
+    def ready(self) -> Ready:
+        """What it says of itself once it has started; raises `Died`."""
+        self._child.say(sources())
+        answer = self._child.hear()
+        assert isinstance(answer, Ready)
+        return answer
 
     def close(self) -> None:
         """End it and remove what it left."""
@@ -170,7 +173,7 @@ class Supervisor:
                     return self._worker
                 self._worker = worker = WorkerProcess(self._root)
             try:
-                ready = worker.listen()
+                ready = worker.ready()
             except Died as death:
                 self._drop()
                 _expect_no_interrupt(death)

@@ -1,16 +1,14 @@
 """What the bits of a run depend on beside its system: versions, sources, the machine."""
 
+import contextlib
 import functools
 import hashlib
 import importlib.metadata
 import platform
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-
-from orchestration.engines import loop
-from orchestration.engines.batch import kernels
-from orchestration.requests import request
 
 ROOTS = (
     "orchestration.runs.simulation",
@@ -33,15 +31,53 @@ _FEATURES = ("fma", "fma4", "avx2", "avx512f")
 """of a processor, by which the C library and numpy choose among their mathematical functions"""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Sources:
+    """The sources on the flight's path by one hash, and how their files are told from edited ones on this machine."""
+
+    hash: str
+    states: Mapping[str, tuple[int, int, int]]
+    """by path: size, and when content and file were changed last [ns]"""
+
+    @classmethod
+    def read(cls) -> "Sources":
+        """As they are now."""
+        files = flight_sources()
+        states = {str(path): _state(path) for path in files.values()}  # before: what is edited meanwhile is not these
+        return cls(hash=sources_hash(files), states=states)
+
+    def now(self) -> "Sources":
+        """These if no file has changed since, else as they are now: to read all of them takes a tenth of a second."""
+        with contextlib.suppress(OSError):
+            if all(_state(Path(path)) == state for path, state in self.states.items()):
+                return self
+        return Sources.read()
+
+
+@functools.cache
+def sources() -> Sources:
+    """Those of this process, read once."""
+    return Sources.read()
+
+
+def software(sources: Sources) -> dict[str, str]:
+    """Versions of what a run's bits depend on."""
+    packages = {name: importlib.metadata.version(name) for name in ("quadcosim", "numpy", "fmpy")}
+    return {**packages, "sources": sources.hash}
+
+
 @functools.cache
 def versions() -> dict[str, str]:
-    """The software that a run's bits depend on, the sources on the flight's path by their hash."""
-    packages = {name: importlib.metadata.version(name) for name in ("quadcosim", "numpy", "fmpy")}
-    return {**packages, "sources": sources_hash(flight_sources())}
+    """Those of this process."""
+    return software(sources())
 
 
 def flight_sources() -> dict[str, Path]:
     """The modules of this project that the code that flies imports, directly or not, by name."""
+    from orchestration.engines import loop  # not before: a worker that is told of its sources needs none of them
+    from orchestration.engines.batch import kernels
+    from orchestration.requests import request
+
     found: dict[str, Path] = {}
     waiting = list(ROOTS)
     while waiting:
@@ -59,7 +95,7 @@ _IMPORT = re.compile(r"^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+)?import[ \t]+(\([^)]*\
 def imported(source: str) -> Iterator[str]:
     """The names of all that a module's source imports: modules, and what may be a module of a package.
 
-    By its lines: each worker begins with this, and syntax trees of a hundred modules take it half a second.
+    By its lines: each sweep begins with this, and syntax trees of a hundred modules take it half a second.
     """
     for module, names in _IMPORT.findall(source):
         if module:
@@ -74,6 +110,11 @@ def sources_hash(sources: Mapping[str, Path]) -> str:
     for name, path in sorted(sources.items()):
         digest.update(f"{name}\0".encode() + hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
+
+
+def _state(path: Path) -> tuple[int, int, int]:
+    found = path.stat()
+    return found.st_size, found.st_mtime_ns, found.st_ctime_ns
 
 
 def _source(name: str) -> Path | None:

@@ -6,10 +6,9 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageError
-from orchestration.engines.batch.batches import Batches
 from orchestration.engines.engine import Engine
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.model import read_model
@@ -18,6 +17,9 @@ from orchestration.runs.result import Result
 from orchestration.runs.simulation import prepared
 from orchestration.system.model import System
 from orchestration.workers.row import Row
+
+if TYPE_CHECKING:
+    from orchestration.engines.batch.batches import Batches
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,7 +87,7 @@ class Runner:
     def __init__(self, machine: str | None = None) -> None:
         self._instances = Instances()
         self._machine = machine
-        self._batches: Batches | None = None
+        self._batches: Batches | None = None  # loads only where runs are flown in lanes
 
     def fly(self, task: RunTask) -> Outcome:
         """Fly one run; what is wrong with it is its row.
@@ -119,6 +121,8 @@ class Runner:
         """
         started = time.perf_counter()
         if self._batches is None:
+            from orchestration.engines.batch.batches import Batches
+
             self._batches = Batches()
         _expect_files(chunk.tasks[0].system)
         try:

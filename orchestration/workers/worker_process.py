@@ -8,7 +8,7 @@ from pathlib import Path
 
 from orchestration.basics import scratch
 from orchestration.processes.channel import Parent
-from orchestration.workers.provenance import machine, versions
+from orchestration.workers.provenance import Sources, machine, software
 from orchestration.workers.task import (
     Chunk,
     EnvironmentFailure,
@@ -30,7 +30,8 @@ def main(own_folder: Path) -> None:
 
     # An FMU must not be blamed for an interrupt.
     parent = Parent(interrupt=signal.SIG_DFL, orphaned=orphaned)
-    parent.say(Ready(versions=versions(), machine=machine()))
+    told: Sources = parent.hear()
+    parent.say(Ready(versions=software(told.now()), machine=machine()))
     runner = Runner(machine())
     for task in parent:
         parent.say(_fly(runner, task))

@@ -6,6 +6,7 @@ import dataclasses
 import functools
 import json
 import math
+import os
 import random
 import re
 import shutil
@@ -29,7 +30,8 @@ from orchestration.quadrotor.wiring import DEFAULT_PLANT
 from orchestration.studies import store as stores
 from orchestration.studies.run_key import run_key
 from orchestration.studies.store import TEXTS, DesignPoint, open_for_reading, open_for_writing
-from orchestration.workers.provenance import flight_sources, imported, sources_hash, versions
+from orchestration.workers import provenance
+from orchestration.workers.provenance import Sources, flight_sources, imported, sources_hash, versions
 from orchestration.workers.row import Row
 from quadcosim import QuadcosimError, Scenario, UsageError
 from tests.orchestration.studies.common import METRICS, OBJECTIVES, files_in, one_line, row
@@ -517,6 +519,17 @@ def test_an_edited_source_on_the_path_of_the_flight_is_other_software(module: st
     edited = tmp_path / "edited.py"
     edited.write_bytes(sources[module].read_bytes() + b"\n")
     assert sources_hash({**sources, module: edited}) != sources_hash(sources) == versions()["sources"]
+
+
+def test_sources_are_read_again_where_one_was_edited_since(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "one.py"
+    file.write_text("1")
+    monkeypatch.setattr(provenance, "flight_sources", lambda: {"one": file})
+    read = Sources.read()
+    assert read.now() is read
+    file.write_text("2")
+    os.utime(file, ns=(0, 0))
+    assert read.now().hash == sources_hash({"one": file}) != read.hash
 
 
 def test_every_header_that_c_on_the_path_of_the_flight_includes_is_one_of_its_sources() -> None:

@@ -13,6 +13,7 @@ from orchestration.system.model import Component, System
 from orchestration.workers import pool
 from orchestration.workers.executors import _local_submit
 from orchestration.workers.pool import Inputs, Pool
+from orchestration.workers.provenance import Sources, sources, versions
 from orchestration.workers.task import Outcome, RunTask
 from quadcosim import QuadcosimError, UsageError
 from tests.orchestration.fmi.small import needs_compiler, small
@@ -89,6 +90,20 @@ def test_a_crew_that_is_closed_starts_no_process_any_more(temporary: Path) -> No
         pool.fly(task())
     pool.remove()
     assert not list(temporary.iterdir())
+
+
+@pytest.mark.parametrize(("read_at", "said"), [(None, "told"), ((0, 0, 0), versions()["sources"])])
+def test_a_worker_reads_the_sources_that_it_is_told_of_only_where_one_was_edited_since(
+    read_at: tuple[int, int, int] | None, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    states = sources().states
+    known = states if read_at is None else dict.fromkeys(states, read_at)
+    monkeypatch.setattr(pool, "sources", lambda: Sources(hash="told", states=known))
+    worker = pool.WorkerProcess(tmp_path)
+    try:
+        assert worker.ready().versions == {**versions(), "sources": said}
+    finally:
+        worker.close()
 
 
 def test_what_workers_leave_is_removed_after_the_last_thread_that_could_leave_more(
