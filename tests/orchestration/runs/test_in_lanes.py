@@ -11,6 +11,7 @@ from orchestration.basics.errors import QuadcosimError
 from orchestration.engines.batch import shape
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
+from orchestration.runs.in_lanes import located
 from orchestration.system.model import Component, System
 from tests.native import NATIVE
 from tests.orchestration.fmi.small import needs_compiler, small
@@ -141,7 +142,7 @@ def test_what_cannot_be_is_refused_in_a_line(values: dict[str, Any], more: dict[
 def test_runs_share_what_they_do_not_have_of_their_own() -> None:
     from orchestration.runs.columns import columns
 
-    system = in_lanes.located(Scenario(timing=Timing(period=0.01)).as_system())
+    system = located(Scenario(timing=Timing(period=0.01)).as_system())
     models = {name: quadcosim.read_model(component.fmu) for name, component in system.components.items()}
     given = columns(Scenario(), system, models, {X: np.zeros(100), "timing.period": [0.01, 0.02] * 50})
     assert len({id(one) for one in given.systems}) == 2
