@@ -44,7 +44,7 @@ def test_rows_and_signals_of_a_sweep_are_those_of_a_run_of_each(
         small(tmp_path / name, *habits)
     (tmp_path / "system.toml").write_text(SYSTEM, encoding="utf-8")
     (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
-    quadcosim("sweep", "study.toml", "--engine", "compiled", "--workers", "2", "--out", "swept", cwd=tmp_path)
+    quadcosim("sweep", "study.toml", "--workers", "2", "--out", "swept", cwd=tmp_path)
     table = frame(store_path("study", tmp_path / "swept"))
     assert len(table) == len(GAINS)
     for gain, (_, swept) in zip(GAINS, table.iterrows(), strict=True):
