@@ -229,7 +229,7 @@ def validate(
     """
     from orchestration.building import fmus
     from orchestration.building.models import MODELS
-    from orchestration.checks.validation import validate as findings_of
+    from orchestration.checks.validation.validator import validate as findings_of
 
     paths = fmu or [fmus.locate(name, say) for name in MODELS]
     for path in paths:

@@ -3,7 +3,7 @@
 import pytest
 
 from orchestration.building import fmus
-from orchestration.checks.validation import validate
+from orchestration.checks.validation.validator import validate
 from tests.examples.common import EXAMPLES
 
 

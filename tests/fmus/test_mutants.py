@@ -10,11 +10,11 @@ import pytest
 
 from orchestration.building import fmus
 from orchestration.building.models import MODELS
-from orchestration.checks.validation import Finding, rules, validate
+from orchestration.checks.validation import rules
 from orchestration.checks.validation.confined_process import PLATFORM, READABLE, look
-from orchestration.checks.validation.finding import name_of
+from orchestration.checks.validation.finding import Finding, name_of
 from orchestration.checks.validation.progress import Report, Told
-from orchestration.checks.validation.validator import PROCESS
+from orchestration.checks.validation.validator import PROCESS, validate
 from orchestration.command import cli
 from orchestration.processes.limits import Limits
 from tests.fmus.damage import Mutant, every

@@ -10,7 +10,7 @@ from elftools.elf.elffile import ELFFile
 from fmu_kit.bundle import Target
 from orchestration.building import fmus
 from orchestration.building.models import MODELS
-from orchestration.checks.validation import validate
+from orchestration.checks.validation.validator import validate
 from tests.examples.common import EXAMPLES
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
 from tests.fmus.making import PAIR

@@ -13,14 +13,15 @@ from fmpy.model_description import ValidationError
 
 from orchestration.basics.errors import QuadcosimError
 from orchestration.building.models import MODELS
-from orchestration.checks.validation import Finding, confined_process, run_rules, validate
-from orchestration.checks.validation.finding import check
+from orchestration.checks.validation import confined_process, run_rules
+from orchestration.checks.validation.finding import Finding, check
 from orchestration.checks.validation.fmu import Fmu, read_co_simulation, read_fmu
 from orchestration.checks.validation.own_description import differences, elements
 from orchestration.checks.validation.probe import Probe
 from orchestration.checks.validation.progress import Frame, Report, Told
 from orchestration.checks.validation.structure import initial_unknowns, known_dependencies, outputs
 from orchestration.checks.validation.units import dimensions, unit_meaning
+from orchestration.checks.validation.validator import validate
 from orchestration.checks.validation.variables import aliases, names
 from orchestration.command import cli
 from orchestration.fmi.archive import Archive

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from fmpy.validation import validate_fmu
 
-from orchestration.checks.validation import Finding, validate
+from orchestration.checks.validation.finding import Finding
+from orchestration.checks.validation.validator import validate
 from orchestration.processes.limits import Limits
 from tests.fmus.damage import Mutant
 
