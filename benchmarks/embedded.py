@@ -8,6 +8,7 @@ there.
 import argparse
 import subprocess
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 from benchmarks import stack
@@ -15,6 +16,7 @@ from benchmarks.mathematics import table
 from docs.pages import fill
 from fmu_kit.bundle import Target
 from fmu_kit.compiler.pack.embedded import write
+from fmu_kit.variants import Value, Variant
 from orchestration.building.models import MODELS
 from tests.fmu_kit.compiler.compiled import HERE as BOARD_FILES
 from tests.fmu_kit.compiler.embedded import ARM, BOARDS, M4F, M7, QEMU, on_cortex_m, rows_of, to_note
@@ -23,6 +25,20 @@ HERE = Path(__file__).parent
 OPTIONS = ("-std=c99", "-fno-math-errno")
 FLIGHT = ("-DSTEPS=3000", "-DH=0.01", "-DSAMPLE_PERIOD=0")
 WITHOUT_TEXTS = "-DUNIFIEDCONTROLLER_NO_TEXTS"
+OFF: dict[str, Value] = {
+    "discretisation": "explicit",
+    "prediction": 0.0,
+    "gain_scaling": "absolute",
+    "hold_period": 0.0,
+    "weight": 1.0,
+    "stages": 3,
+}
+FIXED: dict[str, dict[str, Value]] = {
+    "nothing": {},
+    "no redesign, no prediction": OFF,
+    "`discretisation = mean`, `hold_period = 0.02`": {**OFF, "discretisation": "mean", "hold_period": 0.02},
+}
+"""Values of the controller, in words."""
 MACHINES = {"M4F": M4F, "M7": M7}
 
 
@@ -32,6 +48,19 @@ def compiled(source: Path, folder: Path, *flags: str) -> tuple[int, int]:
     subprocess.run([ARM, *OPTIONS, *stack.OPTIONS, *flags, "-c", str(source), "-o", str(made)], check=True)
     done = subprocess.run(["arm-none-eabi-size", str(made)], check=True, capture_output=True, text=True)
     return int(done.stdout.splitlines()[1].split()[0]), max(stack.deepest(made.with_suffix(".ci").read_text()).values())
+
+
+def with_values_fixed(folder: Path) -> str:
+    """Text and stack of the controller on an M4F at -O2, by what is fixed in it."""
+    rows = []
+    for words, values in FIXED.items():
+        for precision in ("double", "single"):
+            fixed = replace(Target.parse(MODELS["UnifiedController"]), variant=Variant.of("Law", values))
+            source = write(fixed, folder / precision, single=precision == "single")
+            text, depth = compiled(source, folder, *M4F, "-O2")
+            bare, _ = compiled(source, folder, *M4F, "-O2", "-DLAW_NO_TEXTS")
+            rows.append([words, precision, *(f"{n:,}" for n in (text, bare, depth))])
+    return table(["fixed", "precision", "text [B]", "without words [B]", "stack [B]"], rows)
 
 
 def flown(sources: list[Path], folder: Path, board: str, *flags: str) -> list[int]:
@@ -81,12 +110,13 @@ def main() -> None:
                     rows.append([precision, machine, f"`{optimised}`", *(f"{n:,}" for n in numbers)])
         double, single = (folder / precision / "UnifiedController.c" for precision in ("double", "single"))
         far = differences(double, single, plant_source)
+        fixed = with_values_fixed(folder)
     heads = ["precision", "machine", "", "text [B]", "without words [B]", "instance [B]", "stack [B]"]
     found = table([*heads, "instructions a step", "most"], rows)
     version = subprocess.run([ARM, "--version"], check=True, capture_output=True, text=True).stdout.splitlines()[0]
-    print(found, version, far, sep="\n\n")
+    print(found, version, fixed, far, sep="\n\n")
     if page is not None:
-        fill(page, {"sizes": f"{found}\n\n`{version}`", "single": far})
+        fill(page, {"sizes": f"{found}\n\n`{version}`", "single": far, "fixed": fixed})
 
 
 if __name__ == "__main__":

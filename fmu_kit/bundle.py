@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fmu_kit.syntax_trees import parsed, statements
+from fmu_kit.variants import MODULE, Variant
 
 SHARED_PACKAGES = ("fmu_kit", "pythonfmu")
 """What every FMU bundles; else only what lies beside its slave, and the standard library, may be imported."""
@@ -29,6 +30,8 @@ class Target:
     model: str
     root: Path | None = None
     """the folder in which modules are looked for first; None: only as Python finds them"""
+    variant: Variant | None = None
+    """of the slave, with values that are fixed"""
 
     @classmethod
     def parse(cls, text: str, root: Path | None = None) -> "Target":
@@ -50,6 +53,16 @@ class Target:
         folder = path.parent.parent if path.name == "__init__.py" else path.parent
         beside = (folder / top / "__init__.py").is_file() or (folder / f"{top}.py").is_file()
         return beside and folder.name not in ("site-packages", "dist-packages")
+
+    @property
+    def name(self) -> str:
+        """What its FMU is called."""
+        return self.model if self.variant is None else self.variant.name
+
+    @property
+    def entry(self) -> str:
+        """The module that defines what is packed."""
+        return self.module if self.variant is None else MODULE
 
     @property
     def fragment(self) -> Path:
@@ -82,6 +95,8 @@ def bundled_sources(target: Target) -> dict[str, str]:
         waiting += _imported_modules(sources[key], package, path, target)
         if "." in module:
             waiting.append(module.rpartition(".")[0])
+    if target.variant is not None:
+        sources[f"{MODULE}.py"] = target.variant.source(target.module, target.model)
     return dict(sorted(sources.items()))
 
 

@@ -39,8 +39,14 @@ class Making:
     """what to do then"""
 
 
-HEADINGS = {"input": "Inputs", "output": "Outputs", "parameter": "Parameters", "local": "Locals"}
-"""The causalities in the order of the page."""
+HEADINGS = {
+    "input": "Inputs",
+    "output": "Outputs",
+    "parameter": "Parameters",
+    "local": "Locals",
+    "constant": "Constants, fixed when the FMU was built",
+}
+"""The causalities in the order of the page, and what is constant."""
 
 
 def to_html(slave: Any, making: Making, fragment: str = "") -> str:
@@ -98,9 +104,9 @@ def _relocated(fragment: str, folder: str) -> str:
 
 
 def variable_tables(variables: Sequence[Variable]) -> Iterator[str]:
-    """The HTML of a heading and a table for each causality that occurs."""
-    for causality, heading in HEADINGS.items():
-        chosen = [v for v in variables if v.causality == causality]
+    """The HTML of a heading and a table for each causality that occurs, and for constants."""
+    for kind, heading in HEADINGS.items():
+        chosen = [v for v in variables if kind == ("constant" if v.variability == "constant" else v.causality)]
         if chosen:
             yield f"<h3>{heading} ({len(chosen)})</h3>"
             columns = ("Name", "Unit", "Start", "Min", "Max", "Items", "Variability", "Description")

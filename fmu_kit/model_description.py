@@ -161,8 +161,9 @@ def type_attributes(variable: Variable) -> dict[str, str]:
 def initial_dependencies(slave: Any) -> dict[int, list[int]]:
     """By the value reference of each output, those of what it depends on when initialisation ends, in their order."""
     names = [v.name for v in slave.variables]
+    given = [i for i, v in enumerate(slave.variables) if v.is_settable]
     known = {i: slave.initial_dependencies(v.name) for i, v in enumerate(slave.variables) if v.causality == "output"}
-    return {output: [i for i, name in enumerate(names) if name in found] for output, found in known.items()}
+    return {output: [i for i in given if names[i] in found] for output, found in known.items()}
 
 
 def _simple_type(types: Element, name: str) -> Element:

@@ -20,6 +20,7 @@ import sys
 import uuid
 import zipfile
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.dom.minidom import parseString
@@ -28,8 +29,10 @@ from xml.etree.ElementTree import Element, ParseError, fromstring, tostring
 from fmu_kit import bundle, documentation, loader
 from fmu_kit.bundle import PackagingError, Target, bundled_sources, module_path, place, renamed
 from fmu_kit.documentation import Making
+from fmu_kit.errors import FmuError
 from fmu_kit.failure import place_of
 from fmu_kit.model_description import GUID_PLACEHOLDER, PYTHON_REQUIRED, to_xml
+from fmu_kit.variants import Variant
 from fmu_kit.versions import generation_tool, version_of
 
 PAGE = "documentation/index.html"
@@ -121,7 +124,7 @@ def build(target: Target, folder: Path) -> Path:
     files[f"resources/{entry}.py"] = _entry(name, target).encode()
     files["resources/slavemodule.txt"] = entry.encode()
     files[SOURCE_HASH_FILE] = digest.encode()
-    files |= _with_loader(unchanged_files(target), target.model)
+    files |= _with_loader(unchanged_files(target), target.name)
     making = Making(
         needs=documentation.IN_PYTHON,
         source=f"../resources/{name}/{place(target.module, target.root)}",
@@ -157,7 +160,7 @@ def put_guid(files: dict[str, bytes]) -> str:
 def written(files: dict[str, bytes], target: Target, folder: Path) -> Path:
     """Write the FMU, replacing it in one go, and return its path."""
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{target.model}.fmu"
+    path = folder / f"{target.name}.fmu"
     temporary = path.with_suffix(f".{os.getpid()}.partial")
     write_archive(temporary, files, first="modelDescription.xml")
     os.replace(temporary, path)
@@ -167,9 +170,7 @@ def written(files: dict[str, bytes], target: Target, folder: Path) -> Path:
 def _entry(bundle: str, target: Target) -> str:
     """The module that pythonfmu runs; nothing in it is newer than the oldest Python that could load it."""
     oldest = tuple(map(int, PYTHON_REQUIRED.removeprefix(">=").split(".")))
-    return _ENTRY.format(
-        bundle=bundle, module=target.module, model=target.model, oldest=oldest, required=PYTHON_REQUIRED
-    )
+    return _ENTRY.format(bundle=bundle, module=target.entry, model=target.name, oldest=oldest, required=PYTHON_REQUIRED)
 
 
 def content_guid(files: dict[str, bytes]) -> str:
@@ -215,7 +216,18 @@ def slave_class(target: Target) -> Any:
         raise PackagingError(f"{target.module}:{target.model}: expected it to define {left}")
     if "description" not in vars(slave):
         raise PackagingError(f"{target.module}:{target.model}: expected a docstring or a description of its own")
-    return slave
+    return slave if target.variant is None else _variant(slave, target.variant)
+
+
+def _variant(slave: Any, variant: Variant) -> Any:
+    """The class with values that are fixed; raises `PackagingError` for those that it refuses."""
+    about = {"fixed": dict(variant.fixed), "description": variant.described(slave.__name__)}
+    try:
+        made = type(variant.name, (slave,), {**about, "__module__": slave.__module__})
+        made(instance_name=variant.name)._take_parameters()
+    except FmuError as error:
+        raise PackagingError(f"{variant.name}: {error}") from error
+    return made
 
 
 def _binaries(model: str) -> dict[str, bytes]:
@@ -242,7 +254,7 @@ def _with_loader(files: dict[str, bytes], model: str) -> dict[str, bytes]:
 
 def unchanged_files(target: Target) -> dict[str, bytes]:
     """What goes into the FMU as it is, by its place there: binaries, licences, the slave's icon if it has one."""
-    return {**_binaries(target.model), **licences_and_icon(target, pythonfmu=_license_of_pythonfmu())}
+    return {**_binaries(target.name), **licences_and_icon(target, pythonfmu=_license_of_pythonfmu())}
 
 
 def licences_and_icon(target: Target, version: int = 2, **others: str) -> dict[str, bytes]:
@@ -298,18 +310,20 @@ def _license_of_pythonfmu() -> str:
 
 
 def main(arguments: list[str], build: Callable[[Target, Path], Path] = build) -> int:
-    """`python -m fmu_kit.packaging FOLDER [--root ROOT] MODULE:CLASS …`: build each, print its path.
+    """`python -m fmu_kit.packaging FOLDER [--root ROOT] [--variant TEXT] MODULE:CLASS …`: build each, print its path.
 
-    ROOT is the folder in which modules are found before all others.
+    ROOT is the folder in which modules are found before all others, TEXT that of a `Variant`.
     """
     folder, *targets = arguments
-    root = None
+    root, variant = None, None
     if targets[:1] == ["--root"]:
         root, targets = Path(targets[1]), targets[2:]
         sys.path.insert(0, str(root))
+    if targets[:1] == ["--variant"]:
+        variant, targets = Variant.parse(targets[1]), targets[2:]
     try:
         for text in targets:
-            print(build(Target.parse(text, root), Path(folder)), flush=True)
+            print(build(replace(Target.parse(text, root), variant=variant), Path(folder)), flush=True)
     except PackagingError as error:
         print(error, file=sys.stderr)
         return 1

@@ -6,12 +6,13 @@ checks every call and turns any failure into one readable message.
 """
 
 import contextlib
+import difflib
 import enum
 import functools
 import math
 import sys
 from abc import abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ClassVar, TypeVar
 from xml.etree.ElementTree import Element
 
@@ -27,6 +28,7 @@ from fmu_kit.saved_state import State, expect_state, parsed, serialised
 from fmu_kit.scalar import FLOAT
 from fmu_kit.unloading import release_at_exit
 from fmu_kit.variables import INDEX, Variable
+from fmu_kit.variants import Value
 
 
 class Phase(enum.IntEnum):
@@ -68,6 +70,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     variables: ClassVar[tuple[Variable, ...]] = ()
     """By value reference, Reals first."""
+    fixed: ClassVar[Mapping[str, Value]] = {}
+    """Parameters that are constants of the FMU, by their FMI names."""
     description: ClassVar[str]
     """Of the FMU, in a line; the first of the docstring, unless told."""
     initial_outputs_depend_on_inputs: ClassVar[bool | None] = None
@@ -99,9 +103,9 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             )
         declared = declared_in(cls)
         _expect_free_names(cls, declared)
-        if declared == getattr(cls, "_declared", None):
+        if declared == getattr(cls, "_declared", None) and "fixed" not in cls.__dict__:
             return  # as its base has them: pythonfmu 0.7.0 keeps the class of each instance for ever, so it has little
-        cls.variables, cls._initial = variables_of(declared), initial_values(declared)
+        cls.variables, cls._initial = _with_fixed(cls, variables_of(declared)), initial_values(declared)
         cls._index = {v.name: i for i, v in enumerate(cls.variables)}
         for i, variable in enumerate(cls.variables):
             if cls._index[variable.name] != i:
@@ -115,7 +119,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         cls._given = frozenset(i for i, v in enumerate(cls.variables) if v.has_start)
         cls._inputs = frozenset(i for i, v in enumerate(cls.variables) if v.causality == "input")
         cls._tunable = frozenset(i for i, v in enumerate(cls.variables) if v.variability == "tunable")
-        cls._indices = {i: cls._index[f"{v.name}{INDEX}"] for i, v in enumerate(cls.variables) if v.items}
+        chosen = [(i, v.name) for i, v in enumerate(cls.variables) if v.items and v.is_settable]
+        cls._indices = {i: cls._index[f"{name}{INDEX}"] for i, name in chosen}
 
     _declared: ClassVar[list[Declared]]
     _own: ClassVar[tuple[str, ...]]
@@ -444,7 +449,9 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         """The variable of `vr`, of one of the types, if its value may be set now; raises `FmuError` if not."""
         self._of_type([vr], *types)
         variable = self.variables[vr]
-        if not variable.has_start:
+        if variable.variability == "constant":
+            raise FmuError(f"{variable.name}: a constant, fixed when the FMU was built, cannot be set")
+        if not variable.is_settable:
             raise FmuError(f"{variable.name}: a variable with causality {variable.causality} cannot be set")
         if self._phase >= Phase.STEPPING and vr not in self._inputs and vr not in self._tunable:
             raise FmuError(f"{variable.name}: a fixed parameter cannot be set after initialisation")
@@ -474,6 +481,21 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._phase = Phase.FAILED
         self._quickly_settable = frozenset()
         return failure
+
+
+def _with_fixed(slave: type[Slave], variables: tuple[Variable, ...]) -> tuple[Variable, ...]:
+    """The variables, some of them constants; raises `FmuError` for what cannot be fixed, or not at this value."""
+    fixed, names = dict(slave.fixed), {v.name: v for v in variables}
+    for name, value in slave.fixed.items():
+        beside = name.removesuffix(INDEX)
+        if name not in names:
+            near = difflib.get_close_matches(name, names, n=1)
+            raise FmuError(f"{name}: no parameter of {slave.__name__}{f'; did you mean {near[0]}?' if near else ''}")
+        if beside != name and names.get(beside, names[name]).items:
+            raise FmuError(f"{name}: expected {beside}, which fixes both")
+        if names[name].items:
+            fixed[f"{name}{INDEX}"] = names[name].items.get(str(value), value)
+    return tuple(v.fixed_at(fixed[v.name]) if v.name in fixed else v for v in variables)
 
 
 def _first_line(text: str) -> str:

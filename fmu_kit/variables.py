@@ -2,13 +2,13 @@
 
 import enum
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
-from fmu_kit.errors import require
+from fmu_kit.errors import FmuError, require
 
 Causality = Literal["input", "output", "parameter", "local"]
-Variability = Literal["continuous", "discrete", "fixed", "tunable"]
+Variability = Literal["continuous", "discrete", "fixed", "tunable", "constant"]
 Type = Literal["Real", "Integer", "Boolean", "Enumeration"]
 INDEX = "_index"
 """Behind the name of an Enumeration, in that of the Integer beside it"""
@@ -35,7 +35,8 @@ class Variable:
 
     def __post_init__(self) -> None:
         """Raise `TypeError` for an Enumeration whose range would not be checked."""
-        if self.items and (self.causality != "parameter" or [*self.items.values()] != [*range(1, len(self.items) + 1)]):
+        given = self.causality == "parameter" or self.variability == "constant"
+        if self.items and not (given and [*self.items.values()] == [*range(1, len(self.items) + 1)]):
             raise TypeError(f"{self.name}: expected an Enumeration to be a parameter, its items 1, 2, …")
 
     @property
@@ -60,9 +61,27 @@ class Variable:
         return type(self.start).__name__ if self.items else None
 
     @property
-    def has_start(self) -> bool:
-        """Whether the value is given from outside (`initial` exact) and not calculated."""
+    def is_settable(self) -> bool:
+        """Whether the value is given from outside."""
         return self.causality in ("input", "parameter")
+
+    @property
+    def has_start(self) -> bool:
+        """Whether the value is known before anything is computed (`initial` exact)."""
+        return self.is_settable or self.variability == "constant"
+
+    def fixed_at(self, value: float | int | bool | str) -> "Variable":
+        """The parameter as a constant; raises `FmuError` for another variable, and a value that it cannot have."""
+        require(self.causality == "parameter", self.name, f"a variable with causality {self.causality}", "a parameter")
+        known: float | int | bool | str = self.items.get(value, value) if isinstance(value, str) else value
+        if isinstance(known, str) or isinstance(known, bool) != (self.type == "Boolean"):
+            raise FmuError(
+                f"{self.name} = {value}: expected {'true or false' if self.type == 'Boolean' else self.bounds}"
+            )
+        if self.type != "Boolean":
+            require(self.type == "Real" or known == int(known), self.name, value, self.bounds)
+            self.check(known)
+        return replace(self, causality="local", variability="constant", start=type(self.start)(known))
 
     @property
     def bounds(self) -> str:

@@ -1,6 +1,7 @@
 """Where FMUs are: finds them by name, builds those that are missing or whose sources have changed."""
 
 import functools
+import keyword
 import logging
 import os
 import subprocess
@@ -15,10 +16,12 @@ from fmu_kit.bundle import PackagingError, Target
 from fmu_kit.compiler.pack import freshness
 from fmu_kit.discovery import slave_beside, slaves_in
 from fmu_kit.packaging import read_source_hash
+from fmu_kit.variants import Variant
 from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.building import consent
 from orchestration.building.models import MODELS
 from orchestration.processes import subprocesses
+from orchestration.system.model import Parameter
 from orchestration.system.request import Twin
 
 _NOTES = logging.getLogger("quadcosim")
@@ -212,6 +215,16 @@ def slaves_named(text: str) -> list[Target]:
     return named
 
 
+def with_fixed(slave: Target, name: str, values: Mapping[str, Parameter]) -> Target:
+    """A slave with parameters that are fixed, by their FMI names, as the model of this name.
+
+    Raises `UsageError` for a name that a model cannot have.
+    """
+    if not (name.isascii() and name.isidentifier() and not keyword.iskeyword(name)):
+        raise UsageError(f"--name {name}: expected letters, digits and _, no digit first")
+    return replace(slave, variant=Variant.of(name, values))
+
+
 def build_slaves(
     targets: Sequence[Target],
     folder: Path,
@@ -248,9 +261,10 @@ def _packed(
 ) -> list[Path]:
     """What a module of the kit makes of slaves, in a process of its own; the paths that it prints one by one."""
     named = [f"{target.module}:{target.model}" for target in targets]
-    root = targets[0].root if targets else None
-    roots = [] if root is None else ["--root", root]
-    whole = subprocesses.command(*command, folder.resolve(), *roots, *named)
+    first = targets[0] if targets else Target("", "")
+    roots = [] if first.root is None else ["--root", first.root]
+    variant = [] if first.variant is None else ["--variant", first.variant.text]
+    whole = subprocesses.command(*command, folder.resolve(), *roots, *variant, *named)
     made = []
     with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as remarks:
         with subprocess.Popen(

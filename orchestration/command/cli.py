@@ -26,6 +26,7 @@ from orchestration.command.limit_flags import LimitFlags, ProcessFlags
 from orchestration.command.output_options import Manners
 from orchestration.command.registry import FLY, FMUS, TOOLS
 from orchestration.command.shared_flags import takes
+from orchestration.command.variant_flags import VariantFlags
 from orchestration.fmi.banners import banners_to_stderr
 from orchestration.processes.subprocesses import misleading_variables
 
@@ -86,11 +87,15 @@ def quadcosim(
         raise UsageError("expected a command; quadcosim --help lists them")
 
 
+@takes("variant", VariantFlags)
 def build(
-    folder: Annotated[
-        Path | None,
+    slave: Annotated[
+        str | None,
         typer.Argument(
-            help="Folder of modules that define slaves; without one, this project's FMUs.", show_default=False
+            metavar="[FOLDER]",
+            help="Folder of modules that define slaves, FOLDER/NAME for one, or the name of one of this project's; "
+            "without one, all of this project's, or UnifiedController with --name.",
+            show_default=False,
         ),
     ] = None,
     out: Annotated[
@@ -114,25 +119,39 @@ def build(
     fmi: Annotated[
         int, typer.Option("--fmi", min=2, max=3, help="Version of FMI, 3 with --native only; then in native/fmi3/.")
     ] = 2,
+    *,
+    variant: VariantFlags,
 ) -> Answer:
-    """Build every slave that the modules of FOLDER define, each as an .fmu. Same sources give the same bytes."""
+    """Build every slave that the modules of FOLDER define, each as an .fmu. Same sources give the same bytes.
+
+    With --name one slave is built as another FMU: parameters that are fixed by --set and --vehicle are constants of it.
+    """
     from orchestration.building import fmus
     from orchestration.building.models import MODELS
+    from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER
 
     if target is not None and not native:
         raise UsageError("--target: expected --native with it; FMUs with Python inside are the same for all systems")
     if fmi == 3 and not native:
         raise UsageError("--fmi 3: expected --native with it; FMUs with Python inside are of FMI 2.0")
     packing = fmus.IN_PYTHON if not native else fmus.NATIVE_FMI_3 if fmi == 3 else fmus.NATIVE
+    if variant.are_given and variant.name is None:
+        raise UsageError("--set, --vehicle: expected --name NAME, what the FMU with these values is called")
+    if variant.name is not None and variant.name in MODELS:
+        raise UsageError(f"--name {variant.name}: expected another name than that of a slave")
+    asked = [slave] if slave is not None else [DEFAULT_CONTROLLER] if variant.are_given else list(MODELS)
+    slaves = variant.applied_to([each for name in asked for each in fmus.slaves_named(name)])
+    folder = None if slave in (None, *MODELS) else Path(str(slave))
+    if folder is not None:
+        folder = folder if folder.is_dir() else folder.parent
+        consent.agree(folder)
     where = out or (folder or fmus.default_folder()) / packing.folder
     with progress_bar("building") as progress:
         how: Any = {"packing": packing, "systems": target, "progress": progress}
-        if folder is None:
-            return of_files(fmus.build(MODELS, where, say, **how))
-        consent.agree(folder)
-        return of_files(fmus.build_slaves(fmus.slaves_of(folder), where, say, **how))
+        return of_files(fmus.build_slaves(slaves, where, say, **how))
 
 
+@takes("variant", VariantFlags)
 def export_c(
     out: Annotated[Path, typer.Option("--out", help="Folder for NAME.h and NAME.c.", metavar="DIR")],
     slave: Annotated[
@@ -144,11 +163,13 @@ def export_c(
     single: Annotated[
         bool, typer.Option("--single", help="In single precision, with the functions of libm; else double, without.")
     ] = False,
+    *,
+    variant: VariantFlags,
 ) -> Answer:
     """Write a controller, or any slave, as two files in C for a microcontroller: no allocation, C99."""
     from orchestration.building import fmus
 
-    written = fmus.export_c(fmus.slaves_named(slave), out, single=single)
+    written = fmus.export_c(variant.applied_to(fmus.slaves_named(slave)), out, single=single)
     return of_files(each for path in written for each in (path.with_suffix(".h"), path))
 
 

@@ -181,7 +181,7 @@ class FlightFlags:
             top["reference"] = ReferenceChoice(**chosen(self.reference))
         if self.disturbance is not None:
             top["disturbance"] = DisturbanceChoice(**chosen(self.disturbance))
-        parameters = {key: _value(text) for key, text in _pairs("set", self.set or [])}
+        parameters = assigned("set", self.set)
         changed = scenario.with_changes(timing=timing, parameters=parameters, **top)
         if self.controller or self.plant:
             plant, controller = self.plant or changed.plant.fmu, self.controller or changed.controller.fmu
@@ -204,7 +204,7 @@ class FlightFlags:
                 f"{flags}: for the quadrotor only; expected --set PATH=V for a system, as connections.NAME.delay"
             )
         system = native_twins(system) if self.native else system
-        return changed(system, {**top, **{key: _value(text) for key, text in _pairs("set", self.set or [])}})
+        return changed(system, {**top, **assigned("set", self.set)})
 
 
 EngineFlag = Annotated[
@@ -238,6 +238,11 @@ def request_from(path: Path | None, flags: FlightFlags, timing: Path | None = No
 
     request = Scenario() if path is None else load_request(path, timing)
     return flags.applied_to(request) if isinstance(request, Scenario) else flags.applied_to_system(request)
+
+
+def assigned(flag: str, given: list[str] | None) -> "dict[str, Parameter]":
+    """The values of a flag that may be repeated, by name; raises `UsageError` for what is no NAME=VALUE."""
+    return {key: _value(text) for key, text in _pairs(flag, given or [])}
 
 
 def _pairs(flag: str, given: list[str]) -> list[tuple[str, str]]:

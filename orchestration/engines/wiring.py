@@ -68,7 +68,7 @@ def columns_of(system: System) -> tuple[str, ...]:
 def _expect_clock(name: str, component: Component, model: Model) -> None:
     """Raise `UsageError` for a clock that the FMU does not have, or that its parameters would set beside the master."""
     sampling = component.sampling
-    if sampling is None or SAMPLE_PERIOD not in model.variables:
+    if sampling is None or not model.has_clock:
         if sampling is not None and sampling.clock == "fmu":
             raise UsageError(f"components.{name}.sampling.clock = fmu: expected an FMU with {SAMPLE_PERIOD}")
         return
@@ -86,7 +86,8 @@ def _parameters(system: System, models: Mapping[str, Model]) -> dict[str, float]
         given = system.components[name].parameters
         for variable in model.variables.values():
             value = given.get(variable.name, variable.start)
-            if variable.causality == "parameter" and variable.kind in NUMERIC and value is not None:
+            is_one = variable.causality == "parameter" or variable.is_constant
+            if is_one and variable.kind in NUMERIC and value is not None:
                 found[f"{name}.{variable.name}"] = number_of(variable, value)
     return found
 

@@ -56,6 +56,11 @@ class Variable:
         """Whether it is a parameter or an input."""
         return self.causality in ("parameter", "input", "structuralParameter")
 
+    @property
+    def is_constant(self) -> bool:
+        """Whether it is a parameter that was fixed when the FMU was built: what has its value may be given to it."""
+        return self.variability == "constant" and self.causality == "local" and self.start is not None
+
 
 @dataclass(frozen=True, kw_only=True, repr=False, eq=False)
 class Model:
@@ -82,7 +87,13 @@ class Model:
     @property
     def waits(self) -> bool:
         """Whether it is told when its first sample is, and until then is stepped without one."""
-        return self.is_of_this_kit and {SAMPLE_PERIOD, SAMPLE_OFFSET} <= self.variables.keys()
+        return self.is_of_this_kit and self.has_clock and SAMPLE_OFFSET in self.variables
+
+    @property
+    def has_clock(self) -> bool:
+        """Whether it can sample by itself when its parameters say so."""
+        told = [self.variables[name] for name in (SAMPLE_PERIOD, SAMPLE_OFFSET) if name in self.variables]
+        return SAMPLE_PERIOD in self.variables and all(each.is_settable for each in told)
 
     @property
     def name(self) -> str:

@@ -24,8 +24,15 @@ INTEGERS: Mapping[str, type[np.signedinteger[Any] | np.unsignedinteger[Any]]] = 
 def taken(variable: Variable, value: object, place: str) -> Value:
     """`value` as the variable takes it, an item of an enumeration as its number.
 
-    Raises `UsageError` that names the place for a value that it cannot take.
+    Raises `UsageError` that names the place for a value that it cannot take; a constant takes its own.
     """
+    found = _of_its_type(variable, value, place)
+    if variable.is_constant and number_of(variable, found) != number_of(variable, variable.start):
+        raise UsageError(f"{place} = {shown(value)}: expected {variable.start}, which is fixed in this FMU")
+    return found
+
+
+def _of_its_type(variable: Variable, value: object, place: str) -> Value:
     if variable.kind == "Boolean":
         return _of_kind(value, bool, place, "true or false")
     if variable.kind == "String":

@@ -20,7 +20,7 @@ from orchestration.interop.trace import Trace, read_trace
 from orchestration.processes import subprocesses
 from orchestration.processes.child import Child
 from orchestration.requests.ssp import writing
-from orchestration.requests.ssp.carried import Part, carried, has_clock, wholly_carried
+from orchestration.requests.ssp.carried import Part, carried, wholly_carried
 from orchestration.runs.simulation import prepared
 from orchestration.system.model import Parameter, System
 from orchestration.system.paths import changed
@@ -44,7 +44,7 @@ class Flights:
             given = wholly_carried(system, announce)
             self._fmus = {part.name: part.fmu.absolute() for part in given.parts}
             self._system = _with_fmus(system, self._fmus)
-            self._clocks = {part.name for part in given.parts if has_clock(part.model)}
+            self._clocks = {part.name for part in given.parts if part.model.has_clock}
             self.loop = loop_of(given)
             self.step = given.step
             """[s]"""

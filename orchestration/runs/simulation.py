@@ -274,7 +274,8 @@ def _version(package: str) -> str:
 
 def _set_parameters(instance: Instance, component: Component) -> None:
     for name, value in component.parameters.items():
-        instance.set(name, value)
+        if not instance.variables[name].is_constant:
+            instance.set(name, value)
     if component.tolerance is not None:
         instance.set_tolerance(component.tolerance)
 
@@ -282,7 +283,7 @@ def _set_parameters(instance: Instance, component: Component) -> None:
 def _set_clock(instance: Instance, component: Component, model: Model, first: int) -> None:
     """A component built on `fmu_kit` samples at every step from its `first` sample [ns] on, or keeps its own clock."""
     sampling = component.sampling
-    if sampling is None or SAMPLE_PERIOD not in instance.variables:
+    if sampling is None or not model.has_clock:
         return
     if sampling.clock == "fmu":
         instance.set(SAMPLE_PERIOD, sampling.period)

@@ -68,7 +68,7 @@ def _check_divergence(condition: str, models: Mapping[str, Model]) -> None:
 def recorded(system: System, models: Mapping[str, Model]) -> dict[str, tuple[str, ...]]:
     """What is recorded of each component beside what is exchanged: as the file says, or all outputs and local Reals.
 
-    What an expression names is recorded in any case.
+    Constants are not, but what an expression names is recorded in any case.
     """
     named = {name for _, expression in expressions(system) for name in names(parse(expression))}
     found = {}
@@ -81,7 +81,8 @@ def recorded(system: System, models: Mapping[str, Model]) -> dict[str, tuple[str
         chosen = [
             v.name
             for v in model.variables.values()
-            if (v.causality == "output" and v.kind in NUMERIC) or (v.causality == "local" and v.kind == "Real")
+            if (v.causality == "output" and v.kind in NUMERIC)
+            or (v.causality == "local" and v.kind == "Real" and not v.is_constant)
         ]
         found[name] = tuple(chosen)
     return found
@@ -168,7 +169,7 @@ def _article(variable: Variable) -> str:
 def expect_parameter(place: str, model: Model, name: str, value: Parameter, *, is_fed: bool = False) -> None:
     """Raise `UsageError`, naming the `place`, for what a model has no parameter for, or a value that it cannot take."""
     variable = model.variable(name, place)
-    if not variable.is_settable or is_fed:
+    if not (variable.is_settable or variable.is_constant) or is_fed:
         expected = "a parameter or an input that nothing is connected to"
         raise UsageError(f"{place}: is {'connected' if is_fed else _article(variable)}; expected {expected}")
     if isinstance(taken(variable, value, place), float) and not is_finite(value):

@@ -8,7 +8,7 @@ import re
 from collections.abc import Container, Iterable, Mapping
 from typing import ClassVar
 
-from fmu_kit.compiler.trace.statements import TANGENT, Block, Call, Function, Place, Statement, ends
+from fmu_kit.compiler.trace.statements import TANGENT, Block, Call, Function, Place, Statement, each_of, ends, used_by
 from fmu_kit.compiler.trace.symbols import Kind, Symbol, TraceError, closure, integer_of, node, value_of
 from fmu_kit.compiler.trace.tracing import Program
 
@@ -70,7 +70,7 @@ class FunctionWriter:
         self.parameters: list[str] = []
         for name in function.names:
             self.parameters.append(_unused(f"p_{identifier(name)}", self.parameters))
-        self.used = self._used(function.body)
+        self.used = used_by(each_of(function.body), self._named)
         self.gives: dict[int, set[tuple[str, int]]] = {}
 
     def text(self) -> str:
@@ -112,28 +112,6 @@ class FunctionWriter:
             found += self._named(each)
             for inner in each.blocks:
                 found += self._named_in(inner)
-        return found
-
-    def _used(self, block: Block) -> dict[int, Symbol]:
-        """The symbols that a block makes use of, other than to choose between values that nobody asks for."""
-        assigned: dict[int, list[Symbol]] = {}
-        named: list[Symbol] = []
-
-        def note(block: Block) -> None:
-            for each in block:
-                if each.op == "assign":
-                    assigned.setdefault(id(each.symbols[0]), []).append(each.symbols[1])
-                else:
-                    named.extend(self._named(each))
-                for inner in each.blocks:
-                    note(inner)
-
-        note(block)
-        found: dict[int, Symbol] = {}
-        while named:
-            new = {key: symbol for key, symbol in closure(named).items() if key not in found}
-            found |= new
-            named = [value for key in new for value in assigned.get(key, ())]
         return found
 
     # -- memory ----------------------------------------------------------------------------------------------

@@ -37,9 +37,12 @@ class Words:
 
 
 def fields(program: Program) -> dict[str, str]:
-    """Where each place lies in the struct, as `par.mass`."""
+    """Where each place lies in the struct, as `par.mass`; constants are not in it."""
     found: dict[str, str] = {}
+    constants = {v.name for v in program.slave.variables if v.variability == "constant"}
     for place in program.places:
+        if place.reference is not None and place.name in constants:
+            continue
         group = GROUPS[None if place.reference is None else program.slave.variables[place.reference].causality]
         name = identifier(place.name.removeprefix("self."))
         name = (name.strip("_") or name) if group == "kept" else name

@@ -137,7 +137,7 @@ def _damaged(slave: Slave) -> str:
 def _refused_value(slave: Slave, reference: int) -> str:
     """What it answers to a value that is not finite: before the value, and after it."""
     variable = slave.variables[reference]
-    if variable.type != "Real" or not variable.has_start:
+    if variable.type != "Real" or not variable.is_settable:
         return _row(("", ""))
     return _around(["nan"], slave, _SET_REAL, slave, [reference], [math.nan])
 

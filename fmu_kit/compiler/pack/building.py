@@ -11,6 +11,7 @@ import importlib
 import sys
 import types
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from fmu_kit import libraries, packaging
@@ -63,9 +64,9 @@ def build(
         program = precomputed(trace(slave_class(target), modules_of(target)))
         sources = c_sources(program, GUID_PLACEHOLDER, standard)
     except TraceError as error:
-        raise PackagingError(f"{target.model}: {error}") from error
+        raise PackagingError(f"{target.name}: {error}") from error
     files = {f"sources/{name}": text for name, text in sources.items()}
-    files |= standard.sources(target.model, standard.main)
+    files |= standard.sources(target.name, standard.main)
     files |= {f"documentation/{_PYTHON}/{path}": text.encode() for path, text in _python_sources(target).items()}
     files |= licences_and_icon(target, version)
     files[SOURCE_HASH_FILE] = source_hash(target, version).encode()
@@ -86,7 +87,7 @@ def build(
         compiled[here] = libraries.content("native", sources, (OPTIONS, standard.main, mathematics), compile_)
     for system in systems:
         compiled |= compiled_for(system, sources, standard.main, version)
-    files |= {library_path(system, target.model): library for system, library in compiled.items()}
+    files |= {library_path(system, target.name): library for system, library in compiled.items()}
     return written(files, target, folder)
 
 
@@ -106,7 +107,10 @@ def c_sources(program: Program, guid: str, standard: Standard) -> dict[str, byte
 
 def modules_of(target: Target) -> list[types.ModuleType]:
     """The modules that a slave is made of, its own and those of the kit; they are imported."""
-    names = [path.removesuffix(".py").removesuffix("/__init__").replace("/", ".") for path in _python_sources(target)]
+    names = [
+        path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+        for path in _python_sources(replace(target, variant=None))
+    ]
     return [importlib.import_module(name) for name in names]
 
 

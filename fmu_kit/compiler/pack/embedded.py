@@ -58,10 +58,10 @@ def write(target: Target, folder: Path, *, single: bool = False) -> Path:
         program = precomputed(trace(slave, modules_of(target), digits=24 if single else 53))
         header, source = files(program, single=single)
     except TraceError as error:
-        raise PackagingError(f"{target.model}: {error}") from error
+        raise PackagingError(f"{target.name}: {error}") from error
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / f"{target.model}.h").write_text(header, "utf-8")
-    path = folder / f"{target.model}.c"
+    (folder / f"{target.name}.h").write_text(header, "utf-8")
+    path = folder / f"{target.name}.c"
     path.write_text(source, "utf-8")
     return path
 
@@ -114,7 +114,7 @@ def _groups(program: Program, precision: str) -> str:
     places = fields(program)
     parts = []
     for group in GROUPS.values():
-        found = [place for place in program.places if places[place.name].startswith(f"{group}.")]
+        found = [place for place in program.places if places.get(place.name, "").startswith(f"{group}.")]
         widest = max((len(places[place.name]) for place in found), default=0) - len(group)
         lines = []
         for place in found:
@@ -132,6 +132,8 @@ def _starts(program: Program, single: bool) -> str:
     places = fields(program)
     lines = []
     for place in program.places:
+        if place.name not in places:
+            continue
         value = start_of(slave, place)
         if value or math.copysign(1.0, value) < 0.0:
             lines.append(f"        .{places[place.name]} = {single_number(value) if single else repr(value)},\n")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from fmu_kit.compiler.trace.statements import Block, Place, Statement, statement
@@ -30,11 +31,26 @@ def name_of_kept(path: Path) -> str:
     return f"self{written(path)}"
 
 
+@dataclass(frozen=True)
+class Settled:
+    """What of a slave's memory is known from tracing it before."""
+
+    constants: Mapping[str, Symbol] = field(default_factory=dict)
+    """what lies in places that hold one value"""
+    unread: frozenset[str] = frozenset()
+    """places beside the variables that nothing depends on"""
+
+    def needs_no_place(self, place: Place) -> bool:
+        """Whether it is beside the variables, and nobody reads it."""
+        return place.reference is None and (place.name in self.constants or place.name in self.unread)
+
+
 class Memory:
     """The memory of one slave while it is traced: every number in it has a place with a name."""
 
-    def __init__(self, slave: Any, kinds: Mapping[str, Kind]) -> None:
+    def __init__(self, slave: Any, kinds: Mapping[str, Kind], settled: Settled = Settled()) -> None:
         self.slave = slave
+        self.settled = settled
         self.places: dict[str, Place] = {}
         self._kinds = kinds
         """of places, as far as they are known from tracing the slave before"""
@@ -137,10 +153,16 @@ class Memory:
             if not is_number(leaf):
                 return leaf
             place = self.place(path, lifted(leaf))
-            loaded = self.written[place.name] = node("load", (), place.kind, (place.name, 0))
+            loaded = self.written[place.name] = self._read(place, 0)
             return loaded
 
         self._set_attributes({name: mapped(value, load, (name,)) for name, value in self.attributes().items()})
+
+    def _read(self, place: Place, version: int) -> Symbol:
+        """What is read of a place, in a version of the memory."""
+        if place.name in self.settled.constants:
+            return self.settled.constants[place.name]
+        return node("load", (), place.kind, (place.name, version))
 
     def flushed(self) -> Block:
         """The stores that bring the memory up to date."""
@@ -150,7 +172,7 @@ class Memory:
                 continue
             symbol = lifted(leaf)
             place = self.place(path, symbol)
-            if self.written.get(place.name) is not symbol:
+            if self.written.get(place.name) is not symbol and not self.settled.needs_no_place(place):
                 stores.append(statement("store", (symbol,), place.name))
                 self.written[place.name] = symbol
         return tuple(stores)
@@ -163,8 +185,8 @@ class Memory:
             if not is_number(leaf):
                 return leaf
             place = self.place(path, lifted(leaf))
-            if place.name in stored:
-                self.written[place.name] = node("load", (), place.kind, (place.name, self.version))
+            if place.name in stored or self.settled.needs_no_place(place):
+                self.written[place.name] = self._read(place, self.version)
             elif place.name not in before:
                 raise TraceError(f"{place.name}: set on some paths only")
             else:

@@ -29,6 +29,7 @@ from fmu_kit.compiler.trace.symbols import (
     node,
     pieces,
     select,
+    settled,
     token,
     truth,
 )
@@ -102,6 +103,7 @@ class Explorer:
 
     def fail_if(self, condition: Any, error: Exception) -> None:
         """The next statement: an error, if the condition holds."""
+        condition = settled(condition)
         if condition is True:
             raise error
         known = self._now.known

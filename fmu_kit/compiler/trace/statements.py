@@ -5,11 +5,11 @@ Statements are interned as symbols are, so that two paths that do the same do id
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from fmu_kit.compiler.trace.symbols import Kind, Symbol, both, either, negation
+from fmu_kit.compiler.trace.symbols import Kind, Symbol, both, closure, either, negation
 
 Block = tuple["Statement", ...]
 
@@ -124,6 +124,33 @@ class Call:
     function: Function
     memory: int
     """version of the memory before it"""
+
+
+def each_of(block: Block) -> Iterator[Statement]:
+    """The statements of a block, each before those inside of it."""
+    for each in block:
+        yield each
+        for inner in each.blocks:
+            yield from each_of(inner)
+
+
+def used_by(
+    statements: Iterable[Statement], named_by: Callable[[Statement], Sequence[Symbol]] = lambda each: each.symbols
+) -> dict[int, Symbol]:
+    """The symbols that statements make use of, other than to choose between values that nobody asks for."""
+    assigned: dict[int, list[Symbol]] = {}
+    named: list[Symbol] = []
+    for each in statements:
+        if each.op == "assign":
+            assigned.setdefault(id(each.symbols[0]), []).append(each.symbols[1])
+        else:
+            named += named_by(each)
+    found: dict[int, Symbol] = {}
+    while named:
+        new = {key: symbol for key, symbol in closure(named).items() if key not in found}
+        found |= new
+        named = [value for key in new for value in assigned.get(key, ())]
+    return found
 
 
 def symbols_of(block: Block) -> list[Symbol]:

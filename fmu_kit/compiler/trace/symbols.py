@@ -7,10 +7,12 @@ simplified: every one is the operation of Python floats, in their order, so that
 
 from __future__ import annotations
 
+import math
 import operator
 import re
 import struct
 from collections.abc import Callable, Iterable, Sequence
+from ctypes import c_float
 from typing import Any, Literal, NamedTuple
 
 from fmu_kit.compiler.trace import integers
@@ -144,7 +146,8 @@ class Symbol:
         return negation(self) if self.kind == "bool" else -self - 1
 
     def __bool__(self) -> bool:
-        return hooks.decide(truth(self))
+        condition = settled(truth(self))
+        return condition if isinstance(condition, bool) else hooks.decide(condition)
 
     # -- what would lose the symbol --------------------------------------------------------------------------
 
@@ -220,11 +223,29 @@ _interned: dict[Any, Symbol] = {}
 
 def node(op: str, args: Sequence[Symbol], kind: Kind, data: Any = None) -> Symbol:
     """The one node of this operation on these operands."""
+    if op in _DECIDED and all(arg.op == "constant" for arg in args):
+        return constant(_DECIDED[op](*map(_as_computed, args)))
     key = (op, tuple(map(id, args)), kind, data)
     found = _interned.get(key)
     if found is None:
         found = _interned[key] = Symbol(op, tuple(args), kind, data)
     return found
+
+
+_DECIDED: dict[str, Callable[..., bool]] = {
+    **{name: getattr(operator, name) for name in ("lt", "le", "gt", "ge", "eq", "ne")},
+    **{name: getattr(math, name) for name in ("isfinite", "isinf", "isnan")},
+    "not": operator.not_,
+    "and": lambda a, b: bool(a and b),
+    "or": lambda a, b: bool(a or b),
+}
+"""What is decided of constants while the slave is traced; arithmetic is left to C, whose bits count"""
+
+
+def _as_computed(symbol: Symbol) -> float:
+    """The number of a constant, as it will be in the C that is written."""
+    value = integer_of(symbol) if symbol.kind == "wide" else value_of(symbol)
+    return value if hooks.digits >= 53 else c_float(value).value
 
 
 def constant(value: float | int | bool) -> Symbol:
@@ -265,8 +286,16 @@ def truth(value: Symbol) -> Symbol:
     return value if value.kind == "bool" else node("ne", (value, constant(0 if value.kind == "wide" else 0.0)), "bool")
 
 
+def settled(condition: Any) -> Any:
+    """A condition; true or false where it is a constant."""
+    if isinstance(condition, Symbol) and condition.op == "constant":
+        return bool(value_of(condition))
+    return condition
+
+
 def negation(condition: Any) -> Any:
     """Not, of a condition."""
+    condition = settled(condition)
     if is_known(condition):
         return not condition
     return condition.args[0] if condition.op == "not" else node("not", (truth(condition),), "bool")
@@ -274,6 +303,7 @@ def negation(condition: Any) -> Any:
 
 def both(a: Any, b: Any) -> Any:
     """And, of conditions."""
+    a, b = settled(a), settled(b)
     for one, other in ((a, b), (b, a)):
         if is_known(one):
             return other if one else False
@@ -282,6 +312,7 @@ def both(a: Any, b: Any) -> Any:
 
 def either(a: Any, b: Any) -> Any:
     """Or, of conditions."""
+    a, b = settled(a), settled(b)
     for one, other in ((a, b), (b, a)):
         if is_known(one):
             return True if one else other
@@ -290,6 +321,7 @@ def either(a: Any, b: Any) -> Any:
 
 def select(condition: Any, a: Any, b: Any) -> Any:
     """`a` where the condition holds, else `b`; both are computed."""
+    condition = settled(condition)
     if is_known(condition):
         return a if condition else b
     if is_known(a, b) and isinstance(a, bool) and isinstance(b, bool):

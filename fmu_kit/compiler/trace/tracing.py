@@ -13,7 +13,7 @@ import inspect
 import textwrap
 import types
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,10 +21,11 @@ from pythonfmu.fmi2slave import Fmi2Slave
 
 from fmu_kit import scalar
 from fmu_kit.compiler.trace import symbolic_builtins as stand_ins
-from fmu_kit.compiler.trace.memory import Memory
+from fmu_kit.compiler.trace.memory import Memory, Settled, name_of_kept
 from fmu_kit.compiler.trace.path_exploration import Explorer
-from fmu_kit.compiler.trace.statements import Function, Place, Statement
-from fmu_kit.compiler.trace.symbols import Kind, TraceError, hooks
+from fmu_kit.compiler.trace.statements import Function, Place, Statement, each_of, used_by
+from fmu_kit.compiler.trace.symbols import Kind, Symbol, TraceError, constant, hooks
+from fmu_kit.compiler.trace.tree import leaves
 from fmu_kit.failure import place_of
 from fmu_kit.slave import Phase, Slave
 
@@ -64,16 +65,48 @@ def trace(slave: type[Slave], modules: list[types.ModuleType], *, digits: int = 
     """
     hooks.digits = digits
     kinds: dict[str, Kind] = {}
+    fixed = {v.name: constant(v.start) for v in slave.variables if v.variability == "constant"}
+    settled = Settled(fixed)
     while True:
-        memory = Memory(slave(instance_name="traced"), kinds)
+        memory = Memory(slave(instance_name="traced"), kinds, settled)
         try:
             program = _traced(slave, modules, memory)
         except Exception as error:
             raise TraceError(f"{_place(error)}{error}") from error
         found = {name: place.kind for name, place in memory.places.items() if place.reference is None}
-        if all(kinds.get(name, memory.first_kinds[name]) == kind for name, kind in found.items()):
+        same = all(kinds.get(name, memory.first_kinds[name]) == kind for name, kind in found.items())
+        more = _settled(program, settled) if fixed else settled
+        if same and more == settled:
             return program
         kinds = found  # a place that held an integer first and a float later holds a float: once more, with that
+        settled = more  # and what follows from what is fixed, and what nothing depends on then
+
+
+def _settled(program: Program, before: Settled) -> Settled:
+    """What is known of the memory of a program, of which some was known before."""
+    first = {name_of_kept(path) for path, _ in leaves(Memory(program.slave(instance_name="new"), {}).attributes())}
+    kept = {place.name: place for place in program.places if place.reference is None and place.name not in first}
+    each = [each for function in program.functions for each in each_of(function.body)]
+    stored: dict[str, set[Symbol]] = {}
+    for store in each:
+        if store.op == "store":
+            stored.setdefault(store.data, set()).add(store.symbols[0])
+    single = {name: values.pop() for name, values in stored.items() if name in kept and len(values) == 1}
+    constants = {
+        name: value for name, value in single.items() if (value.op, value.kind) == ("constant", kept[name].kind)
+    }
+    return Settled({**before.constants, **constants}, before.unread | (kept.keys() - _read(each, kept.keys())))
+
+
+def _read(statements: Sequence[Statement], kept: Collection[str]) -> set[str]:
+    """The places that something depends on other than what lies in places that nothing depends on."""
+    found: set[str] = set()
+    while True:
+        counting = [each for each in statements if each.op != "store" or each.data not in kept or each.data in found]
+        loaded = {symbol.data[0] for symbol in used_by(counting).values() if symbol.op == "load"}
+        if loaded <= found:
+            return found
+        found |= loaded
 
 
 def _traced(slave: type[Slave], modules: list[types.ModuleType], memory: Memory) -> Program:
@@ -106,7 +139,8 @@ def _traced(slave: type[Slave], modules: list[types.ModuleType], memory: Memory)
             raise TraceError(f"{slave.__name__}.step fails whatever it is given")
         memory.expect_as_before(after, stepped, "in a step", may_add=False)
     variables = {place.reference: place for place in memory.places.values() if place.reference is not None}
-    kept = [place for place in memory.places.values() if place.reference is None]
+    beside = [place for place in memory.places.values() if place.reference is None]
+    kept = [place for place in beside if not memory.settled.needs_no_place(place)]
     return Program(
         model=slave.__name__,
         slave=slave,

@@ -281,7 +281,7 @@ class Batch:
                 sampling = component.sampling
                 if sampling is not None:
                     self._ratios[index][0, lane] = sampling.clock_ratio
-                    if SAMPLE_PERIOD in variables:
+                    if shape.models[name].has_clock:
                         own = sampling.clock == "fmu"
                         memory[variables[SAMPLE_PERIOD].reference, lane] = sampling.period if own else 0.0
                         memory[variables[SAMPLE_OFFSET].reference, lane] = sampling.offset if own else 0.0

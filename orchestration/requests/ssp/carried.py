@@ -103,11 +103,6 @@ def _not_plain(place: str, of: Sampling | Connection, keys: tuple[str, ...]) -> 
             yield f"{place}.{key} = {value}: an SSP cannot say that; expected {defaults[key]}"
 
 
-def has_clock(model: Model) -> bool:
-    """Whether an FMU can sample by itself when its parameters say so."""
-    return SAMPLE_PERIOD in model.variables
-
-
 def _common_step(system: System, models: Mapping[str, Model]) -> tuple[float, list[str]]:
     """The step of all components in continuous time, or the period of all others where there are none.
 
@@ -117,7 +112,7 @@ def _common_step(system: System, models: Mapping[str, Model]) -> tuple[float, li
     by_master = {
         name: c.sampling
         for name, c in system.components.items()
-        if c.sampling is not None and not has_clock(models[name])
+        if c.sampling is not None and not models[name].has_clock
     }
     periods = {f"components.{name}.sampling.period": sampling.period for name, sampling in by_master.items()}
     own = [c.sampling.period for c in system.components.values() if c.sampling is not None]
@@ -168,10 +163,12 @@ def _constants(system: System, name: str) -> dict[str, Parameter]:
 def _values(component: Component, model: Model, constants: Mapping[str, Parameter]) -> dict[str, Parameter]:
     """In the order of the FMU: every parameter that is a number, and what else is given."""
     given = {**component.parameters, **constants}
-    if component.sampling is not None and has_clock(model):
+    if component.sampling is not None and model.has_clock:
         given |= {SAMPLE_PERIOD: component.sampling.period, SAMPLE_OFFSET: component.sampling.offset}
     found: dict[str, Parameter] = {}
     for variable in model.variables.values():
+        if variable.is_constant:
+            continue
         if variable.name in given:
             value = _typed(given[variable.name], variable)
             # A Boolean only if it is not what it is anyway: fmpy takes the text false for true.

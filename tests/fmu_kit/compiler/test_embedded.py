@@ -222,3 +222,14 @@ def test_a_slave_with_much_to_say_is_written_without_a_warning_of_the_compiler(n
     target = Target.parse(f"tests.fmu_kit.compiler.probes:{name}", Path().resolve())
     for single, flags in ((False, ()), (True, ("-O1",))):
         assert made(write(target, tmp_path, single=single), "cc", *flags).is_file()
+
+
+def test_of_values_that_are_fixed_and_what_they_turn_off_there_is_nothing_left(main: Main, tmp_path: Path) -> None:
+    """The paper's law alone: no redesign, no commands on their way; it compiles and says nothing else."""
+    off = ("discretisation=explicit", "prediction=0", "gain_scaling=absolute", "hold_period=0", "weight=1", "stages=3")
+    main("export-c", "--name", "PaperLaw", *(part for each in off for part in ("--set", each)), "--out", tmp_path)
+    header, source = ((tmp_path / f"PaperLaw.{ending}").read_text("utf-8") for ending in ("h", "c"))
+    assert not re.search(r"double (discretisation|prediction|gain_scaling|pending|hold_period|stages)", header)
+    assert not re.search(r"model_(matched|predicted|redesign|discretised|remember)\b", source)
+    made(tmp_path / "PaperLaw.c", tmp_path)
+    assert len(source) < 150_000

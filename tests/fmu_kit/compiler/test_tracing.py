@@ -1,6 +1,7 @@
 """What slaves may do: written out as C they answer as they do in Python, to the last bit and letter."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -8,7 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fmu_kit.bundle import Target
+from fmu_kit.compiler.emit.c_code import c_code
+from fmu_kit.compiler.pack.building import modules_of
+from fmu_kit.compiler.trace.tracing import trace
 from fmu_kit.packaging import slave_class
+from fmu_kit.variants import Variant
 from tests.fmu_kit.compiler.compiled import compiler
 from tests.fmu_kit.compiler.probes import Pendulum, Zeros
 from tests.fmu_kit.compiler.twins import InC, InPython, Values, answers, library
@@ -47,6 +52,36 @@ def test_a_slave_in_c_answers_as_in_python(probe: tuple[Target, Path]) -> None:
         assert answers(reset, given, steps) == expected
 
     answer_alike()
+
+
+@pytest.mark.parametrize("mode", ["as_it_is", "doubled"])
+@pytest.mark.parametrize("name", PROBES)
+def test_a_slave_with_values_that_are_fixed_answers_in_c_as_in_python(name: str, mode: str, tmp_path: Path) -> None:
+    compiler("cc")
+    fixed = Variant.of("Fixed", {"mode": mode, "times": 9, "p": 2.0})
+    target = replace(Target.parse(f"tests.fmu_kit.compiler.probes:{name}"), variant=fixed)
+    slave = slave_class(target)
+    reset = InC.made(slave, library(target, tmp_path))
+
+    @settings(derandomize=True, max_examples=30, database=None)
+    @given(start=INPUTS, q=st.sampled_from([0.25, 2.0, 1e-3]), steps=st.lists(INPUTS, max_size=5))
+    def answer_alike(start: Values, q: float, steps: list[Values]) -> None:
+        expected = answers(InPython(slave(instance_name="probe")), {**start, "q": q}, steps)
+        reset.fmu.reset()
+        assert answers(reset, {**start, "q": q}, steps) == expected
+
+    answer_alike()
+
+
+def test_what_fixed_values_turn_off_is_not_written_and_what_follows_from_them_has_no_place() -> None:
+    target = Target.parse("tests.fmu_kit.compiler.probes:Choices")
+    general, fixed = (
+        trace(slave_class(each), modules_of(each))
+        for each in (target, replace(target, variant=Variant.of("Fixed", {"mode": "turned", "p": 1.0})))
+    )
+    assert "self._offset" in {place.name for place in general.places}
+    assert {place.name for place in fixed.places if place.reference is None} == {"self._stale", "self._start_time"}
+    assert len(c_code(fixed)) < 0.8 * len(c_code(general))
 
 
 def test_of_two_zeros_the_smaller_is_the_first_as_in_python(tmp_path: Path) -> None:
