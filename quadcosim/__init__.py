@@ -19,6 +19,7 @@ Where to begin:
 - `limit` finds the largest period, delay, loss or anything else that is still good;
 - `sweep` flies a `Study` over axes, `compare` controllers against each other, `tune` searches for gains: what is there
   is not flown again, and what they give becomes a table with `to_pandas`;
+- `Simulation` stops a run at each sample, for a controller or any other component that is code of yours;
 - `report` writes one HTML file of runs, with a replay;
 - `read_model` says what an FMU has.
 
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     from orchestration.runs.result import Result
     from orchestration.runs.run_directory import load_run, save_run
     from orchestration.runs.simulation import run
+    from orchestration.runs.stepping import Simulation
     from orchestration.studies.axes import Axis
     from orchestration.studies.study import Study
     from orchestration.studies.study_file import load_study
@@ -67,6 +69,7 @@ _HOMES = {
     "Result": "orchestration.runs.result",
     "save_run": "orchestration.runs.run_directory",
     "load_run": "orchestration.runs.run_directory",
+    "Simulation": "orchestration.runs.stepping",
     "fly_until": "orchestration.runs.pause",
     "resume": "orchestration.runs.pause",
     "report": "orchestration.report.writing",
@@ -139,6 +142,7 @@ __all__ = [
     "RunLost",
     "Sampling",
     "Scenario",
+    "Simulation",
     "SimulatorError",
     "Source",
     "Study",

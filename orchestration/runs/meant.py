@@ -136,4 +136,4 @@ def result_of(meant: Meant, flown: Flown, recorder: Recorder, wall_time: float, 
 
 
 Course = Callable[[Any, Progress | None], bool]
-"""Flies a `Simulation` that is prepared; whether the run is over then. Of a run in another process it is pickled."""
+"""Flies a `PreparedRun`; whether the run is over then. Of a run in another process it is pickled."""

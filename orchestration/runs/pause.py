@@ -17,7 +17,7 @@ from orchestration.requests.request import load_request
 from orchestration.runs.meant import Announce, Progress
 from orchestration.runs.result import Result
 from orchestration.runs.run_directory import METRICS, SCENARIO, STATE, keep_flight
-from orchestration.runs.simulation import Simulation, flown
+from orchestration.runs.simulation import PreparedRun, flown
 from orchestration.system.request import Request, system_meant
 from orchestration.system.times import nanoseconds
 
@@ -56,7 +56,7 @@ def fly_until(
     return keep_flight(folder, fly, figures=figures, replaces=())
 
 
-def _until(pause_at: float, folder: Path, flight: Simulation, progress: Progress | None) -> bool:
+def _until(pause_at: float, folder: Path, flight: PreparedRun, progress: Progress | None) -> bool:
     """The course of a run that is paused: its state is then in `folder`."""
     _expect_states(flight)
     flight.master.initialise()
@@ -105,7 +105,7 @@ def resume(
     return result
 
 
-def _rest(folder: Path, flight: Simulation, progress: Progress | None) -> bool:
+def _rest(folder: Path, flight: PreparedRun, progress: Progress | None) -> bool:
     """The course of a run that was paused in `folder`."""
     state, saved = read_state(folder / STATE)
     _expect_same(state.pop("of"), flight, folder)
@@ -133,7 +133,7 @@ def read_state(path: Path) -> tuple[dict[str, Any], dict[str, bytes]]:
     return state, parts
 
 
-def _write(flight: Simulation, folder: Path) -> None:
+def _write(flight: PreparedRun, folder: Path) -> None:
     state, parts = flight.master.state(), flight.master.saved()
     text = json.dumps({**state, "of": _hashes(flight)})
     arrays = {name: np.frombuffer(part, dtype=np.uint8) for name, part in parts.items()}
@@ -150,7 +150,7 @@ def _digest(text: str, parts: dict[str, bytes]) -> str:
     return content.hexdigest()
 
 
-def _hashes(flight: Simulation) -> dict[str, str]:
+def _hashes(flight: PreparedRun) -> dict[str, str]:
     """Of everything that a run goes on from beside its state."""
     files = {name: source.file for name, source in flight.system.sources.items() if source.file is not None}
     return {
@@ -160,7 +160,7 @@ def _hashes(flight: Simulation) -> dict[str, str]:
     }
 
 
-def _expect_states(flight: Simulation) -> None:
+def _expect_states(flight: PreparedRun) -> None:
     """Raise `UsageError` naming components whose state cannot be saved."""
     without = [name for name, instance in flight.instances.items() if not instance.model.saves_state]
     if without:
@@ -171,7 +171,7 @@ def _hash(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def _expect_same(paused: dict[str, str], flight: Simulation, folder: Path) -> None:
+def _expect_same(paused: dict[str, str], flight: PreparedRun, folder: Path) -> None:
     for what, found in _hashes(flight).items():
         if found != paused.get(what):
             raise UsageError(f"{folder}: {what} is not as when the run was paused; expected it unchanged")

@@ -51,7 +51,7 @@ from orchestration.system.times import NANOSECONDS
 
 
 @dataclass(frozen=True, kw_only=True)
-class Simulation:
+class PreparedRun:
     """A master over instances that have their parameters, ready to initialise or to restore."""
 
     meant: Meant
@@ -111,7 +111,7 @@ class Simulation:
                 foreign[0].warnings.append(warning)
 
 
-def whole(simulation: Simulation, progress: Progress | None) -> bool:
+def whole(simulation: PreparedRun, progress: Progress | None) -> bool:
     """From the start to the end."""
     simulation.master.initialise()
     return simulation.master.run(progress=progress)
@@ -181,7 +181,7 @@ def flown(
         return simulation.result() if over else None
 
 
-def looked_after(simulation: Simulation, progress: Progress | None) -> Progress:
+def looked_after(simulation: PreparedRun, progress: Progress | None) -> Progress:
     """Hears of the progress of a run, and at times looks after what its FMUs share."""
 
     def hear(share: float) -> None:
@@ -202,7 +202,7 @@ def prepared(
     engine: Engine | None = None,
     meant: Meant | None = None,
     room: Room = private,
-) -> Iterator[Simulation]:
+) -> Iterator[PreparedRun]:
     """The FMUs of a system, built if need be, instantiated by `load` and with their parameters.
 
     Ctrl-C ends the run at its next instant. What it is held to may be known already (`meant`); the compiled loop keeps
@@ -242,7 +242,7 @@ def prepared(
                 first_exchange=initial.groups(system.connections, lambda name, output: models[name].depends_on(output)),
                 waiting=[name for name in system.components if models[name].waits],
             )
-        yield Simulation(
+        yield PreparedRun(
             meant=meant, instances=instances, master=master, recorder=recorder, interrupt=interrupt, started=started
         )
 

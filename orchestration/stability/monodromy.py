@@ -22,7 +22,7 @@ from orchestration.engines.wiring import fixed_steps
 from orchestration.fmi.instance import Instance, Loader
 from orchestration.fmi.reuse import Instances
 from orchestration.recording.recording import Chunk, InMemory
-from orchestration.runs.simulation import Simulation, prepared
+from orchestration.runs.simulation import PreparedRun, prepared
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
 from orchestration.stability.linearised_component import PULSE, Rest, Tangent
@@ -78,13 +78,13 @@ def _expect_period(system: System) -> Fraction:
     return period
 
 
-def _expect_states(simulation: Simulation) -> None:
+def _expect_states(simulation: PreparedRun) -> None:
     without = [name for name, instance in simulation.instances.items() if not instance.model.saves_state]
     if without:
         raise UsageError(f"the FMU of {', '.join(without)} cannot save its state")
 
 
-def _come_to_rest(simulation: Simulation, begin: Fraction, period: Fraction) -> None:
+def _come_to_rest(simulation: PreparedRun, begin: Fraction, period: Fraction) -> None:
     """Run for some periods, in which nothing may move."""
     master, system = simulation.master, simulation.system
     master.initialise()
@@ -98,7 +98,7 @@ def _come_to_rest(simulation: Simulation, begin: Fraction, period: Fraction) -> 
     expect_rest(system, np.array(rows))
 
 
-def _tangent(simulation: Simulation, name: str, period: Fraction, pulse: float) -> Tangent:
+def _tangent(simulation: PreparedRun, name: str, period: Fraction, pulse: float) -> Tangent:
     fmu, system = cast("Watched", simulation.instances[name]), simulation.system
     given = {variable_of(end): 0.0 for x in system.connections for end in x.end if component_of(end) == name}
     inputs = tuple(end for end in given if fmu.model.variables[end].kind == "Real")
@@ -125,7 +125,7 @@ def _tangent(simulation: Simulation, name: str, period: Fraction, pulse: float) 
 # -- the map of a period ---------------------------------------------------------------------------------------------
 
 
-def _map_of(simulation: Simulation, tangents: dict[str, Tangent], begin: Fraction, period: Fraction) -> Floats:
+def _map_of(simulation: PreparedRun, tangents: dict[str, Tangent], begin: Fraction, period: Fraction) -> Floats:
     """d(what the loop holds after a period)/d(what it holds), at the instants of `begin` plus whole periods."""
     system = replace(
         simulation.system,

@@ -1,0 +1,91 @@
+"""A system one of whose components is code of the caller's: which one, what it is told, and what it says."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from orchestration.basics.errors import UsageError, expected_name
+from orchestration.building import fmus
+from orchestration.engines.wiring import checked
+from orchestration.fmi.model import Model, read_model
+from orchestration.runs.meant import Meant
+from orchestration.system.model import System, component_of, variable_of
+from orchestration.system.paths import changed
+from orchestration.system.request import Request, in_its_own_words
+
+
+@dataclass(frozen=True, kw_only=True)
+class Replaced:
+    """A request, and the component of its system that is replaced."""
+
+    asked: Request
+    component: str
+    system: System
+    paths: Mapping[str, Path]
+    models: Mapping[str, Model]
+    """of the replaced component without what its FMU would say after initialisation"""
+    measured: tuple[str, ...]
+    """its inputs that are connected, or fed by a source"""
+    commanded: tuple[str, ...]
+    """its outputs that are connected"""
+
+    def held(self, values: Mapping[str, Any]) -> Meant:
+        """A run of it with other values by target, held to its FMUs; raises `UsageError` for what cannot be."""
+        with in_its_own_words(self.asked):
+            paths = {path: value for target, value in values.items() for path in self.asked.paths_of(target)}
+            system = changed(self.system, paths) if paths else self.system
+            if system.fmus != self.system.fmus:
+                raise UsageError("values: expected those of a run of the same FMUs; others are another Simulation")
+            found = checked(system, self.models)
+        return Meant(
+            asked=self.asked, system=found.system, paths=self.paths, models=self.models, parameters=found.parameters,
+            units=found.units,
+        )  # fmt: skip
+
+
+def replaced(asked: Request, component: str | None) -> Replaced:
+    """A request with a component replaced, None: the only sampled one; raises `UsageError` where that cannot be."""
+    with in_its_own_words(asked):
+        system = asked.as_system()
+        name = _name(system, component)
+        measured, commanded = _ends(system, name)
+        whole = replace(system, components={**system.components, name: replace(system.components[name], record=None)})
+        paths = fmus.of_components(system.fmus)
+        models = {each: read_model(path) for each, path in paths.items()}
+    models[name] = _initialising(models[name], commanded)
+    return Replaced(
+        asked=asked, component=name, system=whole, paths=paths, models=models, measured=measured, commanded=commanded
+    )  # fmt: skip
+
+
+def _name(system: System, component: str | None) -> str:
+    """The component that is replaced; raises `UsageError` where it cannot be."""
+    sampled = [name for name, each in system.components.items() if each.sampling is not None]
+    if component is None:
+        if len(sampled) != 1:
+            listed = ", ".join(system.components)
+            raise UsageError(f"component: expected the one to replace, as {len(sampled)} are sampled; one of {listed}")
+        component = sampled[0]
+    if component not in system.components:
+        raise UsageError(f"component: {component}: {expected_name(component, list(system.components))}")
+    sampling = system.components[component].sampling
+    if sampling is not None and sampling.clock == "fmu":
+        raise UsageError(f"components.{component}.sampling.clock = fmu: expected master: your code has no clock")
+    return component
+
+
+def _ends(system: System, component: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The inputs of a component that anything feeds, and its outputs that are connected, in the order of the system."""
+    fed = [end for x in system.connections for end in x.end] + [end for s in system.sources.values() for end in s.to]
+    read = dict.fromkeys(start for x in system.connections for start in x.start)
+    inputs, outputs = (tuple(variable_of(e) for e in ends if component_of(e) == component) for ends in (fed, read))
+    if not outputs:
+        raise UsageError(f"component: {component}: expected one with an output that is connected")
+    return inputs, outputs
+
+
+def _initialising(model: Model, outputs: Sequence[str]) -> Model:
+    """What is known of a component whose FMU says nothing after initialisation but for some outputs."""
+    kept = {name: v for name, v in model.variables.items() if v.causality in ("input", "parameter") or name in outputs}
+    return replace(model, variables=kept)
