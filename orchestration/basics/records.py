@@ -9,14 +9,15 @@ import reprlib
 import typing
 from collections.abc import Callable, Collection, Mapping, Sequence, Set
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
-import pydantic
-import pydantic.dataclasses
-from pydantic_core import core_schema
 from typing_extensions import dataclass_transform
 
 from orchestration.basics.errors import UsageError, no_such_key, shown
+
+if TYPE_CHECKING:
+    import pydantic
+    from pydantic_core import CoreSchema
 
 Class = TypeVar("Class", bound=type)
 
@@ -25,7 +26,9 @@ class _Scalar:
     """Not all that has a value as a float is one: whole numbers of NumPy's stay whole. What is most often is first."""
 
     @staticmethod
-    def __get_pydantic_core_schema__(_source: Any, _handler: Any) -> core_schema.CoreSchema:
+    def __get_pydantic_core_schema__(_source: Any, _handler: Any) -> "CoreSchema":
+        from pydantic_core import core_schema
+
         truth, real, text = core_schema.bool_schema(), core_schema.float_schema(), core_schema.str_schema()
         whole = core_schema.int_schema(ge=-(2**63), lt=2**63)
         only_float = core_schema.chain_schema([core_schema.is_instance_schema(float), real])
@@ -38,7 +41,7 @@ class _Scalar:
 Scalar = Annotated[bool | int | float | str, _Scalar]
 """What a parameter of an FMU can be, and a value of an axis"""
 
-_CONFIG = pydantic.ConfigDict(extra="forbid", strict=True, arbitrary_types_allowed=True)
+_CONFIG: "pydantic.ConfigDict" = {"extra": "forbid", "strict": True, "arbitrary_types_allowed": True}
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(dataclasses.field,))
@@ -48,22 +51,27 @@ def record(place: str = "") -> Callable[[Class], Class]:
     Fields that are missing, that there are not, or of another type are named after their `place`. A list is taken for
     a tuple, text for a path and a path for text, and a number of NumPy's for one of Python's. Its `repr` says what is
     not as by default.
+
+    Who makes none of them loads no pydantic: processes that fly get theirs made.
     """
 
     def declared(cls: Class) -> Class:
-        made: Any = pydantic.dataclasses.dataclass(frozen=True, kw_only=True, repr=False, config=_CONFIG)(cls)
-        plain = made.__init__
+        made: Any = dataclasses.dataclass(frozen=True, kw_only=True, repr=False)(cls)
+        made.__pydantic_config__ = _CONFIG
         if "__repr__" not in vars(cls):
             made.__repr__ = _short
 
-        @functools.wraps(plain)
+        @functools.wraps(made.__init__)
         def checked(self: Any, *unnamed: Any, **given: Any) -> None:
+            import pydantic
+
             try:
-                plain(self, *unnamed, **given)
+                _fill(self, cls, unnamed, given)
             except pydantic.ValidationError:
                 _expect_names(cls, place, unnamed, given)
                 try:
-                    plain(self, **{name: _meant(value, _holds_path(cls, name)) for name, value in given.items()})
+                    meant = {name: _meant(value, _holds_path(cls, name)) for name, value in given.items()}
+                    _fill(self, cls, (), meant)
                 except pydantic.ValidationError as error:
                     _complain_by_meaning(cls, given)
                     raise UsageError(_first_problem(error, place, given)) from None
@@ -73,6 +81,26 @@ def record(place: str = "") -> Callable[[Class], Class]:
         return found
 
     return declared
+
+
+@functools.cache
+def validated(record: type) -> Any:
+    """A record as pydantic has it: its validator, and its fields as those of any table."""
+    import pydantic.dataclasses
+
+    return pydantic.dataclasses.dataclass(frozen=True, kw_only=True, repr=False)(record)
+
+
+def is_record(kind: Any) -> bool:
+    """Whether it is a class of records."""
+    return isinstance(kind, type) and "__pydantic_config__" in vars(kind) and dataclasses.is_dataclass(kind)
+
+
+def _fill(record: Any, cls: type, unnamed: Sequence[Any], given: Mapping[str, Any]) -> None:
+    """Give a record its values; raises `pydantic.ValidationError` for what they may not be."""
+    from pydantic_core import ArgsKwargs
+
+    validated(cls).__pydantic_validator__.validate_python(ArgsKwargs(tuple(unnamed), dict(given)), self_instance=record)
 
 
 def called(words: str) -> Callable[[Class], Class]:
@@ -119,7 +147,7 @@ def _expect_names(cls: type, place: str, unnamed: Sequence[Any], given: Mapping[
 
 
 def _holds_path(cls: Any, name: str) -> bool:
-    hint = cls.__pydantic_fields__[name].annotation
+    hint = validated(cls).__pydantic_fields__[name].annotation
     return hint is Path or Path in typing.get_args(hint)
 
 
@@ -146,7 +174,7 @@ def _complain_by_meaning(cls: Any, given: Mapping[str, Any]) -> None:
         attempt.__post_init__()
 
 
-def _first_problem(error: pydantic.ValidationError, place: str, given: Mapping[str, Any]) -> str:
+def _first_problem(error: "pydantic.ValidationError", place: str, given: Mapping[str, Any]) -> str:
     """The first thing wrong with what was given, in one line that says where it is and what is expected there."""
     problems = error.errors()
     first = problems[0]

@@ -11,7 +11,7 @@ import pydantic
 
 from orchestration.basics.attribute_docs import attribute_docs
 from orchestration.basics.errors import UsageError, no_such_key, shown
-from orchestration.basics.records import default_of
+from orchestration.basics.records import default_of, is_record, validated
 
 Shape = TypeVar("Shape")
 
@@ -81,7 +81,10 @@ def fields_of(shape: Any) -> dict[str, Any]:
 
 
 def _fields(shape: Any) -> dict[str, Any]:
-    found: dict[str, Any] = getattr(shape, "model_fields", None) or getattr(shape, "__pydantic_fields__", {})
+    kind = shape if isinstance(shape, type) else type(shape)
+    if is_record(kind):
+        kind = validated(kind)
+    found: dict[str, Any] = getattr(kind, "__pydantic_fields__", {})
     return found
 
 

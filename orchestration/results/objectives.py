@@ -147,7 +147,7 @@ def known(system: System, signals: set[str], numbers: set[str]) -> System:
     for place, expression in (("good", system.criterion.good), ("diverged", system.criterion.diverged)):
         if expression is not None:
             expect_names(parse(expression), valid, f"criterion.{place}")
-    return replace(system, objectives=found)
+    return system if len(found) == len(system.objectives) else replace(system, objectives=found)
 
 
 def _ends(

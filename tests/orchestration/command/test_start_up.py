@@ -34,3 +34,11 @@ def test_a_run_without_figures_loads_of_them_what_writes_its_files(tmp_path: Pat
 
 def test_a_system_is_shown_as_text_without_any_large_package() -> None:
     assert not LARGE & loaded("show")
+
+
+def test_processes_that_fly_load_what_flies_alone() -> None:
+    imports = "import json, sys, orchestration.workers.worker_process, orchestration.runs.apart_process"
+    code = f"{imports}; print(json.dumps(list(sys.modules)))"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    unused = {"pydantic", "orchestration.requests.request", "orchestration.engines.batch.batch"}
+    assert not (LARGE | unused) & set(json.loads(found))
