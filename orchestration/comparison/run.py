@@ -1,7 +1,8 @@
 """Flies a comparison, concludes from it, and flies a cell of it again."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -119,17 +120,21 @@ def compare(
     )
 
 
-def cell_again(comparison: Comparison, index: int, *, workers: int = 1, engine: EngineChoice = "auto") -> CellSummary:
-    """Fly all runs of one cell, whatever a store has of it; raises `UsageError` for a cell that there is not."""
-    runs = comparison.runs_of(comparison.cell(index))
-    comparison, files, how = _ready(comparison, runs[0], engine)
+def cells_again(
+    comparison: Comparison, indices: Sequence[int], *, workers: int = 1, engine: EngineChoice = "auto"
+) -> list[CellSummary]:
+    """Fly all runs of some cells, whatever a store has of them; in the order of the cells.
+
+    Raises `UsageError` for a cell that there is not.
+    """
+    runs = [comparison.runs_of(comparison.cell(index)) for index in indices]
+    comparison, files, how = _ready(comparison, [some[0] for some in runs], engine)
     study = comparison.study
     starts = files.starts_of(study.origin)
-    systems = [study.system(i, starts) for i in runs]
+    systems = [study.system(i, starts) for i in chain(*runs)]
     with RunEvaluator(files, workers, how.engine) as pool:
         flights = pool.fly_all(systems, in_lanes=how.in_lanes)
-    (found,) = results(comparison, frame_of(comparison, zip(runs, flights)))
-    return found
+    return results(comparison, frame_of(comparison, zip(chain(*runs), flights)))
 
 
 def agree(one: CellSummary, other: CellSummary) -> bool:
@@ -154,23 +159,25 @@ def flight(comparison: Comparison, index: int, start: int, out: Path, *, engine:
     runs = comparison.runs_of(comparison.cell(index))
     if not 0 <= start < len(runs):
         raise UsageError(f"--start {start}: expected a number from 0 to {len(runs) - 1}")
-    comparison, files, how = _ready(comparison, runs[start], engine)
+    comparison, files, how = _ready(comparison, [runs[start]], engine)
     request = comparison.request(runs[start], files.starts_of(comparison.study.origin))
     keep_flight(out, lambda to: fly(request, recorder=to, engine=how.engine))
 
 
-def _ready(comparison: Comparison, index: int, engine: EngineChoice) -> tuple[Comparison, Files, Chosen]:
-    """A comparison as one of its runs is flown by an engine, its files and how; raises `UsageError` for one that cannot
-    be.
+def _ready(comparison: Comparison, indices: Sequence[int], engine: EngineChoice) -> tuple[Comparison, Files, Chosen]:
+    """A comparison as some of its runs are flown by an engine, its files and how.
+
+    Raises `UsageError` for a run that cannot be.
     """
 
     def first(native: bool) -> tuple[System, Files]:
         study = replace(comparison, native=native).study
         files = study.files()
         with in_its_own_words(comparison.base):
-            system = study.system(index, files.starts_of(study.origin))
-            checked(system, files.models_of(system))
-        return system, files
+            systems = [study.system(index, files.starts_of(study.origin)) for index in indices]
+            for system in systems:
+                checked(system, files.models_of(system))
+        return systems[0], files
 
     how = chosen(engine, comparison.native, first)
     return replace(comparison, native=how.native), first(how.native)[1], how
