@@ -22,12 +22,12 @@ import pytest
 from orchestration.building import fmus
 from orchestration.checks.doctor.machine import this_machine
 from orchestration.checks.doctor.verdict import INSTALL_LIBPYTHON, satisfies
-from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
 from orchestration.requests.ssp import writing
 from quadcosim import run
 from tests.fmus.expected import law_command
+from tests.fmus.making import PAIR
 from tests.native import NATIVE
 
 GUIDES = Path(__file__).parent.parent.parent / "docs" / "guides"
@@ -65,13 +65,20 @@ HIDDEN = ("fmu_kit", "controller_fmu", "plant_fmu", "orchestration", "pythonfmu"
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory, built: dict[str, Path]) -> Path:
-    """Both FMUs and the SSP, and nothing else of this project; the plant, which steps most, is the native one."""
+    """Both FMUs, and nothing else of this project; the plant, which steps most, is the native one."""
     folder = tmp_path_factory.mktemp("guide")
-    plant, controller = fmus.locate("native/QuadrotorPlant"), built["UnifiedController"]
-    for path in (plant, controller):
+    for path in (fmus.locate("native/QuadrotorPlant"), built["UnifiedController"]):
         shutil.copy(path, folder)
-    writing.write(Scenario().with_fmus(plant=plant, controller=controller), folder / "QuadrotorLoop.ssp")
     return folder
+
+
+@pytest.fixture
+def native_folder(tmp_path: Path) -> Path:
+    """Both native FMUs and the SSP of them, and nothing else of this project."""
+    for model in PAIR:
+        shutil.copy(fmus.locate(f"native/{model}"), tmp_path)
+    writing.write(NATIVE, tmp_path / "QuadrotorLoop.ssp")
+    return tmp_path
 
 
 @pytest.fixture(scope="module")
@@ -136,15 +143,15 @@ def test_the_fmpy_guide_flies_the_papers_scenario(folder: Path, environment: dic
 
 
 def test_the_ssp_guide_flies_the_same_file_in_three_tools_and_the_container(
-    folder: Path, environment: dict[str, str]
+    native_folder: Path, environment: dict[str, str]
 ) -> None:
-    printed = follow("ssp.md", folder, environment)
+    printed = follow("ssp.md", native_folder, environment)
     late = run(replace(NATIVE, timing=Timing(clock="fmu", delay=0.001)))
     expected = [late.signals[name][-1] for name in POSITION]
     for program in ("libcosim.py", "ecos.py", "fmpy_ssp.py"):
         assert positions(printed, program) == pytest.approx(expected, abs=1e-9), program
     at_once = run(replace(NATIVE, timing=Timing(clock="fmu"))).signals
-    container = np.genfromtxt(folder / "loop.csv", delimiter=",", names=True, deletechars="")
+    container = np.genfromtxt(native_folder / "loop.csv", delimiter=",", names=True, deletechars="")
     for name in POSITION:
         assert np.abs(container[name.removeprefix("plant.")] - at_once[name]).max() < 1e-9, name
 
