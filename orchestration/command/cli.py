@@ -230,6 +230,8 @@ def run(
         return Answer(document={"paused_in": out}, lines=[])
     for warning in result.warnings:
         warn(warning)
+    if follows := result.provenance["follows"]:
+        say(f"follows {follows}")
     if out is not None:
         say(f"results in {out}")
     elif not registering.manners.as_json:

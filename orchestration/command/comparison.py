@@ -32,6 +32,8 @@ def all_cells(
     )
     summary = found.summary
     say(f"{summary.path}: {summary.total} runs, {summary.flown} flown now; tables and pictures beside it")
+    for each in summary.follows:
+        say(f"follows {each}")
     if summary.agreement is not None:
         say(f"engine batch: {summary.agreement}")
     say(f"one cell again, by its number in cells.csv: {again} K")
@@ -39,7 +41,7 @@ def all_cells(
         say(f"{summary.failed} runs failed: runs.csv shows why")
     content: dict[str, Any] = to_json(comparison, found.outcome, found.bandwidths)
     return Answer(
-        document={**content, "files": found.written},
+        document={**content, "follows": summary.follows, "files": found.written},
         lines=list(terminal.lines(comparison, found.outcome)),
         good=not summary.failed,
     )

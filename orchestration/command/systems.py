@@ -78,11 +78,14 @@ def show(
         from orchestration.figures import diagram
 
         say(str(diagram.write(meant, out)))
-    return Answer(document=tables_of(meant), lines=as_text(meant, _units_of(meant)).splitlines())
+    return Answer(document=tables_of(meant), lines=as_text(meant, *_said_by_fmus(meant)).splitlines())
 
 
-def _units_of(system: "System") -> dict[str, str]:
-    """Of its objectives; none where its FMUs are not there, or do not fit: who looks runs no foreign module."""
+def _said_by_fmus(system: "System") -> tuple[dict[str, str], str]:
+    """The units of its objectives, and what is followed by whom.
+
+    Nothing where its FMUs are not there, or do not fit: who looks runs no foreign module.
+    """
     from orchestration.basics.errors import QuadcosimError
     from orchestration.building import fmus
     from orchestration.engines.wiring import checked
@@ -91,9 +94,12 @@ def _units_of(system: "System") -> dict[str, str]:
     try:
         paths = {name: fmus.looked_up(fmu, say) for name, fmu in system.fmus.items()}
         models = {name: read_model(path) for name, path in paths.items() if path is not None}
-        return checked(system, models).units if models.keys() == paths.keys() else {}
+        if models.keys() != paths.keys():
+            return {}, ""
+        found = checked(system, models)
     except QuadcosimError:
-        return {}
+        return {}, ""
+    return found.units, found.follows
 
 
 def register(app: typer.Typer) -> None:

@@ -31,6 +31,7 @@ from orchestration.signals.library import made
 from orchestration.signals.table_file import read_table
 from orchestration.signals.waypoints import read_waypoints
 from orchestration.system.check import check, recorded
+from orchestration.system.following import followed, heard
 from orchestration.system.model import MOTION, Component, Source, System, variable_of
 from orchestration.system.times import Grid, exact_nanoseconds
 
@@ -40,21 +41,24 @@ class Checked:
     """A system that its FMUs fit."""
 
     system: System
-    """with the objectives that they have the variables for"""
+    """with the objectives that they have the variables for, and what each component follows fed to it"""
     parameters: dict[str, float]
     """the numeric ones of all components, as COMPONENT.NAME"""
     units: dict[str, str]
     """of what it comes to, where it has one"""
+    follows: str
+    """what is followed, and by whom; empty where nothing is"""
 
 
 def checked(system: System, models: Mapping[str, Model]) -> Checked:
     """A system held to what its FMUs say; raises `UsageError` for what they do not have, or cannot take."""
     check(system, models)
+    words, system = followed(system, models), heard(system, models)
     for name, component in system.components.items():
         _expect_clock(name, component, models[name])
     parameters = _parameters(system, models)
     system = objectives.known(system, signals_of(system, models), set(parameters))
-    return Checked(system=system, parameters=parameters, units=units(system, models))
+    return Checked(system=system, parameters=parameters, units=units(system, models), follows=words)
 
 
 def columns_of(system: System) -> tuple[str, ...]:
@@ -105,7 +109,7 @@ def source_values(system: System, name: str, parameters: Mapping[str, float], st
         return Constant([source.constant] * len(source.to))
     if source.noise is not None and source.period is not None:
         return WhiteNoise(source.noise, source.period, len(source.to), streams.of(f"sources.{name}", VALUE))
-    if source.trajectory is None:
+    if not source.is_built_in:
         values = _of_file_or_signal(system, name, streams)
         return values if source.scale == 1.0 else Scaled(values, source.scale)
     own = {f"{source.trajectory}.{name}": field for name, field in TRAJECTORY.items()}

@@ -22,12 +22,12 @@ from orchestration.basics.simulator import Floats
 from orchestration.building import fmus
 from orchestration.building.inputs import files_of
 from orchestration.fmi.instance import Instance
-from orchestration.fmi.kit import TRAJECTORY
 from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor import wiring
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
 from orchestration.runs.simulation import prepared
+from orchestration.system.following import AT_REST
 from orchestration.system.model import System
 
 STEP = 1e-6
@@ -51,16 +51,13 @@ class NotSmooth(UsageError):
 def hover_of(scenario: Scenario) -> Scenario:
     """`scenario` with the vehicle at rest at the origin, where its reference rests too, and no wind and no payload."""
     scenario = scenario.resolved()
-    controller = {k: v for k, v in scenario.controller.parameters.items() if k != wiring.USE_REFERENCE_INPUTS}
-    controller |= dict.fromkeys(TRAJECTORY, 0.0)
     plant = dict(scenario.plant.parameters) | dict.fromkeys(wiring.DISTURBANCE, 0.0)
     plant |= {wiring.PAYLOAD: 0.0} if wiring.PAYLOAD in plant else {}
     plant |= {f"initial.{name}": 0.0 for name in wiring.MEASUREMENT} | {f"initial.{SCALAR_PART}": 1.0}
     return dataclasses.replace(
         scenario,
-        controller=dataclasses.replace(scenario.controller, parameters=controller),
         plant=dataclasses.replace(scenario.plant, parameters=plant),
-        reference=ReferenceChoice(),
+        reference=ReferenceChoice(name=AT_REST),
         disturbance=DisturbanceChoice(),
     )
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 
 from orchestration.checks.validation.roles import Port, Role
-from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD, TRAJECTORY
+from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD, TRAJECTORY, USE_REFERENCE_INPUTS
 from orchestration.quadrotor import wiring
 
 
@@ -18,7 +18,7 @@ CONTROLLER = Role(
         *_ports("output", wiring.COMMAND),
         *_ports("input", (*wiring.MEASUREMENT, *wiring.REFERENCE)),
         *_ports("parameter", (SAMPLE_PERIOD, SAMPLE_OFFSET, *TRAJECTORY)),
-        Port(wiring.USE_REFERENCE_INPUTS, "parameter", None, "Boolean"),
+        Port(USE_REFERENCE_INPUTS, "parameter", None, "Boolean"),
     ),
 )
 PLANT = Role(

@@ -4,3 +4,5 @@ SAMPLE_PERIOD, SAMPLE_OFFSET = "sample_period", "sample_offset"
 """Parameters by which a component is given a clock of its own; period 0: it samples at every step from the offset on"""
 TRAJECTORY = {f"trajectory.{name}": name for name in ("amplitude_x", "amplitude_y", "frequency", "start_z", "rate_z")}
 """Parameters of a component's built-in trajectory, and the fields of `fmu_kit.trajectory.Trajectory` they are"""
+USE_REFERENCE_INPUTS = "use_reference_inputs"
+"""Parameter of a component with such a trajectory: whether it follows its inputs instead"""

@@ -46,6 +46,8 @@ class Found:
     refuted_limit: float | None
     """For random quantities the lowest value found at which so many seeds do not fly that `RELIABILITY` is refuted at
     the confidence; None: nothing is random, or none in the range."""
+    follows: str = ""
+    """What is followed, and by whom; empty where nothing is."""
     horizon: float
     """The stop time [s]: what does not settle by it does not fly."""
     tolerance: float

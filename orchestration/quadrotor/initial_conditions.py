@@ -13,6 +13,7 @@ from orchestration.basics.records import record
 from orchestration.basics.simulator import Floats
 from orchestration.engines.wiring import source_values
 from orchestration.fmi.kit import TRAJECTORY
+from orchestration.quadrotor.wiring import REFERENCE
 from orchestration.schedule.streams import Streams
 from orchestration.system.request import Start
 
@@ -87,9 +88,13 @@ def starts_in(table: Mapping[str, Any], beside: Sequence[str] = ()) -> Starts:
 def _beginning(request: Any) -> tuple[Floats, Floats]:
     """P_d(0) [m] and V_d(0) [m/s] of the reference of a `Scenario`, be it built in, a motion or a file."""
     scenario = request.resolved()
-    if scenario.reference.name is not None or scenario.reference.file is not None:
-        values = np.array(source_values(scenario.as_system(), "reference", {}, Streams(scenario.seed)).at(0.0))
-        return values[:3], values[3:6]  # in the order of REFERENCE
+    system = scenario.as_system()
+    source = system.sources["reference"]
+    if not source.is_built_in:
+        fed = dataclasses.replace(source, trajectory=None, to=tuple(f"controller.{name}" for name in REFERENCE[:6]))
+        told = dataclasses.replace(system, sources={"reference": fed})
+        values = np.array(source_values(told, "reference", {}, Streams(scenario.seed)).at(0.0))
+        return values[:3], values[3:]
     given = scenario.controller.parameters
     reference = Trajectory(**{field: given[name] for name, field in TRAJECTORY.items() if name in given}).at(0.0)
     return np.array([*reference.position]), np.array([*reference.velocity])

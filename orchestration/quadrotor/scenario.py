@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from orchestration.basics.bisection import Range
 from orchestration.basics.errors import UsageError, no_such_key, shown
 from orchestration.basics.records import record
-from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
+from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD, USE_REFERENCE_INPUTS
 from orchestration.quadrotor.initial_conditions import Starts, starts_in
 from orchestration.quadrotor.nominal_model import mismatch
 from orchestration.quadrotor.quantities import range_of
@@ -29,7 +29,6 @@ from orchestration.quadrotor.wiring import (
     DEFAULT_CONTROLLER,
     DEFAULT_PLANT,
     RIGID_BODY,
-    USE_REFERENCE_INPUTS,
 )
 from orchestration.results.quantities import setting
 from orchestration.system.model import Parameter, System
@@ -177,10 +176,9 @@ class Scenario:
             changes[f"components.{side}.fmu"] = choice.fmu
             changes |= {f"components.{side}.parameters.{name}": value for name, value in choice.parameters.items()}
             changes[f"components.{side}.record"] = getattr(this.record, side)
-        if this.reference.name is not None or this.reference.file is not None:
-            changes |= {f"sources.reference.{key}": value for key, value in reference_source(this.reference).items()}
-            changes[f"components.controller.parameters.{USE_REFERENCE_INPUTS}"] = True
-        elif this.controller.parameters.get(USE_REFERENCE_INPUTS) is True:
+        fed = reference_source(this.reference)
+        changes |= {f"sources.reference.{key}": value for key, value in fed.items()}
+        if not fed and this.controller.parameters.get(USE_REFERENCE_INPUTS) is True:
             raise UsageError(f"controller.{USE_REFERENCE_INPUTS}: expected [reference] name or file = … to feed them")
         return disturbed(changed(quadrotor(), changes), this.disturbance)
 

@@ -8,7 +8,7 @@ from typing import Any
 from orchestration.basics.errors import UsageError
 from orchestration.quadrotor.signals import DRAG, DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.timing import TIMING_KEYS
-from orchestration.quadrotor.wiring import EXTERNAL_FORCE, REFERENCE
+from orchestration.quadrotor.wiring import EXTERNAL_FORCE, POSITION_REFERENCE
 from orchestration.signals.limits import AXES
 from orchestration.signals.table_file import header_of
 from orchestration.system.model import Source, System
@@ -33,16 +33,14 @@ def in_words_of_a_scenario(text: str) -> str:
 
 
 def reference_source(choice: ReferenceChoice) -> dict[str, Any]:
-    """The source that feeds the reference inputs of the controller."""
-    keys: dict[str, Any] = {
-        "trajectory": None,
-        "to": tuple(f"controller.{name}" for name in REFERENCE),
-        "parameters": dict(choice.parameters),
-    }
+    """What the source of the reference says; empty for what the controller has built in."""
+    if choice.name is None and choice.file is None:
+        return {}
+    keys: dict[str, Any] = {"parameters": dict(choice.parameters)}
     if choice.file is None:
         return {**keys, "signal": choice.name}
     columns = header_of(choice.file)
-    is_table = REFERENCE[0] in columns or not {*AXES} & {*columns}
+    is_table = POSITION_REFERENCE[0] in columns or not {*AXES} & {*columns}
     return {**keys, "file": choice.file, "interpolation": "linear" if is_table else "spline"}
 
 
@@ -114,6 +112,7 @@ PLACES = {
     "sources.reference.signal": "reference.name",
     "sources.reference.parameters.": "reference.",
     "sources.reference.": "reference.",
+    "sources.reference:": "reference:",
     "sources.disturbance.signal": "disturbance.name",
     "sources.disturbance.scale": "disturbance.drag",
     "sources.disturbance.parameters.": "disturbance.",

@@ -29,8 +29,6 @@ _REFERENCE_UNITS = {"position": "m", "velocity": "m/s", "acceleration": "m/s2", 
 REFERENCE = tuple(name for derivative in _REFERENCE_UNITS for name in components(f"reference.{derivative}"))
 """Inputs of the controller that a reference from a file feeds."""
 
-USE_REFERENCE_INPUTS = "use_reference_inputs"
-
 POSITION_REFERENCE = components("reference.position")
 """P_d as it is recorded beside the signals."""
 

@@ -13,6 +13,7 @@ from orchestration.report.tracks import Signals
 from orchestration.results.objectives import Metrics
 from orchestration.runs.simulation import run
 from orchestration.studies.study import Study
+from orchestration.system.following import heard
 from orchestration.system.model import System
 from orchestration.workers.choice import chosen
 
@@ -56,7 +57,8 @@ def fly(
     batches = Batches() if lanes else None
     for first in range(0, len(indices), SOME if lanes else 1):
         some = indices[first : first + (SOME if lanes else 1)]
-        systems = all_with_files([study.system(i, starts) for i in some], paths)
+        asked = [study.system(i, starts) for i in some]
+        systems = all_with_files([heard(system, files.models_of(system)) for system in asked], paths)
         for index, system, found in zip(some, systems, _flown(systems, starts, batches)):
             if found is not None:
                 signals, metrics, message = found

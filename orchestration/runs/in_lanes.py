@@ -19,7 +19,8 @@ from orchestration.fmi.model import Model, read_model
 from orchestration.results.objectives import FIXED, Metrics
 from orchestration.runs.columns import Columns, columns
 from orchestration.runs.simulation import run
-from orchestration.system.check import recorded
+from orchestration.system.check import check, recorded
+from orchestration.system.following import heard
 from orchestration.system.model import System, component_of, variable_of
 from orchestration.system.request import Request, in_its_own_words
 
@@ -75,6 +76,8 @@ def fly(
     with in_its_own_words(asked):
         system = located(asked.as_system())
         models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
+        check(system, models)
+        system = heard(system, models)
         fits = checked(_recording(system, models, record), models)
         names = _outputs(fits.system, outputs)
         given = columns(asked, fits.system, models, values)

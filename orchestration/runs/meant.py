@@ -60,6 +60,8 @@ class Meant:
     """all numeric parameters of all components, as COMPONENT.NAME"""
     units: Mapping[str, str]
     """of what it comes to"""
+    follows: str
+    """what is followed, and by whom; empty where nothing is"""
 
     @property
     def foreign(self) -> list[str]:
@@ -99,7 +101,8 @@ def held_to_fmus(asked: Request, announce: Announce | None = None) -> Meant:
         models = {name: read_model(path) for name, path in paths.items()}
         found = checked(system, models)
     return Meant(
-        asked=asked, system=found.system, paths=paths, models=models, parameters=found.parameters, units=found.units
+        asked=asked, system=found.system, paths=paths, models=models, parameters=found.parameters, units=found.units,
+        follows=found.follows,
     )  # fmt: skip
 
 
@@ -124,7 +127,7 @@ def result_of(meant: Meant, flown: Flown, recorder: Recorder, wall_time: float, 
         divergence=flown.divergence,
         termination=flown.termination,
         interrupted_at=flown.interrupted_at,
-        provenance={**flown.provenance, "wall_time": wall_time},
+        provenance={**flown.provenance, "follows": meant.follows, "wall_time": wall_time},
         warnings=(*meant.asked.warnings(meant.parameters), *flown.warnings),
     )
     _NOTES.debug(

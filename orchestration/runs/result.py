@@ -49,6 +49,8 @@ class Provenance(TypedDict, total=False):
     """By component."""
     engine: str
     """What stepped the FMUs, `compiled` or `python`; the numbers are the same."""
+    follows: str
+    """What was followed, and by whom; empty where nothing was."""
     wall_time: float
     """What the run took [s]."""
 

@@ -12,12 +12,16 @@ from orchestration.signals.waypoints import read_waypoints
 from orchestration.studies.store import expect_columns
 from orchestration.studies.study import Study
 from orchestration.system.check import check_parameter
+from orchestration.system.following import heard
 from orchestration.system.model import System
 from orchestration.system.request import in_its_own_words
 
 
-def expect_flyable(study: Study, files: Files) -> None:
-    """Raise `UsageError` for the first run of `study` that cannot be, saying how many more there are."""
+def expect_flyable(study: Study, files: Files) -> tuple[str, ...]:
+    """What is followed in its runs, and by whom.
+
+    Raises `UsageError` for the first run of `study` that cannot be, saying how many more there are.
+    """
     expect_columns(study.origin.objectives)
     first, wrong = "", 0
     starts, longest, alike = files.starts_of(study.origin), study.origin, _Alike(files)
@@ -33,7 +37,8 @@ def expect_flyable(study: Study, files: Files) -> None:
     if wrong:
         raise UsageError(first + (f" ({wrong - 1} more runs cannot be)" if wrong > 1 else ""))
     with in_its_own_words(study.base):
-        expect_tables(longest)
+        expect_tables(heard(longest, files.models_of(longest)))
+    return tuple(filter(None, alike.follows))
 
 
 class _Alike:
@@ -42,13 +47,16 @@ class _Alike:
     def __init__(self, files: Files) -> None:
         self._files = files
         self._known: dict[Hashable, set[tuple[str, str, Any]]] = {}
+        self.follows: dict[str, None] = {}
+        """What is followed, and by whom, in the order in which it was found."""
 
     def expect(self, system: System) -> None:
         """Raise `UsageError` for what the FMUs do not have, or cannot take."""
         given = [(name, key, value) for name, one in system.components.items() for key, value in one.parameters.items()]
-        structure = outline(system), tuple((name, key) for name, key, _ in given)
+        signals = tuple((source.signal, source.file) for source in system.sources.values())
+        structure = outline(system), signals, tuple((name, key) for name, key, _ in given)
         if structure not in self._known:
-            checked(system, self._files.models_of(system))
+            self.follows[checked(system, self._files.models_of(system)).follows] = None
             self._known[structure] = set(given)
             return
         known, models = self._known[structure], None

@@ -71,7 +71,7 @@ def sweep(
     _expect_workers(workers, dask)
     if time_limit is not None and not time_limit > 0.0:
         raise UsageError(f"--time-limit {time_limit:g}: expected a positive number of seconds")
-    study, files, how = ready(study, engine)
+    study, files, how, follows = ready(study, engine)
     path = store.store_path(study.name, folder)
     with of_runs(progress) as hear, store.open_for_writing(path, study.origin.objectives) as opened:
         _describe(opened, study, files)
@@ -100,25 +100,28 @@ def sweep(
         failed = opened.counts().get("failed", 0)
     return Swept(
         study=study, total=counted.total, flown=len(missing), failed=failed, path=path, engine=how.name,
-        agreement=agreement,
+        agreement=agreement, follows=follows,
     )  # fmt: skip
 
 
-def ready(study: Study, engine: EngineChoice) -> tuple[Study, Files, Chosen]:
-    """A study as it is flown by an engine, its files and how; raises `UsageError` for a run that cannot be."""
-    found: dict[bool, tuple[Study, Files]] = {}
+def ready(study: Study, engine: EngineChoice) -> tuple[Study, Files, Chosen, tuple[str, ...]]:
+    """A study as it is flown by an engine, its files, how, and what is followed in it, by whom.
+
+    Raises `UsageError` for a run that cannot be.
+    """
+    found: dict[bool, tuple[Study, Files, tuple[str, ...]]] = {}
 
     def first(native: bool) -> tuple[System, Files]:
         asked = replace(study, native=native)
         files = asked.files()
-        expect_flyable(asked, files)
-        found[native] = asked, files
+        found[native] = asked, files, expect_flyable(asked, files)
         return asked.system(0, files.starts_of(asked.origin)), files
 
     how = chosen(engine, study.native, first)
     if how.native not in found:
         first(how.native)
-    return *found[how.native], how
+    flown, files, follows = found[how.native]
+    return flown, files, how, follows
 
 
 def _expect_workers(workers: int, dask: str | None) -> None:

@@ -37,6 +37,8 @@ class Swept:
     """What flew, as `--engine` has it."""
     agreement: Agreement | None = None
     """How runs flown as lanes agree with the same flown by FMUs; None if none were."""
+    follows: tuple[str, ...] = ()
+    """What is followed in its runs, and by whom."""
 
     def __repr__(self) -> str:
         return f"<Swept: {self._counts()}, in {self.path}>"

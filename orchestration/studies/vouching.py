@@ -41,7 +41,9 @@ def vouched(
     if not chosen:
         return None
     paths = _in_python({fmu for task in chosen for fmu in task.system.fmus.values()})
-    begun = [_begun(task) for task in chosen if paths.keys() & python_twins(task.system).fmus.values()]
+    known = paths.keys() | files.fmus.keys()
+    twins = {task.key: {*python_twins(task.system).fmus.values()} for task in chosen}
+    begun = [_begun(task) for task in chosen if paths.keys() & twins[task.key] and twins[task.key] <= known]
     tasks: list[RunTask | Chunk] = [*chosen, *map(_in_python_too, begun)]
     if begun:
         tasks.append(Chunk(tasks=(*begun, *(_nudged(one, files.models_of(one.system)) for one in begun))))

@@ -7,8 +7,11 @@ from orchestration.basics.units import in_brackets
 from orchestration.system.model import Component, Connection, Sampling, Source, System, variable_of
 
 
-def as_text(system: System, units: Mapping[str, str] = {}) -> str:
-    """Components, connections, sources, objectives with their `units`, and the criterion, a line each, in columns."""
+def as_text(system: System, units: Mapping[str, str] = {}, follows: str = "") -> str:
+    """Components, connections, sources, objectives with their `units`, and the criterion, a line each, in columns.
+
+    `follows` says what is followed, and by whom.
+    """
     components = [(name, _fmu(c), rate(c), _parameters(c)) for name, c in system.components.items()]
     connections = [
         (x.name, f"{x.sender} -> {x.receiver}", timing(x) or "at once", signals(x)) for x in system.connections
@@ -21,6 +24,7 @@ def as_text(system: System, units: Mapping[str, str] = {}) -> str:
         ("components", components),
         ("connections", connections),
         ("sources", sources),
+        ("follows", [(follows,)] if follows else []),
         (
             "objectives",
             [(name, " ".join(text.split())) for name, text in zip(named, system.objectives.values())],
@@ -84,7 +88,7 @@ def what(source: Source) -> str:
         return f"white noise of intensity {source.noise:g}, held {seconds(source.period or 0.0)}"
     if source.file is not None:
         return f"{'way-points of' if source.is_motion else 'file'} {source.file.name}"
-    return f"trajectory of {source.trajectory}" if source.signal is None else source.signal
+    return source.signal or f"trajectory of {source.trajectory}"
 
 
 def seconds(value: float) -> str:

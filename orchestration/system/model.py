@@ -173,9 +173,10 @@ class Connection:
 class Source:
     """What drives inputs from outside: a constant, a file, white noise, a signal by name or the built-in trajectory.
 
-    Exactly one of `constant`, `file`, `noise`, `signal` and `trajectory` is given. A motion, which is what most signals
-    are and what way-points make, feeds inputs whose names end with QUANTITY.AXIS, as reference.position.x: position,
-    velocity, acceleration, jerk and snap along x, y and z.
+    Exactly one of `constant`, `file`, `noise`, `signal` and `trajectory` is given, but that `trajectory` may stand
+    beside a motion or a file. A motion, which is what most signals are and what way-points make, feeds inputs whose
+    names end with QUANTITY.AXIS, as reference.position.x: position, velocity, acceleration, jerk and snap along x, y
+    and z.
     """
 
     to: tuple[str, ...] = ()
@@ -204,7 +205,13 @@ class Source:
     scale: float = 1.0
     """The factor by which all values of a file or a signal are multiplied."""
     trajectory: str | None = None
-    """The component whose parameters trajectory.* say what the built-in trajectory is."""
+    """The component that follows it, at those of its inputs SOURCE.position.x … SOURCE.snap.z that it has. Without a
+    signal or a file it follows what its parameters trajectory.* say, or, where it has none, the paper's trajectory."""
+
+    @property
+    def is_built_in(self) -> bool:
+        """Whether it is the trajectory that a component has built in."""
+        return self.trajectory is not None and self.signal is None and self.file is None
 
     @property
     def is_motion(self) -> bool:
@@ -232,6 +239,8 @@ class Source:
     def __post_init__(self) -> None:
         kinds = ("constant", "file", "noise", "signal", "trajectory")
         given = [kind for kind in kinds if getattr(self, kind) is not None]
+        if given in (["file", "trajectory"], ["signal", "trajectory"]):
+            given.pop()
         require(len(given) == 1, "source", " and ".join(given) or "nothing", f"one of {', '.join(kinds)}")
         if self.noise is not None:
             require_not_negative(self, "noise")

@@ -38,7 +38,9 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
         elif table == "connections":
             connections[name] = _replaced(place, connections[name], _by_variable(connections[name], keys))
         else:
-            sources[name] = _replaced(place, sources[name], _by_parameter(sources[name], keys))
+            sources[name] = _replaced(
+                place, sources[name], _in_place(sources[name], _by_parameter(sources[name], keys))
+            )
     result: System = _replaced(
         "", system, {**top, "components": components, "connections": tuple(connections.values()), "sources": sources}
     )
@@ -132,6 +134,16 @@ def _by_parameter(of: Component | Source, keys: Mapping[str, Any]) -> dict[str, 
     parameters = {key.partition(".")[2]: value for key, value in keys.items() if key.startswith("parameters.")}
     rest = {key: value for key, value in keys.items() if not key.startswith("parameters.")}
     return {**rest, "parameters": {**rest.get("parameters", of.parameters), **parameters}} if parameters else rest
+
+
+def _in_place(source: Source, keys: Mapping[str, Any]) -> dict[str, Any]:
+    """A file, a signal, a constant or noise takes the place of what a source was before, with what belonged to it."""
+    new = [kind for kind in _KINDS if keys.get(kind) is not None and getattr(source, kind) is None]
+    others = {f.name: f.default for f in dataclasses.fields(Source) if f.name in (*_KINDS, *_OF_KINDS)} if new else {}
+    return {**others, **keys}
+
+
+_KINDS, _OF_KINDS = ("constant", "file", "noise", "signal"), ("interpolation", "columns", "period")
 
 
 def _by_variable(connection: Connection, keys: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from orchestration.basics.progress import ShareHeard, of_share
 from orchestration.basics.terminal import say
 from orchestration.building.inputs import Files
 from orchestration.results import html
+from orchestration.system.following import followed
 from orchestration.tuning.tuning import Fly, Found, Tuning, best_by_period, search
 from orchestration.tuning.tuning_file import gains_text
 from orchestration.workers.choice import EngineChoice, chosen
@@ -96,6 +97,8 @@ def tune(
     announce = announce or (lambda line: None)
     if engine == "auto":
         announce(str(how))
+    if follows := followed(asked.origin, files.models_of(asked.origin)):
+        announce(f"follows {follows}")
     with of_share(progress, "searching") as hear, RunEvaluator(files, workers, how.engine) as pool:
         done = searched(
             asked, files, Path(folder or Path("results") / asked.name),

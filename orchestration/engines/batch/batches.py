@@ -18,6 +18,7 @@ from orchestration.fmi.model import read_model
 from orchestration.results.objectives import Metrics, told
 from orchestration.schedule.schedule_cache import ScheduleCache, timing
 from orchestration.schedule.streams import Streams
+from orchestration.system.following import heard
 from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS, nanoseconds
 
@@ -67,8 +68,10 @@ class Batches:
         for key, places in shapes.items():
             shape, batch = self._batch(key, systems[places[0]])
             timings = {place: known[id(systems[place])][1] for place in places}
+            several = {id(systems[place]): systems[place] for place in places}
+            fed = {key: heard(system, shape.models) for key, system in several.items()}
             for group in _groups(places, timings, self._lanes):
-                some = [systems[i] for i in group]
+                some = [fed[id(systems[i])] for i in group]
                 result = batch.run(
                     some, [timings[i] for i in group], record, {name: values[group] for name, values in own.items()}
                 )

@@ -10,6 +10,7 @@ from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.fmi.model import Model, Variable, read_model
 from orchestration.schedule.plan import Plan
 from orchestration.system.check import check
+from orchestration.system.following import heard
 from orchestration.system.model import Component, Connection, Parameter, Sampling, System, component_of, variable_of
 from orchestration.system.request import Request, in_its_own_words
 
@@ -57,6 +58,7 @@ def carried(asked: Request, announce: Callable[[str], None] | None = None) -> Ca
         located = fmus.of_components(system.fmus, announce)
         models = {name: read_model(path) for name, path in located.items()}
         check(system, models)
+        system = heard(system, models)
         plan = Plan(system)
         step, unequal = _common_step(system, models)
         unsaid = (*_unsaid(system), *unequal)

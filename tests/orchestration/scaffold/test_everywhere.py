@@ -1,0 +1,155 @@
+"""One controller, as `quadcosim new` writes it, flies every vehicle, every reference and every comparison unchanged."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from orchestration.building import fmus
+from orchestration.comparison.design import Comparison
+from orchestration.comparison.file import load_comparison
+from orchestration.quadrotor import vehicle
+from orchestration.runs.simulation import run
+from orchestration.scaffold.folder import write
+from orchestration.signals.motions import MOTIONS
+from orchestration.system.request import in_its_own_words
+from quadcosim import FmuChoice, ReferenceChoice, Scenario, UsageError, load_vehicle
+from tests.commands import Main
+
+DEAF = '''"""Deaf: holds the origin, and has no input for anything else."""
+
+from mine import Mine
+from fmu_kit.algebra import ZERO
+from fmu_kit.interface import Input, Local
+
+
+class Deaf(Mine):
+    """PD that holds the origin by itself."""
+
+    target = Local("the origin", "m", ZERO)
+    target_velocity = Local("at rest", "m/s", ZERO)
+    target_acceleration = Local("at rest", "m/s2", ZERO)
+'''
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the controller, native and of the same law one that hears no reference."""
+    folder = tmp_path_factory.mktemp("own")
+    write("controller", "mine", folder, author="", license="")
+    (folder / "mine" / "deaf.py").write_text(DEAF)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def scenario(folder: Path) -> Scenario:
+    """The first moments of the paper's flight, with the controller."""
+    mine = FmuChoice(fmu=str(folder / "mine" / "native" / "Mine.fmu"))
+    return Scenario(stop_time=0.3, controller=mine, plant=FmuChoice(fmu="native/QuadrotorPlant"))
+
+
+@pytest.mark.parametrize("name", vehicle.names())
+def test_it_flies_each_vehicle(scenario: Scenario, name: str) -> None:
+    of_vehicle = scenario.with_changes(vehicle=load_vehicle(name, Path()))
+    result = run(of_vehicle)
+    assert result.parameters["controller.mass"] == result.parameters["plant.mass"]
+    assert result.parameters["controller.inertia.zz"] == result.parameters["plant.inertia.zz"]
+    assert not result.metrics["diverged"]
+    assert not result.warnings
+
+
+@pytest.mark.parametrize("name", [None, *MOTIONS, "waypoints.csv"])
+def test_it_follows_each_reference(scenario: Scenario, folder: Path, name: str | None) -> None:
+    (folder / "waypoints.csv").write_text("x,y,z\n0,0,0\n1,0,-1\n")
+    is_file = name is not None and name.endswith(".csv")
+    choice = ReferenceChoice(file=folder / name) if name and is_file else ReferenceChoice(name=name)
+    result = run(scenario.with_changes(reference=choice))
+    what = "the paper's trajectory" if name is None else str(folder / name) if is_file else name
+    assert result.provenance["follows"] == f"{what}, fed to Mine as position, velocity, acceleration"
+    fed = {name for name in result.signals if name.startswith("reference.acceleration")}
+    assert len(fed) == 3
+
+
+def test_what_it_is_fed_by_itself_is_the_path_that_others_have_built_in(scenario: Scenario) -> None:
+    unified = run(scenario.with_changes(controller=FmuChoice(fmu="native/UnifiedController")))
+    assert unified.provenance["follows"] == "the trajectory that UnifiedController has built in"
+    mine = run(scenario)
+    for axis in "xyz":
+        name = f"reference.position.{axis}"
+        assert mine.signals[name] == pytest.approx(unified.signals[name], abs=1e-12)
+
+
+def test_one_that_hears_no_reference_is_refused_but_for_rest(scenario: Scenario, folder: Path) -> None:
+    deaf = scenario.with_changes(controller=FmuChoice(fmu=str(folder / "mine" / "native" / "Deaf.fmu")))
+    expected = (
+        "reference: Deaf cannot hear what it is to follow, it has no input reference.position.x, "
+        "reference.position.y, reference.position.z; expected reference hover, for one that holds a point by itself"
+    )
+    for choice in (ReferenceChoice(), ReferenceChoice(name="circle")):
+        with pytest.raises(UsageError) as refused:
+            run(deaf.with_changes(reference=choice))
+        assert str(refused.value) == expected
+    hover = run(deaf.with_changes(reference=ReferenceChoice(name="hover"), stop_time=8.0))
+    assert hover.provenance["follows"] == "hover, which Deaf holds by itself"
+    assert hover.metrics["good"]
+
+
+COMPARISON = """
+[base]
+stop_time = 6.0
+timing = {{ plant_interval = 0.004 }}
+plant = {{ fmu = "native/QuadrotorPlant" }}
+
+[[controllers]]
+name = "the paper's"
+fmu = "native/UnifiedController"
+bandwidth = 27.0
+
+[[controllers]]
+name = "mine"
+fmu = "{fmu}"
+bandwidth = 19.0
+
+[axis]
+name = "period"
+sets = ["timing.period"]
+values = [0.02, 0.16]
+
+[starts]
+count = 6
+position = 1.0
+velocity = 0.5
+angle = 0.5
+rate = 0.5
+"""
+
+
+@pytest.mark.parametrize("engine", [(), ("--engine", "batch")])
+def test_a_comparison_judges_it_as_single_runs_do(
+    scenario: Scenario, folder: Path, tmp_path: Path, main: Main, engine: tuple[str, ...]
+) -> None:
+    file = tmp_path / "comparison.toml"
+    file.write_text(COMPARISON.format(fmu=scenario.controller.fmu))
+    fmus.locate(scenario.controller.fmu)
+    done = main("compare", file, *engine, "--no-figures", "--json", "--out", tmp_path)
+    found = json.loads(done.stdout)
+    assert found["follows"] == [
+        "the trajectory that UnifiedController has built in",
+        "the paper's trajectory, fed to Mine as position, velocity, acceleration",
+    ]
+    comparison = load_comparison(file)
+    for cell in found["cells"]:
+        assert (cell["survives"], cell["settles"]) == flown_alone(comparison, cell["cell"]), cell
+    mine = [cell["settles"] for cell in found["cells"] if cell["controller"] == "mine"]
+    assert mine == [6, 0]
+
+
+def flown_alone(comparison: Comparison, cell: int) -> tuple[int, int]:
+    """How many starts of a cell survive and settle, each flown as `run` flies a scenario."""
+    starts = comparison.study.files().starts_of(comparison.study.origin)
+    with in_its_own_words(comparison.base):
+        metrics = [
+            run(comparison.request(i, starts)).metrics for i in comparison.runs_of(comparison.cell(cell))
+        ]  # fmt: skip
+    survive = [each for each in metrics if not each["diverged"]]
+    return len(survive), sum(each["settling_time"] is not None for each in survive)
