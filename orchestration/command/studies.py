@@ -56,7 +56,10 @@ def sweep(
     lines = [f"{summary.path}: {summary.total} runs, {summary.flown} flown now{failed}"]
     if summary.agreement is not None:
         lines.append(f"engine batch: {summary.agreement}")
-    document = {name: getattr(summary, name) for name in ("total", "flown", "failed", "path", "engine", "agreement")}
+    for each in summary.follows:
+        say(f"follows {each}")
+    told = ("total", "flown", "failed", "path", "engine", "agreement", "follows")
+    document = {name: getattr(summary, name) for name in told}
     return Answer(document=document, lines=lines, good=not summary.failed)
 
 
@@ -205,14 +208,16 @@ def limit(
     ] = None,
     timing: Timing = None,
     of: Annotated[
-        str,
+        str | None,
         typer.Option(
             "--of",
-            help="The quantity: of the quadrotor by name, of any system by path.",
+            help="The quantity: of the quadrotor by name, of any system by path; default: the period of what is "
+            "sampled.",
             metavar="period|delay|jitter|loss|PATH",
             autocompletion=completion.among("period", "delay", "jitter", "loss"),
+            show_default=False,
         ),
-    ] = "period",
+    ] = None,
     first: Annotated[
         float | None, typer.Option("--from", help="Where the scan begins.", metavar="A", show_default=False)
     ] = None,

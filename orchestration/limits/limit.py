@@ -16,7 +16,7 @@ from orchestration.engines.wiring import checked
 from orchestration.fmi.foreign import LostError, computed
 from orchestration.limits.evaluation import RELIABILITY, Evaluator, is_random, said
 from orchestration.limits.found import Continuous, Found
-from orchestration.requests.ranges import Varied, range_asked_for
+from orchestration.requests.ranges import Varied, range_asked_for, usual_quantity
 from orchestration.results import html
 from orchestration.results.criterion import edge, judged
 from orchestration.stability.known_loops import Local
@@ -84,7 +84,7 @@ class Limit(Found):
 @explained
 def find(
     request: Request,
-    of: str,
+    of: str | None = None,
     *,
     first: float | None = None,
     last: float | None = None,
@@ -99,15 +99,16 @@ def find(
 ) -> Limit:
     """Find the largest value of a quantity of a system or a scenario that is still good, all else as it is.
 
-    `of` is a path, or of the quadrotor `period`, `delay`, `jitter` or `loss`; it is looked for from `first` to `last`,
-    `scan` is the step, `continuous` adds that flight (of the quadrotor). The seeds of a random quantity are flown by
-    `workers` processes. The engine `auto` takes native twins of the FMUs where they can be had. `progress` hears the
-    share that is done of a search in which nothing fails before the end of the scan, `announce` what flies and a line
-    for each value that was tried; None for silence.
+    `of` is a path, or of the quadrotor `period`, `delay`, `jitter` or `loss`; without it, the period of the only
+    component that is sampled. It is looked for from `first` to `last`, `scan` is the step, `continuous` adds that
+    flight (of the quadrotor). The seeds of a random quantity are flown by `workers` processes. The engine `auto` takes
+    native twins of the FMUs where they can be had. `progress` hears the share that is done of a search in which nothing
+    fails before the end of the scan, `announce` what flies and a line for each value that was tried; None for silence.
 
     Raises `UsageError` for a quantity, range, tolerance, step or confidence that cannot be.
     """
     request, how = alone(request, engine)
+    of = of or usual_quantity(request)
     varied, files = _checked(request, of, confidence)
     near = request.near_continuous(CONTINUOUS) if continuous else None
     if continuous and near is None:
@@ -115,8 +116,8 @@ def find(
     models = files.models_of(varied.system)
     span = range_asked_for(varied, models, first=first, last=last, tolerance=tolerance, scan=scan)
     with in_its_own_words(request):
-        units = [checked(varied.at(value), models).units for value in span.values()]
-    metric = judged(varied.system)
+        fitting = [checked(varied.at(value), models) for value in span.values()]
+    units, metric = fitting[0].units, judged(varied.system)
     random = is_random(varied.at(span.last))
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
     local = _local(varied, span, files)
@@ -124,7 +125,7 @@ def find(
         tell = announce or (lambda line: None)
         if engine == "auto":
             tell(str(how))
-        trials = Evaluator(varied, span, seeds, confidence if random else None, units[0], pool, tell, hear)
+        trials = Evaluator(varied, span, seeds, confidence if random else None, units, pool, tell, hear)
         values = span.values()
         bracket = first_failure(
             trials.fails, values, span.tolerance, parts=FINER, left=lambda left: trials.expect(left + BEYOND)
@@ -140,12 +141,12 @@ def find(
         hear(1.0)
     tried = tuple(trials.tried[value] for value in sorted(trials.tried))
     return Limit(
-        of=of, unit=span.unit.strip() or None, judged=metric, judged_unit=units[0].get(metric or ""),
+        of=of, unit=span.unit.strip() or None, judged=metric, judged_unit=units.get(metric or ""),
         judged_bound=None if metric is None else edge(varied.system, metric),
         local_limit=local.limit, local_limit_outside=local.outside, local_method=local.method,
         local_accuracy=local.accuracy, large_signal_limit=None if bracket is None else bracket.good,
-        refuted_limit=refuted, horizon=varied.system.stop_time, tolerance=span.tolerance, scan=span.step,
-        confidence=confidence if random else None, seeds=seeds,
+        refuted_limit=refuted, follows=fitting[0].follows, horizon=varied.system.stop_time, tolerance=span.tolerance,
+        scan=span.step, confidence=confidence if random else None, seeds=seeds,
         flies_above=tuple(
             one.value for one in tried if bracket is not None and one.value > bracket.bad and one.flew == seeds
         ),
@@ -169,10 +170,16 @@ def _local(varied: Varied, span: Range, files: Files) -> Local:
         return Local(reason=f"no local limit: {error}")
 
 
+_ALWAYS = ("local_limit", "large_signal_limit")
+"""What is asked for: told also where there is none"""
+
+
 def as_text(found: Limit) -> dict[str, str]:
-    """The fields of a limit in words; of the values tried, those for which the share of seeds is known."""
-    shown = {name: "-" if value is None else str(value) for name, value in vars(found).items()}
-    shown["flies_above"] = ", ".join(f"{value:.6g}" for value in found.flies_above) or "-"
+    """The fields of a limit that apply, in words; of the values tried, those for which the share of seeds is known."""
+    told = {name: value for name, value in vars(found).items() if value not in (None, "", ())}
+    shown = {name: str(told[name]) if name in told else "-" for name in vars(found) if name in (*told, *_ALWAYS)}
+    if found.flies_above:
+        shown["flies_above"] = ", ".join(f"{value:.6g}" for value in found.flies_above)
     if (ideal := found.continuous) is not None:
         settles = "" if ideal.settling_time is None else f", within 5 cm from {ideal.settling_time:.6g} s on"
         shown["continuous"] = f"{ideal.outcome} at a period of {ideal.period:g} s{settles}"
@@ -220,6 +227,8 @@ def _note(span: Range, bracket: Bracket | None, trials: Evaluator, refuted: floa
     if local is None:
         return [*parts, found.reason]
     measured = None if bracket is None else bracket.good
-    if measured is None or abs(measured - local) > GAP * local:
+    if measured is None:
+        return [*parts, f"the local limit is {local:.6g}{span.unit}"]
+    if abs(measured - local) > GAP * local:
         return [*parts, f"more than a tenth from the local limit of {local:.6g}{span.unit}: large signals decide"]
     return [*parts, f"within a tenth of the local limit of {local:.6g}{span.unit}"]

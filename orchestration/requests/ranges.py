@@ -13,7 +13,8 @@ from orchestration.system.model import System
 from orchestration.system.paths import TOP, changed, value_at
 from orchestration.system.request import Request, in_its_own_words, system_meant
 
-QUANTITIES = ("period", "delay", "jitter", "loss")
+PERIOD = "period"
+QUANTITIES = (PERIOD, "delay", "jitter", "loss")
 """Names by which a request may know quantities; any other is a path"""
 STEPS, PARTS = 20, 50
 """of a range that is given: values of the scan, and parts of its step to which the last bracket is brought together"""
@@ -70,7 +71,7 @@ def range_asked_for(
     for flag, value in (("tolerance", tolerance), ("scan", scan)):
         if value is not None and not (value > 0.0 and math.isfinite(value)):
             raise UsageError(f"--{flag} {value}: expected a positive number")
-    known = varied.request.range_of(varied.of)
+    known = varied.request.range_of(varied.of) or _range_of_period(varied)
     if known is None and (first is None or last is None):
         raise UsageError(f"--of {varied.of}: expected --from and --to, between which it is looked for")
     low = first if first is not None else known.first if known is not None else 0.0
@@ -86,6 +87,29 @@ def range_asked_for(
         tolerance=tolerance if tolerance is not None else known.tolerance if known is not None else step / PARTS,
         unit=known.unit if known is not None else after(unit_at(varied.paths[0], models)),
     )
+
+
+def usual_quantity(request: Request) -> str:
+    """What is looked for where nobody says what: the period, of a system that of its only sampled component.
+
+    Raises `UsageError` naming the periods of a system that has none or several.
+    """
+    if request.range_of(PERIOD) is not None:
+        return PERIOD
+    sampled = [name for name, each in system_meant(request).components.items() if each.sampling is not None]
+    paths = [f"components.{name}.sampling.{PERIOD}" for name in sampled]
+    if len(paths) != 1:
+        listed = f", one of {', '.join(paths)}" if paths else ""
+        raise UsageError(f"--of: expected a path, as connections.NAME.delay{listed}")
+    return paths[0]
+
+
+def _range_of_period(varied: Varied) -> Range | None:
+    """From half of the period of a sampled component to fifty times of it, as that of the quadrotor is scanned."""
+    if not varied.of.endswith(f".sampling.{PERIOD}"):
+        return None
+    period = float(value_at(varied.system, varied.of))
+    return Range(first=period / 2.0, step=period / 2.0, last=50.0 * period, tolerance=period / 20.0)
 
 
 def unit_at(path: str, models: Mapping[str, Model]) -> str | None:

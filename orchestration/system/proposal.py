@@ -4,12 +4,12 @@ import itertools
 import json
 import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from orchestration.basics.errors import UsageError
-from orchestration.fmi.model import NUMERIC, Model
+from orchestration.fmi.model import Model
 from orchestration.system.matching import Match, match
 from orchestration.system.model import component_of
 
@@ -17,6 +17,16 @@ STEP, PERIOD, STOP = 0.001, 0.01, 10.0
 """[s], where no FMU says how it is meant to be run"""
 WIDTH = 110
 """Characters of a line beyond which a list has a line for each of its members"""
+_TO_FILL_IN = (
+    "# What a run comes to, and when it is good, which `quadcosim limit` asks for. Fill in, for instance:",
+    "# [objectives]",
+    '# peak = "max(abs({0}))"',
+    '# final = "max(abs({0}) * (time >= 0.75 * stop_time))"',
+    "#",
+    "# [criterion]",
+    '# good = "final < 0.05"',
+    '# diverged = "abs({0}) > 1e3"',
+)
 TAKEN = frozenset(("rows", "time", "stop_time", "sampled"))
 """Names that no component can have"""
 
@@ -27,7 +37,7 @@ class Proposal:
 
     text: str
     guessed: tuple[str, ...]
-    """connections of variables with different names"""
+    """connections of variables with different names, and who is a controller"""
     undecided: tuple[str, ...]
 
 
@@ -36,31 +46,35 @@ def propose(fmus: Sequence[tuple[str, Model]], folder: Path) -> Proposal:
 
     Each FMU is given by the path or name that the user wrote, with what it says of itself.
 
-    One whose outputs are all discrete is proposed as sampled, any other in continuous time. Raises `UsageError`
-    without any FMU.
+    One whose outputs are all discrete is proposed as sampled, and so is the controller of a loop; any other in
+    continuous time. Raises `UsageError` without any FMU.
     """
     if not fmus:
         raise UsageError("expected at least one FMU")
     models = [model for _, model in fmus]
     named = dict(zip(_names(models), models))
     matches = match(named)
+    sampled = {name: "all its outputs are discrete" for name, model in named.items() if _is_discrete(model)}
+    guessed = _controllers(named, matches.found, sampled)
+    sampled |= guessed
     stop = max((_experiment(model, "stopTime") or 0.0 for model in models), default=0.0) or STOP
     blocks = [
         [
             "# Proposed from what the FMUs say of themselves. Look at each line: names are no proof.",
             f"stop_time = {stop!r}",
         ],
-        *(_component(name, text, model, folder) for name, (text, model) in zip(named, fmus)),
+        *(_component(name, text, model, folder, sampled.get(name)) for name, (text, model) in zip(named, fmus)),
         *_connections(sorted(matches.found, key=lambda m: list(named).index(component_of(m.start)))),
     ]
     if matches.undecided:
         blocks.append(["# Not decided:", *(f"# - {line}" for line in matches.undecided)])
-    first = next((f"{n}.{v}" for n, model in named.items() for v in model.names("output", kinds=("Real",))), None)
+    moving = sorted(named, key=lambda name: name in sampled)
+    first = next((f"{n}.{v}" for n in moving for v in named[n].names("output", kinds=("Real",))), None)
     if first is not None:
-        blocks.append(["# What a run comes to, for instance:", "# [objectives]", f'# peak = "max(abs({first}))"'])
+        blocks.append([line.format(first) for line in _TO_FILL_IN])
     return Proposal(
         text="\n\n".join("\n".join(block) for block in blocks) + "\n",
-        guessed=_guesses(matches.found),
+        guessed=(*_guesses(matches.found), *(f"{name} is sampled, as {why}" for name, why in guessed.items())),
         undecided=matches.undecided,
     )
 
@@ -76,16 +90,36 @@ def _names(models: Iterable[Model]) -> list[str]:
     return names
 
 
-def _component(name: str, fmu: str, model: Model, folder: Path) -> list[str]:
+def _is_discrete(model: Model) -> bool:
+    outputs = model.names("output")
+    return bool(outputs) and all(model.variables[name].variability != "continuous" for name in outputs)
+
+
+def _controllers(named: Mapping[str, Model], found: Iterable[Match], sampled: Container[str]) -> dict[str, str]:
+    """Of each two in continuous time that feed each other, the one that seems to be the controller, and why."""
+    pairs = {(component_of(m.start), component_of(m.end)) for m in found}
+    loops = [(a, b) for a, b in pairs if (b, a) in pairs and a not in sampled and b not in sampled]
+    by_answer = {a: _ANSWERS for a, b in loops if _answers_at_once(named[a]) and not _answers_at_once(named[b])}
+    by_name = {a: _NAMED for a, b in loops if _NAMES.search(a) and not _NAMES.search(b)}
+    return dict(sorted((by_answer | by_name).items()))
+
+
+_NAMES = re.compile(r"control|ctrl|pid|lqr|regulator|autopilot", re.IGNORECASE)
+_NAMED, _ANSWERS = "its name is that of a controller", "all its outputs follow its inputs at once, as a controller's do"
+
+
+def _answers_at_once(model: Model) -> bool:
+    return all(model.depends_on(output) for output in model.names("output"))
+
+
+def _component(name: str, fmu: str, model: Model, folder: Path, sampled: str | None) -> list[str]:
+    """`sampled` says why it is."""
     place = _relative(Path(fmu), folder) if fmu.endswith(".fmu") else fmu
     lines = [f"[components.{name}]", f"fmu = {_text(place)}"]
     step = _experiment(model, "stepSize")
-    outputs = [model.variables[v] for v in model.names("output", kinds=NUMERIC)]
-    if outputs and all(output.variability != "continuous" for output in outputs):
+    if sampled is not None:
         said = "" if step else "; its FMU does not say how often"
-        lines.append(
-            f"sampling = {{ period = {step or PERIOD!r} }}    # sampled, as all its outputs are discrete{said}"
-        )
+        lines.append(f"sampling = {{ period = {step or PERIOD!r} }}    # sampled, as {sampled}{said}")
     else:
         said = "" if step else "    # its FMU does not say how long"
         lines.append(f"step = {step or STEP!r}{said}")

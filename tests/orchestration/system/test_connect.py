@@ -148,6 +148,30 @@ def test_one_whose_outputs_are_all_discrete_is_sampled_any_other_is_not(tmp_path
     assert system.stop_time == STOP
 
 
+@pytest.mark.parametrize(("name", "sampled"), [("PidLaw", True), ("Law", False)])
+def test_the_controller_of_a_loop_is_sampled_whatever_its_outputs_are_and_the_file_says_why(
+    tmp_path: Path, name: str, sampled: bool
+) -> None:
+    plant = described(tmp_path, "Plant", inputs={"force": "Real N"}, outputs={"x": "Real m"})
+    law = described(tmp_path, name, inputs={"x": "Real m"}, outputs={"force": "Real N"})
+    system, _, text = proposed(tmp_path, plant, law)
+    assert (system.components[name].sampling, system.components["Plant"].step) == (
+        Sampling(period=PERIOD) if sampled else None,
+        STEP,
+    )
+    assert ("# sampled, as its name is that of a controller; its FMU does not say how often\n" in text) == sampled
+
+
+def test_the_criterion_that_is_to_be_filled_in_is_one_that_the_system_takes(tmp_path: Path) -> None:
+    law = described(tmp_path, "Law", inputs={"x": "Real m"}, outputs={"force": "Real N discrete"})
+    plant = described(tmp_path, "Plant", inputs={"force": "Real N"}, outputs={"x": "Real m"})
+    _, _, text = proposed(tmp_path, law, plant)
+    text = re.sub(r"^# (?=\[|\w+ = )", "", text, flags=re.MULTILINE)
+    (tmp_path / "filled.toml").write_text(text, encoding="utf-8")
+    system = load_system(tmp_path / "filled.toml")
+    assert (system.criterion.good, system.criterion.diverged) == ("final < 0.05", "abs(Plant.x) > 1e3")
+
+
 def test_an_fmu_may_say_how_it_is_to_be_run(tmp_path: Path) -> None:
     one = described(tmp_path, "A", outputs={"x": "Boolean"}, experiment='stopTime="7" stepSize="0.25"')
     two = described(tmp_path, "B", experiment='stopTime="3" stepSize="0.5"')
