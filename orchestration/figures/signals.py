@@ -1,11 +1,11 @@
 """What is exchanged in a system of any FMUs."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration.figures.lines import TIME, legend_of_runs, quantity, see
+from orchestration.figures.lines import TIME, legend_of_runs, quantity, see, wrapped
 from orchestration.figures.palette import CYCLE
 from orchestration.figures.run import Run, title
 from orchestration.figures.style import Style
@@ -13,25 +13,26 @@ from orchestration.results import display_names as labels
 from orchestration.system.model import component_of
 
 MOST_LINES = 8
-"""In one panel"""
+"""In one panel; what is more gets panels of its own"""
+
+Panel = tuple[str, str | None, list[str]]
+"""What is drawn together: of which connection or component, in which unit, and the columns"""
 
 
 def signals(runs: Sequence[Run], style: Style) -> Figure:
-    """A panel for each connection, its signals as the receiver has them.
+    """A panel for each connection and unit, its signals as the receiver has them.
 
     Of a system without connections, the recorded outputs of each component.
     """
-    groups = _groups(runs[0])
-    figure = style.figure(3.0 + 10.5 * max(1, len(groups)))
-    panels = figure.subplots(max(1, len(groups)), 1, sharex=True, squeeze=False)[:, 0]
-    for panel, (name, columns) in zip(panels, groups.items()):
+    wanted = [*_panels(runs[0])]
+    figure = style.figure(3.0 + 10.5 * max(1, len(wanted)))
+    panels = figure.subplots(max(1, len(wanted)), 1, sharex=True, squeeze=False)[:, 0]
+    for panel, (name, unit, columns) in zip(panels, wanted):
         for run in runs:
             _draw(panel, run, columns, alone=len(runs) == 1)
-        units = {runs[0].described[column].unit for column in columns}
-        panel.set_ylabel(quantity(labels.words(name), units.pop() if len(units) == 1 else None))
+        panel.set_ylabel(wrapped(quantity(labels.words(name), unit), 16))
         see(panel, runs)
-        if columns:
-            panel.legend(loc="upper right")
+        panel.legend(loc="upper left", bbox_to_anchor=(1.0, 1.05), ncols=1 + (len(columns) - 1) // 4)
     if style.has_titles and title(runs):
         panels[0].set_title(title(runs))
     panels[-1].set_xlabel(TIME)
@@ -39,33 +40,33 @@ def signals(runs: Sequence[Run], style: Style) -> Figure:
     return figure
 
 
-def _groups(run: Run) -> dict[str, list[str]]:
-    """The columns of each panel."""
+def _panels(run: Run) -> Iterator[Panel]:
     carried = {
-        x.name: [end if end in run else start for start, end in zip(x.start, x.end)][:MOST_LINES]
-        for x in run.system.connections
+        x.name: [end if end in run else start for start, end in zip(x.start, x.end)] for x in run.system.connections
     }
-    return carried or {
-        name: [column for column in run.recording.columns if column.startswith(f"{name}.")][:MOST_LINES]
+    of_components = {
+        name: [column for column in run.recording.columns if column.startswith(f"{name}.")]
         for name in run.system.components
     }
+    for name, columns in (carried or of_components).items():
+        there = [column for column in columns if column in run]
+        for unit in dict.fromkeys(run.described[column].unit for column in there):
+            alike = [column for column in there if run.described[column].unit == unit]
+            for first in range(0, len(alike), MOST_LINES):
+                yield name, unit, alike[first : first + MOST_LINES]
 
 
 def _draw(panel: Axes, run: Run, columns: Sequence[str], *, alone: bool) -> None:
     """Colours tell signals of one run, or runs; dashes the other."""
     system = run.system
     applied = {end for x in system.connections for end in x.end}
-    several = len({run.described[column].unit for column in columns}) > 1
     for k, column in enumerate(columns):
         if column not in run:
             continue
         held = column in applied or system.components[component_of(column)].sampling is not None
-        name = labels.signal(column, run.described)
-        if several:
-            name = quantity(name, run.described[column].unit)
         panel.plot(
             run.time, run[column], drawstyle="steps-post" if held else "default",
             color=CYCLE[k % len(CYCLE)] if alone else run.color,
             linestyle="-" if alone else ("-", "--", "-.", ":")[k % 4],
-            label=name if run.place == 0 else None,
+            label=labels.signal(column, run.described) if run.place == 0 else None,
         )  # fmt: skip

@@ -37,6 +37,8 @@ class View:
     """those that a run draws at once; all others when they are asked for"""
     load: Callable[[], Drawing]
     """with it comes matplotlib"""
+    needs: frozenset[str] = frozenset()
+    """columns of runs of any kind by which they get these figures too; without any, none does"""
 
 
 def _of_any_system() -> Drawing:
@@ -50,9 +52,10 @@ VIEWS = {ANY: View(names=("signals",), first=("signals",), load=_of_any_system)}
 """By kind of request; rooms above enter theirs"""
 
 
-def view_of(kind: str) -> View:
-    """The figures of a kind of runs: those of any system, unless it has its own."""
-    return VIEWS.get(kind, VIEWS[ANY])
+def view_of(kind: str, columns: Collection[str]) -> View:
+    """The figures of runs of a kind: its own, or those that their columns are of, or those of any system."""
+    known = (view for view in VIEWS.values() if view.needs and view.needs <= {*columns})
+    return VIEWS[kind] if kind != ANY and kind in VIEWS else next(known, VIEWS[ANY])
 
 
 def files() -> frozenset[str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from orchestration.checks.validation.roles import ROLES
 from orchestration.comparison.crossovers import CROSSOVERS
 from orchestration.figures.views import VIEWS, Drawing, View
-from orchestration.flight.names import FIGURES, KIND
+from orchestration.flight.names import FIGURES, KIND, NEEDED
 from orchestration.flight.ports import CONTROLLER, PLANT
 from orchestration.report.known_layouts import LAYOUTS
 from orchestration.stability.known_loops import LOOPS
@@ -42,7 +42,7 @@ def _crossover() -> Crossover:
     return crossover
 
 
-VIEWS[KIND] = View(names=FIGURES, first=FIGURES[:4], load=_drawing)
+VIEWS[KIND] = View(names=FIGURES, first=FIGURES[:4], load=_drawing, needs=NEEDED)
 LAYOUTS.enter(KIND, _layout)
 LOOPS.enter(KIND, _loop)
 CROSSOVERS.enter(KIND, _crossover)

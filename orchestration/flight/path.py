@@ -36,9 +36,10 @@ def draw_in_space(axes: Any, runs: Sequence[Run], style: Style) -> None:
     wanted = [run.stacked(POSITION_REFERENCE) for run in runs]
     for i, points in enumerate(wanted):
         if not any(np.array_equal(points, other) for other in wanted[:i]):
+            rests = not np.ptp(points, axis=0).any()
             axes.plot(
-                *points.T, color=ORANGE, linewidth=3.5 * style.line, alpha=0.6, zorder=1,
-                label="reference" if i == 0 else None,
+                *(points[:1] if rests else points).T, "D" if rests else "-", color=ORANGE,
+                linewidth=3.5 * style.line, alpha=0.6, zorder=1, label="reference" if i == 0 else None,
             )  # fmt: skip
     for run, points in zip(runs, flown, strict=True):
         alone = len(runs) == 1

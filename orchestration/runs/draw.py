@@ -33,11 +33,11 @@ def draw(
     Raises `UsageError` for a name of a figure that there is not, and for runs of different systems.
     """
     listed = list(results) if isinstance(results, Sequence) else [results]
-    kinds = {result.asked.kind for result in listed}
+    views = [view_of(result.asked.kind, result.recording.columns) for result in listed]
     components = {frozenset(result.system.components) for result in listed}
-    if len(kinds) != 1 or len(components) != 1:
+    if any(view is not views[0] for view in views) or len(components) != 1:
         raise UsageError("expected runs of one system to lay over each other")
-    view = view_of(kinds.pop())
+    view = views[0]
     for name in which or ():
         if not any(name in each.names for each in VIEWS.values()):
             raise UsageError(f"--figure {name}: expected one of {', '.join(view.names)}")

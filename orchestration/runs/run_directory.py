@@ -63,7 +63,7 @@ def _write(result: Result, folder: Path, *, figures: bool) -> None:
         from orchestration.figures import style
         from orchestration.runs import draw  # with it comes matplotlib, which takes longer than a short run
 
-        style.save(draw.draw(result, view_of(result.asked.kind).first), folder)
+        style.save(draw.draw(result, view_of(result.asked.kind, result.recording.columns).first), folder)
 
 
 def load_run(folder: str | Path) -> Result:
