@@ -40,7 +40,7 @@ class Replaced:
             found = checked(system, self.models)
         return Meant(
             asked=self.asked, system=found.system, paths=self.paths, models=self.models, parameters=found.parameters,
-            units=found.units,
+            units=found.units, follows=found.follows,
         )  # fmt: skip
 
 
