@@ -5,6 +5,7 @@ a store in `results/comparisons/NAME`, and goes on where it was stopped.
 """
 
 import json
+import math
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,11 +18,11 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestration.basics.statistics import wilson
+from orchestration.basics.statistics import first_end, wilson
 from orchestration.comparison import pictures
 from orchestration.comparison.cells import CellSummary, Median, Share, sizes
 from orchestration.comparison.design import Comparison
-from orchestration.comparison.fates import FATES, SETTLING, survived
+from orchestration.comparison.fates import FATES, RESIDUAL, SETTLING, survived
 from orchestration.comparison.file import load_comparison
 from orchestration.comparison.fronts import Point
 from orchestration.comparison.limits import Limit
@@ -30,9 +31,11 @@ from orchestration.comparison.pictures import BINS, Reach
 from orchestration.comparison.run import compare
 from orchestration.figures.palette import BLUE, BROWN, GREEN, GREY, ORANGE, PURPLE, RED
 from orchestration.figures.style import DOCS
+from orchestration.quadrotor.initial_conditions import Starts
 from orchestration.results import display_names as labels
 from orchestration.results.quantities import Quantity
 from orchestration.studies.axis_labels import quantity_of
+from orchestration.studies.sweep import sweep
 
 ROOT = Path(__file__).parent.parent
 FILES = ROOT / "studies" / "comparisons"
@@ -40,6 +43,7 @@ DATA = Path(__file__).parent / "data"
 RESULTS = ROOT / "results" / "comparisons"
 NAMES = (
     "periods", "fast_inner", "tuned", "tuned_mean", "delays", "inertias", "mismatches", "losses", "jitters", "vehicles",
+    "positions", "negative_thrust",
 )  # fmt: skip
 RATES = 20.0
 """Periods of the outer loops by those of the inner ones, where these are fast"""
@@ -90,15 +94,16 @@ def kept(name: str) -> Any:
 
 def fly_all(name: str) -> Any:
     """Fly what is missing of a comparison, and keep what comes of it."""
-    began, comparison = time.perf_counter(), loaded(name)
+    began, comparison, steady = time.perf_counter(), loaded(name), on_path(loaded(name))
     flown = compare(comparison, folder=RESULTS / name, workers=WORKERS, engine="batch", figures=False)
+    pushed = sweep(steady.study, folder=RESULTS / steady.name, workers=WORKERS, engine="batch").to_pandas()[RESIDUAL]
     found, table = as_json(comparison, flown.outcome, flown.bandwidths), flown.table
     minutes = round((time.perf_counter() - began) / 60.0, 1)
     content = {
         "flights": len(table),
         "minutes": minutes if flown.summary.flown else kept(name)["minutes"],
-        "cells": [_short(cell, table[table["design_index"].isin(comparison.runs_of(comparison.cell(cell["cell"])))],
-                         comparison) for cell in found["cells"]],
+        "cells": [{**_short(cell, table[table["design_index"].isin(comparison.runs_of(comparison.cell(cell["cell"])))],
+                            comparison), "on_path": _known(pushed[cell["cell"]])} for cell in found["cells"]],
         "limits": found["limits"],
         "fronts": [_point(point) for point in found["fronts"]],
     }  # fmt: skip
@@ -107,21 +112,38 @@ def fly_all(name: str) -> Any:
     return kept(name)
 
 
+def on_path(comparison: Comparison) -> Comparison:
+    """The same from the path itself, once: its residual is that of wind and path, without an initial error."""
+    once = Starts(count=1, position=0.0, velocity=0.0, angle=0.0, rate=0.0)
+    return replace(comparison, name=f"{comparison.name}_on_path", starts=once)
+
+
+def by_horizon(rows: Any) -> dict[str, dict[str, int]]:
+    """How many of some runs have diverged, and how many settled, by each of `HORIZONS`."""
+    alive, settling, end = survived(rows), rows[SETTLING].to_numpy(float), rows["divergence_time"].astype(float)
+    return {
+        "diverged_by": {f"{t:g}": int((~alive & (end <= t)).sum()) for t in HORIZONS},
+        "settled_by": {f"{t:g}": int((alive & (settling <= t)).sum()) for t in HORIZONS},
+    }
+
+
 def _short(cell: dict[str, Any], rows: Any, comparison: Comparison) -> dict[str, Any]:
     """A cell as it is kept: counts, medians with their intervals, and counts by the size of the initial error."""
     bins = (sizes(comparison, rows) * BINS).astype(int).clip(upper=BINS - 1)
-    alive, settling = survived(rows), rows[SETTLING].to_numpy(float)
     counts = ("cell", "vehicle", "condition", "controller", "value", "count", "survives", "settles", "diverged")
     return {
         **{key: cell[key] for key in (*counts, "diverged_late")},
         **{name: [cell[f"{name}{end}"] for end in ("", ".low", ".high")] for name in TOLD},
-        "diverged_by": {f"{t:g}": int((~alive & (rows["divergence_time"].astype(float) <= t)).sum()) for t in HORIZONS},
-        "settled_by": {f"{t:g}": int((alive & (settling <= t)).sum()) for t in HORIZONS},
+        **by_horizon(rows),
         "by_size": {
             fate: [[int((has(rows) & (bins == i)).sum()), int((bins == i).sum())] for i in range(BINS)]
             for fate, has in FATES.items()
         },
     }
+
+
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else value
 
 
 def _point(point: dict[str, Any]) -> dict[str, Any]:
@@ -148,6 +170,19 @@ def _compact(content: dict[str, Any]) -> str:
     return "{\n" + ",\n".join(parts) + "\n}\n"
 
 
+def from_the_path() -> str:
+    """In how many cells a residual is that of a flight from the path, and in how many that flight comes to rest."""
+    cells = [cell for name in NAMES if name != "losses" for cell in kept(name)["cells"]]  # one flight tells no chance
+    settled = [cell for cell in cells if cell["settles"] == cell["count"]]
+    alike = [one for one in settled if math.isclose(one["residual"][0], one["on_path"] or 0.0, rel_tol=0.02)]
+    restless = [cell for cell in cells if cell["settles"] == 0 and 2 * cell["survives"] > cell["count"]]
+    at_rest = [one for one in restless if (one["on_path"] or math.inf) < 0.05]
+    return (
+        f"of {len(settled)} cells in which all settle {len(alike)} have the residual from the path to 2 %; of "
+        f"{len(restless)} in which most survive and none settles {len(at_rest)} come to rest from the path"
+    )
+
+
 # -- what is printed and drawn ----------------------------------------------------------------------------
 
 
@@ -167,12 +202,30 @@ def lines(name: str, content: Any) -> Iterator[str]:
         by = "/".join(str(count) for count in cell["settled_by"].values())
         yield (f"  cell {cell['cell']}: {where}, {cell['value']:g}: of {cell['count']} {cell['survives']} survive "
                f"({low:.1%} to {high:.1%}, {cell['diverged_late']} lost late), {cell['settles']} settle "
-               f"({least:.1%} to {most:.1%}; by 20/30/40/60 s {by}); {told}")  # fmt: skip
+               f"({least:.1%} to {most:.1%}; by 20/30/40/60 s {by}); {told}; from the path {_number(cell['on_path'])}"
+               )  # fmt: skip
+    for key, fate, by_size in _ends_by_size(name):
+        yield f"  {', '.join(key)}: by size of the initial error half {fate} up to {', '.join(by_size)}"
+
+
+def _ends_by_size(name: str) -> Iterator[tuple[tuple[str, ...], str, list[str]]]:
+    """Of each controller on each vehicle under each condition, for each bin: up to which value half have a fate."""
+    where = ("vehicle", "condition", "controller")
+    for key, group in groupby(kept(name)["cells"], lambda cell: tuple(cell[one] for one in where)):
+        cells = [*group]
+        for fate in FATES:
+            counts = np.array([cell["by_size"][fate] for cell in cells])
+            half = 2 * counts[..., 0] >= counts[..., 1]
+            yield key, fate, [_number(first_end([cell["value"] for cell in cells], bin)) for bin in half.T]
 
 
 def _numbers(median: list[float | None]) -> str:
-    value, low, high = ("-" if one is None else f"{one:.3g}" for one in median)
+    value, low, high = map(_number, median)
     return f"{value} [{low}, {high}]"
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"
 
 
 def figures() -> Iterator[tuple[str, Figure]]:
@@ -181,6 +234,10 @@ def figures() -> Iterator[tuple[str, Figure]]:
     by_size = dict([*_by_size("periods"), *_by_size("fast_inner", RATES)])
     tall = replace(DOCS, width=280.0, height=260.0)
     yield "comparison_basins", pictures.basins(by_size, outer, "survive", "paper's body", tall)
+    yield (
+        "comparison_positions",
+        pictures.basins(dict(_by_size("positions")), outer, "survive", "initial error of up to 8 m, at rest", WIDE),
+    )
     reaches = [*_reaches("periods"), *_reaches("fast_inner", RATES)]
     yield "comparison_limits", pictures.limits_of(reaches, outer, True, WIDE)
     yield "comparison_tuned", _shares({"paper's body": [*_cells("tuned"), *_cells("tuned_mean")]}, "tuned")
@@ -225,9 +282,10 @@ def _cells(name: str) -> list[CellSummary]:
 
 
 def _by_size(name: str, factor: float = 1.0) -> Iterator[tuple[str, pictures.BySize]]:
-    """Of each controller values of the axis, with a factor on them, and the shares that survive."""
-    for controller, group in groupby(kept(name)["cells"], lambda cell: cell["controller"]):
-        cells = [*group]
+    """Of each controller under each condition values of the axis, with a factor, and the shares that survive."""
+    several = len(loaded(name).conditions) > 1
+    for key, group in groupby(kept(name)["cells"], lambda cell: (cell["controller"], cell["condition"])):
+        cells, controller = [*group], ", ".join(key[: 1 + several])
         share = np.array([[alive / count for alive, count in cell["by_size"]["survive"]] for cell in cells])
         yield controller, ([factor * cell["value"] for cell in cells], share.T)
 

@@ -1,22 +1,30 @@
-"""The experiments of `findings/` that stand beside theory: how an error decays, what sets the limit, which delays."""
+"""What the findings set beside theory: how an error decays, what sets the limit of the period, which delays."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 import quadcosim
-from docs.experiments import random_starts
+from fmu_kit.trajectory import Trajectory
 from orchestration.flight.hover_loop import HoverLoop
 from orchestration.flight.local_limit import local_limit
-from orchestration.quadrotor.scenario import Scenario
-from orchestration.quadrotor.timing import Timing
+from orchestration.quadrotor.scenario import FmuChoice, Scenario
+from orchestration.studies.axes import Axis
+from orchestration.studies.linked_settings import LinkedSettings
+from orchestration.studies.study import Study
+from orchestration.system.model import Parameter
 
 Array = Any
 
-NATIVE = Scenario(timing=Timing(plant_interval=0.005)).with_fmus(
-    plant="native/QuadrotorPlant", controller="native/UnifiedController"
-)
+PAPER = Scenario(
+    controller=FmuChoice(fmu="native/UnifiedController"), plant=FmuChoice(fmu="native/QuadrotorPlant"), stop_time=60.0
+).with_changes(timing={"plant_interval": 0.005}, parameters={"plant.max_internal_step": 0.005})
+"""The paper's flight to 60 s, as in the study files, by native FMUs"""
+CALM: Mapping[str, Parameter] = {f"plant.wind.amplitude.{axis}": 0.0 for axis in "xyz"}
+"""No wind"""
 
 # -- how an error decays ---------------------------------------------------------------------------------------------
 
@@ -26,73 +34,66 @@ EXPONENTS = (1.0, 0.99, 0.95, 0.9, 0.85, 0.8, 0.7, 0.5)
 """β_t"""
 DECAY_PERIODS = (0.001, 0.01, 0.05)
 """[s]"""
-DECADES = ((0.1, 0.01), (0.01, LAYER), (LAYER, 1e-4), (1e-4, 1e-5))
-"""[m], of the largest position error of the three axes; the first two lie outside of the boundary layer"""
+BOUNDS = (0.1, 0.01, LAYER, 1e-4, 1e-5)
+"""[m], of the largest position error of the three axes; the first two decades lie outside of the boundary layer"""
 STAYS = 2.0
-"""[s], for which an error has to be inside, lest a swing through zero at the end counts"""
+"""[s], for how long an error has to be below a bound, lest a swing through zero at the end counts"""
 DECAY_STARTS = 20
-"""1 m from the path in random directions, beside the paper's start"""
+"""1 m from the path in random directions, beside the paper's initial condition"""
+_ERROR = "max({})".format(", ".join(f"abs(plant.position.{axis} - reference.position.{axis})" for axis in "xyz"))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Decay:
-    """A flight without wind, from the paper's attitude."""
-
-    exponent: float
-    period: float
-    start: tuple[float, float, float]
-    stop_time: float = 25.0
+def decaying(exponent: float = 0.99) -> Scenario:
+    """The flight of which the decay is measured."""
+    own: dict[str, Parameter] = {"controller.surface_exponent": exponent, "controller.boundary_layer": LAYER}
+    return PAPER.with_changes(parameters={**CALM, **own})
 
 
-def decays() -> list[Decay]:
-    """Every exponent at every period from every start; the paper's start comes first."""
-    starts = [(0.0, 0.0, 0.0), *(tuple(start) for start in random_starts()[0][:DECAY_STARTS].tolist())]
-    return [Decay(exponent=b, period=T, start=P) for b in EXPONENTS for T in DECAY_PERIODS for P in starts]
+def decay_study() -> Study:
+    """Every exponent at every period from every initial condition, the paper's first."""
+    system = decaying().as_system()
+    measured = {_within(bound): f"settling_time({_ERROR}, {bound})" for bound in BOUNDS}
+    remains = {"remains": f"max({_ERROR} * (time >= stop_time - 5))"}
+    generator = np.random.default_rng(1)
+    directions = generator.standard_normal((DECAY_STARTS, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    places = [np.zeros(3), *(np.array([*Trajectory().position(0.0)]) + directions)]
+    return Study(
+        name="decay",
+        base=replace(system, objectives={**system.objectives, **measured, **remains}),
+        axes=(
+            Axis(name="exponent", targets=("components.controller.parameters.surface_exponent",), values=EXPONENTS),
+            Axis(name="period", targets=("components.controller.sampling.period",), values=DECAY_PERIODS),
+            Axis(name="start", targets=(), values=tuple(range(len(places)))),
+        ),
+        together=(LinkedSettings(axes=("start",), sets={(i,): _begins_at(place) for i, place in enumerate(places)}),),
+    )
 
 
-def error_over_time(flight: Decay) -> tuple[Array, Array, Array]:
-    """Time [s], the largest error of the three axes [m] and the energy L_κ [J], at samples."""
-    calm = {f"plant.wind.amplitude.{axis}": 0.0 for axis in "xyz"}
-    at = {f"plant.initial.position.{axis}": x for axis, x in zip("xyz", flight.start, strict=True)}
-    own = {"controller.surface_exponent": flight.exponent, "controller.boundary_layer": LAYER}
-    timing = {"period": flight.period, "plant_interval": min(flight.period, 0.005)}
-    scenario = NATIVE.with_changes(parameters={**calm, **at, **own}, stop_time=flight.stop_time, timing=timing)
-    signals = quadcosim.run(scenario).signals
-    every = slice(None, None, round(flight.period / timing["plant_interval"]))
+def since(table: Any) -> Array:
+    """From when on each flight's error stays below each of `BOUNDS` [s], shape (flights, bounds); nan: it does not."""
+    found = table[[_within(bound) for bound in BOUNDS]].to_numpy(float)
+    return np.where(found <= PAPER.stop_time - STAYS, found, np.nan)
+
+
+def rates_of(times: Array) -> Array:
+    """At what rate the error falls from each bound to the next [1/s], of what `since` gives."""
+    spans = np.diff(times, axis=1)
+    return np.log(np.divide(BOUNDS[:-1], BOUNDS[1:])) / np.where(spans > 0.0, spans, np.nan)
+
+
+def error_over_time(exponent: float) -> tuple[Array, Array, Array]:
+    """Time [s], the largest error of the three axes [m] and the energy L_κ [J] of the paper's flight at 1 ms."""
+    signals = quadcosim.run(decaying(exponent).with_changes(timing={"period": 0.001})).signals
     error = np.max([np.abs(signals[f"plant.position.{a}"] - signals[f"reference.position.{a}"]) for a in "xyz"], axis=0)
-    return signals["time"][every], error[every], signals["controller.energy"][every]
+    return signals["time"], error, signals["controller.energy"]
 
 
-def decay_of(flight: Decay) -> dict[str, Any]:
-    """Since when the error stays inside ε, at what rate error and energy fall in each decade, and what remains."""
-    time, error, energy = error_over_time(flight)
-    since = {bound: _since(time, error, bound) for decade in DECADES for bound in decade}
-    rates: list[float | None] = []
-    energy_rates: list[float | None] = []
-    for high, low in DECADES:
-        begin, end = since[high], since[low]
-        if begin is None or end is None or end <= begin:
-            rates.append(None)
-            energy_rates.append(None)
-            continue
-        rates.append(np.log(high / low) / (end - begin))
-        energy_rates.append(_slope(time, energy, begin, end))
-    last = float(error[time >= flight.stop_time - 5.0].max()) if time[-1] >= flight.stop_time - 1e-6 else None
-    return {"inside": since[LAYER], "rates": rates, "energy_rates": energy_rates, "remains": last}
-
-
-def _since(time: Array, error: Array, bound: float) -> float | None:
-    """The time [s] from which the error stays below a bound; None: not for `STAYS` up to the end."""
-    outside = time[error > bound]
-    since = float(time[time > outside[-1]].min(initial=np.inf)) if len(outside) else float(time[0])
-    return since if since <= time[-1] - STAYS else None
-
-
-def _slope(time: Array, energy: Array, begin: float, end: float) -> float | None:
-    there = (time >= begin) & (time <= end) & (energy > 0.0)
-    if there.sum() < 5:
-        return None
-    return float(-np.polyfit(time[there], np.log(energy[there]), 1)[0])
+def energy_rates() -> list[float]:
+    """At what rate L_κ falls while the error falls from each bound to the next, β_t = 1 [1/s]."""
+    time, error, energy = error_over_time(1.0)
+    ends = [int(np.flatnonzero(error > bound)[-1]) for bound in BOUNDS]
+    return [-float(np.polyfit(time[a:b], np.log(energy[a:b]), 1)[0]) for a, b in pairwise(ends)]
 
 
 def expected_rate(exponent: float, gain: float = 2.99) -> float:
@@ -102,6 +103,14 @@ def expected_rate(exponent: float, gain: float = 2.99) -> float:
     damping. Over a swing ⟨ė²⟩ = 2 (1 + β_t)/(3 + β_t) of the energy, which goes as |e|^(1 + β_t) and falls by k ⟨ė²⟩.
     """
     return 2.0 * gain / (3.0 + exponent)
+
+
+def _within(bound: float) -> str:
+    return f"within_{round(bound * 1e6)}_um"
+
+
+def _begins_at(place: Array) -> dict[str, float]:
+    return {f"components.plant.parameters.initial.position.{axis}": float(x) for axis, x in zip("xyz", place)}
 
 
 # -- what sets the limit ---------------------------------------------------------------------------------------------
@@ -124,15 +133,15 @@ def scaled(names: tuple[str, ...], factor: float, scenario: Scenario) -> Scenari
     return scenario.with_changes(parameters=values)
 
 
-def limits_over_gains(kappa: float) -> dict[str, list[float | None]]:
+def limits_over_gains(kappa: float) -> dict[str, Array]:
     """Local limits of the period [s] by what is scaled, for each of `FACTORS`."""
-    base = NATIVE.with_changes(parameters={"controller.coupling": kappa})
+    base = PAPER.with_changes(parameters={"controller.coupling": kappa})
     plant = HoverLoop.of(base)
-    found: dict[str, list[float | None]] = {}
-    for name, names in LOOPS.items():
-        loops = [(scaled(names, factor, base)) for factor in FACTORS]
-        found[name] = [local_limit(plant.with_law(one), one, "period") for one in loops]
-    return found
+    return {
+        name: np.array([local_limit(plant.with_law(one), one, "period") for one in loops], float)
+        for name, names in LOOPS.items()
+        for loops in [[scaled(names, factor, base) for factor in FACTORS]]
+    }
 
 
 def of_attitude_alone(k_theta: float, k_eta: float, k_q: float) -> float:

@@ -42,7 +42,10 @@ def test_one_cell_in_a_hundred_is_what_is_flown_again(name: str) -> None:
     kept = comparisons.kept(name)["cells"]
     chosen = sorted(random.Random(name).sample(kept, math.ceil(len(kept) / 100)), key=lambda cell: cell["cell"])
     flown = cells_again(comparisons.loaded(name), [cell["cell"] for cell in chosen], engine="batch")
-    for cell, summary in zip(chosen, flown, strict=True):
+    steady = cells_again(
+        comparisons.on_path(comparisons.loaded(name)), [cell["cell"] for cell in chosen], engine="batch"
+    )
+    for cell, summary, alone in zip(chosen, flown, steady, strict=True):
         row = summary.row("value")
         for key in ("count", "survives", "settles", "diverged", "diverged_late"):
             assert row[key] == cell[key], key
@@ -50,3 +53,5 @@ def test_one_cell_in_a_hundred_is_what_is_flown_again(name: str) -> None:
             again = [math.nan if row[f"{key}{end}"] is None else row[f"{key}{end}"] for end in ("", ".low", ".high")]
             before = [math.nan if one is None else one for one in cell[key]]
             assert again == pytest.approx(before, rel=1e-4, nan_ok=True), key
+        residual = alone.medians["residual"].value
+        assert residual == (None if cell["on_path"] is None else pytest.approx(cell["on_path"], rel=1e-4))

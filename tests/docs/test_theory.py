@@ -1,8 +1,12 @@
 """What the findings say from theory is what the equations do; what they measure is measured rightly."""
 
+import math
+
 import numpy as np
+import pandas as pd
 import pytest
 
+import quadcosim
 from docs import theory
 from orchestration.flight.hover_loop import HoverLoop
 
@@ -26,7 +30,7 @@ def test_a_spring_of_any_power_under_linear_damping_decays_exponentially_at_the_
 
 def test_the_rate_of_the_linear_loop_is_that_of_its_slowest_mode() -> None:
     """k = k_t + β of the paper, β_t = 1: half of it, in continuous time without a coupling."""
-    loop = HoverLoop.of(theory.NATIVE.with_changes(parameters={"controller.coupling": 0.0}))
+    loop = HoverLoop.of(theory.PAPER.with_changes(parameters={"controller.coupling": 0.0}))
     A, B, F = loop.continuous()
     assert -np.linalg.eigvals(A + B @ F).real.max() == pytest.approx(theory.expected_rate(1.0), rel=1e-5)
 
@@ -44,7 +48,7 @@ def test_the_attitude_loop_by_itself_is_at_the_edge_at_its_limit() -> None:
 
 def test_all_rates_together_scale_the_limit_of_the_period_inversely() -> None:
     """Times a factor in 1/s, its square in 1/s²: the same loop in another unit of time."""
-    base = theory.NATIVE.with_changes(parameters={"controller.coupling": 0.0})
+    base = theory.PAPER.with_changes(parameters={"controller.coupling": 0.0})
     faster = theory.scaled(("k_θ", "k_η", "k_s", "k_t + β"), 2.0, base)
     faster = theory.scaled(("k_q",), 4.0, faster)
     loop = HoverLoop.of(base)
@@ -60,21 +64,27 @@ def test_exponent_of_a_power_is_the_power_and_its_interval_holds_it_under_noise(
     assert slope == pytest.approx(0.5 * (low + high))
 
 
-def test_an_error_is_inside_since_it_was_outside_for_the_last_time() -> None:
-    time = np.arange(6.0)
-    assert theory._since(time, np.array([3.0, 2.0, 0.5, 0.5, 0.4, 0.1]), 1.0) == 2.0
-    assert theory._since(time, np.array([0.1] * 6), 1.0) == 0.0
-    assert theory._since(time, np.array([0.1] * 5 + [2.0]), 1.0) is None
-    assert theory._since(time, np.array([2.0] * 4 + [0.1] * 2), 1.0) is None  # not for 2 s
+def test_an_error_counts_as_inside_if_it_stays_so_for_a_while_before_the_end() -> None:
+    """Rates are of what falls from one bound to the next, and stays below both."""
+    names = [name for name in theory.decay_study().origin.objectives if name.startswith("within_")]
+    late = theory.PAPER.stop_time - 1.0
+    table = pd.DataFrame([[2.0, 4.0, 6.0, 6.0, late], [2.0, 4.0, late, None, None]], columns=names)
+    times = theory.since(table)
+    assert np.isnan(times).tolist() == [[False] * 4 + [True], [False] * 2 + [True] * 3]
+    rate = math.log(10.0) / 2.0
+    assert theory.rates_of(times) == pytest.approx(
+        np.array([[rate, rate, math.nan, math.nan], [rate, math.nan, math.nan, math.nan]]), nan_ok=True
+    )
 
 
 def test_a_flight_with_the_papers_exponent_decays_and_one_with_a_small_exponent_does_not() -> None:
-    settling, circling = (
-        theory.decay_of(theory.Decay(exponent=b, period=0.01, start=(0.0, 0.0, 0.0), stop_time=15.0))
-        for b in (0.99, 0.7)
-    )
-    assert settling["inside"] == pytest.approx(7.55, abs=0.02)
-    assert all(1.0 < rate < 2.5 for rate in settling["rates"])
-    assert circling["inside"] is None
-    assert circling["rates"][1:] == [None, None, None]
-    assert 1e-3 < circling["remains"] < 1e-2
+    base, (exponent, period, *_) = theory.decay_study().base, theory.decay_study().axes
+    values = {exponent.targets[0]: [0.99, 0.7], period.targets[0]: 0.01}
+    flights = pd.DataFrame(dict(quadcosim.fly(base, values)))
+    times, remains = theory.since(flights), flights["remains"]
+    rates = theory.rates_of(times)
+    assert times[0, 2] == pytest.approx(7.55, abs=0.02)
+    assert ((rates[0] > 1.0) & (rates[0] < 2.5)).all()
+    assert np.isnan(times[1, 2])
+    assert np.isnan(rates[1, 1:]).all()
+    assert 1e-3 < remains[1] < 1e-2
