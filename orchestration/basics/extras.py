@@ -10,6 +10,7 @@ EXTRAS = {
     "studies": ("cma", "dask", "distributed", "filelock", "pandas", "SALib", "scipy", "xarray"),
     "interop": ("libcosimpy", "ecospy", "tbb", "fmu-manipulation-toolbox"),
     "report": ("plotly",),
+    "gym": ("gymnasium",),
 }
 """By the extra that brings them."""
 

@@ -1,0 +1,26 @@
+"""A run as an environment of Gymnasium; it needs `pip install 'quadcosim[gym]'`.
+
+For example one that rewards being near the paper's path::
+
+    from quadcosim import Scenario
+    from quadcosim.gym import Environment
+
+    def reward(now):
+        return -sum((now[f"plant.position.{a}"] - now[f"reference.position.{a}"]) ** 2 for a in "xyz")
+
+    environment = Environment(Scenario(), reward, low=[0, -5, -5, -5], high=[30, 5, 5, 5])
+    observation, info = environment.reset(seed=0)
+    observation, reward, terminated, truncated, info = environment.step([9.81, 0, 0, 0])
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from orchestration.basics.extras import explained
+
+if TYPE_CHECKING:
+    from orchestration.runs.environment import Environment
+else:
+    Environment = explained(import_module)("orchestration.runs.environment").Environment
+
+__all__ = ["Environment"]
