@@ -1,6 +1,6 @@
 """Flies the comparisons of `findings.md` and keeps what their cells come to beside the page: `docs/data/NAME.json`.
 
-`python -m docs.comparisons NAME …` flies what `quadcosim compare studies/comparisons/NAME.toml --engine batch` does, in
+`python -m docs.comparisons NAME …` flies what `quadcosim compare studies/comparisons/NAME.toml` does, in
 a store in `results/comparisons/NAME`, and goes on where it was stopped.
 """
 

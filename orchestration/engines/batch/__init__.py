@@ -1,1 +1,1 @@
-"""Whole studies as lanes of runs in vector registers: what `sweep --engine batch` flies by."""
+"""Whole studies as lanes of runs in vector registers: what the engine `batch` flies by."""
