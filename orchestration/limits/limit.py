@@ -17,6 +17,7 @@ from orchestration.fmi.foreign import LostError, computed
 from orchestration.limits.evaluation import RELIABILITY, Evaluator, is_random, said
 from orchestration.limits.found import Continuous, Found
 from orchestration.requests.ranges import Varied, range_asked_for, usual_quantity
+from orchestration.requests.request import Asked, asked_for
 from orchestration.results import html
 from orchestration.results.criterion import edge, judged
 from orchestration.stability.known_loops import Local
@@ -83,7 +84,7 @@ class Limit(Found):
 
 @explained
 def find(
-    request: Request,
+    asked: Asked,
     of: str | None = None,
     *,
     first: float | None = None,
@@ -107,7 +108,7 @@ def find(
 
     Raises `UsageError` for a quantity, range, tolerance, step or confidence that cannot be.
     """
-    request, how = alone(request, engine)
+    request, how = alone(asked_for(asked), engine)
     of = of or usual_quantity(request)
     varied, files = _checked(request, of, confidence)
     near = request.near_continuous(CONTINUOUS) if continuous else None

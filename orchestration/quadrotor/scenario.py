@@ -1,10 +1,13 @@
 """What a run is, as one frozen value."""
 
 import dataclasses
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
+
+from pydantic import BeforeValidator
 
 from orchestration.basics.bisection import Range
 from orchestration.basics.errors import UsageError, no_such_key, shown
@@ -57,6 +60,11 @@ class Record:
     """The variables of the controller to record; None: all outputs and locals."""
 
 
+def _vehicle_meant(given: Any) -> Any:
+    """A vehicle by its name, or the path of its file, as files have it."""
+    return load_vehicle(os.fspath(given), Path()) if isinstance(given, (str, os.PathLike)) else given
+
+
 @record()
 class Scenario:
     """One run; the defaults are the paper's scenario (section V) at a 10 ms period.
@@ -71,9 +79,9 @@ class Scenario:
     model_mismatch: bool = False
     """Whether it is meant if the controller's nominal mass or inertia is not the plant's; it only silences a
     warning."""
-    vehicle: Vehicle | None = None
-    """The vehicle whose parameters hold where `controller` and `plant` say nothing else, of `load_vehicle`; in a file
-    its name, or the path of its own file."""
+    vehicle: Annotated[Vehicle | None, BeforeValidator(_vehicle_meant)] = None
+    """The vehicle whose parameters hold where `controller` and `plant` say nothing else, of `load_vehicle`; or its
+    name, or the path of its own file."""
     controller: FmuChoice = field(default_factory=lambda: FmuChoice(fmu=DEFAULT_CONTROLLER))
     """The FMU of the controller and its parameters: in a file `fmu`, its name or path, and parameters by their names in
     the FMU."""
@@ -112,14 +120,19 @@ class Scenario:
     ) -> "Scenario":
         """This scenario with other timing keys, parameters (`controller.NAME`, `plant.NAME` and so on) or fields.
 
+        A dictionary for `plant`, `controller`, `reference` or `disturbance` has parameters: `plant={"mass": 1.2}`.
+
         Raises `UsageError` for a key that does not exist.
         """
         _expect_keys("", fields, Scenario)
         _expect_keys("timing.", timing or {}, Timing)
+        tables = {side: fields.pop(side) for side in SIDES if isinstance(fields.get(side), Mapping)}
+        of_tables = {f"{side}.{name}": value for side, table in tables.items() for name, value in table.items()}
+        parameters = {**of_tables, **(parameters or {})}
         changed = dataclasses.replace(self, **fields)
         if timing:
             changed = dataclasses.replace(changed, timing=dataclasses.replace(self.timing, **dict(timing)))
-        for name, value in (parameters or {}).items():
+        for name, value in parameters.items():
             side, _, parameter = name.partition(".")
             if side not in SIDES or not parameter:
                 raise UsageError(

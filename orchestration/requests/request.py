@@ -1,16 +1,19 @@
 """What can be asked to run: a system file or a scenario of the quadrotor, both TOML; an SSP and its timing."""
 
-from collections.abc import Iterator
+import copy
+import os
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from orchestration.basics.documents import read_toml
-from orchestration.basics.errors import UsageError
+from orchestration.basics.errors import UsageError, shown
 from orchestration.quadrotor import translation
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.scenario_file import scenario_from_tables
 from orchestration.system.model import System
+from orchestration.system.request import Request
 from orchestration.system.system_file import is_system, system_from_tables
 
 FILES = (translation.SYSTEM,)
@@ -18,6 +21,25 @@ FILES = (translation.SYSTEM,)
 SSP_ENDINGS = (".ssp", ".ssd")
 SSP = "ssp"
 """Key of a file with timing: the SSP that it is for"""
+
+
+Asked: TypeAlias = Request | str | os.PathLike[str] | Mapping[str, Any]
+"""A request, the path of its file, or what stands in that as a dictionary"""
+
+
+def asked_for(given: Asked) -> Request:
+    """The request that is given, whichever way; relative paths of a dictionary start at the current folder.
+
+    Raises `UsageError` for what is none, and as `load_request`.
+    """
+    if isinstance(given, (str, os.PathLike)):
+        return load_request(Path(given))
+    if isinstance(given, Mapping):
+        return request_from_tables(copy.deepcopy(dict(given)), Path())
+    if isinstance(given, type) or not isinstance(given, Request):
+        expected = "a Scenario, a System, the path of a file of one, or its tables as a dictionary"
+        raise UsageError(f"{shown(repr(given))}: expected {expected}")
+    return given
 
 
 def usual() -> Scenario:

@@ -8,8 +8,8 @@ import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
+from orchestration.requests.request import Asked
 from orchestration.runs.stepping import Simulation
-from orchestration.system.request import Request
 
 Reward = Callable[[Mapping[str, float]], float]
 """Of all columns of a run as they are after a step, by name: `Simulation.values`"""
@@ -28,7 +28,7 @@ class Environment(gymnasium.Env[Floats, Floats]):  # type: ignore[misc]
 
     def __init__(
         self,
-        asked: Request,
+        asked: Asked,
         reward: Reward,
         *,
         low: Any,

@@ -16,13 +16,14 @@ from orchestration.engines.batch.batches import Batches
 from orchestration.engines.batch.shape import expect_lanes
 from orchestration.engines.wiring import checked, columns_of, source_signals
 from orchestration.fmi.model import Model, read_model
+from orchestration.requests.request import Asked, asked_for
 from orchestration.results.objectives import FIXED, Metrics
 from orchestration.runs.columns import Columns, columns
 from orchestration.runs.simulation import run
 from orchestration.system.check import check, recorded
 from orchestration.system.following import heard
 from orchestration.system.model import System, component_of, variable_of
-from orchestration.system.request import Request, in_its_own_words
+from orchestration.system.request import in_its_own_words
 
 BATCH = "batch"
 _NOTES = logging.getLogger("quadcosim")
@@ -60,7 +61,7 @@ class Flights(Mapping[str, Floats]):
 
 
 def fly(
-    asked: Request, values: Mapping[str, Any], *, outputs: Sequence[str] | None = None, record: Sequence[str] = ()
+    asked: Asked, values: Mapping[str, Any], *, outputs: Sequence[str] | None = None, record: Sequence[str] = ()
 ) -> Flights:
     """Fly many runs of a system, or a scenario, from arrays into arrays, without a store or a result for each.
 
@@ -73,14 +74,15 @@ def fly(
     lanes, else each run as `run` does. Raises `UsageError` for a path, an output or a column that there is not, arrays
     of different lengths and values that cannot be; and what `run` raises for a run that cannot be flown, saying which.
     """
-    with in_its_own_words(asked):
-        system = located(asked.as_system())
+    request = asked_for(asked)
+    with in_its_own_words(request):
+        system = located(request.as_system())
         models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
         check(system, models)
         system = heard(system, models)
         fits = checked(_recording(system, models, record), models)
         names = _outputs(fits.system, outputs)
-        given = columns(asked, fits.system, models, values)
+        given = columns(request, fits.system, models, values)
         reason = _reason_unavailable(fits.system, models)
         table = _Table(given.count, names, record)
         for flown in _alone(given, range(given.count), record) if reason else _in_lanes(given, fits.parameters, record):

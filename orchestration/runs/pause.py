@@ -13,17 +13,17 @@ from orchestration.engines.engine import Engine
 from orchestration.processes.limits import Limits
 from orchestration.recording.recording import InMemory, Recorder
 from orchestration.recording.tables import InFolder, ToFolder
-from orchestration.requests.request import load_request
+from orchestration.requests.request import Asked, asked_for, load_request
 from orchestration.runs.meant import Announce, Progress
 from orchestration.runs.result import Result
 from orchestration.runs.run_directory import METRICS, SCENARIO, STATE, keep_flight
 from orchestration.runs.simulation import PreparedRun, flown
-from orchestration.system.request import Request, system_meant
+from orchestration.system.request import system_meant
 from orchestration.system.times import nanoseconds
 
 
 def fly_until(
-    asked: Request,
+    asked: Asked,
     pause_at: float,
     folder: str | Path,
     *,
@@ -40,13 +40,14 @@ def fly_until(
     Returns None, or the result if the run was over before: its directory is then in `folder`. Where it is flown, and
     within which limits, is as in `run`.
     """
-    stop_time = system_meant(asked).stop_time
+    request = asked_for(asked)
+    stop_time = system_meant(request).stop_time
     if not 0.0 <= pause_at < stop_time:
         raise UsageError(f"pause at {pause_at:g} s: expected a time from 0 to before stop_time {stop_time:g} s")
 
     def fly(recorder: ToFolder) -> Result | None:
         result = flown(
-            asked, partial(_until, pause_at, recorder.folder.absolute()), recorder=recorder, progress=progress,
+            request, partial(_until, pause_at, recorder.folder.absolute()), recorder=recorder, progress=progress,
             announce=announce, engine=engine, in_process=in_process, time_limit=time_limit, memory_limit=memory_limit,
         )  # fmt: skip
         if result is None:

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -48,6 +49,9 @@ from orchestration.system.check import recorded
 from orchestration.system.model import Component, System, component_of, variable_of
 from orchestration.system.request import Request, in_its_own_words
 from orchestration.system.times import NANOSECONDS
+
+if TYPE_CHECKING:
+    from orchestration.requests.request import Asked
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,8 +121,20 @@ def whole(simulation: PreparedRun, progress: Progress | None) -> bool:
     return simulation.master.run(progress=progress)
 
 
+@overload
 def run(
-    asked: Request | None = None,
+    asked: "Asked | None" = None, *, recorder: Recorder | None = None, progress: Progress | None = None,
+    announce: Announce | None = None, engine: Engine | None = None, in_process: bool = False,
+    time_limit: float | None = None, memory_limit: float = Limits.memory,
+) -> Result: ...  # fmt: skip
+@overload
+def run(
+    asked: list[Any], *, recorder: None = None, progress: Progress | None = None,
+    announce: Announce | None = None, engine: Engine | None = None, in_process: bool = False,
+    time_limit: float | None = None, memory_limit: float = Limits.memory,
+) -> list[Result]: ...  # fmt: skip
+def run(
+    asked: "Asked | list[Any] | None" = None,
     *,
     recorder: Recorder | None = None,
     progress: Progress | None = None,
@@ -127,8 +143,10 @@ def run(
     in_process: bool = False,
     time_limit: float | None = None,
     memory_limit: float = Limits.memory,
-) -> Result:
+) -> Result | list[Result]:
     """Run a system, or fly a scenario of the quadrotor, the paper's if none is given.
+
+    It may be given by the path of its file, or as a dictionary of what stands there; of a list each is run, in turn.
 
     Divergence is a result, and so is what was recorded until an FMU has ended the run.
 
@@ -141,12 +159,20 @@ def run(
     refuses a call for another reason than divergence, `RunLost` with what was recorded if an FMU or a limit ends
     the process, `RunInterrupted` after Ctrl-C.
     """
-    if asked is None:
-        from orchestration.requests.request import usual  # the readers of files load only where nobody has read one
+    from orchestration.requests.request import asked_for, usual  # the readers of files are for who reads one
 
-        asked = usual()
+    if isinstance(asked, list):
+        if recorder is not None:
+            raise UsageError("recorder: expected none for a list of runs")
+        return [
+            run(
+                each, progress=progress, announce=announce, engine=engine, in_process=in_process,
+                time_limit=time_limit, memory_limit=memory_limit,
+            ) for each in asked
+        ]  # fmt: skip
+    request = usual() if asked is None else asked_for(asked)
     result = flown(
-        asked, whole, recorder=recorder, progress=progress, announce=announce, engine=engine,
+        request, whole, recorder=recorder, progress=progress, announce=announce, engine=engine,
         in_process=in_process, time_limit=time_limit, memory_limit=memory_limit,
     )  # fmt: skip
     assert result is not None

@@ -17,13 +17,13 @@ from orchestration.basics.simulator import Floats
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.reuse import Instances
 from orchestration.recording.recording import InMemory
+from orchestration.requests.request import Asked, asked_for
 from orchestration.runs.in_place import InPlace, Left
 from orchestration.runs.meant import Flown, result_of
 from orchestration.runs.replaced import replaced
 from orchestration.runs.result import Result
 from orchestration.runs.simulation import PreparedRun, prepared
 from orchestration.schedule.streams import Streams
-from orchestration.system.request import Request
 from orchestration.system.times import NANOSECONDS
 
 
@@ -43,13 +43,13 @@ class Simulation:
     else is the run that it is with that FMU, by the same engine, to the bit.
     """
 
-    def __init__(self, asked: Request, component: str | None = None) -> None:
+    def __init__(self, asked: Asked, component: str | None = None) -> None:
         """`component` is the one that is replaced; without it, the only sampled one.
 
         Raises `UsageError` for a system that cannot run, and for a component that there is not or that has a clock of
         its own.
         """
-        self._replaced = one = replaced(asked, component)
+        self._replaced = one = replaced(asked_for(asked), component)
         self.component = one.component
         """The name of the component that is replaced."""
         self.measured = one.measured

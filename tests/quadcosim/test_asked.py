@@ -1,0 +1,68 @@
+"""What runs can be asked for by: requests, paths of their files, dictionaries, lists; anything else is refused."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import quadcosim
+from quadcosim import Result, Scenario, UsageError
+from tests.native import NATIVE, assert_the_same
+
+SHORT = NATIVE.with_changes(stop_time=0.1)
+ENTRIES: dict[str, Callable[[Any], object]] = {
+    "run": quadcosim.run,
+    "limit": lambda asked: quadcosim.limit(asked, "period", workers=1),
+    "fly": lambda asked: quadcosim.fly(asked, {"seed": [0]}),
+    "fly_until": lambda asked: quadcosim.fly_until(asked, 0.1, "nowhere"),
+    "Simulation": quadcosim.Simulation,
+}
+
+
+@pytest.fixture(scope="module")
+def expected() -> Result:
+    return quadcosim.run(SHORT)
+
+
+def test_a_file_is_run_by_its_path(tmp_path: Path, expected: Result) -> None:
+    path = tmp_path / "scenario.toml"
+    path.write_text(SHORT.to_toml(), encoding="utf-8")
+    assert_the_same(quadcosim.run(path), expected)
+    assert_the_same(quadcosim.run(str(path)), expected)
+
+
+def test_a_dictionary_is_run_as_the_file_that_says_it(expected: Result) -> None:
+    tables = {
+        "stop_time": 0.1, "controller": {"fmu": "native/UnifiedController"}, "plant": {"fmu": "native/QuadrotorPlant"},
+    }  # fmt: skip
+    for _ in range(2):  # it is left as it is
+        assert_the_same(quadcosim.run(tables), expected)
+
+
+def test_a_list_gives_a_list(expected: Result) -> None:
+    found = quadcosim.run([SHORT, SHORT.with_changes(stop_time=0.05)])
+    assert_the_same(found[0], expected)
+    assert [result.end for result in found] == [0.1, 0.05]
+
+
+@pytest.mark.parametrize("entry", ENTRIES)
+@pytest.mark.parametrize("asked", [3, Scenario, object(), {3}], ids=["number", "class", "object", "set"])
+def test_anything_else_is_refused_with_what_is_expected(entry: str, asked: Any) -> None:
+    expected = r": expected a Scenario, a System, the path of a file of one, or its tables as a dictionary$"
+    with pytest.raises(UsageError, match=expected):
+        ENTRIES[entry](asked)
+
+
+def test_a_vehicle_is_known_by_its_name() -> None:
+    named, loaded = Scenario(vehicle="crazyflie"), quadcosim.load_vehicle("crazyflie", Path())  # type: ignore[arg-type]
+    assert named == Scenario(vehicle=loaded) == Scenario().with_changes(vehicle="crazyflie")
+    with pytest.raises(UsageError, match=r"^vehicle crazyfly: did you mean crazyflie\? expected one of"):
+        Scenario(vehicle="crazyfly")  # type: ignore[arg-type]
+
+
+def test_parameters_of_a_side_are_changed_by_their_names() -> None:
+    first = Scenario().with_changes(plant={"mass": 1.5}, controller={"gain.eta": 4.0})
+    assert first.with_changes(plant={"gravity": 9.8}).plant.parameters == {"mass": 1.5, "gravity": 9.8}
+    assert first == Scenario().with_changes(parameters={"plant.mass": 1.5, "controller.gain.eta": 4.0})
+    assert Scenario().with_changes(reference={"name": "circle", "radius": 2.0}).reference.name == "circle"
