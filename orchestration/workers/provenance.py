@@ -4,11 +4,14 @@ import contextlib
 import functools
 import hashlib
 import importlib.metadata
+import os
 import platform
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+
+from orchestration.processes import subprocesses
 
 ROOTS = (
     "orchestration.runs.simulation",
@@ -79,13 +82,15 @@ def flight_sources() -> dict[str, Path]:
     from orchestration.requests import request
 
     found: dict[str, Path] = {}
-    waiting = list(ROOTS)
+    seen, waiting = set(_ASIDE), list(ROOTS)
     while waiting:
         name = waiting.pop()
-        if name in found or name in _ASIDE or (path := _source(name)) is None:
+        if name in seen:
             continue
-        found[name] = path
-        waiting += imported(path.read_text(encoding="utf-8"))
+        seen.add(name)
+        if (path := _source(name)) is not None:
+            found[name] = path
+            waiting += imported(path.read_text(encoding="utf-8"))
     return found | {path.name: path for path in (*request.FILES, *loop.FILES, *kernels.FILES)}
 
 
@@ -122,8 +127,8 @@ def _source(name: str) -> Path | None:
     package, *parts = name.split(".")
     if package not in _PACKAGES or not parts:
         return None
-    path = Path(__file__).resolve().parents[2].joinpath(package, *parts).with_suffix(".py")
-    return path if path.is_file() else None  # a name that is imported from a module has none
+    path = os.path.join(subprocesses.ROOT, package, *parts) + ".py"
+    return Path(path) if os.path.isfile(path) else None  # a name that is imported from a module has none
 
 
 @functools.cache
