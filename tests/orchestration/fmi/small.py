@@ -1,18 +1,22 @@
 """FMUs of one C source with one habit each, compiled where the tests run, their descriptions written to fit."""
 
+import functools
 import shutil
 import subprocess
+import tempfile
 import uuid
 import zipfile
 from pathlib import Path
 
 import fmpy
+import platformdirs
 import pytest
 
 COMPILER = shutil.which("gcc") or shutil.which("cc")
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
 
 _SOURCE = Path(__file__).with_name("small.c")
+_KEPT = b"0123456789abcdef" * 2
 
 _FMI2 = """<fmiModelDescription fmiVersion="2.0" modelName="Small" guid="small">
   <CoSimulation modelIdentifier="Small" {attributes}/>{experiment}
@@ -68,6 +72,17 @@ SIZE = '<UInt64 name="size" valueReference="9" causality="structuralParameter" s
 CLOCK = '<Clock name="tick" valueReference="7" causality="input" intervalVariability="constant" intervalDecimal="1"/>'
 
 
+def nothing_known(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A user's cache, from now on, in which nothing is known of any FMU; what is compiled is shared with all tests."""
+    usual, own = (Path(each) / "quadcosim" for each in (platformdirs.user_cache_dir(), folder))
+    own.mkdir(parents=True)
+    for name in ("batch", "lanes", "loader", "loop", "native"):
+        (usual / name).mkdir(parents=True, exist_ok=True)
+        (own / name).symlink_to(usual / name)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
+    return folder
+
+
 def small(
     folder: Path,
     *habits: str,
@@ -84,11 +99,7 @@ def small(
     `mode_is_input`: that of FMI 2.0 has `mode` as an Integer that others may feed, of any value.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    library = folder / f"Small{fmpy.sharedLibraryExtension}"
-    macros = [f"-D{macro}" for macro in (*habits, *(["FMI3"] if fmi == 3 else []), f'KEPT="{uuid.uuid4().hex}"')]
-    subprocess.run(
-        [str(COMPILER), "-shared", "-fPIC", "-O1", "-w", *macros, str(_SOURCE), "-o", str(library), "-lm"], check=True
-    )
+    library = _compiled(*habits, *(["FMI3"] if fmi == 3 else [])).replace(_KEPT, uuid.uuid4().hex.encode())
     state = (
         ("canGetAndSetFMUState", "canSerializeFMUState")
         if fmi == 3
@@ -110,5 +121,18 @@ def small(
         experiment = "" if tolerance is None else f'<DefaultExperiment tolerance="{tolerance}"/>'
         described = text.format(attributes=attributes, items=_ITEMS, more=more, experiment=experiment)
         archive.writestr("modelDescription.xml", described)
-        archive.write(library, f"binaries/{place}/{library.name}")
+        archive.writestr(f"binaries/{place}/Small{fmpy.sharedLibraryExtension}", library)
     return path
+
+
+@functools.cache
+def _compiled(*macros: str) -> bytes:
+    """The library, in which what is kept has a name that each FMU replaces by its own."""
+    defined = [f"-D{macro}" for macro in (*macros, f'KEPT="{_KEPT.decode()}"')]
+    with tempfile.TemporaryDirectory() as folder:
+        made = Path(folder) / "small"
+        options = ("-shared", "-fPIC", "-O1", "-w")
+        subprocess.run([str(COMPILER), *options, *defined, str(_SOURCE), "-o", str(made), "-lm"], check=True)
+        found = made.read_bytes()
+    assert _KEPT in found
+    return found

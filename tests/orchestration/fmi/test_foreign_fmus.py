@@ -20,7 +20,7 @@ from orchestration.processes import subprocesses
 from orchestration.runs.result import Result
 from orchestration.runs.simulation import prepared
 from orchestration.system.model import Component, Connection, Sampling, Source, System
-from tests.orchestration.fmi.small import BINARY, CLOCK, SIZE, needs_compiler, small
+from tests.orchestration.fmi.small import BINARY, CLOCK, SIZE, needs_compiler, nothing_known, small
 
 pytestmark = needs_compiler
 
@@ -28,7 +28,7 @@ pytestmark = needs_compiler
 @pytest.fixture(autouse=True)
 def cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is known of any FMU."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+    nothing_known(tmp_path_factory.mktemp("cache"), monkeypatch)
 
 
 def alone(path: Path, stop: float = 0.1, **component: Any) -> System:

@@ -12,7 +12,7 @@ from orchestration.fmi.reuse import Instances
 from orchestration.processes.child import Child, Ending
 from orchestration.runs.simulation import prepared
 from orchestration.system.model import Parameter
-from tests.orchestration.fmi.small import needs_compiler, small
+from tests.orchestration.fmi.small import needs_compiler, nothing_known, small
 from tests.orchestration.fmi.test_foreign_fmus import alone, ran
 
 pytestmark = needs_compiler
@@ -33,8 +33,7 @@ SETTINGS: tuple[dict[str, Parameter], ...] = ({"gain": 3.0, "mode": "backward"},
 @pytest.fixture(autouse=True)
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Nothing is known of any FMU."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    return tmp_path / "cache"
+    return nothing_known(tmp_path / "cache", monkeypatch)
 
 
 def made(habits: str, folder: Path, fmi: int = 2) -> Path:

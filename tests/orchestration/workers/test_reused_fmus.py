@@ -8,8 +8,8 @@ import pytest
 
 from orchestration.studies.store import store_path
 from orchestration.studies.table import frame
-from tests.orchestration.fmi.small import needs_compiler, small
-from tests.orchestration.studies.common import quadcosim
+from tests.commands import Main
+from tests.orchestration.fmi.small import needs_compiler, nothing_known, small
 
 pytestmark = needs_compiler
 
@@ -37,21 +37,21 @@ values = {list(GAINS)}
 
 
 def test_rows_and_signals_of_a_sweep_are_those_of_a_run_of_each(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, main: Main, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    nothing_known(tmp_path / "cache", monkeypatch)
     for name, habits in HABITS.items():
         small(tmp_path / name, *habits)
     (tmp_path / "system.toml").write_text(SYSTEM, encoding="utf-8")
     (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
-    quadcosim("sweep", "study.toml", "--workers", "2", "--out", "swept", cwd=tmp_path)
+    main("sweep", tmp_path / "study.toml", "--workers", "2", "--out", tmp_path / "swept")
     table = frame(store_path("study", tmp_path / "swept"))
     assert len(table) == len(GAINS)
     for gain, (_, swept) in zip(GAINS, table.iterrows(), strict=True):
         settings = [word for name in FMUS for word in ("--set", f"components.{name}.parameters.gain={gain}")]
-        done = quadcosim("run", "system.toml", *settings, "--out", f"run-{gain}", "--json", cwd=tmp_path)
-        alone = json.loads(done.stdout)
+        kept = ("--out", tmp_path / f"run-{gain}", "--no-figures")
+        alone = json.loads(main("run", tmp_path / "system.toml", *settings, *kept, "--json").stdout)
         assert {name: swept[name] for name in FMUS} == {name: alone[name] for name in FMUS}
         assert alone["twin"] == alone["statics"]
-        kept = pq.read_table(tmp_path / "swept" / "signals" / f"{swept['key'][:16]}.parquet")
-        assert kept.equals(pq.read_table(tmp_path / f"run-{gain}" / "signals.parquet").select(kept.column_names))
+        signals = pq.read_table(tmp_path / "swept" / "signals" / f"{swept['key'][:16]}.parquet")
+        assert signals.equals(pq.read_table(tmp_path / f"run-{gain}" / "signals.parquet").select(signals.column_names))
