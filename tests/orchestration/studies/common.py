@@ -84,6 +84,8 @@ def axis(target: str, *values: Any) -> Axis:
 FAILS = 0.0
 """A mass that the description of the plant allows and the plant does not"""
 PERIODS = axis("timing.period", 0.01, 0.02)
+POLL = 0.02
+"""[s] between two looks at what another process does, each of which costs milliseconds itself"""
 STORE = Path("results") / "study" / "study.sqlite"
 """Where the command keeps the study of `study.toml`"""
 
@@ -186,7 +188,7 @@ def wait_until(condition: Callable[[], bool]) -> None:
     end = time.monotonic() + PATIENCE
     while not condition():
         assert time.monotonic() < end, "expected it some time"
-        time.sleep(0.005)
+        time.sleep(POLL)
 
 
 def wait_for_rows(path: Path, number: int) -> None:

@@ -4,6 +4,7 @@ import dataclasses
 import os
 import shutil
 import signal
+import time
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from quadcosim import QuadcosimError
 from tests.orchestration.studies.common import (
     NOISY,
     PERIODS,
+    POLL,
     RUNS,
     STORE,
     axis,
@@ -80,11 +82,12 @@ def test_the_death_of_a_worker_loses_nothing(folder: Path, reference: list[dict[
 
 
 def test_a_run_whose_worker_is_killed_from_outside_stops_the_sweep_and_has_no_row(tmp_path: Path) -> None:
-    (tmp_path / "study.toml").write_text('[base]\nstop_time = 2.0\n[[axes]]\nname = "seed"\nvalues = [1]\n')
+    (tmp_path / "study.toml").write_text('[base]\nstop_time = 0.2\n[[axes]]\nname = "seed"\nvalues = [1]\n')
     with start("sweep", "study.toml", "--engine", "compiled", cwd=tmp_path) as coordinator:
         while coordinator.poll() is None:
             for process in workers_of(coordinator.pid):
                 kill(process)
+            time.sleep(POLL)
         _, err = coordinator.communicate()
     assert coordinator.returncode == 1
     assert len(err.splitlines()) == 1, err

@@ -40,13 +40,13 @@ def test_a_run_that_hangs_is_a_failed_row_that_says_so(waits: str, tmp_path: Pat
         stop_time=0.1, components={"it": Component(fmu=str(path), step=0.01)}, objectives={"last": "max(it.y)"}
     )
     study = Study(name="hangs", base=system, axes=(Axis(name=GAIN, targets=(GAIN,), values=(1.0, 3.0, 2.0)),))
-    found = sweep(study, folder=tmp_path / "out", time_limit=2.0, progress=None, announce=None)
+    found = sweep(study, folder=tmp_path / "out", time_limit=1.0, progress=None, announce=None)
     assert (found.total, found.flown, found.failed) == (3, 3, 1)
     with open_for_reading(found.path) as store:
         rows = {row["design_index"]: (row["status"], row["message"]) for row in store.rows()}
     assert rows == {
         0: ("done", None),
-        1: ("failed", "it was ended: it takes more than the time limit of 2 s"),
+        1: ("failed", "it was ended: it takes more than the time limit of 1 s"),
         2: ("done", None),
     }
 
@@ -56,9 +56,9 @@ def test_the_command_limits_each_run(tmp_path: Path, main: Main) -> None:
     (tmp_path / "system.toml").write_text(SYSTEM)
     (tmp_path / "study.toml").write_text(STUDY)
     done = main(
-        "sweep", tmp_path / "study.toml", "--out", tmp_path / "out", "--time-limit", "2", "--engine", "compiled", code=1
+        "sweep", tmp_path / "study.toml", "--out", tmp_path / "out", "--time-limit", "1", "--engine", "compiled", code=1
     )
-    assert "failed: it was ended: it takes more than the time limit of 2 s" in done.stderr
+    assert "failed: it was ended: it takes more than the time limit of 1 s" in done.stderr
     assert "3 runs, 3 flown now, 1 failed" in done.stdout
     done = main("sweep", tmp_path / "study.toml", "--out", tmp_path / "out", "--time-limit", "-1", code=2)
     assert done.stderr == "quadcosim: --time-limit -1: expected a positive number of seconds\n"
