@@ -1,13 +1,15 @@
 """The geometric law against a second form of it, its own derivatives, its authors' code and their example."""
 
+import functools
 import itertools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given, note, settings
 from hypothesis import strategies as st
 
 from controller_fmu.geometric.law import NORTH, Evaluation, Gains, Heading, evaluate
@@ -193,36 +195,32 @@ def test_a_quaternion_and_its_negative_give_the_same_command(situation: Situatio
 # -- rates ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("quantity", "rate"),
-    [
-        ("velocity_error", "acceleration_error"),
-        ("acceleration_error", "jerk_error"),
-        ("force", "force_dot"),
-        ("force_dot", "force_ddot"),
-        ("desired_angular_velocity", "desired_angular_acceleration"),
-    ],
-)
+RATES = {
+    "velocity_error": "acceleration_error",
+    "acceleration_error": "jerk_error",
+    "force": "force_dot",
+    "force_dot": "force_ddot",
+    "desired_angular_velocity": "desired_angular_acceleration",
+}
+
+
 @settings(max_examples=30)
 @given(situation=situations())
-def test_rate_is_the_derivative_along_the_closed_loop(quantity: str, rate: str, situation: Situation) -> None:
-    assert_is_the_rate(list(getattr(situation.now(), rate)), lambda h: list(getattr(situation.flow(h), quantity)))
+def test_every_rate_is_the_derivative_along_the_closed_loop(situation: Situation) -> None:
+    """Those that are named so, Omega_c of the desired attitude, and what the errors give of the error function."""
+    now, flow = situation.now(), functools.cache(situation.flow)
 
+    def along(quantity: str) -> Callable[[float], list[float]]:
+        return lambda h: list(getattr(flow(h), quantity))
 
-@settings(max_examples=30)
-@given(situations())
-def test_omega_c_is_the_angular_velocity_of_the_desired_attitude(situation: Situation) -> None:
-    now = situation.now()
-    rate = now.desired_quaternion.rate(now.desired_angular_velocity)
-    assert_is_the_rate(list(rate), lambda h: list(situation.flow(h).desired_quaternion))
-
-
-@settings(max_examples=30)
-@given(situations())
-def test_error_function_has_the_rate_that_the_errors_give(situation: Situation) -> None:
-    now = situation.now()
-    rate = now.rotation_error @ now.angular_velocity_error
-    assert_is_the_rate(rate, lambda h: situation.flow(h).error_function)
+    for quantity, rate in RATES.items():
+        note(quantity)
+        assert_is_the_rate(list(getattr(now, rate)), along(quantity))
+    note("desired attitude")
+    turning = now.desired_quaternion.rate(now.desired_angular_velocity)
+    assert_is_the_rate(list(turning), along("desired_quaternion"))
+    note("error function")
+    assert_is_the_rate(now.rotation_error @ now.angular_velocity_error, lambda h: flow(h).error_function)
 
 
 @settings(max_examples=30)
