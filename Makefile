@@ -28,7 +28,7 @@ QUICK := $(addprefix tests/,controller_fmu plant_fmu fmus/test_one_fmu.py fmu_ki
 	studies/test_axes.py studies/test_study_file.py system requests/ssp/test_reading.py basics/test_statistics.py)
 
 check: lint
-	$(BIN)/pytest --numprocesses 2 --dist load --ignore-glob '*/test_flight.py' $(QUICK)
+	$(BIN)/pytest --numprocesses 2 --dist load --hypothesis-profile quick --ignore-glob '*/test_flight.py' $(QUICK)
 
 test: lint
 	$(BIN)/pytest --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
