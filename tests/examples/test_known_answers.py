@@ -1,18 +1,28 @@
-"""The examples give the numbers that are known of their problems, each to the accuracy that is said."""
+"""The examples give the numbers that are known of their problems, each to the accuracy that is said.
+
+Their slaves are written out as C, which `test_native` shows to make the runs that they make in Python.
+"""
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pytest
 
+from orchestration.building import fmus
 from orchestration.limits import limit
 from orchestration.runs.simulation import run
 from orchestration.system.model import System
-from tests.examples.common import example
+from tests.examples import common
 
 PERIOD = "components.controller.sampling.period"
 COMMAND_DELAY = "connections.command.delay"
+
+
+def example(name: str, changes: Mapping[str, Any]) -> System:
+    """The system of an example, changed by path, by native FMUs."""
+    return fmus.native_twins(common.example(name, changes))
 
 
 def limits(system: System, of: str, near: float, **options: Any) -> tuple[float, float]:
