@@ -44,9 +44,14 @@ def legend_of_runs(figure: Figure, runs: Sequence[Run], style: Style) -> None:
     """Which line is which run, above all panels; nothing for one run."""
     if len(runs) > 1:
         handles = [Line2D([], [], color=run.color, linestyle=run.dashes, label=run.name) for run in runs]
-        longest = max(len(run.name) for run in runs) + 6
-        columns = max(1, int(style.width / (0.5 * longest * style.font * 0.353)))
-        figure.legend(handles=handles, loc="outside upper center", ncols=min(columns, len(runs)))
+        columns = abreast([run.name for run in runs], style)
+        figure.legend(handles=handles, loc="outside upper center", ncols=columns)
+
+
+def abreast(names: Sequence[str], style: Style) -> int:
+    """How many entries of a legend stand side by side in the width of a figure."""
+    longest = max(map(len, names)) + 6
+    return min(len(names), max(1, int(style.width / (0.5 * longest * style.font * 0.353))))
 
 
 def quantity(name: str, unit: str | None) -> str:

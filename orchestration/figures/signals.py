@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration.figures.lines import TIME, legend_of_runs, quantity, see, wrapped
+from orchestration.figures.lines import TIME, abreast, legend_of_runs, quantity, see, wrapped
 from orchestration.figures.palette import CYCLE
 from orchestration.figures.run import Run, title
 from orchestration.figures.style import Style
@@ -32,9 +32,10 @@ def signals(runs: Sequence[Run], style: Style) -> Figure:
             _draw(panel, run, columns, alone=len(runs) == 1)
         panel.set_ylabel(wrapped(quantity(labels.words(name), unit), 16))
         see(panel, runs)
-        panel.legend(loc="upper left", bbox_to_anchor=(1.0, 1.05), ncols=1 + (len(columns) - 1) // 4)
+        handles, names = panel.get_legend_handles_labels()
+        panel.legend(handles, names, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=abreast(names, style))
     if style.has_titles and title(runs):
-        panels[0].set_title(title(runs))
+        figure.suptitle(title(runs))
     panels[-1].set_xlabel(TIME)
     legend_of_runs(figure, runs, style)
     return figure

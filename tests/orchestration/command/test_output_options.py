@@ -102,8 +102,8 @@ def test_flags_before_a_command_hold_with_those_behind_it(main: Main) -> None:
 
 def test_verbose_says_what_is_done(main: Main) -> None:
     more, usual = (main(*SHORT, *flags).stderr for flags in (["-v"], []))
-    assert "UnifiedController" in more
-    assert "UnifiedController" not in usual
+    assert "UnifiedController.fmu" in more
+    assert "UnifiedController.fmu" not in usual
 
 
 def test_the_log_has_what_was_said_and_done_with_times_and_where_an_error_came_from(main: Main, here: Path) -> None:

@@ -58,7 +58,8 @@ def flown(swept: tuple[Path, Done], folder: Path) -> Path:
 
 def test_a_study_is_flown_looked_at_and_exported(flown: Path, swept: tuple[Path, Done], main: Main) -> None:
     assert swept[1].stdout == f"{STORE}: 6 runs, 6 flown now\n"
-    assert [line for line in swept[1].stderr.splitlines() if " of 6 runs" not in line] == [], "or how far, if slow"
+    told = [line for line in swept[1].stderr.splitlines() if " of 6 runs" not in line]  # or how far, if slow
+    assert told == ["follows the trajectory that UnifiedController has built in"]
     assert main("status", "study.toml").stdout == f"{STORE}: 6 of 6 runs, 0 failed, 0 missing\n"
     exported = main("export", "study.toml").stdout.splitlines()
     assert exported == [str(STORE.parent / "runs.parquet"), str(STORE.parent / "runs.csv")]
@@ -97,6 +98,7 @@ def test_failed_runs_are_told_at_once_and_fail_the_command(folder: Path, main: M
     done = main("sweep", "study.toml", "--engine", "compiled", code=1)
     assert "12 runs, 12 flown now, 6 failed (quadcosim export shows why; --retry-failed)" in done.stdout
     told = done.stderr.splitlines()
+    assert told.pop() == "follows the trajectory that UnifiedController has built in"
     assert len(told) == 3
     assert told[0].startswith("run 1 (period = 0.02, delay = 0.0, plant.mass = 0.0) failed: plant.mass = 0.0: ")
     assert told[2].endswith("; further ones are not told")

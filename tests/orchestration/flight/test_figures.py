@@ -21,6 +21,7 @@ from orchestration.flight.phase import surface
 from orchestration.flight.spectrum import welch
 from orchestration.runs.draw import draw
 from orchestration.runs.run_labels import labels_of_runs
+from orchestration.system.model import Criterion
 from quadcosim import Result, Scenario, UsageError
 
 TANK = Path(__file__).parents[3] / "examples" / "water_tank" / "system.toml"
@@ -83,6 +84,29 @@ def test_signals_of_any_fmus_have_their_descriptions_and_units(tank: Result) -> 
     named = [text.get_text() for axes in figure.axes for text in axes.get_legend().get_texts()]  # type: ignore[union-attr]
     assert any(": " in name for name in named)
     assert not any("." in name for name in named)
+
+
+def test_a_system_with_the_variables_of_a_quadrotor_is_drawn_as_a_flight_also_over_one(flight: Result) -> None:
+    system = quadcosim.run(flight.asked.as_system())
+    assert set(draw(system)) == set(draw([flight, system])) == set(FLIGHT)
+
+
+def test_signals_of_any_system_share_a_panel_by_unit_and_none_is_left_out(flight: Result) -> None:
+    whole = flight.asked.as_system()
+    bare = replace(whole, sources={}, objectives={}, optional=(), criterion=Criterion(), operating_point={})
+    result = quadcosim.run(replace(bare, stop_time=0.05))
+    figure = draw(result)["signals"]
+    figure.draw_without_rendering()
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert labels == [
+        *(f"measurement [{unit}]" for unit in ("m", "m/s", "1", "rad/s")), *(f"command [{u}]" for u in ("N", "N·m"))
+    ]  # fmt: skip
+    assert sum(len(axes.get_lines()) for axes in figure.axes) == sum(len(x.start) for x in whole.connections)
+    for axes in figure.axes:
+        legend = axes.get_legend()
+        assert legend is not None
+        assert len(legend.get_texts()) == len(axes.get_lines())
+        assert legend.get_window_extent().y0 >= axes.get_window_extent().y1 - 1.0
 
 
 def test_a_legend_tells_what_differs_between_runs(flight: Result, slow: Result) -> None:
