@@ -16,10 +16,14 @@ CONTROLLER = Role(
     told_by=wiring.COMMAND,
     ports=(
         *_ports("output", wiring.COMMAND),
-        *_ports("input", (*wiring.MEASUREMENT, *wiring.REFERENCE)),
+        *_ports("input", wiring.MEASUREMENT),
+    ),
+    further=(
+        *_ports("input", wiring.REFERENCE),
         *_ports("parameter", (SAMPLE_PERIOD, SAMPLE_OFFSET, *TRAJECTORY)),
         Port(USE_REFERENCE_INPUTS, "parameter", None, "Boolean"),
     ),
+    whole_by=(*TRAJECTORY,),
 )
 PLANT = Role(
     told_by=wiring.MEASUREMENT,

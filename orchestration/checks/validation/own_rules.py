@@ -87,9 +87,14 @@ def ports(fmu: Fmu) -> Iterator[str]:
     """A controller, and a plant, has all that is wired to it, under the names and with the units of the wiring."""
     outputs, by_name = {v.name for v in fmu.of_causality("output")}, {v.name: v for v in fmu.variables}
     role = next((role for role in ROLES if outputs.intersection(role.told_by)), None)
-    for port in () if role is None else role.ports:
+    if role is None:
+        return
+    is_whole = not by_name.keys().isdisjoint(role.whole_by)
+    for port in (*role.ports, *role.further):
         expected = _described(port.kind, port.causality, port.unit)
         if port.name not in by_name:
+            if port in role.further and not is_whole:
+                continue
             yield f"{port.name}: expected {expected}, found none"
         elif (found := _as_port(by_name[port.name])) != expected:
             yield f"{port.name}: expected {expected}, found {found}"

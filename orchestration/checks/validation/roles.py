@@ -21,6 +21,9 @@ class Role:
     told_by: Sequence[str]
     """outputs of which any says that it has this role, unless it has one before"""
     ports: Sequence[Port]
+    further: Sequence[Port] = ()
+    """what may be missing, unless it has any of `whole_by`; what there is of it is as it is here"""
+    whole_by: Sequence[str] = ()
 
 
 ROLES: list[Role] = []

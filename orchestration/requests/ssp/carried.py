@@ -1,17 +1,28 @@
 """What of a system other masters can be given: FMUs with their parameters, wires, and one step for all."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from orchestration.basics.errors import UsageError
 from orchestration.building import fmus
+from orchestration.engines.wiring import source_values
 from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.fmi.model import Model, Variable, read_model
 from orchestration.schedule.plan import Plan
+from orchestration.schedule.streams import Streams
 from orchestration.system.check import check
-from orchestration.system.following import heard
-from orchestration.system.model import Component, Connection, Parameter, Sampling, System, component_of, variable_of
+from orchestration.system.following import AT_REST, heard
+from orchestration.system.model import (
+    Component,
+    Connection,
+    Parameter,
+    Sampling,
+    Source,
+    System,
+    component_of,
+    variable_of,
+)
 from orchestration.system.request import Request, in_its_own_words
 
 
@@ -58,7 +69,7 @@ def carried(asked: Request, announce: Callable[[str], None] | None = None) -> Ca
         located = fmus.of_components(system.fmus, announce)
         models = {name: read_model(path) for name, path in located.items()}
         check(system, models)
-        system = heard(system, models)
+        system = _held(heard(system, models))
         plan = Plan(system)
         step, unequal = _common_step(system, models)
         unsaid = (*_unsaid(system), *unequal)
@@ -68,6 +79,21 @@ def carried(asked: Request, announce: Callable[[str], None] | None = None) -> Ca
             step=step,
             unsaid=tuple(map(asked.in_words, unsaid)),
         )
+
+
+def _held(system: System) -> System:
+    """With a constant for each input that is fed a motion at rest, which is all that other masters can be told of."""
+    sources: dict[str, Source] = {}
+    for name, source in system.sources.items():
+        if source.signal != AT_REST or not source.to:
+            sources[name] = source
+            continue
+        values = source_values(system, name, {}, Streams(system.seed, system.streams)).at(0.0)
+        sources |= {
+            f"{name}_{i}": Source(constant=float(value), to=(end,))
+            for i, (end, value) in enumerate(zip(source.to, values, strict=True))
+        }
+    return replace(system, sources=sources)
 
 
 def wholly_carried(asked: Request, announce: Callable[[str], None] | None = None) -> Carried:

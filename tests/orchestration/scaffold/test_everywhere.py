@@ -153,3 +153,85 @@ def flown_alone(comparison: Comparison, cell: int) -> tuple[int, int]:
         ]  # fmt: skip
     survive = [each for each in metrics if not each["diverged"]]
     return len(survive), sum(each["settling_time"] is not None for each in survive)
+
+
+def test_fmus_checks_other_masters_and_limits_take_it_as_any_controller(
+    scenario: Scenario, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, main: Main
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    mine = scenario.controller.fmu
+    flight = ("--controller", mine, "--native", "--stop-time", "0.3")
+    fmus.locate(mine)
+    assert ": no problems" in main("validate", mine).stdout
+    assert main("doctor", mine).returncode == 0
+    assert main("ssp", *flight, "--reference", "hover", "--plant-interval", "0.01", "--out", "mine.ssp").stderr == (
+        "mine.timing.toml has its timing, for quadcosim run\n"
+    )
+    assert json.loads(main("margin", *flight, "--json").stdout)["delay_limit"] > 0.01
+    found = json.loads(main("limit", *flight, "--from", "0.01", "--to", "0.02", "--scan", "0.01", "--json").stdout)
+    assert found["local_limit"] == pytest.approx(0.111, abs=0.001)
+    assert found["follows"] == "the paper's trajectory, fed to Mine as position, velocity, acceleration"
+    assert "follows\n  the paper's trajectory, fed to Mine" in main("show", *flight).stdout
+    proposed = main("connect", "QuadrotorPlant", mine).stdout
+    assert "sampling = { period = 0.01 }    # sampled" in proposed
+
+
+def test_its_own_system_is_drawn_as_a_flight_and_searched_over_its_period_without_a_word(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, main: Main
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    system = folder / "mine" / "system.toml"
+    main("run", system, "--native", "--out", "flown", "--set", "stop_time=0.3")
+    assert {path.name for path in Path("flown").glob("*.png")} == {
+        "path.png", "errors.png", "components.png", "commands.png",
+    }  # fmt: skip
+    found = json.loads(main("limit", system, "--native", "--to", "0.01", "--no-figures", "--json").stdout)
+    assert (found["of"], found["scan"]) == ("components.controller.sampling.period", 0.005)
+
+
+STUDY = """
+[base]
+stop_time = 0.3
+vehicle = "hummingbird"
+controller = {{ fmu = "{fmu}" }}
+plant = {{ fmu = "native/QuadrotorPlant" }}
+reference = {{ name = "circle" }}
+"""
+
+TUNED = """
+[cost]
+of = "position_rmse"
+bad = 10.0
+[starts]
+count = 1
+judged = 1
+[search]
+periods = [0.02]
+evaluations = 1
+seeds = [1]
+[[parameters]]
+name = "k_p"
+sets = ["controller.k_p"]
+start = 2.0
+stop = 5.0
+[[parameters]]
+name = "k_d"
+sets = ["controller.k_d"]
+start = 2.0
+stop = 5.0
+"""
+
+
+def test_studies_and_tunings_take_it_with_vehicle_and_reference(
+    scenario: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, main: Main
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    base = STUDY.format(fmu=scenario.controller.fmu)
+    Path("study.toml").write_text(
+        base + '[[axes]]\nname = "radius"\nsets = ["reference.radius"]\nvalues = [1.0, 2.0]\n'
+    )
+    swept = json.loads(main("sweep", "study.toml", "--json").stdout)
+    assert swept["follows"] == ["circle, fed to Mine as position, velocity, acceleration"]
+    assert main("report", "study.toml").stdout.endswith(".html\n")
+    Path("tuning.toml").write_text(base + TUNED)
+    assert "follows circle, fed to Mine" in main("tune", "tuning.toml", "--out", "gains").stderr
