@@ -37,10 +37,31 @@ from fmu_kit.compiler.trace.symbols import TraceError
 from fmu_kit.compiler.trace.tracing import Program, trace
 from fmu_kit.documentation import Making
 from fmu_kit.model_description import GUID_PLACEHOLDER
-from fmu_kit.packaging import SOURCE_HASH_FILE, described, licences_and_icon, put_guid, slave_class, written
+from fmu_kit.packaging import (
+    NATIVE_TABLES,
+    SOURCE_HASH_FILE,
+    described,
+    licences_and_icon,
+    put_guid,
+    slave_class,
+    written,
+)
 
 BESIDE = ("instance.h", "integers.h", "lanes.c", "lanes.h", "mathematics.h", "text.h")
 """What lies beside the file to compile, the same for every slave."""
+TABLES = NATIVE_TABLES.rpartition("/")[2]
+UNOPTIMISED = """
+/* Derivatives are computed at initialisation, if at all, and are most of the text: a compiler need not work at them. */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC push_options
+#pragma GCC optimize("O0")
+#endif
+"""
+OPTIMISED = """
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC pop_options
+#endif
+"""
 _NEEDS = FOLDER / "needs.html"
 _PYTHON = "python"
 """Where in the documentation the Python is from which the C was written."""
@@ -78,8 +99,9 @@ def build(
         afterwards="After a failure, reset the instance, set it to a state that was saved before, or free it.",
     )
     described(files, target, making, standard.describe(slave_class(target), standard.main))
-    sources = c_sources(program, put_guid(files), standard)
-    files |= {f"sources/{name}": text for name, text in sources.items()}
+    guid = put_guid(files)
+    sources = {**sources, TABLES: sources[TABLES].replace(GUID_PLACEHOLDER.encode(), guid.encode())}
+    files[NATIVE_TABLES] = sources[TABLES]
     compiled: dict[str, bytes] = {}
     here = host_platform(version)
     if not systems and here is not None:
@@ -95,11 +117,10 @@ def c_sources(program: Program, guid: str, standard: Standard) -> dict[str, byte
     """The sources of an FMU, by the names of their files."""
     fixed = {name: (FOLDER / name).read_bytes() for name in (standard.main, *BESIDE)}
     derivatives = with_tangents(program, program.initialise)
-    functions = f"{c_code(program)}\n{c_code(derivatives)}"
     made = {
         "places.h": places(program),
-        "tables.h": tables(program, guid, standard),
-        "functions.h": functions,
+        TABLES: tables(program, guid, standard),
+        "functions.h": f"{c_code(program)}\n{UNOPTIMISED}\n{c_code(derivatives)}\n{OPTIMISED}\n",
         "lane_functions.h": lane_code(program),
     }
     return {**fixed, **{name: text.encode() for name, text in made.items()}}

@@ -9,6 +9,7 @@ from typing import Any
 from fmu_kit.compiler.trace.statements import Block, Place, Statement, statement
 from fmu_kit.compiler.trace.symbols import Kind, Symbol, TraceError, common_kind, lifted, node
 from fmu_kit.compiler.trace.tree import (
+    USUAL_LEAVES,
     Path,
     Snapshot,
     children,
@@ -52,6 +53,7 @@ class Memory:
         self.slave = slave
         self.settled = settled
         self.places: dict[str, Place] = {}
+        self._names: dict[Path, str] = {}
         self._kinds = kinds
         """of places, as far as they are known from tracing the slave before"""
         self.first_kinds: dict[str, Kind] = {}
@@ -114,10 +116,12 @@ class Memory:
 
     def name(self, path: Path) -> str:
         """The name of a place."""
-        first, *rest = path
-        if first in ("_reals", "_others") and rest:
-            return str(self.slave.variables[rest[0]].name)
-        return name_of_kept(path)
+        found = self._names.get(path)
+        if found is None:
+            first, *rest = path
+            is_variable = first in ("_reals", "_others") and rest
+            found = self._names[path] = self.slave.variables[rest[0]].name if is_variable else name_of_kept(path)
+        return found
 
     def name_in_view(self, path: Path) -> str:
         """The name of what lies in a view, or in what a function returns."""
@@ -235,12 +239,13 @@ def _note_holders(value: Any, path: Path, found: dict[Path, int]) -> None:
     if not isinstance(value, tuple) and (inside or isinstance(value, list | dict)):
         found[path] = id(value)
     for key, child in inside:
-        _note_holders(child, (*path, key), found)
+        if type(child) not in USUAL_LEAVES:
+            _note_holders(child, (*path, key), found)
 
 
 def _graft(live: Any, new: Any, path: Path, holders: dict[Path, int]) -> Any:
     """`new`, but in the objects of `live` where these are what all paths left."""
-    if not children(new):
+    if type(new) in USUAL_LEAVES or not children(new):
         return new
     held = dict(children(live)) if type(live) is type(new) else {}
     if path not in holders or holders[path] != id(live):

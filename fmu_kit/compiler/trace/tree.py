@@ -6,14 +6,17 @@ import array
 import collections
 import copy
 import enum
+import functools
 import random
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, Literal
 
 from fmu_kit.compiler.trace.symbols import Symbol, TraceError
 
 Path = tuple[Any, ...]
-_LEAVES = (Symbol, float, int, bool, str, bytes, type(None), type, enum.Enum)
+USUAL_LEAVES = frozenset({Symbol, float, int, bool, str, bytes, type(None)})
+"""Classes, of most of what is held: to be looked for before anything is called"""
+_LEAVES = (*USUAL_LEAVES, type, enum.Enum)
 _OPAQUE = (set, bytearray, array.array, collections.deque, random.Random, Iterator)
 _DEEPEST = 12
 
@@ -28,38 +31,62 @@ def children(value: Any) -> list[tuple[Any, Any]]:
 
     Raises `TraceError` for what may hold something that is not seen.
     """
-    if isinstance(value, _LEAVES) or callable(value):
+    form = _form(type(value))  # type: ignore[arg-type]  # mypy takes a class for what has no hash
+    if form == "leaf":
         return []
-    if isinstance(value, _OPAQUE):
-        raise TraceError(f"{type(value).__name__}: expected numbers in tuples, lists, dictionaries and objects")
-    if isinstance(value, tuple | list):
-        names = getattr(value, "_fields", None)
-        return list(zip(names, value)) if names else list(enumerate(value))
-    if isinstance(value, dict):
+    if form == "object":
+        return [(name, getattr(value, name)) for name in attributes(value) if hasattr(value, name)]
+    if form == "dict":
         return list(value.items())
-    return [(name, getattr(value, name)) for name in attributes(value) if hasattr(value, name)]
+    if form == "opaque":
+        raise TraceError(f"{type(value).__name__}: expected numbers in tuples, lists, dictionaries and objects")
+    return list(enumerate(value) if form == "sequence" else zip(value._fields, value))
+
+
+@functools.cache
+def _form(cls: type) -> Literal["leaf", "object", "dict", "opaque", "sequence", "named"]:
+    """How what is of a class holds others."""
+    if issubclass(cls, _LEAVES) or any("__call__" in vars(each) for each in cls.__mro__):
+        return "leaf"
+    if issubclass(cls, _OPAQUE):
+        return "opaque"
+    if issubclass(cls, tuple | list):
+        return "named" if getattr(cls, "_fields", None) else "sequence"
+    return "dict" if issubclass(cls, dict) else "object"
 
 
 def attributes(value: Any) -> list[str]:
     """The names of the attributes of an object, of its slots and its dictionary."""
-    slots = [name for cls in type(value).__mro__ for name in _slots(cls)]
-    return [name for name in (*slots, *getattr(value, "__dict__", ())) if not name.startswith("__")]
+    slots = _slots(type(value))  # type: ignore[arg-type]
+    return [*slots, *(name for name in getattr(value, "__dict__", ()) if not name.startswith("__"))]
 
 
+@functools.cache
 def _slots(cls: type) -> tuple[str, ...]:
-    slots = vars(cls).get("__slots__", ())
-    return (slots,) if isinstance(slots, str) else tuple(slots)
+    """The names of the slots of a class and those that it is made of."""
+    named = [vars(each).get("__slots__", ()) for each in cls.__mro__]
+    found = [name for slots in named for name in ((slots,) if isinstance(slots, str) else slots)]
+    return tuple(name for name in found if not name.startswith("__"))
 
 
-def leaves(value: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
+def leaves(value: Any) -> list[tuple[Path, Any]]:
     """Every leaf in a value, with the path to it."""
-    if len(path) > _DEEPEST:
-        raise TraceError(f"{'.'.join(map(str, path))}: nested deeper than {_DEEPEST} levels")
-    inside = children(value)
-    if not inside:
-        yield path, value
-    for key, child in inside:
-        yield from leaves(child, (*path, key))
+    found: list[tuple[Path, Any]] = []
+
+    def collect(value: Any, path: Path) -> None:
+        if len(path) > _DEEPEST:
+            raise TraceError(f"{'.'.join(map(str, path))}: nested deeper than {_DEEPEST} levels")
+        inside = children(value)
+        if not inside:
+            found.append((path, value))
+        for key, child in inside:
+            if type(child) in USUAL_LEAVES:
+                found.append(((*path, key), child))
+            else:
+                collect(child, (*path, key))
+
+    collect(value, ())
+    return found
 
 
 def shape(value: Any) -> Any:
@@ -97,7 +124,10 @@ def mapped(value: Any, change: Callable[[Path, Any], Any], path: Path = ()) -> A
     inside = children(value)
     if not inside:
         return change(path, value)
-    new = [(key, mapped(child, change, (*path, key))) for key, child in inside]
+    new = [
+        (key, change((*path, key), child) if type(child) in USUAL_LEAVES else mapped(child, change, (*path, key)))
+        for key, child in inside
+    ]
     if isinstance(value, list):
         return [child for _, child in new]
     if isinstance(value, tuple):
@@ -120,7 +150,8 @@ def mutable_objects(value: Any, found: dict[int, Any]) -> None:
             return
         found[id(value)] = value
     for _, child in inside:
-        mutable_objects(child, found)
+        if type(child) not in USUAL_LEAVES:
+            mutable_objects(child, found)
 
 
 def expect_no_twins(value: Any) -> None:

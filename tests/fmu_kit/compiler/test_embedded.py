@@ -231,5 +231,5 @@ def test_of_values_that_are_fixed_and_what_they_turn_off_there_is_nothing_left(m
     header, source = ((tmp_path / f"PaperLaw.{ending}").read_text("utf-8") for ending in ("h", "c"))
     assert not re.search(r"double (discretisation|prediction|gain_scaling|pending|hold_period|stages)", header)
     assert not re.search(r"model_(matched|predicted|redesign|discretised|remember)\b", source)
-    made(tmp_path / "PaperLaw.c", tmp_path)
+    made(tmp_path / "PaperLaw.c", "cc")
     assert len(source) < 150_000
