@@ -35,8 +35,8 @@ Announce = Callable[[str], None]
 """Hears of a run that failed."""
 
 TOTAL, STUDY_PARTS, DESIGN_PARTS, PLACE_PARTS, AXES = "total", "study", "design", "place", "axes"
-AGREEMENT = "agreement"
-"""What a store says by this name of runs flown in lanes: how they agree with their FMUs"""
+ENGINE, AGREEMENT = "engine", "agreement"
+"""What a store says by these names: what has flown last, and how runs flown in lanes agree with their FMUs"""
 _TOLD = 3
 """failed runs that are announced one by one"""
 
@@ -78,8 +78,10 @@ def sweep(
         missing = _missing(opened, study, retry_failed)
         counted = _Counted(len(study.points), opened, hear, announce)
         fly = _flying(Inputs.of(files), workers, dask)
-        if announce is not None and missing and engine == "auto":
-            announce(str(how))
+        if missing:
+            opened.describe({ENGINE: how.name})
+            if announce is not None and engine == "auto":
+                announce(str(how))
         tasks = (_task(study, index, files, how.engine, time_limit) for index in missing)
         lanes: dict[str, Row] = {}
         try:

@@ -33,13 +33,13 @@ class Chosen:
     @property
     def name(self) -> str:
         """As `--engine` has it."""
-        return "batch" if self.in_lanes else self.engine or "auto"
+        return "batch" if self.in_lanes else self.engine or "compiled"
 
     def __str__(self) -> str:
         if self.in_lanes:
             return "engine batch: native FMUs, many runs at once"
         what = "native FMUs" if self.native else "the FMUs as they are"
-        return f"engine {self.engine or 'compiled'}: {what}, one run at a time" + (
+        return f"engine {self.name}: {what}, one run at a time" + (
             f" ({self.reason})" if self.reason else ""
         )
 

@@ -22,6 +22,7 @@ from orchestration.studies.study import Study
 from orchestration.studies.swept import Swept
 from orchestration.system.model import System
 from orchestration.system.paths import value_at
+from orchestration.system.request import Request
 from orchestration.workers.row import Row
 from quadcosim import QuadcosimError, Scenario, Timing
 from tests.commands import Done
@@ -90,7 +91,7 @@ STORE = Path("results") / "study" / "study.sqlite"
 """Where the command keeps the study of `study.toml`"""
 
 
-def study(*axes: Axis, base: Scenario | None = None, **fields: Any) -> Study:
+def study(*axes: Axis, base: Request | None = None, **fields: Any) -> Study:
     return Study(name="study", base=base or short(), axes=axes, **fields)
 
 
