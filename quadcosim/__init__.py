@@ -30,6 +30,10 @@ All times are in seconds, all values in the units that the FMUs declare. What go
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from orchestration.basics.errors import in_python, tell_in
+
+tell_in(in_python)
+
 if TYPE_CHECKING:
     from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageError
     from orchestration.comparison.design import Comparison

@@ -10,6 +10,7 @@ from pathlib import Path
 import hypothesis
 import pytest
 
+import quadcosim  # noqa: F401 - errors are told in the words of Python, those of the command line in its own
 from orchestration.basics import terminal
 from orchestration.building import fmus
 from orchestration.building.models import MODELS

@@ -1,7 +1,9 @@
 """Failures that a user sees as one line."""
 
 import difflib
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 LONGEST = 4000
 """Characters of a message; what a message names may come from a file and be of any length."""
@@ -12,6 +14,9 @@ class QuadcosimError(Exception):
 
     def __init__(self, text: str) -> None:
         super().__init__(one_line(text))
+
+    def __str__(self) -> str:
+        return _said(super().__str__())
 
 
 class UsageError(QuadcosimError):
@@ -84,3 +89,47 @@ def shown(value: object) -> str:
     """A value as a message gives it: a float to twelve digits, 0.3 for 0.30000000000000004; anything long cut."""
     text = repr(float(f"{value:.12g}")) if isinstance(value, float) else str(value)
     return text if len(text) <= 100 else f"{text[:99]}…"
+
+
+Words = Callable[[str], str]
+_said: Words = str
+"""In whose words errors are told; they are written in those of the command line"""
+
+
+@contextmanager
+def told_in(words: Words) -> Iterator[None]:
+    """Errors are told in these words while the block runs."""
+    before = _said
+    tell_in(words)
+    try:
+        yield
+    finally:
+        tell_in(before)
+
+
+def tell_in(words: Words) -> None:
+    """From here on errors are told in these words: `str` for those of the command line, or `in_python`."""
+    global _said
+    _said = words
+
+
+_ARGUMENTS = {"from": "first", "to": "last", "out": "folder"}
+"""What Python calls a flag where that is not its name"""
+_COMMAND_OR_FLAG = re.compile(r"quadcosim \S+(?: --[a-z-]+)+|(?<![\w-])--([a-z][a-z-]*)")
+_GIVEN = re.compile(r"--([a-z-]+) ([^\s,]*)(?: (?=--)|$)")
+
+
+def in_python(text: str) -> str:
+    """A message with arguments in place of flags: `first = 1, last = 0: expected …` for `--from 1 --to 0: …`.
+
+    A whole command that it names is left as it is.
+    """
+    head, colon, rest = text.partition(": ")
+    given = _GIVEN.findall(head)
+    if given and _GIVEN.sub("", head) == "":
+        head = ", ".join(f"{_argument(flag)} = {value}" for flag, value in given)
+    return _COMMAND_OR_FLAG.sub(lambda found: _argument(found[1]) if found[1] else found[0], f"{head}{colon}{rest}")
+
+
+def _argument(flag: str) -> str:
+    return _ARGUMENTS.get(flag, flag.replace("-", "_"))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 import typer.core
 
-from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageError, no_utf8
+from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageError, no_utf8, told_in
 from orchestration.basics.extras import extra_of
 from orchestration.basics.terminal import complain, progress_bar, say, warn
 from orchestration.basics.units import after
@@ -344,7 +344,12 @@ def _metrics(result: "Result") -> Answer:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line and end with one of the codes that its help names; one line for an error."""
+    """Run the command line and end with one of the codes that its help names; one line for an error, in its words."""
+    with told_in(str):
+        _run(arguments)
+
+
+def _run(arguments: list[str] | None) -> None:
     given = sys.argv[1:] if arguments is None else arguments
     registering.arguments = given
     registering.behave(Manners(), anew=True)

@@ -208,7 +208,7 @@ def test_what_cannot_be_is_said_in_one_line_with_the_file(before: str, after: st
 
 
 def test_a_cell_that_there_is_not_is_refused(comparison: Comparison) -> None:
-    with pytest.raises(UsageError, match=rf"--cell {CELLS}: expected a number from 0 to {CELLS - 1}"):
+    with pytest.raises(UsageError, match=rf"cell = {CELLS}: expected a number from 0 to {CELLS - 1}"):
         comparison.cell(CELLS)
 
 

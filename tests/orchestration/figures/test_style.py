@@ -56,12 +56,12 @@ def test_a_figure_has_the_size_that_was_asked_for_to_a_tenth_of_a_millimetre(tmp
 @pytest.mark.parametrize(
     ("flags", "expected"),
     [
-        ({"format": ["jpg"]}, "--format jpg: expected one of png, svg, pdf"),
-        ({"style": "poster"}, "--style poster: expected one of screen, paper, slides"),
-        ({"width": "wide"}, "--width wide: expected single, double or millimetres, each from 20 to 2000 mm"),
-        ({"size": "120"}, "--size 120: expected MMxMM, as in 120x80, each from 20 to 2000 mm"),
-        ({"size": "120x80", "width": "90"}, "--size: expected no --width with it"),
-        ({"font_size": 0.0}, "--font-size 0: expected 1 to 100 points"),
+        ({"format": ["jpg"]}, "format = jpg: expected one of png, svg, pdf"),
+        ({"style": "poster"}, "style = poster: expected one of screen, paper, slides"),
+        ({"width": "wide"}, "width = wide: expected single, double or millimetres, each from 20 to 2000 mm"),
+        ({"size": "120"}, "size = 120: expected MMxMM, as in 120x80, each from 20 to 2000 mm"),
+        ({"size": "120x80", "width": "90"}, "size: expected no width with it"),
+        ({"font_size": 0.0}, "font_size = 0: expected 1 to 100 points"),
     ],
 )
 def test_what_cannot_be_drawn_is_told(flags: dict[str, Any], expected: str) -> None:

@@ -122,7 +122,7 @@ def test_a_legend_tells_what_differs_between_runs(flight: Result, slow: Result) 
 def test_runs_of_different_systems_are_not_laid_over_each_other(flight: Result, tank: Result) -> None:
     with pytest.raises(UsageError, match="expected runs of one system"):
         draw([flight, tank])
-    with pytest.raises(UsageError, match="--figure beauty: expected one of path, errors"):
+    with pytest.raises(UsageError, match="figure = beauty: expected one of path, errors"):
         draw(flight, ["beauty"])
 
 

@@ -121,7 +121,7 @@ def test_the_command_takes_any_system_and_leaves_out_tools_for_components_that_i
     servo = carried("dc_servo").components
     assert not any(tool.alone == "plant" for tool in chosen(None, servo))
     assert any(tool.alone == "controller" for tool in chosen(None, servo))
-    with pytest.raises(UsageError, match="--tool fmpy, plant alone: expected a system with a component plant"):
+    with pytest.raises(UsageError, match="tool fmpy, plant alone: expected a system with a component plant"):
         chosen(["fmpy, plant alone"], servo)
 
 
@@ -133,7 +133,7 @@ SAMPLING = "components.controller.sampling"
     ("name", "changes", "said"),
     [
         ("water_tank", {}, "connections.valve.delay = 0.25: an SSP cannot say that; expected 0.0"),
-        ("water_tank", CARRIED["water_tank"], "--tool libcosim: no conversion of types, as of controller.valve"),
+        ("water_tank", CARRIED["water_tank"], "tool = libcosim: no conversion of types, as of controller.valve"),
         ("double_integrator", {f"{SAMPLING}.period": 0.1}, f"{SAMPLING}.period = 0.1: an SSP has one step for all"),
         ("double_integrator", {f"{SAMPLING}.jitter": 0.01}, f"{SAMPLING}.jitter = 0.01: an SSP cannot say that"),
         ("double_integrator", {"stop_time": 0.33}, "stop_time = 0.33: expected a multiple of the common step of 0.05"),

@@ -690,15 +690,15 @@ def test_find_of_a_random_quantity_is_the_same_with_any_number_of_workers(worker
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"of": "mass"}, "--of mass: expected one of period, delay, jitter, loss, or a path"),
-        ({"tolerance": 0.0}, "--tolerance 0.0: expected a positive number"),
-        ({"tolerance": -1.0}, "--tolerance -1.0: expected a positive number"),
-        ({"tolerance": math.nan}, "--tolerance nan: expected a positive number"),
-        ({"scan": 0.0}, "--scan 0.0: expected a positive number"),
-        ({"scan": math.inf}, "--scan inf: expected a positive number"),
-        ({"confidence": 0.0}, "--confidence 0.0: expected a number between 0 and 1"),
-        ({"confidence": 1.0}, "--confidence 1.0: expected a number between 0 and 1"),
-        ({"confidence": math.nan}, "--confidence nan: expected a number between 0 and 1"),
+        ({"of": "mass"}, "of = mass: expected one of period, delay, jitter, loss, or a path"),
+        ({"tolerance": 0.0}, "tolerance = 0.0: expected a positive number"),
+        ({"tolerance": -1.0}, "tolerance = -1.0: expected a positive number"),
+        ({"tolerance": math.nan}, "tolerance = nan: expected a positive number"),
+        ({"scan": 0.0}, "scan = 0.0: expected a positive number"),
+        ({"scan": math.inf}, "scan = inf: expected a positive number"),
+        ({"confidence": 0.0}, "confidence = 0.0: expected a number between 0 and 1"),
+        ({"confidence": 1.0}, "confidence = 1.0: expected a number between 0 and 1"),
+        ({"confidence": math.nan}, "confidence = nan: expected a number between 0 and 1"),
     ],
 )
 def test_what_cannot_be_asked_for_is_refused_before_anything_flies(

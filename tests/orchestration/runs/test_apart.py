@@ -234,7 +234,7 @@ def test_a_run_is_paused_and_resumed_in_processes_of_their_own(tmp_path: Path) -
 
 
 def test_the_process_of_a_run_is_what_is_limited(tmp_path: Path, main: Main) -> None:
-    with pytest.raises(UsageError, match="--time-limit: expected without --in-process"):
+    with pytest.raises(UsageError, match="time_limit: expected without in_process"):
         run(alone(small(tmp_path)), in_process=True, time_limit=1.0)
     done = main("run", "--time-limit", "0", code=2)
     assert done.stderr == "quadcosim: --time-limit 0: expected a positive number of seconds\n"

@@ -119,7 +119,7 @@ def test_a_changed_study_is_refused_and_says_what_changed(finished: Path, change
     before = bits(store_path("study", finished))
     with pytest.raises(UsageError, match=rf"holds another study \({said}") as caught:
         sweep(changed, folder=finished)
-    assert "expected the same one: take another --out, or remove the store" in one_line(caught.value)
+    assert "expected the same one: take another folder, or remove the store" in one_line(caught.value)
     assert bits(store_path("study", finished)) == before
 
 
@@ -345,7 +345,7 @@ def test_a_pool_raises_what_a_run_failed_with() -> None:
 
 
 def test_without_a_worker_nothing_is_flown(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="--workers 0: expected at least 1"):
+    with pytest.raises(UsageError, match="workers = 0: expected at least 1"):
         sweep(study(PERIODS), folder=tmp_path, workers=0)
 
 

@@ -102,13 +102,13 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
        for wrong in ("nonsense://127.0.0.1:1", "nonsense", "tcp://host", "host:99999", ""))],
 )  # fmt: skip
 def test_a_scheduler_that_is_not_there_is_one_line(tmp_path: Path, address: str, said: str) -> None:
-    with pytest.raises(QuadcosimError, match=rf"--dask {address}: {said}") as caught:
+    with pytest.raises(QuadcosimError, match=rf"dask = {address}: {said}") as caught:
         sweep(study(PERIODS), folder=tmp_path, dask=address)
     one_line(caught.value)
 
 
 def test_the_store_is_of_use_after_a_scheduler_that_was_not_there(tmp_path: Path) -> None:
-    with pytest.raises(QuadcosimError, match="--dask nonsense: "):
+    with pytest.raises(QuadcosimError, match="dask = nonsense: "):
         sweep(study(PERIODS), folder=tmp_path, dask="nonsense")
     assert sweep(study(PERIODS), folder=tmp_path).flown == 2
 

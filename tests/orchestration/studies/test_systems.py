@@ -249,14 +249,17 @@ def test_without_an_operating_point_there_is_no_local_limit_and_it_is_said(syste
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"of": "period"}, "--of period: for the quadrotor only; expected a path"),
-        ({"of": "mass"}, "--of mass: expected a path, as connections.NAME.delay"),
-        ({"of": "connections.command.order"}, "--of connections.command.order: expected the path of a number"),
+        ({"of": "period"}, "of = period: for the quadrotor only; expected a path"),
+        ({"of": "mass"}, "of = mass: expected a path, as connections.NAME.delay"),
+        ({"of": "connections.command.order"}, "of = connections.command.order: expected the path of a number"),
         ({"of": "connections.9.delay"}, "connections.9.delay: expected connections.NAME.KEY"),
-        ({"of": DELAY}, f"--of {DELAY}: expected --from and --to"),
-        ({"of": DELAY, "first": 1.0, "last": 0.5}, "--from 1 --to 0.5: expected finite numbers, the first one smaller"),
+        ({"of": DELAY}, f"of = {DELAY}: expected first and last"),
+        (
+            {"of": DELAY, "first": 1.0, "last": 0.5},
+            "first = 1, last = 0.5: expected finite numbers, the first one smaller",
+        ),
         ({"of": DELAY, "first": -1.0, "last": 0.5}, "delay = -1.0: expected zero or a positive number"),
-        ({"of": DELAY, "first": 0.0, "last": 0.5, "continuous": True}, "--continuous: for the quadrotor only"),
+        ({"of": DELAY, "first": 0.0, "last": 0.5, "continuous": True}, "continuous: for the quadrotor only"),
     ],
 )
 def test_what_cannot_be_asked_of_a_system_is_refused_in_one_line(

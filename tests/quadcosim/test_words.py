@@ -1,0 +1,35 @@
+"""Errors of the API name arguments, those of the command line its flags."""
+
+import pytest
+
+import quadcosim
+from orchestration.basics.errors import in_python
+from quadcosim import Scenario, UsageError
+from tests.commands import Main
+
+SAID = {
+    "--of peroid: did you mean period? expected one of a": "of = peroid: did you mean period? expected one of a",
+    "--from 1 --to 0: expected finite numbers": "first = 1, last = 0: expected finite numbers",
+    "--of x: expected --from and --to": "of = x: expected first and last",
+    "--time-limit: expected without --in-process": "time_limit: expected without in_process",
+    "--run, --flights and --store: expected a study": "run, flights and store: expected a study",
+    "as quadcosim build --native makes them, for --engine batch": (
+        "as quadcosim build --native makes them, for engine batch"
+    ),
+    "a -- b, x--y": "a -- b, x--y",
+}
+
+
+@pytest.mark.parametrize("text", SAID)
+def test_flags_are_told_as_arguments(text: str) -> None:
+    assert in_python(text) == SAID[text]
+
+
+def test_the_api_names_the_argument_and_the_command_its_flag(main: Main) -> None:
+    with pytest.raises(UsageError, match=r"^of = peroid: did you mean period\? expected one of"):
+        quadcosim.limit(Scenario(), "peroid")
+    with pytest.raises(UsageError, match=r"^of = connections.command.delay: expected first and last, between which"):
+        quadcosim.limit(Scenario(), "connections.command.delay")
+    assert "--of peroid: did you mean period? expected one of" in main("limit", "--of", "peroid", code=2).stderr
+    with pytest.raises(UsageError, match=r"^of = peroid: "):  # and after it as before
+        quadcosim.limit(Scenario(), "peroid")
