@@ -42,13 +42,10 @@ def interop(
     from orchestration.interop import table
     from orchestration.interop.catalogue import chosen
     from orchestration.interop.compare import agreements
-    from orchestration.runs.meant import held_to_fmus
     from orchestration.system.request import system_meant
 
     asked = request_from(scenario, flags, timing)
     tools = chosen(tool, system_meant(asked).components)
-    if follows := held_to_fmus(asked, say).follows:
-        say(f"follows {follows}")
     with progress_bar("flying in other masters") as progress:
         found = agreements(asked, tools, announce=say, progress=progress)
     if out is not None:

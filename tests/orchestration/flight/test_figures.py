@@ -97,7 +97,7 @@ def test_signals_of_any_system_share_a_panel_by_unit_and_none_is_left_out(flight
     result = quadcosim.run(replace(bare, stop_time=0.05))
     figure = draw(result)["signals"]
     figure.draw_without_rendering()
-    labels = [axes.get_ylabel() for axes in figure.axes]
+    labels = [axes.get_ylabel().replace("\u00a0", " ") for axes in figure.axes]
     assert labels == [
         *(f"measurement [{unit}]" for unit in ("m", "m/s", "1", "rad/s")), *(f"command [{u}]" for u in ("N", "N·m"))
     ]  # fmt: skip
