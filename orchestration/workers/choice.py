@@ -39,9 +39,7 @@ class Chosen:
         if self.in_lanes:
             return "engine batch: native FMUs, many runs at once"
         what = "native FMUs" if self.native else "the FMUs as they are"
-        return f"engine {self.name}: {what}, one run at a time" + (
-            f" ({self.reason})" if self.reason else ""
-        )
+        return f"engine {self.name}: {what}, one run at a time" + (f" ({self.reason})" if self.reason else "")
 
 
 def choice_named(name: str) -> EngineChoice:
