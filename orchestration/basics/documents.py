@@ -61,10 +61,17 @@ def read_text(path: Path, what: str) -> str:
 def read_toml(path: Path, what: str) -> dict[str, Any]:
     """The tables of a TOML file.
 
+    Raises `UsageError` as `toml_of`, and for a file that cannot be read.
+    """
+    return toml_of(read_text(path, what), str(path))
+
+
+def toml_of(text: str, path: str) -> dict[str, Any]:
+    """The tables of TOML that somebody has written, at a place that is named in errors.
+
     Raises `UsageError` for what is no TOML, is nested deeper than `DEEPEST`, or has a whole number beyond 64
     bits or a NUL character in it.
     """
-    text = read_text(path, what)
     if any(key["deep"] for key in _KEYS.finditer(text)):  # parsing takes time by the square of a key's parts
         raise UsageError(f"{path}: expected TOML nested at most {DEEPEST} deep")
     try:
@@ -75,7 +82,7 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
         raise UsageError(f"{path}: expected whole numbers of at most 64 bits") from error
     except RecursionError as error:
         raise UsageError(f"{path}: expected TOML nested at most {DEEPEST} deep") from error
-    _expect_plain(tables, str(path))
+    _expect_plain(tables, path)
     return tables
 
 

@@ -50,13 +50,18 @@ def usual() -> Scenario:
 def load_request(path: str | Path, timing: str | Path | None = None) -> Scenario | System:
     """Read a system file, a scenario file, or an SSP with a file of its `timing`; paths are relative to their file.
 
-    A file with timing that names its SSP is as good as both. Raises `UsageError` for a file that cannot be read, a
-    key that does not exist (naming those that do) or a value of the wrong kind.
+    A file with timing that names its SSP is as good as both; without one, an SSP has the timing of its annotation.
+    Raises `UsageError` for a file that cannot be read, a key that does not exist (naming those that do) or a value of
+    the wrong kind.
     """
     path = Path(path)
     if path.suffix.lower() in SSP_ENDINGS:
-        on_top = {} if timing is None else read_toml(Path(timing), "file with timing")
-        if SSP in on_top and (Path(timing or "").parent / str(on_top.pop(SSP))).resolve() != path.resolve():
+        on_top = None if timing is None else read_toml(Path(timing), "file with timing")
+        if (
+            on_top is not None
+            and SSP in on_top
+            and (Path(timing or "").parent / str(on_top.pop(SSP))).resolve() != path.resolve()
+        ):
             raise UsageError(f"{timing}: ssp: names another file than {path}")
         with _said_of(path if timing is None else Path(timing)):
             return _from_ssp(path, on_top, path.parent if timing is None else Path(timing).parent)
@@ -74,7 +79,7 @@ def request_from_tables(tables: dict[str, Any], folder: Path) -> Scenario | Syst
     return (system_from_tables if is_system(tables) else scenario_from_tables)(tables, folder)
 
 
-def _from_ssp(path: Path, timing: dict[str, Any], folder: Path) -> System:
+def _from_ssp(path: Path, timing: dict[str, Any] | None, folder: Path) -> System:
     from orchestration.requests.ssp.reading import tables_of  # with it comes XML, which no other file needs
 
     return system_from_tables(tables_of(path, timing), folder)

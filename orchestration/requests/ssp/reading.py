@@ -14,7 +14,7 @@ from orchestration.requests.ssp.document import read
 from orchestration.requests.ssp.package import opened
 from orchestration.requests.ssp.parameters import Value
 from orchestration.requests.ssp.structure import Node, Path_, Structure, Wire, said, structure_of
-from orchestration.requests.ssp.timing import expect_tables
+from orchestration.requests.ssp.timing import expect_tables, from_text
 from orchestration.system.conversion import Conversion, OtherQuantity, between
 from orchestration.system.model import Parameter, component_of
 
@@ -35,16 +35,18 @@ class Signal:
     """whether that is all there is to its units, by suppressUnitConversion somewhere on the way"""
 
 
-def tables_of(path: Path, timing: Mapping[str, Any]) -> dict[str, Any]:
-    """The tables of the system file that an SSP and the `timing` on top of it mean.
+def tables_of(path: Path, timing: Mapping[str, Any] | None) -> dict[str, Any]:
+    """The tables of the system file that an SSP and the `timing` on top of it mean; None: that of its annotation.
 
     A component is stepped as `timing` says, else in continuous time with the step that the SSP's annotations name.
     Components that `timing` has come first, in its order, which decides ties. Raises `UsageError` for what is not
     read, what does not exist, and a step or end that nobody says.
     """
-    expect_tables(timing)
     package = opened(path)
     structure = structure_of(read(package.structure, "ssd"), package)
+    if timing is None:
+        timing = {} if structure.timing is None else from_text(structure.timing)
+    expect_tables(timing)
     names = _names(structure.components)
     models = {place: read_model(fmu) for place, fmu in structure.components.items()}
     tables: dict[str, Any] = {**timing}

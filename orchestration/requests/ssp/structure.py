@@ -9,6 +9,7 @@ from orchestration.basics.units import BaseUnits
 from orchestration.requests.ssp.document import Read, all_of
 from orchestration.requests.ssp.package import Package
 from orchestration.requests.ssp.parameters import Value, definitions_in, transformation, values_of
+from orchestration.requests.ssp.timing import ANNOTATION
 from orchestration.system.conversion import Conversion
 
 Path_ = tuple[str, ...]
@@ -50,6 +51,8 @@ class Structure:
     stop: float | None = None
     step: float | None = None
     """[s], if they are in it"""
+    timing: str | None = None
+    """what only this project's annotation says"""
 
     def way_to(self, node: Node) -> Iterator[Wire]:
         """The wires that lead to a connector, the last first, through the connectors of systems."""
@@ -68,7 +71,7 @@ def said(node: Node) -> str:
 def structure_of(root: Read, package: Package) -> Structure:
     """Take a document apart; raises `UsageError` for what is not read."""
     (system,) = all_of(root, "ssd:System")
-    result = Structure(stop=_stop(root), step=_step(root))
+    result = Structure(stop=_stop(root), step=_step(root), timing=_timing(root))
     result.definitions.update(definitions_in(root, "ssd:Units/ssc:Unit"))
     _walk(system, (), package, result)
     return result
@@ -160,6 +163,13 @@ def _stop(root: Read) -> float | None:
             raise UsageError(f"DefaultExperiment.startTime = {start:g}: expected 0; runs begin there")
         if experiment.get("stopTime") is not None:
             return float(experiment.get("stopTime"))
+    return None
+
+
+def _timing(root: Read) -> str | None:
+    for annotation in all_of(root, "ssd:Annotations/ssc:Annotation"):
+        if annotation.get("type") == ANNOTATION:
+            return "".join(child.text or "" for child in annotation)
     return None
 
 

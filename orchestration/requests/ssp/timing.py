@@ -4,20 +4,33 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from orchestration.basics.documents import toml_of
 from orchestration.basics.errors import UsageError, shown
 from orchestration.system.model import System
 from orchestration.system.written import tables_of
 
 ENDING = ".timing.toml"
+ANNOTATION = "quadcosim.timing"
+"""Type of the annotation of an SSP that says the same"""
 
 
 def written(system: System, ssp: Path) -> Path:
     """Write the file that makes `system` of its SSP again, beside it; its path."""
+    path = ssp.with_suffix(ENDING)
+    path.write_text(as_text(system, ssp=ssp.name), encoding="utf-8")
+    return path
+
+
+def as_text(system: System, **before: str) -> str:
+    """What such a file says, behind other keys."""
     import tomli_w
 
-    path = ssp.with_suffix(ENDING)
-    path.write_text(tomli_w.dumps({"ssp": ssp.name, **_left_to_say(system)}), encoding="utf-8")
-    return path
+    return tomli_w.dumps({**before, **_left_to_say(system)})
+
+
+def from_text(text: str) -> dict[str, Any]:
+    """What the annotation of an SSP says; raises `UsageError` if it is no TOML."""
+    return toml_of(text, f"annotation {ANNOTATION}")
 
 
 def _left_to_say(system: System) -> dict[str, Any]:

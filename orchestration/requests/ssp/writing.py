@@ -115,6 +115,8 @@ def _structure(given: Carried, name: str, about: Mapping[str, str]) -> Element:
     annotation = add(add(experiment, "ssd:Annotations"), "ssc:Annotation", type="com.opensimulationplatform")
     algorithm = add(annotation, "osp:Algorithm")
     add(algorithm, "osp:FixedStepAlgorithm", baseStepSize=step)
+    own = add(add(root, "ssd:Annotations"), "ssc:Annotation", type=timing.ANNOTATION)
+    add(own, "quadcosim:Timing").text = timing.as_text(given.system)
     return root
 
 

@@ -1,6 +1,7 @@
 """What is written as an SSP with its timing beside it is flown back as it was."""
 
 import dataclasses
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -34,7 +35,7 @@ def test_an_example_has_the_same_rows_in_the_same_order_as_before(name: str, tmp
     assert timing == tmp_path / "out" / "loop.timing.toml"
     read = load_request(ssp, timing)
     assert isinstance(read, System)
-    assert load_request(timing) == read
+    assert load_request(timing) == load_request(ssp) == read
     expected, found = run(system), run(read)
     assert bits(found) == bits(expected)
     assert list(found.signals) == list(expected.signals)
@@ -54,6 +55,27 @@ def test_a_component_that_nothing_is_connected_to_is_flown_back(tmp_path: Path) 
         sources={"push": Source(constant=1.0, to=("plant.u",))},
     )
     assert run(load_request(*writing.write_with_timing(alone, tmp_path / "loop.ssp"))).metrics == run(alone).metrics
+
+
+def test_the_timing_of_the_annotation_holds_where_no_file_is_given_and_is_held_to_the_rules_of_files(
+    tmp_path: Path,
+) -> None:
+    system = dataclasses.replace(carried("double_integrator"), seed=7)
+    ssp, timing = writing.write_with_timing(system, tmp_path / "loop.ssp")
+    changed = tmp_path / "changed.toml"
+    changed.write_text(timing.read_text().replace("seed = 7", "seed = 8").replace('ssp = "loop.ssp"', ""), "utf-8")
+    assert [load_request(ssp, each).seed for each in (None, timing, changed)] == [7, 7, 8]
+    document = load_structure(ssp, tmp_path / "damaged")
+    document.write_text(document.read_text("utf-8").replace("seed = 7", "seed = = 7"), "utf-8")
+    with pytest.raises(UsageError, match=r"annotation quadcosim\.timing: expected TOML"):
+        load_request(document)
+
+
+def load_structure(ssp: Path, folder: Path) -> Path:
+    """Unpacked, its document."""
+    with zipfile.ZipFile(ssp) as archive:
+        archive.extractall(folder)
+    return folder / package.STRUCTURE
 
 
 def test_what_the_timing_says_on_top_is_flown(tmp_path: Path) -> None:
