@@ -296,10 +296,10 @@ def test_a_wrong_parameter_name_is_refused_with_the_closest(file: Path) -> None:
         quadcosim.run(scenario)
 
 
-@pytest.mark.parametrize(("name", "flag"), [("sample_period", "--period"), ("sample_offset", "--offset")])
-def test_the_controllers_own_clock_is_refused_with_the_reason(file: Path, name: str, flag: str) -> None:
+@pytest.mark.parametrize(("name", "key"), [("sample_period", "period"), ("sample_offset", "offset")])
+def test_the_controllers_own_clock_is_refused_with_the_reason(file: Path, name: str, key: str) -> None:
     message = refusal(file, f"[controller]\n{name} = 0.02")
-    assert message.startswith(f"controller.{name}: expected {flag}")
+    assert message.startswith(f"controller.{name}: expected {key} ")
     assert "the master" in message
     with pytest.raises(UsageError, match=f"controller.{name}"):
         Scenario().with_changes(parameters={f"controller.{name}": 0.02})

@@ -141,7 +141,7 @@ def test_ideal_flights_of_all_vehicles_are_the_same_path() -> None:
         (
             "[controllers.GeometricController]\ngain_scalin = 'inertia'",
             "controllers.GeometricController.gain_scalin: GeometricController has no such variable; did you mean "
-            "gain_scaling?",
+            "gain_scaling or gain_scaling_index?",
         ),
         (
             "[controllers.GeometricController]\ngain_scaling = 'weight'",

@@ -67,7 +67,7 @@ def test_what_flies_alone_is_its_native_twin_where_there_is_one(tmp_path: Path) 
 
 
 def test_an_engine_that_there_is_not_is_named() -> None:
-    with pytest.raises(UsageError, match=r"--engine bach: did you mean batch\? expected one of auto, python, compiled"):
+    with pytest.raises(UsageError, match=r"engine = bach: did you mean batch\? expected one of auto, python, compiled"):
         choice_named("bach")
 
 

@@ -173,4 +173,4 @@ def test_an_archive_is_refused_when_any_file_in_it_is_damaged_or_it_is_too_large
     path = changed(plant, tmp_path / "a.fmu", {"resources/data.txt": b"as it was written"})
     path.write_bytes(path.read_bytes().replace(b"as it was written", b"as it never was.."))
     assert refusal(path) == "expected a zip archive that is whole: wrong CRC or header of resources/data.txt"
-    assert refusal(plant, size_limit=0.1).endswith("MB: expected at most 0.1 MB (--size-limit)")
+    assert refusal(plant, size_limit=0.1).endswith("MB: expected at most 0.1 MB (size_limit)")
