@@ -107,7 +107,9 @@ FLIGHTS = [words for _, words in COMMANDS if words[0] == "run" and not {"--resum
 
 
 @pytest.mark.parametrize(
-    "words", [w for w in FLIGHTS if not any(word.endswith((".toml", ".csv", ".fmu")) for word in w)], ids=" ".join
+    "words",
+    [w for w in FLIGHTS if not any(word.endswith((".toml", ".csv", ".fmu", ".ssp")) for word in w)],
+    ids=" ".join,
 )
 def test_flights_of_the_pages_begin(words: list[str], main: Main) -> None:
     flags = [] if "--stop-time" in words else ["--stop-time", "0.02"]
