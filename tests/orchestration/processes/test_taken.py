@@ -42,6 +42,15 @@ def test_what_was_spent_is_not_taken_back_by_a_wait_that_is_told_late(taken: Tak
     assert taken.own == 1.0
 
 
+def test_a_wait_that_is_told_late_is_no_time_of_its_own_in_the_end(taken: Taken) -> None:
+    waits = [0.0, 0.0, 0.0, 2.5, 2.5]
+    for before, now in zip(waits, waits[1:]):
+        taken.count({1: member(0.0, before)}, {1: member(0.0, now)}, 1.0)
+    assert taken.own == 2.0, "expected two seconds while nothing was told of the wait"
+    taken.count({1: member(0.0, 2.5)}, {1: member(1.0, 2.5)}, 1.0)
+    assert taken.own == 5.0 - 2.5
+
+
 def test_threads_that_compute_at_once_take_the_time_of_the_wall_and_more_of_the_processors(taken: Taken) -> None:
     taken.count({1: member(0.0, 0.0)}, {1: member(4.0, 0.0)}, 1.0)
     assert (taken.own, taken.processor) == (1.0, 4.0)
