@@ -1,5 +1,7 @@
 """The time of a process is what the wall's clock says, less what it had to wait; that of a processor is all it had."""
 
+import itertools
+
 import pytest
 
 from orchestration.processes.family import Member
@@ -44,7 +46,7 @@ def test_what_was_spent_is_not_taken_back_by_a_wait_that_is_told_late(taken: Tak
 
 def test_a_wait_that_is_told_late_is_no_time_of_its_own_in_the_end(taken: Taken) -> None:
     waits = [0.0, 0.0, 0.0, 2.5, 2.5]
-    for before, now in zip(waits, waits[1:]):
+    for before, now in itertools.pairwise(waits):
         taken.count({1: member(0.0, before)}, {1: member(0.0, now)}, 1.0)
     assert taken.own == 2.0, "expected two seconds while nothing was told of the wait"
     taken.count({1: member(0.0, 2.5)}, {1: member(1.0, 2.5)}, 1.0)
