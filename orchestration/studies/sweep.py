@@ -59,8 +59,8 @@ def sweep(
     The store is in `folder`, default `results/NAME`: what is there is not flown again, so that a sweep may be
     stopped and called again. Runs are flown by `workers` processes of this machine, which need no guard of the main
     module and work from a notebook, or by those of a `dask` scheduler at that address. The engine `batch` flies them as
-    lanes of native FMUs, and some of them by the FMUs too, to compare; `auto` does so where it can, takes native FMUs
-    where there are lanes of none, and else the FMUs as they are. A run that takes more than `time_limit` [s] of the
+    lanes of native FMUs, and some of them by the FMUs too, to compare; `auto` takes lanes where these can be had, else
+    native FMUs one at a time, else the FMUs as they are. A run that takes more than `time_limit` [s] of the
     processor has failed, and says so. `progress` hears how many of how many are done, `announce` what flies and of runs
     that failed; None for silence.
 

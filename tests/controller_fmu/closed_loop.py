@@ -1,9 +1,10 @@
 """What the tests of every law share: states and models to try it at, and rates by differences along its flow."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from hypothesis import note
 from hypothesis import strategies as st
 
 from fmu_kit.algebra import Inertia, Quaternion, Vec3
@@ -61,3 +62,20 @@ def assert_is_the_rate(exact: Any, f: Callable[[float], Any]) -> None:
     value, exact = np.asarray(f(0.0)), np.asarray(exact)
     error = np.max(np.abs(rate_of(f) - exact))
     assert error <= 1e-7 * (1.0 + np.max(np.abs(exact)) + np.max(np.abs(value))), error
+
+
+def assert_rates(now: Any, flow: Callable[[float], Any], rates: Mapping[str, str]) -> None:
+    """The rate of each quantity of a law is what is named beside it; the desired attitude's is its angular velocity's.
+
+    `flow` is the law along the closed loop, by the time from `now` on [s].
+    """
+
+    def along(quantity: str) -> Callable[[float], list[float]]:
+        return lambda h: list(getattr(flow(h), quantity))
+
+    for quantity, rate in rates.items():
+        note(quantity)
+        assert_is_the_rate(list(getattr(now, rate)), along(quantity))
+    note("desired attitude")
+    turning = now.desired_quaternion.rate(now.desired_angular_velocity)
+    assert_is_the_rate(list(turning), along("desired_quaternion"))

@@ -3,7 +3,6 @@
 import functools
 import itertools
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +19,15 @@ from fmu_kit.integrator import rk4_step
 from fmu_kit.rigid_body import RigidState, Wrench, derivative
 from fmu_kit.trajectory import Reference, Trajectory
 from orchestration.engines.sources import NUMPY
-from tests.controller_fmu.closed_loop import assert_is_the_rate, between, inertias, quaternions, trajectories, triple
+from tests.controller_fmu.closed_loop import (
+    assert_is_the_rate,
+    assert_rates,
+    between,
+    inertias,
+    quaternions,
+    trajectories,
+    triple,
+)
 from tests.controller_fmu.geometric import second_form
 
 IDENTITY = Quaternion.from_xyzw(0.0, 0.0, 0.0, 1.0)
@@ -209,16 +216,7 @@ RATES = {
 def test_every_rate_is_the_derivative_along_the_closed_loop(situation: Situation) -> None:
     """Those that are named so, Omega_c of the desired attitude, and what the errors give of the error function."""
     now, flow = situation.now(), functools.cache(situation.flow)
-
-    def along(quantity: str) -> Callable[[float], list[float]]:
-        return lambda h: list(getattr(flow(h), quantity))
-
-    for quantity, rate in RATES.items():
-        note(quantity)
-        assert_is_the_rate(list(getattr(now, rate)), along(quantity))
-    note("desired attitude")
-    turning = now.desired_quaternion.rate(now.desired_angular_velocity)
-    assert_is_the_rate(list(turning), along("desired_quaternion"))
+    assert_rates(now, flow, RATES)
     note("error function")
     assert_is_the_rate(now.rotation_error @ now.angular_velocity_error, lambda h: flow(h).error_function)
 

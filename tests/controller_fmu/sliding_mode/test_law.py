@@ -3,7 +3,6 @@
 import csv
 import functools
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -31,7 +30,15 @@ from fmu_kit.rigid_body import Body, RigidState, Wrench, derivative
 from fmu_kit.scalar import FLOAT, ScalarOps
 from fmu_kit.trajectory import Reference, Trajectory
 from orchestration.engines.sources import NUMPY
-from tests.controller_fmu.closed_loop import assert_is_the_rate, between, inertias, quaternions, trajectories, triple
+from tests.controller_fmu.closed_loop import (
+    assert_is_the_rate,
+    assert_rates,
+    between,
+    inertias,
+    quaternions,
+    trajectories,
+    triple,
+)
 from tests.reference.tables import LAWS, law_at
 from tests.scalars import PRECISE
 
@@ -218,18 +225,11 @@ RATES = {
 def test_every_rate_is_the_derivative_along_the_closed_loop(situation: Situation) -> None:
     """Those that are named so, and by (13) and (10) those of the desired attitude and of the error of attitude."""
     now, flow = situation.now(), functools.cache(situation.flow)
-
-    def along(quantity: str) -> Callable[[float], list[float]]:
-        return lambda h: list(getattr(flow(h), quantity))
-
-    for quantity, rate in RATES.items():
-        note(quantity)
-        assert_is_the_rate(list(getattr(now, rate)), along(quantity))
-    note("(13)")
-    turning = now.desired_quaternion.rate(now.desired_angular_velocity)
-    assert_is_the_rate(list(turning), along("desired_quaternion"))
+    assert_rates(now, flow, RATES)
     note("(10)")
-    assert_is_the_rate(list(now.attitude_error.rate(now.angular_velocity_error)), along("attitude_error"))
+    assert_is_the_rate(
+        list(now.attitude_error.rate(now.angular_velocity_error)), lambda h: list(flow(h).attitude_error)
+    )
 
 
 def energy_rate(situation: Situation) -> float:
