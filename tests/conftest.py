@@ -1,5 +1,6 @@
 """Settings and fixtures that all tests share."""
 
+import gc
 import math
 import os
 import signal
@@ -27,6 +28,14 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell's background jo
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 DATA = Path(__file__).parent / "data"
+
+gc.disable()  # while thousands of tests are collected, of which none is garbage
+
+
+def pytest_collection_finish() -> None:
+    """What has been collected is not looked through again for garbage by each test that leaves some."""
+    gc.freeze()
+    gc.enable()
 
 
 def surroundings() -> dict[str, object]:

@@ -2,7 +2,9 @@
 
 import sys
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +16,11 @@ from tests.fmus.process import run
 
 NATIVE = Scenario().with_fmus(plant="native/QuadrotorPlant", controller="native/UnifiedController")
 """The paper's flight by the FMUs that fly fastest, with the same rows as those with Python inside."""
+
+
+def native(**fields: Any) -> Scenario:
+    """The same with other fields."""
+    return replace(NATIVE, **fields)
 
 
 def natives(targets: Iterable[Target], folder: Path, mathematics: Mathematics) -> dict[str, Path]:

@@ -22,7 +22,8 @@ from orchestration.flight.spectrum import welch
 from orchestration.runs.draw import draw
 from orchestration.runs.run_labels import labels_of_runs
 from orchestration.system.model import Criterion
-from quadcosim import Result, Scenario, UsageError
+from quadcosim import Result, UsageError
+from tests.native import native
 
 TANK = Path(__file__).parents[3] / "examples" / "water_tank" / "system.toml"
 NARROW = replace(STYLES["paper"], width=COLUMNS["single"])
@@ -32,7 +33,7 @@ WINDOW = (0.3, 0.6)
 @pytest.fixture(scope="module")
 def flight() -> Result:
     """With torques beyond the limit of the plant."""
-    return quadcosim.run(Scenario(stop_time=1.2).with_changes(parameters={"plant.torque_max": 15.0}))
+    return quadcosim.run(native(stop_time=1.2).with_changes(parameters={"plant.torque_max": 15.0}))
 
 
 @pytest.fixture(scope="module")
@@ -132,7 +133,7 @@ def test_a_flight_that_rests_where_it_should_is_drawn_too(tmp_path: Path) -> Non
     zero = [f"plant.initial.{what}.{axis}" for what in ("position", "quaternion") for axis in "xyz"]
     zero += [f"plant.wind.amplitude.{axis}" for axis in "xyz"]
     zero += [f"controller.trajectory.{what}" for what in ("amplitude_x", "amplitude_y", "start_z", "rate_z")]
-    still = Scenario(stop_time=0.1).with_changes(
+    still = native(stop_time=0.1).with_changes(
         parameters={**dict.fromkeys(zero, 0.0), "plant.initial.quaternion.w": 1.0}
     )
     made = draw(quadcosim.run(still))

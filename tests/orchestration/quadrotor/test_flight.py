@@ -17,6 +17,7 @@ import pytest
 
 import quadcosim
 from fmu_kit.trajectory import Trajectory
+from orchestration.building import fmus
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.quadrotor.measures import desired
 from orchestration.quadrotor.scenario import FmuChoice, Record
@@ -24,6 +25,7 @@ from orchestration.quadrotor.signals import ReferenceChoice
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE, REFERENCE
 from orchestration.runs.simulation import prepared
 from quadcosim import Result, RunInterrupted, Scenario, SimulatorError, Timing, UsageError
+from tests.native import native
 
 EVERYTHING: dict[str, Any] = {
     "delay": 0.003,
@@ -38,7 +40,7 @@ EVERYTHING: dict[str, Any] = {
 
 
 def fly(stop_time: float, parameters: Mapping[str, float | str] | None = None, seed: int = 0, **timing: Any) -> Result:
-    scenario = Scenario(stop_time=stop_time, seed=seed, timing=Timing(**timing))
+    scenario = native(stop_time=stop_time, seed=seed, timing=Timing(**timing))
     return quadcosim.run(scenario.with_changes(parameters=parameters))
 
 
@@ -156,7 +158,9 @@ HASH = """
 import hashlib, json, sys
 import quadcosim
 from quadcosim import Scenario, Timing
-scenario = Scenario(stop_time=1.0, seed=9, timing=Timing(**json.loads(sys.argv[1])))
+from quadcosim import Timing
+from tests.native import native
+scenario = native(stop_time=1.0, seed=9, timing=Timing(**json.loads(sys.argv[1])))
 result = quadcosim.run(scenario)
 print(hashlib.sha256(result.rows.tobytes() + repr(result.events).encode()).hexdigest())
 """
@@ -193,7 +197,7 @@ def write_reference(path: Path, times: np.ndarray, trajectory: Trajectory) -> Pa
 
 def test_a_table_of_the_built_in_trajectory_flies_like_it(tmp_path: Path) -> None:
     table = write_reference(tmp_path / "reference.csv", np.arange(0, 201) / 100, Trajectory())
-    flight = quadcosim.run(Scenario(stop_time=2.0, reference=ReferenceChoice(file=table)))
+    flight = quadcosim.run(native(stop_time=2.0, reference=ReferenceChoice(file=table)))
     for name in (*MEASUREMENT, *COMMAND):
         assert flight.signals[f"plant.{name}"] == pytest.approx(plain().signals[f"plant.{name}"], rel=1e-9, abs=1e-9)
     assert desired(flight.signals) == pytest.approx(desired(plain().signals), abs=1e-5)  # linear between rows
@@ -211,7 +215,7 @@ def test_the_true_error_is_that_to_the_trajectory_of_the_parameters() -> None:
 def test_a_table_that_is_too_short_is_refused(tmp_path: Path) -> None:
     table = write_reference(tmp_path / "short.csv", np.array([0.0, 1.0]), Trajectory())
     with pytest.raises(UsageError, match="expected 0 to stop_time = 2"):
-        quadcosim.run(Scenario(stop_time=2.0, reference=ReferenceChoice(file=table)))
+        quadcosim.run(native(stop_time=2.0, reference=ReferenceChoice(file=table)))
 
 
 # -- what its metrics rest on -----------------------------------------------------------------------------
@@ -296,7 +300,7 @@ def test_the_controller_is_stepped_to_its_first_sample_without_one(timing: dict[
                 steps.append((t, h))
             super().step(t, h)
 
-    asked = Scenario(stop_time=0.1, timing=Timing(**timing))
+    asked = native(stop_time=0.1, timing=Timing(**timing))
     with prepared(asked, load=Watched) as simulation:
         simulation.master.initialise()
         simulation.master.run()
@@ -324,7 +328,7 @@ def test_limits_of_the_plant_are_counted_as_saturation() -> None:
 
 def test_what_is_recorded_can_be_chosen() -> None:
     record = Record(plant=("tilt",), controller=("energy",))
-    flight = quadcosim.run(Scenario(stop_time=0.05, record=record))
+    flight = quadcosim.run(native(stop_time=0.05, record=record))
     exchanged = [f"plant.{name}" for name in (*COMMAND, *MEASUREMENT)]
     commands = [f"controller.{name}" for name in COMMAND]
     judged = ["controller.energy", "controller.attitude_error.w"]  # the latter only because objectives name it
@@ -365,7 +369,7 @@ def test_a_parameter_that_cannot_be_set_is_refused_in_one_line(parameters: dict[
 @pytest.mark.parametrize("side", ["plant", "controller"])
 def test_a_value_that_the_fmu_refuses_is_an_error_in_the_fmus_own_words(side: str) -> None:
     with pytest.raises(SimulatorError, match=r"mass = 0.0: expected a finite value > 0") as refused:
-        fly(0.05, {f"{side}.mass": 0.0})
+        quadcosim.run(Scenario(stop_time=0.05).with_changes(parameters={f"{side}.mass": 0.0}))
     assert str(refused.value).startswith(side)
     assert "Traceback" in refused.value.details
 
@@ -378,9 +382,9 @@ def test_a_value_below_what_the_fmu_declares_is_refused_before_it_is_loaded(side
 
 def test_a_record_of_what_is_no_variable_is_refused() -> None:
     with pytest.raises(UsageError, match="did you mean tilt"):
-        quadcosim.run(Scenario(stop_time=0.05, record=Record(plant=("tild",))))
+        quadcosim.run(native(stop_time=0.05, record=Record(plant=("tild",))))
     with pytest.raises(UsageError, match=r"^record.plant: mass is a parameter; expected an output or a local$"):
-        quadcosim.run(Scenario(stop_time=0.05, record=Record(plant=("mass",))))
+        quadcosim.run(native(stop_time=0.05, record=Record(plant=("mass",))))
 
 
 def test_an_unknown_measurement_is_refused() -> None:
@@ -388,13 +392,10 @@ def test_an_unknown_measurement_is_refused() -> None:
         fly(0.05, noise={"positio": 1.0})
 
 
-def test_an_fmu_may_be_given_by_its_path(built: dict[str, Path]) -> None:
-    scenario = Scenario(
-        stop_time=2.0,
-        plant=FmuChoice(fmu=str(built["QuadrotorPlant"])),
-        controller=FmuChoice(fmu=str(built["UnifiedController"])),
-    )
-    assert same_bits(quadcosim.run(scenario), plain())
+def test_an_fmu_may_be_given_by_its_path() -> None:
+    sides = {"plant": "native/QuadrotorPlant", "controller": "native/UnifiedController"}
+    paths = {side: FmuChoice(fmu=str(fmus.locate(name))) for side, name in sides.items()}
+    assert same_bits(quadcosim.run(native(stop_time=2.0, **paths)), plain())
 
 
 def test_the_provenance_has_versions_and_guids(built: dict[str, Path]) -> None:
@@ -419,7 +420,7 @@ def test_the_fmus_have_nothing_to_warn_of() -> None:
 
 
 def test_nominal_model_that_is_not_the_plant_is_warned_of_unless_it_is_meant() -> None:
-    one_side = Scenario(stop_time=0.02).with_changes(parameters={"plant.mass": 1.2, "controller.inertia.xy": 0.1})
+    one_side = native(stop_time=0.02).with_changes(parameters={"plant.mass": 1.2, "controller.inertia.xy": 0.1})
     (warning,) = quadcosim.run(one_side).warnings
     assert "controller.mass = 1 where plant.mass = 1.2" in warning
     assert "controller.inertia.xy = 0.1 where plant.inertia.xy = 0," not in warning
@@ -432,7 +433,7 @@ def test_nominal_model_that_is_not_the_plant_is_warned_of_unless_it_is_meant() -
 
 def test_progress_and_announcements_are_heard() -> None:
     heard: list[float] = []
-    quadcosim.run(Scenario(stop_time=1.0), progress=heard.append)
+    quadcosim.run(native(stop_time=1.0), progress=heard.append)
     assert heard == sorted(heard)
     assert heard[-1] == 1.0
 
@@ -464,7 +465,7 @@ def test_ctrl_c_is_not_blamed_on_an_fmu_that_is_python() -> None:
 def test_ctrl_c_before_the_first_instant_ends_the_flight_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Fmi2Instance, "enter_initialization", lambda *_: signal.raise_signal(signal.SIGINT))
     with pytest.raises(KeyboardInterrupt):
-        quadcosim.run(Scenario(stop_time=1.0))
+        quadcosim.run(native(stop_time=1.0))
 
 
 def test_an_error_after_ctrl_c_is_ctrl_c(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -474,7 +475,7 @@ def test_an_error_after_ctrl_c_is_ctrl_c(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(Fmi2Instance, "step", fail)
     with pytest.raises(KeyboardInterrupt):
-        quadcosim.run(Scenario(stop_time=1.0), engine="python")
+        quadcosim.run(native(stop_time=1.0), engine="python")
 
 
 def test_the_second_ctrl_c_does_not_wait(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -485,4 +486,4 @@ def test_the_second_ctrl_c_does_not_wait(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(Fmi2Instance, "step", hang)
     with pytest.raises(KeyboardInterrupt):
-        quadcosim.run(Scenario(stop_time=1.0), engine="python")
+        quadcosim.run(native(stop_time=1.0), engine="python")

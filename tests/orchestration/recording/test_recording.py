@@ -14,10 +14,11 @@ from orchestration.runs import draw as drawn
 from orchestration.runs.draw import draw
 from orchestration.runs.pause import fly_until, resume
 from orchestration.runs.run_directory import keep_flight
-from quadcosim import Result, Scenario, Timing, load_run
+from quadcosim import Result, Timing, load_run
+from tests.native import native
 
 JACOBI = Timing(order="jacobi", delay=0.003, jitter=0.004, command_loss=0.3, hold="first")
-SCENARIO = Scenario(stop_time=0.5, timing=JACOBI, seed=5)
+SCENARIO = native(stop_time=0.5, timing=JACOBI, seed=5)
 
 
 @pytest.fixture
@@ -56,7 +57,7 @@ def test_what_is_on_disk_is_what_was_flown_chunk_by_chunk(whole: Result, tmp_pat
 def test_a_sample_at_the_last_row_of_a_chunk_is_in_that_chunk_and_counts_once(
     engine: Engine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scenario = Scenario(stop_time=0.3, timing=Timing(offset=0.009))  # at rows 9, 19, 29 and so on
+    scenario = native(stop_time=0.3, timing=Timing(offset=0.009))  # at rows 9, 19, 29 and so on
     monkeypatch.setattr("orchestration.engines.backlog.ROWS", 10**6)
     whole = quadcosim.run(scenario, engine=engine)
     monkeypatch.setattr("orchestration.engines.backlog.ROWS", 10)
@@ -100,7 +101,7 @@ def test_a_pause_between_chunks_changes_nothing(at: float, whole: Result, tmp_pa
 
 
 def test_a_diverged_run_is_the_same_in_chunks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    scenario = Scenario(stop_time=3.0, timing=Timing(period=0.3, order="jacobi"))
+    scenario = native(stop_time=3.0, timing=Timing(period=0.3, order="jacobi"))
     chunks = quadcosim.run(scenario)
     monkeypatch.setattr("orchestration.engines.backlog.ROWS", 10**6)
     expect_equal(chunks, quadcosim.run(scenario))

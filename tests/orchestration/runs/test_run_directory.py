@@ -34,6 +34,7 @@ from quadcosim import (  # fmt: skip
     load_run,
     save_run,
 )
+from tests.native import native
 
 FILES = {"signals.parquet", "events.parquet", "metrics.json", "scenario.toml"}
 FIRST = VIEWS["flight"].first
@@ -43,7 +44,7 @@ FIGURES = {f"{name}.png" for name in FIRST}
 @pytest.fixture(scope="module")
 def result() -> Result:
     timing = Timing(delay=0.003, measurement_loss=0.2, command_loss=0.2, noise={"position": 0.01})
-    return quadcosim.run(Scenario(stop_time=0.3, timing=timing).with_changes(parameters={"plant.mass": 1.1}))
+    return quadcosim.run(native(stop_time=0.3, timing=timing).with_changes(parameters={"plant.mass": 1.1}))
 
 
 @pytest.fixture
@@ -88,7 +89,7 @@ def test_a_run_read_back_is_the_run_written(result: Result, folder: Path) -> Non
 
 
 def test_a_diverged_run_is_read_back_with_its_reason(folder: Path) -> None:
-    diverged = quadcosim.run(Scenario(stop_time=2.0, timing=Timing(period=0.3)))
+    diverged = quadcosim.run(native(stop_time=2.0, timing=Timing(period=0.3)))
     again = load_run(save_run(diverged, folder))
     assert again.divergence == diverged.divergence
     assert again.metrics["diverged"] is True
@@ -141,7 +142,7 @@ def test_the_commands_are_zoomed_on_the_window(result: Result, window: tuple[flo
 
 
 def test_a_run_without_samples_can_be_drawn(tmp_path: Path) -> None:
-    without = quadcosim.run(Scenario(stop_time=0.05, timing=Timing(offset=1.0)))
+    without = quadcosim.run(native(stop_time=0.05, timing=Timing(offset=1.0)))
     assert {path.name for path in save(drawing.draw(without), tmp_path)} == {f"{name}.png" for name in FLIGHT} - {
         "energy.png",
         "spectrum.png",
@@ -149,7 +150,7 @@ def test_a_run_without_samples_can_be_drawn(tmp_path: Path) -> None:
 
 
 def test_no_energy_is_drawn_of_a_controller_that_has_none() -> None:
-    flown = quadcosim.run(Scenario(stop_time=0.1))
+    flown = quadcosim.run(native(stop_time=0.1))
     place = flown.columns.index("controller.energy")
     columns, without = (*flown.columns[:place], *flown.columns[place + 1 :]), InMemory()
     without.begin(columns)
@@ -162,7 +163,7 @@ def test_no_energy_is_drawn_of_a_controller_that_has_none() -> None:
 
 def test_an_earlier_run_is_replaced_whole(result: Result, folder: Path) -> None:
     save_run(result, folder)
-    other = quadcosim.run(Scenario(stop_time=0.1))
+    other = quadcosim.run(native(stop_time=0.1))
     save_run(other, folder, figures=False)
     assert load_run(folder).rows.tobytes() == other.rows.tobytes()
     assert not FIGURES & {path.name for path in folder.iterdir()}
@@ -236,7 +237,7 @@ def test_a_failure_while_writing_leaves_the_earlier_run(
 
     monkeypatch.setattr(drawing, "draw", interrupt)
     with pytest.raises(KeyboardInterrupt):
-        save_run(quadcosim.run(Scenario(stop_time=0.05)), folder)
+        save_run(quadcosim.run(native(stop_time=0.05)), folder)
     assert contents(folder) == before
     assert list(folder.parent.iterdir()) == [folder]
 
@@ -307,7 +308,7 @@ def test_a_process_killed_between_two_renames_leaves_one_that_the_next_finishes(
     renames: int, result: Result, folder: Path
 ) -> None:
     new = save_run(result, folder.with_name("new"), figures=False)
-    old = save_run(quadcosim.run(Scenario(stop_time=0.1)), folder.with_name("old"), figures=False)
+    old = save_run(quadcosim.run(native(stop_time=0.1)), folder.with_name("old"), figures=False)
     new.rename(folder.parent / ".run.0123456789ab.new" if renames == 1 else folder)
     old.rename(folder.parent / ".run.0123456789ab.old")
     save_run(result, folder.with_name("other"), figures=False)
@@ -382,13 +383,13 @@ def test_what_was_recorded_before_an_interruption_is_kept_but_replaces_nothing(
 
     with pytest.raises(RunInterrupted, match=r"^at t = [0-2]\.\d+ s of 3 s; what was recorded is in ") as stop:
         keep_flight(
-            folder, lambda to: quadcosim.run(Scenario(stop_time=3.0), recorder=to, progress=progress), figures=False
+            folder, lambda to: quadcosim.run(native(stop_time=3.0), recorder=to, progress=progress), figures=False
         )
     assert str(stop.value).endswith(str(place))
     kept = load_run(place)
     assert kept.interrupted_at == kept.signals["time"][-1] == kept.metrics["horizon"]
     assert max(event.time for event in kept.events) <= kept.interrupted_at * 1e9
-    whole = quadcosim.run(Scenario(stop_time=3.0))
+    whole = quadcosim.run(native(stop_time=3.0))
     assert kept.rows.tobytes() == whole.rows[: len(kept.rows)].tobytes()
     if there:
         assert load_run(folder).interrupted_at is None
