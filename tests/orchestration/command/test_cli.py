@@ -18,11 +18,12 @@ from orchestration.flight.names import FIGURES as FLIGHT
 from orchestration.processes import subprocesses
 from quadcosim import Scenario, Timing, load_run, run, save_run
 from tests.commands import Done, Main
+from tests.native import native
 from tests.patience import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[3]
 SCRIPT = shutil.which("quadcosim", path=str(Path(sys.executable).parent))
-SHORT = ("--stop-time", "0.5")
+SHORT = ("--native", "--stop-time", "0.5")
 
 KEYS = {
     "engine",
@@ -74,7 +75,7 @@ def quadcosim(*arguments: str | Path, code: int = 0, environment: dict[str, str]
 
 def flown(**timing: Any) -> dict[str, Any]:
     """The metrics of the same flight by the API."""
-    result = run(Scenario(stop_time=0.5, timing=Timing(**timing)))
+    result = run(native(stop_time=0.5, timing=Timing(**timing)))
     return {**result.metrics, "wall_time": None, "engine": result.provenance["engine"]}
 
 
@@ -245,7 +246,7 @@ def test_out_keeps_the_run_and_its_figures(main: Main, here: Path) -> None:
 
 
 def test_plot_zooms_on_a_window(main: Main, here: Path) -> None:
-    save_run(run(Scenario(stop_time=0.5)), here / "run")
+    save_run(run(native(stop_time=0.5)), here / "run")
     before = (here / "run" / "commands.png").read_bytes()
     done = main("plot", "run", "--from", "0.1", "--to", "0.2")
     assert {Path(line).name for line in done.stdout.splitlines()} == {f"{name}.png" for name in FLIGHT}
@@ -284,7 +285,7 @@ def test_ctrl_c_ends_a_flight_with_one_line_and_130(here: Path, out: list[str]) 
 
 
 def test_divergence_is_a_result(main: Main) -> None:
-    diverging = ("run", "--stop-time", "2", "--period", "0.3")
+    diverging = ("run", "--native", "--stop-time", "2", "--period", "0.3")
     done = main(*diverging)
     assert "diverged: norm(plant.angular_velocity) = " in done.stdout
     assert "Traceback" not in done.stderr
@@ -319,7 +320,7 @@ def test_a_run_paused_and_resumed_is_the_same_run(main: Main, here: Path) -> Non
     resumed = main("run", "--resume", "paused", "--json", "--out", "whole", "--no-figures")
     assert json.loads(resumed.stdout)["steps"] == 500
     timing = Timing(measurement_loss=0.1, command_loss=0.1, delay=0.015)
-    expected = run(Scenario(stop_time=0.5, timing=timing))
+    expected = run(native(stop_time=0.5, timing=timing))
     whole = load_run(here / "whole")
     assert whole.rows.tobytes() == expected.rows.tobytes()
     assert whole.events == expected.events
@@ -432,7 +433,7 @@ def test_a_timing_that_the_run_is_too_short_for_is_warned_of(main: Main, flags: 
 )
 def test_debug_shows_where(main: Main, parameter: str, code: int, text: str) -> None:
     for arguments in (("--debug", "run", "--set", parameter), ("run", "--set", parameter, "--debug")):
-        done = main(*arguments, *SHORT, code=code)
+        done = main(*arguments, "--stop-time", "0.5", code=code)
         assert "Traceback (most recent call last)" in done.stderr
         assert text in done.stderr
         assert done.stderr.splitlines()[-1].startswith("quadcosim: ")
