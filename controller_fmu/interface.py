@@ -26,7 +26,7 @@ class ControllerInterface(Slave):
     reference_jerk = Input(f"desired jerk, {_USED}", "m/s3", ZERO, name="reference.jerk")
     reference_snap = Input(f"desired snap, {_USED}", "m/s4", ZERO, name="reference.snap")
 
-    thrust = Output("total thrust along -z of the body, held between samples", "N")
+    thrust = Output("total thrust along -z of the body, held between samples", "N", nominal=_BODY.mass * _BODY.gravity)
     torque = Output("body torque, held between samples", "N.m", ZERO)
 
     trajectory_amplitude_x = FixedParameter(
@@ -39,7 +39,12 @@ class ControllerInterface(Slave):
         "a_y of the built-in trajectory", "m", _TRAJECTORY.amplitude_y, name="trajectory.amplitude_y"
     )
     trajectory_frequency = FixedParameter(
-        "w of the built-in trajectory", "rad/s", _TRAJECTORY.frequency, name="trajectory.frequency"
+        "w of the built-in trajectory",
+        "rad/s",
+        _TRAJECTORY.frequency,
+        name="trajectory.frequency",
+        nominal=_TRAJECTORY.frequency,
+        quantity="AngularFrequency",
     )
     trajectory_start_z = FixedParameter(
         "z0 of the built-in trajectory, positive down", "m", _TRAJECTORY.start_z, name="trajectory.start_z"
@@ -51,7 +56,11 @@ class ControllerInterface(Slave):
     gravity = FixedParameter("nominal gravity g", "m/s2", _BODY.gravity, minimum=0.0)
     inertia = FixedParameter("entry of the nominal inertia matrix J, body frame", "kg.m2", _BODY.inertia)
     sample_period = FixedParameter(
-        "of the FMU's own clock; 0: sample at every communication point from sample_offset on", "s", 0.01, minimum=0.0
+        "of the FMU's own clock; 0: sample at every communication point from sample_offset on",
+        "s",
+        0.01,
+        minimum=0.0,
+        nominal=0.01,
     )
     sample_offset = FixedParameter("time of the first sample of the FMU's own clock", "s", 0.0, minimum=0.0)
 
@@ -61,7 +70,7 @@ class ControllerInterface(Slave):
     attitude_error = Local("Q_d^-1 Q as of the last sample (8)", "1", _NONE)
     angular_velocity_error = Local("angular velocity minus the desired one, body frame", "rad/s", ZERO)
 
-    sample_count = Local("number of samples since the start, initialisation not counted", None, 0)
+    sample_count = Local("number of samples since the start, initialisation not counted", None, 0, minimum=0)
     use_reference_inputs = FixedParameter("true: follow reference.*; false: the built-in trajectory", start=False)
 
 

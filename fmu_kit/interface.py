@@ -104,8 +104,10 @@ class Declared(property):
         minimum: float | None = None,
         maximum: float | None = None,
         above: float | None = None,
+        nominal: float | None = None,
+        quantity: str | None = None,
     ) -> None:
-        """`name`: where that of the FMI variable is not the attribute's; bounds are of parameters, as in `Variable`.
+        """`name`: where that of the FMI variable is not the attribute's; all behind it is as in `Variable`.
 
         Raises `ValueError` for a unit that is none, `TypeError` for a start that no variable can have.
         """
@@ -120,7 +122,8 @@ class Declared(property):
         if self.unit is not None:
             base_unit_exponents(self.unit)
         self.name, self._variability = name or "", variability or self.usually
-        self._bounds = {"minimum": minimum, "maximum": maximum, "above": above}
+        bounds = {"minimum": minimum, "maximum": maximum, "above": above}
+        self._said: dict[str, Any] = {**bounds, "nominal": nominal, "named_quantity": quantity}
 
     def __set_name__(self, owner: type, attribute: str) -> None:
         self.attribute, self.name = attribute, self.name or attribute
@@ -204,7 +207,7 @@ class Declared(property):
             variability=variability,
             unit=self.unit,
             start=0.0 if axes else self.start,
-            **self._bounds,
+            **self._said,
         )
         if not axes:
             return [variable]

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
-from fmu_kit.units import base_unit_exponents
+from fmu_kit.units import DISPLAYED, base_unit_exponents
 from fmu_kit.variables import Variable
 
 PYTHON_REQUIRED = ">=3.10"
@@ -88,12 +88,15 @@ def generation_date() -> str:
 
 
 def add_units(root: Element, variables: tuple[Variable, ...]) -> None:
-    """The units of variables, by what they are in base units."""
+    """The units of variables, by what they are in base units, and what they are displayed in."""
     definitions = SubElement(root, "UnitDefinitions")
     for name in sorted({v.unit for v in variables if v.unit is not None}):
         unit = SubElement(definitions, "Unit", name=name)
         exponents = {base: str(exponent) for base, exponent in base_unit_exponents(name).items()}
         SubElement(unit, "BaseUnit", attrib=exponents)
+        if name in DISPLAYED:
+            shown, factor = DISPLAYED[name]
+            SubElement(unit, "DisplayUnit", name=shown, factor=repr(factor))
 
 
 def add_types(root: Element, variables: tuple[Variable, ...], add_type: Callable[[Element, str], Element]) -> None:
@@ -142,20 +145,21 @@ def attributes(variable: Variable, value_reference: int) -> dict[str, str]:
 
 
 def type_attributes(variable: Variable) -> dict[str, str]:
-    """Declared type, start, unit and bounds of a variable."""
-    found: dict[str, str] = {}
-    if variable.declared_type is not None:
-        found["declaredType"] = variable.declared_type
-    if variable.has_start:
-        found["start"] = _literal(variable.start)
-    if variable.unit is not None:
-        found["unit"] = variable.unit
-    lower = variable.minimum if variable.minimum is not None else variable.above
-    if lower is not None:
-        found["min"] = _literal(lower)
-    if variable.maximum is not None:
-        found["max"] = _literal(variable.maximum)
-    return found
+    """Declared type, start, quantity, units, bounds and usual size of a variable."""
+    numbers = {
+        "start": variable.start if variable.has_start else None,
+        "min": variable.minimum if variable.minimum is not None else variable.above,
+        "max": variable.maximum,
+        "nominal": variable.nominal,
+    }
+    found = {
+        "declaredType": variable.declared_type,
+        "quantity": variable.quantity,
+        "unit": variable.unit,
+        "displayUnit": variable.displayed_in,
+        **{name: None if number is None else _literal(number) for name, number in numbers.items()},
+    }
+    return {name: said for name, said in found.items() if said is not None}
 
 
 def initial_dependencies(slave: Any) -> dict[int, list[int]]:

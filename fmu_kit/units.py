@@ -4,6 +4,7 @@ Used when an FMU is built. A name is a product of symbols with whole exponents, 
 in parentheses.
 """
 
+import math
 import re
 
 SYMBOLS: dict[str, dict[str, int]] = {
@@ -31,6 +32,47 @@ SYMBOLS: dict[str, dict[str, int]] = {
     "Hz": {"s": -1},
 }
 """Symbols whose unit is a product of base units without a factor."""
+
+QUANTITIES = {
+    "m": "Length",
+    "m/s": "Velocity",
+    "m/s2": "Acceleration",
+    "m/s3": "Jerk",
+    "rad": "Angle",
+    "rad/s": "AngularVelocity",
+    "rad/s2": "AngularAcceleration",
+    "kg": "Mass",
+    "kg.m2": "MomentOfInertia",
+    "kg/m3": "Density",
+    "N": "Force",
+    "N.m": "Torque",
+    "s": "Time",
+    "Hz": "Frequency",
+    "m2": "Area",
+    "m3": "Volume",
+    "m3/s": "VolumeFlowRate",
+    "kg/s": "MassFlowRate",
+    "Pa": "Pressure",
+    "J": "Energy",
+    "W": "Power",
+    "K": "ThermodynamicTemperature",
+    "A": "ElectricCurrent",
+    "V": "ElectricPotential",
+    "C": "ElectricCharge",
+    "Ohm": "Resistance",
+    "S": "Conductance",
+    "F": "Capacitance",
+    "H": "Inductance",
+    "Wb": "MagneticFlux",
+    "T": "MagneticFluxDensity",
+    "mol": "AmountOfSubstance",
+    "cd": "LuminousIntensity",
+}
+"""What is meant by a unit unless another quantity is said, in the words of `Modelica.Units.SI`."""
+
+_DEGREES = math.degrees(1.0)
+DISPLAYED = {"rad": ("deg", _DEGREES), "rad/s": ("deg/s", _DEGREES), "rad/s2": ("deg/s2", _DEGREES)}
+"""By unit, the one that people read instead, and how many of it are one of that."""
 
 
 def base_unit_exponents(name: str) -> dict[str, int]:

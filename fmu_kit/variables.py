@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from fmu_kit.errors import FmuError, require
+from fmu_kit.units import DISPLAYED, QUANTITIES
 
 Causality = Literal["input", "output", "parameter", "local"]
 Variability = Literal["continuous", "discrete", "fixed", "tunable", "constant"]
@@ -20,7 +21,8 @@ class Variable:
 
     The type of `start` is the type of the variable; one that is a member of an `IntEnum` makes an Enumeration of the
     members, named in lower case, for a parameter only. `minimum` and `maximum` are inclusive, `above` is an exclusive
-    lower bound; they are checked for parameters when initialisation ends.
+    lower bound; they are checked for parameters when initialisation ends. `nominal` is a usual size, `named_quantity`
+    what is measured where the unit alone does not say it.
     """
 
     name: str
@@ -32,6 +34,8 @@ class Variable:
     minimum: float | None = None
     maximum: float | None = None
     above: float | None = None
+    nominal: float | None = None
+    named_quantity: str | None = None
 
     def __post_init__(self) -> None:
         """Raise `TypeError` for an Enumeration whose range would not be checked."""
@@ -59,6 +63,16 @@ class Variable:
     def declared_type(self) -> str | None:
         """The name of the type that an Enumeration is of; None for other types."""
         return type(self.start).__name__ if self.items else None
+
+    @property
+    def quantity(self) -> str | None:
+        """What is measured; None where neither a name nor the unit says it."""
+        return self.named_quantity or QUANTITIES.get(self.unit or "")
+
+    @property
+    def displayed_in(self) -> str | None:
+        """The unit in which people read it; None: its own, as that of what has a name of its own."""
+        return DISPLAYED[self.unit][0] if self.unit in DISPLAYED and self.named_quantity is None else None
 
     @property
     def is_settable(self) -> bool:

@@ -1,5 +1,7 @@
 """The variables of the plant FMU."""
 
+import math
+
 from fmu_kit.algebra import ZERO, Quaternion
 from fmu_kit.interface import FixedParameter, Input, Local, Output, Parameter
 from fmu_kit.rigid_body import Body
@@ -14,12 +16,13 @@ LARGEST_INTERNAL_STEP = 0.002
 """[s]"""
 
 _BODY, _WIND, _BOX, _MOTORS = Body(), Wind(), Box(), Motors()
+_HOVER = _BODY.mass * _BODY.gravity
 
 
 class PlantInterface(Slave):
     """What goes in, what comes out, and of what the vehicle is."""
 
-    thrust = Input("total thrust along -z of the body, before limits and lag", "N", _BODY.mass * _BODY.gravity)
+    thrust = Input("total thrust along -z of the body, before limits and lag", "N", _HOVER, nominal=_HOVER)
     torque = Input("body torque, before limits and lag", "N.m", ZERO)
     external_force = Input("force in the inertial frame, added to the wind", "N", ZERO)
 
@@ -44,9 +47,20 @@ class PlantInterface(Slave):
         "angular velocity at 0, body frame", "rad/s", ZERO, name="initial.angular_velocity"
     )
     wind_amplitude = Parameter(
-        "a of the wind force a cos(w t), inertial frame", "N", _WIND.amplitude, name="wind.amplitude"
+        "a of the wind force a cos(w t), inertial frame",
+        "N",
+        _WIND.amplitude,
+        name="wind.amplitude",
+        nominal=_WIND.amplitude.x,
     )
-    wind_frequency = Parameter("w of the wind force a cos(w t)", "rad/s", _WIND.frequency, name="wind.frequency")
+    wind_frequency = Parameter(
+        "w of the wind force a cos(w t)",
+        "rad/s",
+        _WIND.frequency,
+        name="wind.frequency",
+        nominal=_WIND.frequency,
+        quantity="AngularFrequency",
+    )
     thrust_max = FixedParameter("thrust is limited to [thrust_min, thrust_max]", "N", _BOX.thrust_max, minimum=0.0)
     thrust_min = FixedParameter("least thrust; negative: propellers can push downwards", "N", _BOX.thrust_min)
     torque_max = FixedParameter("each torque is limited to +-torque_max", "N.m", _BOX.torque_max, minimum=0.0)
@@ -56,7 +70,9 @@ class PlantInterface(Slave):
         _BOX.time_constant,
         minimum=0.0,
     )
-    max_internal_step = FixedParameter("largest internal integration step", "s", LARGEST_INTERNAL_STEP, above=0.0)
+    max_internal_step = FixedParameter(
+        "largest internal integration step", "s", LARGEST_INTERNAL_STEP, above=0.0, nominal=LARGEST_INTERNAL_STEP
+    )
 
     motor_thrust_max = FixedParameter(
         "largest thrust of each of four motors on an X frame; 0: no motors",
@@ -97,5 +113,18 @@ class PlantInterface(Slave):
     )
 
     acceleration = Local("dV/dt, inertial frame", "m/s2", ZERO, variability="continuous")
-    wind_force = Local("wind force, inertial frame", "N", ZERO, name="wind.force", variability="continuous")
-    tilt = Local("angle between the z axes of body and inertial frame", "rad", variability="continuous")
+    wind_force = Local(
+        "wind force, inertial frame",
+        "N",
+        ZERO,
+        name="wind.force",
+        variability="continuous",
+        nominal=_WIND.amplitude.x,
+    )
+    tilt = Local(
+        "angle between the z axes of body and inertial frame",
+        "rad",
+        variability="continuous",
+        minimum=0.0,
+        maximum=math.pi,
+    )

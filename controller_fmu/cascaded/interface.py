@@ -87,6 +87,7 @@ class CascadeInterface(ControllerInterface):
         _VELOCITY.derivative_cutoff,
         name="cutoff.velocity_derivative",
         above=0.0,
+        quantity="AngularFrequency",
     )
     horizontal_limit = Parameter(
         "(MPC_XY_VEL_MAX)", "m/s", _POSITION.horizontal_limit, name="limit.velocity.horizontal", above=0.0
@@ -167,6 +168,7 @@ class CascadeInterface(ControllerInterface):
         _RATE.derivative_cutoff,
         name="cutoff.rate_derivative",
         above=0.0,
+        quantity="AngularFrequency",
     )
     rate_yaw_cutoff = Parameter(
         "of the low-pass of the yaw command (MC_YAW_TQ_CUTOFF: 2 Hz)",
@@ -174,6 +176,7 @@ class CascadeInterface(ControllerInterface):
         _RATE.yaw_cutoff,
         name="cutoff.yaw_torque",
         above=0.0,
+        quantity="AngularFrequency",
     )
     rate_integral_limit = Parameter(
         "of a full command (MC_RR_INT_LIM, MC_PR_INT_LIM, MC_YR_INT_LIM)",

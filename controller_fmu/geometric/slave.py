@@ -33,7 +33,7 @@ class GeometricController(ScaledGains, RedesignedController):
     heading = Parameter("direction that the body's x axis is to have: from north, to the east", "rad", 0.0)
 
     rotation_error = Local("e_R as of the last sample, body frame", "1", ZERO)
-    error_function = Local("attitude error function Psi as of the last sample: 0 none, 2 upside down", "1")
+    error_function = Local("attitude error function Psi as of the last sample: 0 none, 2 upside down", "1", minimum=0.0)
     desired_angular_velocity = Local("Omega_c as of the last sample, desired body frame", "rad/s", ZERO)
     energy = Local("of position, velocity, attitude and angular velocity errors, at the last sample", "J")
 

@@ -41,6 +41,7 @@ class UnifiedController(RedesignedController, ScaledGains):
         _GAINS.epsilon,
         name="boundary_layer",
         above=0.0,
+        nominal=_GAINS.epsilon,
     )
     kappa = Parameter(
         "kappa >= 0, weight of s.s/2 in the energy (33) and so of its term in Psi (29): "

@@ -67,6 +67,23 @@ def test_attributes_are_fmi_variables_in_order_reals_first():
     ]  # fmt: skip
 
 
+def test_a_variable_says_what_is_measured_its_usual_size_and_how_it_is_displayed():
+    class Told(Slave):
+        """Told."""
+
+        turn = Input("by its unit", "rad/s")
+        cutoff = Parameter("by its name", "rad/s", 30.0, quantity="AngularFrequency", nominal=30.0)
+        ratio = Local("of what, no unit says")
+
+        def step(self, t: float, h: float) -> None: ...
+
+    assert [(v.quantity, v.displayed_in, v.nominal) for v in Told.variables] == [
+        ("AngularVelocity", "deg/s", None),
+        ("AngularFrequency", None, 30.0),
+        (None, None, None),
+    ]
+
+
 class Weighed(Slave):
     """What others inherit."""
 

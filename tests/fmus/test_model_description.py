@@ -1,6 +1,7 @@
 """`modelDescription.xml`: the contract that people wire to, apart from what validation finds wrong with any FMU."""
 
 import ast
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from xml.etree.ElementTree import fromstring
@@ -59,6 +60,38 @@ def test_no_input_or_output_is_missing_from_the_interface(description: ModelDesc
 def test_bounds_are_declared(description: ModelDescription) -> None:
     bounded = {v.name: float(v.min) for v in description.modelVariables if v.min is not None}
     assert (bounded["mass"], bounded["gravity"]) == (0.0, 0.0)
+
+
+QUANTITIES = {
+    "m": "Length", "m/s": "Velocity", "m/s2": "Acceleration", "m/s3": "Jerk", "rad": "Angle",
+    "rad/s": "AngularVelocity", "rad/s2": "AngularAcceleration", "kg": "Mass", "kg.m2": "MomentOfInertia",
+    "N": "Force", "N.m": "Torque", "s": "Time", "J": "Energy",
+}  # fmt: skip
+"""As Modelica's library calls them"""
+
+
+def test_each_unit_says_what_is_measured_and_angles_are_displayed_in_degrees(description: ModelDescription) -> None:
+    for variable in description.modelVariables:
+        is_of_a_period = "frequency" in variable.name or "cutoff" in variable.name
+        quantity = "AngularFrequency" if is_of_a_period else QUANTITIES.get(variable.unit)
+        assert (variable.name, variable.quantity) == (variable.name, quantity)
+        in_degrees = variable.unit in ("rad", "rad/s", "rad/s2") and not is_of_a_period
+        expected = variable.unit.replace("rad", "deg") if in_degrees else None
+        assert (variable.name, variable.displayUnit) == (variable.name, expected)
+    shown = {shown.name: float(shown.factor) for unit in description.unitDefinitions for shown in unit.displayUnits}
+    assert shown["deg/s"] == math.degrees(1.0)
+    assert shown.keys() >= {v.displayUnit for v in description.modelVariables if v.displayUnit is not None}
+
+
+def test_what_is_far_from_one_says_its_usual_size_and_what_has_ends_says_them(
+    descriptions: dict[str, ModelDescription],
+) -> None:
+    plant, controller = (
+        {v.name: v for v in descriptions[model].modelVariables} for model in ("QuadrotorPlant", "UnifiedController")
+    )
+    assert float(plant["thrust"].nominal) == float(controller["thrust"].nominal) == 9.81
+    assert float(plant["wind.force.z"].nominal) == 0.01
+    assert (float(plant["tilt"].min), float(plant["tilt"].max)) == (0.0, math.pi)
 
 
 def test_the_default_experiment_is_30_s_in_steps_of_10_ms(description: ModelDescription) -> None:

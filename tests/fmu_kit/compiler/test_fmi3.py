@@ -79,7 +79,10 @@ def test_it_has_the_variables_of_the_other(name: str) -> None:
         "variability",
         "initial",
         "start",
+        "quantity",
         "unit",
+        "displayUnit",
+        "nominal",
         "min",
         "max",
         "valueReference",
@@ -88,6 +91,11 @@ def test_it_has_the_variables_of_the_other(name: str) -> None:
     for one, other in zip(two.modelVariables, variables, strict=True):
         assert {key: getattr(one, key) for key in common} == {key: getattr(other, key) for key in common}
         assert TYPES[one.type] == other.type
+    displayed = [
+        {unit.name: [(shown.name, shown.factor) for shown in unit.displayUnits] for unit in of.unitDefinitions}
+        for of in (two, three)
+    ]
+    assert displayed[0] == displayed[1]
     assert (time.name, time.causality, time.valueReference) == ("time", "independent", len(variables))
     for structure in ("outputs", "initialUnknowns"):
         found = [
