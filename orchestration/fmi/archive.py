@@ -24,6 +24,10 @@ class OtherVersionError(UnreadableFmuError):
     """It is an FMU, of a version of FMI that is not looked at."""
 
 
+VERSIONS = {"2.0": 2, "3.0": 3}
+"""Of FMI, that are looked at, as descriptions write them"""
+
+
 @dataclass(frozen=True, slots=True)
 class Archive:
     """The content of an .fmu file."""
@@ -94,15 +98,19 @@ def expect_honest_size(path: Path) -> None:
 
 
 def read_root(archive: Archive) -> Element:
-    """The description of an FMU; raises `UnreadableFmuError` if it is no XML, `OtherVersionError` if not FMI 2.0."""
+    """The description; raises `UnreadableFmuError` if it is no XML, `OtherVersionError` if of no known version."""
     try:
         root = ElementTree.fromstring(archive.files[DESCRIPTION])
     except ElementTree.ParseError as error:
         raise UnreadableFmuError(f"{DESCRIPTION}: expected well-formed XML: {error}") from error
     version = root.get("fmiVersion")
-    if version != "2.0":
+    if version not in VERSIONS:
         raise OtherVersionError(
-            f"fmiVersion = {version}: expected 2.0; an FMU of FMI {version} is not checked here; "
-            "fmpy validate checks its description"
+            f"fmiVersion = {version}: expected {' or '.join(VERSIONS)}; an FMU of FMI {version} is not checked here"
         )
     return root
+
+
+def version_of(root: Element) -> int:
+    """2 or 3, of a description that was read."""
+    return VERSIONS[root.get("fmiVersion", "")]

@@ -2,14 +2,13 @@
 
 import ctypes
 import math
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 from fmpy import fmi2
 
 from orchestration.basics.errors import SimulatorError, UsageError
-from orchestration.fmi.messages import WARNING, collecting_callbacks
+from orchestration.fmi.messages import WARNING
 from orchestration.fmi.native import NativeInstance
 
 
@@ -24,16 +23,8 @@ class Fmi2Instance(NativeInstance):
         if self.model.version != 2:
             raise UsageError(f"{self.path}: FMI {self.description.fmiVersion}; expected FMI 2.0 for co-simulation")
 
-    def _instantiated(self, folder: Path) -> Any:
-        fmu = fmi2.FMU2Slave(
-            guid=self.description.guid,
-            unzipDirectory=str(folder),
-            modelIdentifier=self.description.coSimulation.modelIdentifier,
-            instanceName=self.name,
-        )
-        fmu.instantiate(callbacks=collecting_callbacks(self._messages, self.name, folder), loggingOn=True)
-        self._do_step = self.watched(fmu.dll.fmi2DoStep)
-        return fmu
+    def _know(self, library: Any) -> None:
+        self._do_step = self.watched(library.fmi2DoStep)
 
     def _enter(self, start: float, stop: float | None) -> None:
         self._call("setupExperiment", tolerance=self._tolerance, startTime=start, stopTime=stop)

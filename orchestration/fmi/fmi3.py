@@ -1,7 +1,6 @@
 """An instance of an FMI 3.0 FMU for co-simulation: scalars and arrays of numbers; no clocks, no event mode."""
 
 import ctypes
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -33,23 +32,12 @@ class Fmi3Instance(NativeInstance):
         if clocks:
             raise UsageError(f"{self.path}: has clocks, which are not supported: {', '.join(clocks)}; expected none")
 
-    def _instantiated(self, folder: Path) -> Any:
-        fmu = fmi3.FMU3Slave(
-            guid=self.description.instantiationToken,
-            unzipDirectory=str(folder),
-            modelIdentifier=self.description.coSimulation.modelIdentifier,
-            instanceName=self.name,
-        )
-        fmu.instantiate(loggingOn=True, logMessage=self._log)
-        self._do_step = self.watched(fmu.dll.fmi3DoStep)
+    def _know(self, library: Any) -> None:
+        self._do_step = self.watched(library.fmi3DoStep)
         self._event, self._ends, self._early = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
         self._reached = ctypes.c_double()
         self.said = (self._event, self._ends, self._early, self._reached)
         self._said = [ctypes.byref(x) for x in self.said]
-        return fmu
-
-    def _log(self, environment: Any, status: int, category: bytes | None, message: bytes | None) -> None:
-        self._messages.append((status, category, message or b""))
 
     def _enter(self, start: float, stop: float | None) -> None:
         self._call("enterInitializationMode", tolerance=self._tolerance, startTime=start, stopTime=stop)

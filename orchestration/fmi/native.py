@@ -26,6 +26,7 @@ from orchestration.fmi import pythonfmu
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.messages import WARNING, Messages, words
 from orchestration.fmi.model import Variable, read_model
+from orchestration.fmi.slaves import instantiate, loaded
 from orchestration.fmi.surroundings import FOLDER, ROUNDING, Surroundings, sentence
 from orchestration.fmi.values import Value, number_of, same, taken
 
@@ -91,7 +92,6 @@ class NativeInstance(Instance):
             pythonfmu.expect_readable_place(self._folder.path)
             self._fmu = self._instantiated(self._folder.path)
             self.put_back()
-            pythonfmu.release_interpreter_state(self._fmu.dll)
         except Exception as error:
             self.failed = True
             self.close()
@@ -120,8 +120,8 @@ class NativeInstance(Instance):
         """Raise `UsageError` for an FMU that needs what is not done here."""
 
     @abstractmethod
-    def _instantiated(self, folder: Path) -> Any:
-        """fmpy's instance of the FMU unpacked in `folder`, its messages collected."""
+    def _know(self, library: Any) -> None:
+        """Keep what every step needs of the FMU's library."""
 
     @abstractmethod
     def _enter(self, start: float, stop: float | None) -> None:
@@ -307,6 +307,15 @@ class NativeInstance(Instance):
         return transfer
 
     # -- inside --------------------------------------------------------------------------------------------------
+
+    def _instantiated(self, folder: Path) -> Any:
+        """fmpy's instance of the FMU unpacked in `folder`, its messages collected."""
+        described = self.description
+        identifier = described.coSimulation.modelIdentifier
+        fmu = loaded(self.model.version, folder, token=described.guid, identifier=identifier, name=self.name)
+        instantiate(fmu, self._messages)
+        self._know(fmu.dll)
+        return fmu
 
     def _transfer(self, function: str, references: Sequence[int], values: Numbers) -> Transfer:
         """A call of a function of `_access` that transfers `values`."""

@@ -47,7 +47,7 @@ def _machine_rows(machine: Machine) -> Iterator[Row]:
 def _fmu_rows(verdict: Verdict, machine: Machine) -> Iterator[Row]:
     fmu, here = verdict.fmu, part_for(verdict.fmu, machine)
     for part in fmu.platforms:
-        yield from _platform_rows(part, machine, part is here)
+        yield from _platform_rows(part, machine, fmu.version, part is here)
     yield from _python_rows(fmu, machine)
     if fmu.needs_tool is not None:
         yield "tool", f"{fmu.needs_tool}, says the FMU (needsExecutionTool)", False
@@ -66,10 +66,10 @@ def _host_row(label: str, examples: str, host: Host) -> Row:
     return label, f"{examples}: {'; '.join(parts)}", not host.ready
 
 
-def _platform_rows(part: PlatformBinary, machine: Machine, here: bool) -> Iterator[Row]:
+def _platform_rows(part: PlatformBinary, machine: Machine, version: int, here: bool) -> Iterator[Row]:
     if part.binary is None:
         return
-    known = "" if part.platform in PLATFORMS else "; FMI 2.0 has no such platform"
+    known = "" if part.platform in PLATFORMS[version] else f"; FMI {version}.0 has no such platform"
     yield part.platform, f"{part.binary.target}: {'fits' if here else 'not for'} this machine{known}", False
     if part.binary.dependencies is None:
         yield "", "its dependencies are unknown", False

@@ -12,7 +12,10 @@ from typing import BinaryIO
 LINUX, WINDOWS, MACOS = "Linux", "Windows", "macOS"
 
 _ELF_SYSTEMS = {"ELFOSABI_SYSV": LINUX, "ELFOSABI_LINUX": LINUX}
-_ELF_MACHINES = {"EM_386": "x86", "EM_X86_64": "x86-64", "EM_ARM": "arm", "EM_AARCH64": "aarch64"}
+_ELF_MACHINES = {
+    **{"EM_386": "x86", "EM_X86_64": "x86-64", "EM_ARM": "arm", "EM_AARCH64": "aarch64"},
+    **{"EM_PPC": "ppc32", "EM_PPC64": "ppc64"},
+}
 _PE_MACHINES = {0x14C: "x86", 0x8664: "x86-64", 0x1C4: "arm", 0xAA64: "aarch64"}
 _MACH_MACHINES = {7: "x86", 0x01000007: "x86-64", 12: "arm", 0x0100000C: "aarch64"}
 _MACH_O = {b"\xce\xfa\xed\xfe": "<", b"\xcf\xfa\xed\xfe": "<", b"\xfe\xed\xfa\xce": ">", b"\xfe\xed\xfa\xcf": ">"}
@@ -143,9 +146,10 @@ def _read_elf(stream: BinaryIO, symbols: bool) -> Binary:
         elif symbols and isinstance(section, SymbolTableSection) and section.name == ".dynsym":
             undefined = tuple(s.name for s in section.iter_symbols() if s["st_shndx"] == "SHN_UNDEF")
     machine, abi = str(elf["e_machine"]), str(elf["e_ident"]["EI_OSABI"])
+    named = f"riscv{elf.elfclass}" if machine == "EM_RISCV" else _ELF_MACHINES.get(machine, machine)
     return Binary(
         system=_ELF_SYSTEMS.get(abi, abi),
-        architectures=(_ELF_MACHINES.get(machine, machine),),
+        architectures=(named,),
         dependencies=None
         if dependencies is None
         else tuple(Dependency(name=name, versions=required.get(name, ())) for name in dependencies),

@@ -11,19 +11,41 @@ from xml.etree.ElementTree import Element
 from fmu_kit import loader
 from orchestration.checks.doctor import sources
 from orchestration.checks.doctor.binaries import LINUX, MACOS, WINDOWS, Binary, UnreadableError, joined, origin_in, read
-from orchestration.fmi.archive import DESCRIPTION, UnreadableFmuError, read_archive, read_root
+from orchestration.fmi.archive import DESCRIPTION, UnreadableFmuError, read_archive, read_root, version_of
 
-CO_SIMULATION, MODEL_EXCHANGE = "CoSimulation", "ModelExchange"
+CO_SIMULATION = "CoSimulation"
+KINDS = {CO_SIMULATION: "co-simulation", "ModelExchange": "model exchange", "ScheduledExecution": "scheduled execution"}
+"""By the elements that declare them"""
 
-PLATFORMS = {
-    "linux32": (LINUX, ("x86",)),
-    "linux64": (LINUX, ("x86-64",)),
-    "win32": (WINDOWS, ("x86",)),
-    "win64": (WINDOWS, ("x86-64",)),
-    "darwin32": (MACOS, ("x86",)),
-    "darwin64": (MACOS, ("x86-64", "aarch64")),
+ARCHITECTURES = {
+    "x86": "x86",
+    "x86-64": "x86_64",
+    "arm": "aarch32",
+    "aarch64": "aarch64",
+    "riscv32": "riscv32",
+    "riscv64": "riscv64",
+    "ppc32": "ppc32",
+    "ppc64": "ppc64",
 }
-"""The folders that FMI 2.0 names, and the machines they stand for."""
+"""By the names of the doctor, what FMI 3.0 calls them"""
+SYSTEMS = {LINUX: "linux", WINDOWS: "windows", MACOS: "darwin"}
+"""By the names of the doctor, what FMI 3.0 calls them"""
+PLATFORMS: Mapping[int, Mapping[str, tuple[str, tuple[str, ...]]]] = {
+    2: {
+        "linux32": (LINUX, ("x86",)),
+        "linux64": (LINUX, ("x86-64",)),
+        "win32": (WINDOWS, ("x86",)),
+        "win64": (WINDOWS, ("x86-64",)),
+        "darwin32": (MACOS, ("x86",)),
+        "darwin64": (MACOS, ("x86-64", "aarch64")),
+    },
+    3: {
+        f"{architecture}-{folder}": (system, (name,))
+        for name, architecture in ARCHITECTURES.items()
+        for system, folder in SYSTEMS.items()
+    },
+}
+"""The folders that a version of FMI names, and the machines they stand for."""
 
 _SUFFIXES = {"linux": ".so", "win": ".dll", "darwin": ".dylib"}
 
@@ -45,12 +67,15 @@ class PlatformBinary:
 
 @dataclass(frozen=True, kw_only=True)
 class Fmu:
-    """What an FMI 2.0 FMU needs."""
+    """What an FMU needs."""
 
     path: Path
+    version: int
+    """2 or 3, of FMI"""
     kinds: tuple[str, ...]
     model_identifier: str
     guid: str
+    """In FMI 3.0 the instantiation token."""
     start_time: float
     """[s]; of the default experiment, 0 if it has none"""
     needs_tool: str | None
@@ -63,23 +88,25 @@ class Fmu:
 
 
 def read_fmu(path: Path, size_limit: float = math.inf) -> Fmu:
-    """What a file says; raises `UnreadableFmuError` if it is not an FMI 2.0 FMU, or unpacks to over `size_limit` MB."""
+    """What a file says; raises `UnreadableFmuError` if it is no FMU, or unpacks to over `size_limit` MB."""
     archive = read_archive(path, size_limit)
     description = read_root(archive)
-    kinds = tuple(kind for kind in (CO_SIMULATION, MODEL_EXCHANGE) if description.find(kind) is not None)
+    version = version_of(description)
+    kinds = tuple(kind for kind in KINDS if description.find(kind) is not None)
     chosen = description.find(kinds[0]) if kinds else None
     if chosen is None:
-        raise UnreadableFmuError(f"expected {CO_SIMULATION} or {MODEL_EXCHANGE} in {DESCRIPTION}")
+        raise UnreadableFmuError(f"expected {' or '.join(list(KINDS)[:version])} in {DESCRIPTION}")
     declared = description.find("VendorAnnotations/Tool[@name='quadcosim']/Python")
     tool = description.get("generationTool", "the tool that made it")
     return Fmu(
         path=path,
+        version=version,
         kinds=kinds,
         model_identifier=chosen.get("modelIdentifier", ""),
-        guid=description.get("guid", ""),
+        guid=description.get("guid" if version == 2 else "instantiationToken", ""),
         start_time=_start_time(description),
         needs_tool=tool if chosen.get("needsExecutionTool") in ("true", "1") else None,
-        platforms=_platforms(archive.files, chosen.get("modelIdentifier", "")),
+        platforms=_platforms(archive.files, version, chosen.get("modelIdentifier", "")),
         requires_python=None if declared is None else declared.get("requires"),
         python=sources.read(archive.files),
     )
@@ -93,14 +120,20 @@ def _start_time(description: Element) -> float:
         return 0.0
 
 
-def _platforms(files: Mapping[str, bytes], identifier: str) -> tuple[PlatformBinary, ...]:
+def _platforms(files: Mapping[str, bytes], version: int, identifier: str) -> tuple[PlatformBinary, ...]:
     parts = [name.split("/") for name in files]
     folders = sorted({part[1] for part in parts if part[0] == "binaries" and len(part) > 2 and part[2]})
-    return tuple(_platform(files, folder, identifier) for folder in folders)
+    return tuple(_platform(files, version, folder, identifier) for folder in folders if not _is_static(version, folder))
 
 
-def _platform(files: Mapping[str, bytes], folder: str, identifier: str) -> PlatformBinary:
-    suffixes = [suffix for system, suffix in _SUFFIXES.items() if folder.startswith(system)] or _SUFFIXES.values()
+def _is_static(version: int, folder: str) -> bool:
+    """Whether FMI 3.0 has libraries for linking there: a compiler's name comes after that of the system."""
+    return version == 3 and folder.count("-") > 1
+
+
+def _platform(files: Mapping[str, bytes], version: int, folder: str, identifier: str) -> PlatformBinary:
+    called = folder if version == 2 else folder.rpartition("-")[2]
+    suffixes = [suffix for system, suffix in _SUFFIXES.items() if called.startswith(system)] or _SUFFIXES.values()
     expected = [f"binaries/{folder}/{identifier}{suffix}" for suffix in suffixes]
     found = next((name for name in expected if name in files), None)
     if found is None:
@@ -114,7 +147,7 @@ def _platform(files: Mapping[str, bytes], folder: str, identifier: str) -> Platf
         return PlatformBinary(platform=folder, problem=f"{found}: {error}")
     looked_at = {f"binaries/{folder}"} if binary.system == WINDOWS else set(_inside(binary, folder))
     bundled = {name for name in binary.dependency_names for place in looked_at if f"{place}/{name}" in files}
-    problem = _mismatch(folder, binary)
+    problem = _mismatch(version, folder, binary)
     return PlatformBinary(
         platform=folder, binary=binary, finds_python=finds_python, bundled=frozenset(bundled), problem=problem
     )
@@ -126,11 +159,11 @@ def _inside(binary: Binary, folder: str) -> list[str]:
     return [posixpath.normpath(origin_in(entry, own)) for entry in binary.run_path]
 
 
-def _mismatch(folder: str, binary: Binary) -> str | None:
+def _mismatch(version: int, folder: str, binary: Binary) -> str | None:
     """What is wrong if the header of a binary speaks of another machine than its folder."""
-    if folder not in PLATFORMS:
+    if folder not in PLATFORMS[version]:
         return None
-    system, architectures = PLATFORMS[folder]
+    system, architectures = PLATFORMS[version][folder]
     if binary.system == system and set(binary.architectures) <= set(architectures):
         return None
     return f"a binary for {binary.target}, expected {system}, {' or '.join(architectures)} in this folder"

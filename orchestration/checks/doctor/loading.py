@@ -7,20 +7,18 @@ folder, an empty one, and says what comes of it: an `error`, or the `fmu` and wh
 import importlib
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from orchestration.basics.errors import QuadcosimError, UsageError
-from orchestration.checks.doctor.fmu import CO_SIMULATION, Fmu, read_fmu
+from orchestration.checks.doctor.fmu import CO_SIMULATION, KINDS, Fmu, read_fmu
 from orchestration.fmi.archive import OtherVersionError, UnreadableFmuError
 from orchestration.processes import subprocesses
 from orchestration.processes.channel import Parent
 from orchestration.processes.child import Child, Ending
 from orchestration.processes.limits import Limits, restrict
-
-_MODEL_EXCHANGE = "not tried: it is for model exchange only"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +33,7 @@ class Trial:
 def attempt(path: Path, limits: Limits) -> Trial:
     """Read, load and initialise an FMU in this Python.
 
-    Raises `UsageError` if it is none, `OtherVersionError` if it is not of FMI 2.0.
+    Raises `UsageError` if it is none, `OtherVersionError` if it is of another version than FMI 2.0 and 3.0.
 
     Where variables of the environment may mislead Python, it is tried without them first.
     """
@@ -67,7 +65,9 @@ def _attempt(path: Path, limits: Limits, environment: Mapping[str, str]) -> Tria
         words = f": {ending.said}" if ending.said else ""
         raise UsageError(f"{path}: could not be read, the process {ending.described}{words}")
     fmu: Fmu = found["fmu"]
-    return Trial(fmu=fmu, failure=_failure(found, ending) if CO_SIMULATION in fmu.kinds else _MODEL_EXCHANGE)
+    if CO_SIMULATION not in fmu.kinds:
+        return Trial(fmu=fmu, failure=f"not tried: it is for {' and '.join(KINDS[kind] for kind in fmu.kinds)} only")
+    return Trial(fmu=fmu, failure=_failure(found, ending))
 
 
 def _failure(found: dict[str, Any], ending: Ending) -> str | None:
@@ -101,33 +101,38 @@ def main(path: Path, folder: Path, size_limit: float, say: Callable[[object], No
 def _load(fmu: Fmu, folder: Path) -> None:
     """With what its description must say and no more: it may be odd in what loading does not need."""
     import fmpy
-    from fmpy import fmi2
 
-    from orchestration.fmi.messages import Message, collecting_callbacks, words
-    from orchestration.fmi.pythonfmu import expect_readable_place, release_interpreter_state
+    from orchestration.fmi.messages import Message, words
+    from orchestration.fmi.pythonfmu import expect_readable_place
+    from orchestration.fmi.slaves import FOLDERS, instantiate, loaded
 
-    if fmpy.platform not in fmpy.supported_platforms(str(fmu.path)):
-        raise QuadcosimError(f"has no binary for {fmpy.platform}")
+    here = FOLDERS[fmu.version]
+    if here not in {part.platform for part in fmu.platforms}:
+        raise QuadcosimError(f"has no binary for {here}")
     fmpy.extract(str(fmu.path), str(folder))
     expect_readable_place(folder)
     messages: list[Message] = []
     call = "loading"
     try:
-        slave = fmi2.FMU2Slave(
-            guid=fmu.guid, unzipDirectory=str(folder), modelIdentifier=fmu.model_identifier, instanceName="doctor"
-        )
-        call = "fmi2Instantiate"
-        slave.instantiate(callbacks=collecting_callbacks(messages, "doctor", folder), loggingOn=True)
-        release_interpreter_state(slave.dll)
-        call = "fmi2SetupExperiment"
-        slave.setupExperiment(startTime=fmu.start_time)
-        call = "fmi2EnterInitializationMode"
-        slave.enterInitializationMode()
-        call = "fmi2ExitInitializationMode"
-        slave.exitInitializationMode()
+        slave = loaded(fmu.version, folder, token=fmu.guid, identifier=fmu.model_identifier, name="doctor")
+        call = "fmi2Instantiate" if fmu.version == 2 else "fmi3InstantiateCoSimulation"
+        instantiate(slave, messages)
+        for call, make in _initialisation(slave, fmu):  # noqa: B007 - the last one is named where it fails
+            make()
     except Exception as error:
         raise QuadcosimError(f"{call}: {words(messages, str(error))[0]}") from error
     slave.freeInstance()
+
+
+def _initialisation(slave: Any, fmu: Fmu) -> Iterator[tuple[str, Callable[[], object]]]:
+    """The calls that initialise an instance, by the names of their functions."""
+    enter, start = slave.enterInitializationMode, fmu.start_time
+    if fmu.version == 2:
+        yield "fmi2SetupExperiment", lambda: slave.setupExperiment(startTime=start)
+        yield "fmi2EnterInitializationMode", enter
+    else:
+        yield "fmi3EnterInitializationMode", lambda: enter(startTime=start)
+    yield f"fmi{fmu.version}ExitInitializationMode", slave.exitInitializationMode
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from orchestration.checks.doctor import loader
 from orchestration.checks.doctor.binaries import LINUX, MACOS, WINDOWS
-from orchestration.checks.doctor.fmu import Fmu
+from orchestration.checks.doctor.fmu import ARCHITECTURES, SYSTEMS, Fmu
 from orchestration.checks.doctor.loader import Loader
 from orchestration.checks.doctor.pythons import PythonLibrary, python_libraries
 
@@ -59,9 +59,10 @@ class Machine:
     modules: Mapping[str, bool] = field(default_factory=dict)
     """Whether this Python can import a module."""
 
-    @property
-    def platform(self) -> str:
-        """The folder in `binaries/` that FMI 2.0 tools look into here."""
+    def platform(self, version: int) -> str:
+        """The folder in `binaries/` that tools of a version of FMI look into here."""
+        if version == 3:
+            return f"{ARCHITECTURES.get(self.architecture, self.architecture)}-{SYSTEMS.get(self.system, self.system)}"
         return _FOLDERS.get(self.system, self.system) + ("64" if self.architecture in _ON_64_BITS else "32")
 
 

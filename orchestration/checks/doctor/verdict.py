@@ -90,7 +90,9 @@ class Unjudged:
 def judge(fmu: Fmu, machine: Machine, failure: str | None) -> Verdict:
     """Compare; `failure` is what trying to load it here gave."""
     hosts = python_host(fmu, machine), other_host(fmu, machine)
-    return Verdict(fmu=fmu, platform=machine.platform, python_host=hosts[0], other_host=hosts[1], failure=failure)
+    return Verdict(
+        fmu=fmu, platform=machine.platform(fmu.version), python_host=hosts[0], other_host=hosts[1], failure=failure
+    )
 
 
 def python_host(fmu: Fmu, machine: Machine) -> Host:

@@ -5,7 +5,7 @@ from typing import NoReturn
 from xml.etree.ElementTree import Element
 
 from fmu_kit.packaging import SOURCE_HASH_FILE
-from orchestration.fmi.archive import DESCRIPTION, Archive, UnreadableFmuError, read_root
+from orchestration.fmi.archive import DESCRIPTION, Archive, OtherVersionError, UnreadableFmuError, read_root, version_of
 
 TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 NUMBERS = ("Real", "Integer", "Enumeration")
@@ -117,6 +117,11 @@ class Fmu:
 def read_co_simulation(archive: Archive) -> Element:
     """The description of an FMU; raises `UnreadableFmuError` if it is not of FMI 2.0 for co-simulation."""
     root = read_root(archive)
+    if version_of(root) != 2:
+        raise OtherVersionError(
+            "fmiVersion = 3.0: expected 2.0; an FMU of FMI 3.0 is not checked here; "
+            "fmpy validate checks its description"
+        )
     if root.find("CoSimulation") is None:
         raise UnreadableFmuError(f"{DESCRIPTION}: expected a CoSimulation element, nothing else was checked")
     return root

@@ -3,15 +3,15 @@
 import struct
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, TypeAlias
 
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
 from orchestration.basics.errors import QuadcosimError
 from orchestration.checks.validation.fmu import Fmu, Variable
-from orchestration.fmi.messages import Message, collecting_callbacks, words
-from orchestration.fmi.pythonfmu import release_interpreter_state
+from orchestration.fmi.messages import Message, words
+from orchestration.fmi.slaves import instantiate, loaded
 
 Value: TypeAlias = float | int | bool | str
 Values: TypeAlias = Mapping[str, Value]
@@ -28,24 +28,6 @@ class RefusedError(QuadcosimError):
     """The FMU did not carry out a call; the text names the call and has the FMU's own words."""
 
 
-class FMU2Slave(fmi2.FMU2Slave):  # type: ignore[misc]  # fmpy has no types; by this name it knows the version
-    """As fmpy's, which takes the signatures of all functions apart for each instance: here they are known once.
-
-    A validation makes 150 instances, which took it a third of its time.
-    """
-
-    _known: ClassVar[dict[str, tuple[Any, Any, Any]]] = {}
-
-    def _loadFunctions(self) -> None:  # noqa: N802
-        if not self._known:
-            super()._loadFunctions()
-            self._known.update({name: (f.argnames, f.argtypes, f.restype) for name, f in self._functions.items()})
-        for name, (names, types, result) in self._known.items():
-            function = getattr(self.dll, name)
-            function.argnames, function.argtypes, function.restype = names, types, result
-            self._functions[name] = function
-
-
 class Instance:
     """One instance; after a call that failed it is never called again, not even to free it."""
 
@@ -57,13 +39,10 @@ class Instance:
         self._beat = beat
         beat()
         try:
-            self._slave = FMU2Slave(
-                guid=fmu.guid, unzipDirectory=str(folder), modelIdentifier=fmu.model_identifier, instanceName=name
-            )
-            self._slave.instantiate(callbacks=collecting_callbacks(self.messages, name, folder), loggingOn=True)
+            self._slave = loaded(2, folder, token=fmu.guid, identifier=fmu.model_identifier, name=name)
+            instantiate(self._slave, self.messages)
         except Exception as error:
             raise RefusedError(f"fmi2Instantiate: {words(self.messages, str(error))[0]}") from error
-        release_interpreter_state(self._slave.dll)
         beat()
         self._failed = False
 
