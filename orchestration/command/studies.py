@@ -121,17 +121,17 @@ def draw(
     study: StudyFile,
     out: Out = None,
     metric: Annotated[
-        str | None, typer.Option("--metric", help="What to draw; default: the objective of the criterion.")
+        str | None, typer.Option("--metric", help="What to draw; default: the first objective that varies.")
     ] = None,
     *,
     look: FigureFlags,
 ) -> Answer:
     """Draw a study: a metric over one or two axes with what is good, or sensitivity bars."""
-    from orchestration.studies.drawing import draw_study, metric_of
+    from orchestration.studies.drawing import draw_study, expect_metric
     from orchestration.studies.study_file import load_study
 
     chosen = load_study(study)
-    metric = metric_of(chosen, metric)
+    expect_metric(chosen, metric)
     _current_store(study, out)
     return of_files(draw_study(chosen, out, metric, look.chosen))
 

@@ -7,11 +7,13 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PatchCollection
-from matplotlib.colors import ListedColormap, LogNorm
+from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.patches import Patch, Rectangle
 
 from orchestration.basics.simulator import Floats
 from orchestration.figures.palette import GREY, RED, SHADES
+from orchestration.figures.shades import shades_of
+from orchestration.figures.ticks import plain
 
 LIMIT = {"colors": RED, "linewidths": 1.8}
 """How the line between what is good and what is not looks"""
@@ -32,17 +34,26 @@ def edges(values: Sequence[float] | Floats, *, logarithmic: bool = False) -> Flo
 def fill(panel: Axes, x: Floats, y: Floats, values: Floats, **how: Any) -> Any:
     """Colour cells between edges `x` and `y` by `values`, shape (rows, columns); none where they are nan.
 
-    Logarithmic in the values unless `norm` or `vmin` say otherwise or nothing is positive. Returns what a colour bar
-    is made of.
+    From which value to which the colours go is as `shades_of` says unless `vmin` does. Returns what a colour bar is
+    made of.
     """
-    if not {"norm", "vmin", "cmap"} & set(how) and (values[np.isfinite(values)] > 0.0).any():
-        how["norm"] = LogNorm()
+    if "vmin" not in how and (shades := shades_of(values)) is not None:
+        how["norm"] = (LogNorm if shades.logarithmic else Normalize)(shades.low, shades.high)
     panel.grid(False)
     mesh = panel.pcolormesh(
         x, y, np.ma.masked_invalid(values), shading="flat", **{"cmap": SHADES, "rasterized": True, **how}
     )
     panel.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
     return mesh
+
+
+def color_bar(panel: Axes, mesh: Any, values: Floats, label: str) -> None:
+    """What the colours of `values` stand for, with an arrow where some lie beyond; nothing where there is none."""
+    shades = shades_of(values)
+    if shades is not None:
+        ends = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+        bar = panel.get_figure().colorbar(mesh, ax=panel, label=label, extend=ends[shades.leaves_out])  # type: ignore[union-attr]
+        plain(bar.ax.yaxis)
 
 
 def fill_kinds(panel: Axes, x: Floats, y: Floats, kinds: Floats, colors: Sequence[str]) -> None:

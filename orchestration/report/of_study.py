@@ -7,20 +7,24 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from orchestration.basics.errors import UsageError
-from orchestration.expressions.syntax import names, parse
+from orchestration.basics.simulator import Floats
 from orchestration.report.blobs import Blobs
 from orchestration.report.flights import Flight, Progress, fastest, fly
 from orchestration.report.model import Report, Run, Setting, Share
 from orchestration.report.number_format import percent
 from orchestration.report.subset import ALONE, MOST, chosen, points_for
-from orchestration.report.tables import ColumnAxis, Row, share_of, shares_along, table_of
+from orchestration.report.tables import ColumnAxis, Row, is_good, share_of, shares_along, table_of
 from orchestration.report.tracks import Tracks
 from orchestration.results import display_names as labels
 from orchestration.results.column_info import described
+from orchestration.results.criterion import judged
 from orchestration.results.quantities import quantity
 from orchestration.studies.axis_labels import quantity_of
-from orchestration.studies.store import TEXTS, UNITS, open_for_reading
+from orchestration.studies.shown_first import shown_first
+from orchestration.studies.store import FIXED, TEXTS, UNITS, open_for_reading
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import AGREEMENT, expect_current
 from orchestration.system.model import DIVERGED, TERMINATED
@@ -140,14 +144,13 @@ def _values(stored: Stored, axis: str) -> list[Any]:
 
 
 def metric_of(stored: Stored, study: Study | None) -> str:
-    """What the criterion is about, else the first objective."""
-    if study is not None and study.origin.criterion.good is not None:
-        named = names(parse(study.origin.criterion.good))
-        for name in named:
-            if name in stored.metrics:
-                return name
-    fixed = ("good", "horizon", "diverged", "divergence_time", "steps")
-    return next((name for name in stored.metrics if name not in fixed), "steps")
+    """What is drawn first, as in figures of the study."""
+
+    def values(name: str) -> Floats:
+        return np.array([float(row[name]) for row in stored.rows if is_good(row) and row[name] is not None])
+
+    preferred = None if study is None else judged(study.origin)
+    return shown_first((name for name in stored.metrics if name not in FIXED), values, preferred)
 
 
 def words_of(stored: Stored, study: Study | None) -> tuple[str, str]:

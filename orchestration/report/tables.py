@@ -95,10 +95,9 @@ def _metrics(rows: Sequence[Row], metrics: Sequence[str], units: Mapping[str, st
         values = np.array([math.nan if row[name] is None else float(row[name]) for row in rows])
         known = values[np.isfinite(values)]
         if len(known) and name not in ("good", "diverged"):
-            spread = bool((known > 0.0).all() and known.max() > 50.0 * known.min())
             yield Column(
                 name=name, label=labels.metric(name), unit=labels.unit(units.get(name)), kind="metric",
-                values=blobs.exact(values), logarithmic=spread,
+                values=blobs.exact(values),
             )  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from orchestration.results.criterion import edge, judged
 from orchestration.studies import figures, sensitivity
 from orchestration.studies.axes import Axis, unit_points
 from orchestration.studies.maps import heat_map
+from orchestration.studies.shown_first import shown_first
 from orchestration.studies.store import TEXTS, metrics_with, store_path
 from orchestration.studies.study import Study
 from orchestration.studies.table import frame, units_in
@@ -22,18 +23,15 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def metric_of(study: Study, metric: str | None) -> str:
-    """The metric that was asked for, else the one that the criterion is about; raises `UsageError` for none."""
-    system = study.origin
-    known = [name for name in metrics_with(system.objectives) if name not in TEXTS or _is_screened(study)]
-    chosen = (judged(system) or "horizon") if metric is None else metric
-    if chosen not in known:
-        raise UsageError(f"metric {chosen}: expected one of {', '.join(known)}; every figure shows the outcome")
-    return chosen
+def expect_metric(study: Study, metric: str | None) -> None:
+    """Raise `UsageError` for a metric that was asked for and is none."""
+    known = [name for name in metrics_with(study.origin.objectives) if name not in TEXTS or _is_screened(study)]
+    if metric is not None and metric not in known:
+        raise UsageError(f"metric {metric}: expected one of {', '.join(known)}; every figure shows the outcome")
 
 
 def draw_study(study: Study, folder: Path | None, metric: str | None = None, style: Style = SCREEN) -> list[Path]:
-    """Draw what is in the store of `study`, by default what its criterion is about; the paths of figures and tables.
+    """Draw what is in the store of `study`, by default the first objective that varies; the paths.
 
     Raises `UsageError` for a metric that does not exist, or axes that no figure here is for.
     """
@@ -50,8 +48,10 @@ def study_figures(
 
     Raises `UsageError` as `draw_study` does.
     """
-    metric = metric_of(study, metric)
+    expect_metric(study, metric)
     table, units = frame(store), units_in(store)
+    if metric is None:
+        metric = _shown_first(study, table)
     indices = indices_of(study, numbers(table, metric), metric) if _is_screened(study) else []
     with style.applied():
         if indices:
@@ -92,6 +92,13 @@ def numbers(table: "pd.DataFrame", metric: str) -> Floats:
     """A metric run by run, shape (n,); of the outcome, 1 for a run that is good, 0 for one that is not."""
     values = figures.flew(table).astype(float).where(table["outcome"].notna()) if metric == "outcome" else table[metric]
     return np.asarray(values.to_numpy(float, na_value=np.nan))
+
+
+def _shown_first(study: Study, table: "pd.DataFrame") -> str:
+    good, system = figures.flew(table), study.origin
+    return shown_first(
+        system.objectives, lambda name: table[name].where(good).to_numpy(float, na_value=np.nan), judged(system)
+    )
 
 
 def _is_screened(study: Study) -> bool:

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from orchestration.basics.simulator import Floats
 from orchestration.basics.statistics import wilson
 from orchestration.basics.units import after
 from orchestration.figures.palette import BLUE, GREY, ORANGE, RED, SHADES
+from orchestration.figures.shades import is_wide
 from orchestration.figures.style import SCREEN, Style
 from orchestration.figures.style import save as write
 from orchestration.figures.ticks import plain
@@ -40,7 +42,8 @@ def lines(
 ) -> Figure:
     """A metric against the first axis, one line for each value of the second; what is not good is crossed.
 
-    What diverged has no metric; it is marked along the lower edge. `units` are those of metrics and axes that have one.
+    What diverged has no metric; it is marked along the lower edge, in a row for each line. `units` are those of metrics
+    and axes that have one.
     """
     figure = style.figure(35.0)
     panel = figure.add_subplot()
@@ -48,6 +51,7 @@ def lines(
     across, second = quantity_of(x, units), quantity_of(axes[-1], units)
     groups = [(None, table)] if len(axes) == 1 else list(table.groupby(axes[1].name, sort=True))
     colors = matplotlib.colormaps[SHADES](np.linspace(0.0, 0.9, len(groups)))
+    diverged: dict[str | tuple[float, ...], Floats] = {}
     for (value, group), color in zip(groups, [BLUE] if len(groups) == 1 else colors, strict=True):
         ordered = group.sort_values(x.name)
         fell = ~flew(ordered)
@@ -55,25 +59,40 @@ def lines(
         named = None if value is None else f"{float(second.of(value)):g}"
         panel.plot(at, np.where(fell, np.nan, y), ".-", color=color, label=named)
         panel.plot(at[fell], y[fell], "x", color=color, markersize=5)
-        down = at[(ordered["outcome"] == "diverged").to_numpy()]
-        panel.plot(
-            down, np.full(len(down), 0.02), "v", color=color, markersize=4, transform=panel.get_xaxis_transform()
-        )
-    panel.plot([], [], ".-", color=BLUE if len(groups) == 1 else GREY, label=words[0])
-    panel.plot([], [], "x", color=GREY, label=words[1])
-    panel.plot([], [], "v", color=GREY, markersize=4, label="diverged")
+        diverged[color if len(groups) == 1 else tuple(color)] = at[(ordered["outcome"] == DIVERGED).to_numpy()]
+    there = {*table["outcome"].dropna()}
+    for word, mark in ((words[0], ".-"), (words[1], "x"), (TERMINATED, "x"), (DIVERGED, "v")):
+        if word in there:
+            color = BLUE if len(groups) == 1 and word == words[0] else GREY
+            panel.plot([], [], mark, color=color, markersize=4 if mark == "v" else None, label=word)
     panel.set(
         xlabel=across.title, ylabel=labels.metric_with_unit(metric, units.get(metric)), yscale=_scale(table[metric])
     )
     panel.set_xscale(SCALES[x.scale])
-    plain(panel.yaxis)
     if edge is not None:
         panel.axhline(
             edge, color=RED, linewidth=0.8, linestyle="--", label=f"{words[0]} up to {edge:g}{after(units.get(metric))}"
         )
+    _mark_diverged(panel, {color: at for color, at in diverged.items() if len(at)})
+    plain(panel.yaxis)
     handles, names = panel.get_legend_handles_labels()
     figure.legend(handles, names, title=None if len(axes) == 1 else second.title, loc="outside right upper")
     return figure
+
+
+def _mark_diverged(panel: Axes, places: Mapping[str | tuple[float, ...], Floats]) -> None:
+    """Triangles along the lower edge, in a row for each colour, below all that is drawn."""
+    if not places:
+        return
+    step = min(0.022, 0.25 / len(places))
+    share = step * (len(places) + 1)
+    scale = panel.yaxis.get_transform()
+    low, high = (scale.transform(end) for end in panel.get_ylim())
+    bottom = scale.inverted().transform(low - (high - low) * share / (1.0 - share))
+    panel.set_ylim(bottom=float(np.asarray(bottom)))
+    for row, (color, at) in enumerate(places.items(), start=1):
+        across = panel.get_xaxis_transform()
+        panel.plot(at, np.full(len(at), row * step), "v", color=color, markersize=4, transform=across)
 
 
 def scatter(
@@ -101,10 +120,9 @@ def scatter(
     for panel in panels[len(axes) :]:
         panel.set_visible(False)
     figure.supylabel(labels.metric_with_unit(metric, units.get(metric)))
-    kinds = zip((*words, DIVERGED), ("dots", "crosses", "below"), strict=True)
-    counts = [f"{int((table['outcome'] == kind).sum())} {kind} ({mark})" for kind, mark in kinds]
-    terminated = int((table["outcome"] == TERMINATED).sum())
-    counts += [f"{terminated} {TERMINATED} (crosses)"] if terminated else []
+    kinds = zip((*words, TERMINATED, DIVERGED), ("dots", "crosses", "crosses", "below"), strict=True)
+    counted = [(int((table["outcome"] == kind).sum()), kind, mark) for kind, mark in kinds]
+    counts = [f"{count} {kind} ({mark})" for count, kind, mark in counted if count]
     low, high = wilson(int((~fell).sum()), len(table))
     figure.suptitle(
         f"{len(table)} runs: {', '.join(counts)}{by_horizon(table)}\n"
@@ -186,7 +204,7 @@ def by_horizon(table: "pd.DataFrame") -> str:
 
 
 def _scale(values: "pd.Series") -> str:
-    return "log" if (values.dropna().astype(float) > 0.0).any() else "linear"
+    return "log" if is_wide(values.to_numpy(float, na_value=np.nan)) else "linear"
 
 
 _KINDS = {

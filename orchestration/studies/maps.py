@@ -14,7 +14,6 @@ from orchestration.figures import cells
 from orchestration.figures.palette import DIVERGED as DARK
 from orchestration.figures.palette import NOT_GOOD, RED, SHADES
 from orchestration.figures.style import SCREEN, Style
-from orchestration.figures.ticks import plain
 from orchestration.results import display_names as labels
 from orchestration.studies.axes import Axis
 from orchestration.studies.axis_labels import SCALES, edges, quantity_of
@@ -34,7 +33,10 @@ def heat_map(
     units: Mapping[str, str],
     style: Style = SCREEN,
 ) -> Figure:
-    """A metric where runs are good, the outcome where not, the limit between the two; what is missing is hatched."""
+    """A metric where runs are good, the outcome where not, the limit between the two; what is missing is hatched.
+
+    Outcomes are told where they occur.
+    """
     kinds = {words[0]: 0, words[1]: 1, TERMINATED: 1, DIVERGED: 2}
     coded = table.assign(flew=flew(table).astype(float), kind=table["outcome"].map(kinds).astype(float))
     coded.loc[table["outcome"].isna(), "flew"] = np.nan
@@ -44,21 +46,23 @@ def heat_map(
     figure = style.figure(36.0)
     panel = figure.add_subplot()
     cells.fill_kinds(panel, x, y, np.where(kind > 0.0, kind - 1.0, np.nan), (NOT_GOOD, DARK))
-    mesh = cells.fill(panel, x, y, np.where(good > 0.5, values, np.nan))
+    shown = np.where(good > 0.5, values, np.nan)
+    mesh = cells.fill(panel, x, y, shown)
     cells.hatch(panel, x, y, np.isnan(kind))
     has_limit = cells.limit(panel, x, y, good) is not None
     panel.set(xlabel=across.title, ylabel=up.title, xscale=SCALES[axes[0].scale], yscale=SCALES[axes[1].scale])
     named = labels.metric_with_unit(metric, units.get(metric))
-    bar = figure.colorbar(mesh, ax=panel, label=f"{named}, where {words[0]}")
-    plain(bar.ax.yaxis)
-    bad = f"{words[1]} or {TERMINATED}" if (table["outcome"] == TERMINATED).any() else words[1]
-    shown: list[Patch | Line2D] = [
-        Patch(color=matplotlib.colormaps[SHADES](0.5), label=words[0]),
-        *(Patch(color=color, label=word) for word, color in ((bad, NOT_GOOD), (DIVERGED, DARK))),
-        *([cells.hatched()] if np.isnan(kind).any() else []),
-        *([Line2D([], [], color=RED, label=f"limit of what is {words[0]}{by_horizon(table)}")] if has_limit else []),
+    cells.color_bar(panel, mesh, shown, f"{named}, where {words[0]}")
+    there = {*table["outcome"].dropna()}
+    bad = " or ".join(word for word in (words[1], TERMINATED) if word in there)
+    told: list[Patch | Line2D] = [
+        Patch(color=color, label=word)
+        for word, color in ((words[0], matplotlib.colormaps[SHADES](0.5)), (bad, NOT_GOOD), (DIVERGED, DARK))
+        if word and (word == bad or word in there)
     ]
-    figure.legend(handles=shown, loc="outside lower center", ncols=len(shown) if style.is_wide else 2)
+    told += [cells.hatched()] if np.isnan(kind).any() else []
+    told += [Line2D([], [], color=RED, label=f"limit of what is {words[0]}{by_horizon(table)}")] if has_limit else []
+    figure.legend(handles=told, loc="outside lower center", ncols=len(told) if style.is_wide else 2)
     return figure
 
 

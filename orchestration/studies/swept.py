@@ -56,7 +56,7 @@ class Swept:
 
     @explained
     def plot(self, metric: str | None = None) -> "Figures":
-        """The figures of a metric over the axes, by default of what the criterion is about; a notebook shows them.
+        """The figures of a metric over the axes, by default of the first that varies; a notebook shows them.
 
         Raises `UsageError` for a metric that does not exist, or axes that no figure is for.
         """

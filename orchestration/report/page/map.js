@@ -5,8 +5,9 @@ const MARKS = { good: "circle", bad: "x-thin-open", diverged: "triangle-down-ope
 const EDGE = "#D55E00";
 const MOST_SYMBOLS = 2500;
 const VALUE = "value";
+const [OUTER, MOST, LEAST, WIDE] = [0.02, 2.5, 0.05, 50]; // as in figures: figures/shades.py says what each is
 
-const map = { x: null, y: null, metric: null, fixed: {}, row: null, rows: [], isGrid: false };
+const map = { x: null, y: null, metric: null, fixed: {}, row: null, rows: [], isGrid: false, shades: null };
 
 function startMap() {
   byId("map").hidden = false;
@@ -69,6 +70,7 @@ function rowsOfSlice() {
 function drawMap() {
   map.rows = rowsOfSlice();
   map.isGrid = report.table.is_grid && map.y !== VALUE;
+  map.shades = shadesOf(map.rows.filter((row) => kindOf(outcomeOf(row)) === "good").map((row) => cellOf(map.metric, row)));
   const traces = map.isGrid ? gridTraces() : pointTraces();
   const holder = byId("map-plot");
   return Plotly.react(holder, [...traces, chosenTrace()], mapLayout(), PLOTLY).then(() => {
@@ -80,10 +82,15 @@ function drawMap() {
 
 function mapHint() {
   const flights = report.runs.length ? ` ${report.runs.length} of ${report.table.count} have their flight in this file.` : "";
+  const there = new Set(map.rows.map((row) => kindOf(outcomeOf(row))));
   const [good, bad] = report.words;
-  const signs = map.isGrid ? `Colour: ${good}; light grey ✕: ${bad}; dark grey ▽: diverged; orange line: edge of what is ${good}.` : `Discs: ${good}; ✕: ${bad}; ▽: diverged.`;
-  const clipped = map.isClipped ? " The colours leave out the outermost 2 % to each side." : "";
-  return `${signs}${clipped} Click, or move with the arrow keys, to open a run.${flights}`;
+  const signs = map.isGrid
+    ? { good: `Colour: ${good}`, bad: `light grey ✕: ${bad}`, diverged: "dark grey ▽: diverged" }
+    : { good: `Discs: ${good}`, bad: `✕: ${bad}`, diverged: "▽: diverged" };
+  const told = ["good", "bad", "diverged"].filter((kind) => there.has(kind)).map((kind) => signs[kind]);
+  if (map.isGrid && there.has("good") && there.size > 1) told.push(`orange line: edge of what is ${good}`);
+  const clipped = map.shades.isClipped ? " Some values lie beyond the colours, which are for the others." : "";
+  return `${told.join("; ")}.${clipped} Click, or move with the arrow keys, to open a run.${flights}`;
 }
 
 function rowOfPoint(point) {
@@ -109,29 +116,38 @@ function lineOf(axis, row) {
   return axis.lines.get(value);
 }
 
-/** Whether colour and height go by the logarithm of the metric. */
-function isLogarithmic() {
-  return map.metric.logarithmic;
+/** Whether values are of different orders of magnitude. */
+function isWide(values) {
+  const known = values.filter(Number.isFinite);
+  const [low, high] = known.reduce(([a, b], value) => [Math.min(a, value), Math.max(b, value)], [Infinity, -Infinity]);
+  return low > 0 && high > WIDE * low;
 }
 
-/** The ends of the colours: of all values, or without the outermost fiftieths where those would take most of them. */
-function colorEnds(values) {
-  const sorted = values.filter(Number.isFinite).sort((a, b) => a - b);
-  if (!sorted.length) return [0, 1];
-  const at = (share) => sorted[Math.round(share * (sorted.length - 1))];
-  const [low, high, inner, outer] = [sorted[0], sorted.at(-1), at(0.02), at(0.98)];
-  map.isClipped = sorted.length >= 20 && high - low > 2.5 * (outer - inner) && outer > inner;
-  return map.isClipped ? [inner, outer] : [low, high];
+/** What the first colour and the last stand for, as their logarithms where that is wide. */
+function shadesOf(values) {
+  const known = values.filter(Number.isFinite).sort((a, b) => a - b);
+  if (!known.length) return { low: 0, high: 1, isLogarithmic: false, isClipped: false };
+  const isLogarithmic = isWide(known);
+  const scaled = isLogarithmic ? known.map(Math.log10) : known;
+  const at = (share) => scaled[Math.round(share * (scaled.length - 1))];
+  const within = at(1 - OUTER) - at(OUTER);
+  const hasOutliers = scaled.length >= 20 && within > 0 && scaled.at(-1) - scaled[0] > MOST * within;
+  const ends = hasOutliers ? [at(OUTER), at(1 - OUTER)] : [scaled[0], scaled.at(-1)];
+  const middle = (ends[0] + ends[1]) / 2;
+  const half = (LEAST / 2) * (isLogarithmic ? Math.LOG10E : Math.max(Math.abs(known[0]), Math.abs(known.at(-1))));
+  const [low, high] = [Math.min(ends[0], middle - half), Math.max(ends[1], middle + half)];
+  return { low, high, isLogarithmic, isClipped: scaled[0] < low || scaled.at(-1) > high };
 }
 
 function colorOf(value) {
-  return isLogarithmic() ? Math.log10(value) : value;
+  return map.shades.isLogarithmic ? Math.log10(value) : value;
 }
 
-/** The colour bar between two ends, its ticks in the metric's own numbers. */
-function colorBar([low, high]) {
+/** The colour bar, its ticks in the metric's own numbers. */
+function colorBar() {
+  const { low, high, isLogarithmic } = map.shades;
   const bar = { title: { text: escaped(titled(map.metric.label, map.metric.unit)), side: "right" }, thickness: 14, outlinewidth: 0, len: 1 };
-  if (!isLogarithmic()) return bar;
+  if (!isLogarithmic) return bar;
   const ticks = [];
   for (let power = Math.floor(low); power <= high; power += 1) {
     for (const factor of high - low > 2.5 ? [1] : [1, 2, 5]) {
@@ -162,9 +178,8 @@ function gridTraces() {
   const gaps = across.length * up.length <= 900 ? { xgap: 1, ygap: 1 } : {};
   const scale = [[0, "rgba(0,0,0,0)"], [1 / 3, "rgba(0,0,0,0)"], [1 / 3, NOT_GOOD.bad], [2 / 3, NOT_GOOD.bad], [2 / 3, NOT_GOOD.diverged], [1, NOT_GOOD.diverged]];
   const values = colors.flat();
-  const [zmin, zmax] = colorEnds(values);
   return [
-    { type: "heatmap", x: across, y: up, z: colors, zmin, zmax, colorscale: "Viridis", colorbar: colorBar([zmin, zmax]), hoverinfo: "skip", showscale: values.some(Number.isFinite), ...gaps },
+    { type: "heatmap", x: across, y: up, z: colors, zmin: map.shades.low, zmax: map.shades.high, colorscale: "Viridis", colorbar: colorBar(), hoverinfo: "skip", showscale: values.some(Number.isFinite), ...gaps },
     { type: "heatmap", x: across, y: up, z: codes, zmin: -0.5, zmax: 2.5, colorscale: scale, showscale: false, customdata: rows, text: texts, hovertemplate: "%{text}<extra></extra>", ...gaps },
     ...symbolTraces(kinds, across, up),
     edgeTrace(kinds, across, up),
@@ -213,17 +228,21 @@ function edgeTrace(kinds, across, up) {
 
 // -- points of a sample -----------------------------------------------------------------------------------
 
+/** The metric of the runs that are shown, as far as they have one. */
+function heights() {
+  return map.rows.map((row) => cellOf(map.metric, row)).filter(Number.isFinite);
+}
+
 function pointTraces() {
   const many = map.rows.length > 1500 && hasWebGL();
-  const values = map.rows.map((row) => colorOf(cellOf(map.metric, row))).filter(Number.isFinite);
-  const ends = colorEnds(map.rows.filter((row) => kindOf(outcomeOf(row)) === "good").map((row) => colorOf(cellOf(map.metric, row))));
-  const bottom = values.length ? (isLogarithmic() ? 10 ** Math.min(...values) : Math.min(...values)) : 0;
-  return ["good", "bad", "diverged"].map((kind) => {
+  const bottom = heights().reduce((least, value) => Math.min(least, value), Infinity);
+  return ["good", "bad", "diverged"].flatMap((kind) => {
     const rows = map.rows.filter((row) => kindOf(outcomeOf(row)) === kind);
+    if (!rows.length) return [];
     const height = (row) => {
       if (map.y !== VALUE) return cellOf(map.y, row);
       const value = cellOf(map.metric, row);
-      return Number.isNaN(value) ? bottom : value;
+      return Number.isNaN(value) ? (Number.isFinite(bottom) ? bottom : 0) : value;
     };
     const word = { good: report.words[0], bad: report.words[1], diverged: "diverged" }[kind];
     const colored = kind === "good" && map.y !== VALUE;
@@ -235,7 +254,7 @@ function pointTraces() {
       marker: {
         symbol: MARKS[kind], size: kind === "good" ? 7 : 8, line: { width: kind === "good" ? 0 : 1.5, color: plain },
         color: colored ? rows.map((row) => colorOf(cellOf(map.metric, row))) : plain,
-        ...(colored ? { colorscale: "Viridis", colorbar: colorBar(ends), cmin: ends[0], cmax: ends[1] } : {}),
+        ...(colored ? { colorscale: "Viridis", colorbar: colorBar(), cmin: map.shades.low, cmax: map.shades.high } : {}),
       },
     };
   });
@@ -299,7 +318,7 @@ function spreadOf(axis) {
 }
 
 function mapLayout() {
-  const y = map.y === VALUE ? { title: { text: escaped(titled(map.metric.label, map.metric.unit)) }, type: isLogarithmic() ? "log" : "linear" } : axisLayout(map.y);
+  const y = map.y === VALUE ? { title: { text: escaped(titled(map.metric.label, map.metric.unit)) }, type: isWide(heights()) ? "log" : "linear" } : axisLayout(map.y);
   return {
     height: 470, margin: { l: 66, r: 10, t: 26, b: 50 }, font: FONT, hovermode: "closest", dragmode: "pan",
     paper_bgcolor: "#fff", plot_bgcolor: map.isGrid ? "#fff" : "#fbfcfd", xaxis: axisLayout(map.x),

@@ -189,6 +189,27 @@ def test_a_metric_has_its_unit_wherever_it_is_drawn() -> None:
     assert scattered.get_supylabel() == "largest position error, last third [m]"
 
 
+def test_what_diverged_is_marked_in_a_row_for_each_line_below_all_values() -> None:
+    runs = pd.concat([table().assign(**{"timing.delay": delay}) for delay in (0.0, 0.01)])
+    runs.loc[runs["timing.period"] > 0.03, ["outcome", "ultimate_bound"]] = ["diverged", np.nan]
+    axes = (axis("timing.period", 0.01), axis("timing.delay", 0.01))
+    figure = figures.lines(judged(runs), axes, "ultimate_bound", WORDS, units={})
+    panel = figure.axes[0]
+    rows = [line for line in lines_of(figure) if line.get_marker() == "v" and len(line.get_xdata())]
+    heights = [
+        set(panel.transAxes.inverted().transform(line.get_path().transformed(line.get_transform()).vertices)[:, 1])
+        for line in rows
+    ]
+    lowest = panel.transAxes.inverted().transform(panel.transData.transform((10.0, 0.01)))[1]
+    assert [len(one) for one in heights] == [1, 1]
+    assert 0.0 < min(heights[0]) < min(heights[1]) < lowest
+
+
+def test_without_a_metric_the_first_objective_that_varies_is_drawn(tmp_path: Path) -> None:
+    (picture,) = draw_study(invented(tmp_path, study(PERIODS)), tmp_path)
+    assert picture.name == "position_rmse.png"
+
+
 def test_a_map_has_a_cell_for_each_run_and_the_boundary_of_what_flies() -> None:
     runs = pd.concat([table().assign(**{"timing.delay": delay}) for delay in (0.0, 0.01, 0.02)])
     figure = heat_map(
@@ -229,18 +250,28 @@ def test_a_map_tells_bounded_from_diverged_with_the_horizon_beside_them() -> Non
     )
     fell = np.ma.filled(np.ma.asarray(figure.axes[0].collections[0].get_array()), np.nan).reshape(2, 5)[0]
     assert fell == pytest.approx([np.nan, np.nan, 1.0, 0.0, np.nan], nan_ok=True)
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
-        "settled", "bounded", "diverged", "missing", "limit of what is settled, by 30 s",
-    ]  # fmt: skip
+    assert told_of(figure) == ["settled", "bounded", "diverged", "missing", "limit of what is settled, by 30 s"]
+
+
+def told_of(figure: matplotlib.figure.Figure) -> list[str]:
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_outcomes_are_told_where_they_occur() -> None:
+    runs = judged(pd.concat([table(4).assign(**{"timing.delay": delay}) for delay in (0.0, 0.01)]))
+    axes = (axis("timing.period", 0.01), axis("timing.delay", 0.01))
+    assert told_of(heat_map(runs, axes, "ultimate_bound", WORDS, units={})) == ["settled"]
+    assert told_of(figures.lines(runs, axes[:1], "ultimate_bound", WORDS, units={})) == ["settled"]
+    fell = judged(runs.assign(outcome="diverged", ultimate_bound=np.nan))
+    assert told_of(heat_map(fell, axes, "ultimate_bound", WORDS, units={})) == ["diverged"]
+    assert "8 runs: 8 settled (dots)\n" in figures.scatter(runs, axes, "ultimate_bound", WORDS, units={}).get_suptitle()
 
 
 def test_a_line_marks_what_diverged_where_it_has_no_value() -> None:
     runs = table()
     runs["outcome"] = ["diverged", *runs["outcome"][1:]]
     runs.loc[runs["outcome"] == "diverged", "ultimate_bound"] = np.nan
-    _, _, down, *_ = lines_of(
-        figures.lines(judged(runs), (axis("timing.period", 0.01),), "ultimate_bound", WORDS, units={})
-    )
+    *_, down = lines_of(figures.lines(judged(runs), (axis("timing.period", 0.01),), "ultimate_bound", WORDS, units={}))
     assert (down.get_marker(), down.get_xdata().tolist()) == ("v", pytest.approx([50.0]))
 
 
@@ -384,7 +415,7 @@ def test_dots_of_many_axes_are_apart_by_what_flies() -> None:
     axes = (axis("timing.period", 0.01), axis("plant.mass", 1), axis("timing.delay", 0.01))
     figure = figures.scatter(judged(runs), axes, "ultimate_bound", WORDS, units={})
     for panel in figure.axes[:3]:
-        dots, crosses, _ = panel.get_lines()
+        dots, crosses, *_ = panel.get_lines()
         assert (np.size(dots.get_xdata()), np.size(crosses.get_xdata())) == (4, 1)
     assert not figure.axes[3].get_visible()
     assert "share that is settled 80%, 95 % interval 38% to 96%" in figure.get_suptitle()
