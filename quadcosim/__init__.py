@@ -17,6 +17,7 @@ Where to begin:
 - `load_scenario` and `load_system` read files of them, and the constructors refuse what the files refuse, in one line;
 - `fly` takes arrays of initial conditions, or of anything else, and gives arrays: many runs at once, without a store;
 - `limit` finds the largest period, delay, loss or anything else that is still good;
+- `linearise` cuts a loop open about its operating point, sampled, held and late as it is: two systems of matrices;
 - `sweep` flies a `Study` over axes, `compare` controllers against each other, `tune` searches for gains: what is there
   is not flown again, and what they give becomes a table with `to_pandas`;
 - `Simulation` stops a run at each sample, for a controller or any other component that is code of yours;
@@ -55,6 +56,8 @@ if TYPE_CHECKING:
     from orchestration.runs.run_directory import load_run, save_run
     from orchestration.runs.simulation import run
     from orchestration.runs.stepping import Simulation
+    from orchestration.stability.linearise import Linearised, linearise
+    from orchestration.stability.state_space import StateSpace
     from orchestration.studies.axes import Axis
     from orchestration.studies.study import Study
     from orchestration.studies.study_file import load_study
@@ -103,6 +106,9 @@ _HOMES = {
     "Flights": "orchestration.runs.in_lanes",
     "limit": "orchestration.limits.limit",
     "Limit": "orchestration.limits.limit",
+    "linearise": "orchestration.stability.linearise",
+    "Linearised": "orchestration.stability.linearise",
+    "StateSpace": "orchestration.stability.state_space",
     "sweep": "orchestration.studies.sweep",
     "Study": "orchestration.studies.study",
     "Axis": "orchestration.studies.axes",
@@ -137,6 +143,7 @@ __all__ = [
     "Flights",
     "FmuChoice",
     "Limit",
+    "Linearised",
     "Model",
     "QuadcosimError",
     "Record",
@@ -149,6 +156,7 @@ __all__ = [
     "Simulation",
     "SimulatorError",
     "Source",
+    "StateSpace",
     "Study",
     "Swept",
     "System",
@@ -162,6 +170,7 @@ __all__ = [
     "fly",
     "fly_until",
     "limit",
+    "linearise",
     "load_comparison",
     "load_run",
     "load_scenario",

@@ -11,6 +11,7 @@ EXTRAS = {
     "interop": ("libcosimpy", "ecospy", "tbb", "fmu-manipulation-toolbox"),
     "report": ("plotly",),
     "gym": ("gymnasium",),
+    "control": ("control",),
 }
 """By the extra that brings them."""
 

@@ -12,6 +12,7 @@ from orchestration.quadrotor.scenario import Scenario
 from orchestration.requests.ranges import Varied
 from orchestration.stability.known_loops import Local
 from orchestration.stability.local_limit import about_rest
+from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.request import Request
 
@@ -24,6 +25,10 @@ KNOWN = ("period", "delay")
 
 class AboutHover:
     """The loop of a `Scenario` about hover."""
+
+    def at_rest(self, request: Request) -> System:
+        """The system that hovers as a scenario would."""
+        return at_hover(cast(Scenario, request))
 
     def local_limits(self, varied: Varied, span: Range) -> Local:
         """The local limit of a quantity: of the loop about hover where that is for it, else as of any system."""

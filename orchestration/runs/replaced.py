@@ -48,7 +48,8 @@ def replaced(asked: Request, component: str | None) -> Replaced:
     """A request with a component replaced, None: the only sampled one; raises `UsageError` where that cannot be."""
     with in_its_own_words(asked):
         system = asked.as_system()
-        name = _name(system, component)
+        name = component_named(system, component, "to replace")
+        _expect_no_clock(system, name)
         measured, commanded = _ends(system, name)
         whole = replace(system, components={**system.components, name: replace(system.components[name], record=None)})
         paths = fmus.of_components(system.fmus)
@@ -59,20 +60,23 @@ def replaced(asked: Request, component: str | None) -> Replaced:
     )  # fmt: skip
 
 
-def _name(system: System, component: str | None) -> str:
-    """The component that is replaced; raises `UsageError` where it cannot be."""
+def component_named(system: System, component: str | None, to: str) -> str:
+    """The component that somebody named `to` do something with it, None: the only sampled one; raises `UsageError`."""
     sampled = [name for name, each in system.components.items() if each.sampling is not None]
     if component is None:
         if len(sampled) != 1:
             listed = ", ".join(system.components)
-            raise UsageError(f"component: expected the one to replace, as {len(sampled)} are sampled; one of {listed}")
+            raise UsageError(f"component: expected the one {to}, as {len(sampled)} are sampled; one of {listed}")
         component = sampled[0]
     if component not in system.components:
         raise UsageError(f"component: {component}: {expected_name(component, list(system.components))}")
+    return component
+
+
+def _expect_no_clock(system: System, component: str) -> None:
     sampling = system.components[component].sampling
     if sampling is not None and sampling.clock == "fmu":
         raise UsageError(f"components.{component}.sampling.clock = fmu: expected master: your code has no clock")
-    return component
 
 
 def _ends(system: System, component: str) -> tuple[tuple[str, ...], tuple[str, ...]]:

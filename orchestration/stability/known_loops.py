@@ -11,6 +11,7 @@ from orchestration.basics.by_kind import ByKind
 if TYPE_CHECKING:
     from orchestration.basics.bisection import Range
     from orchestration.requests.ranges import Varied
+    from orchestration.system.model import System
     from orchestration.system.request import Request
 
 
@@ -28,6 +29,9 @@ class Local:
 
 class KnownLoop(Protocol):
     """The linear loop of one kind of request about its operating point."""
+
+    def at_rest(self, request: Request) -> System:
+        """The system of a request at its operating point."""
 
     def local_limits(self, varied: Varied, span: Range) -> Local:
         """The local limit of a quantity, by whatever is known of the loop."""

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestration.basics.errors import UsageError
-from orchestration.basics.simulator import Floats, Transfer
+from orchestration.basics.simulator import Floats
 from orchestration.fmi.instance import Instance
+from orchestration.stability.linear_simulator import Linear
 from orchestration.system.times import NANOSECONDS
 
 PULSE = 1e-6
@@ -55,7 +56,7 @@ _Pair = tuple[_State, _State]
 """A state after a pulse up, and after one down"""
 
 
-class Tangent:
+class Tangent(Linear):
     """A component about rest; as a `Simulator` it is linear, and begins at rest.
 
     `ladder` are the lengths of the steps [s] that make and tell states; where the component takes steps of a `unit`
@@ -63,8 +64,8 @@ class Tangent:
     """
 
     def __init__(self, rest: Rest, ladder: Sequence[float], pulse: float = PULSE, *, unit: float | None = None) -> None:
-        self._unit = unit
-        self._fmu, self._inputs, self._names, self._outputs = rest.fmu, rest.inputs, rest.fmu.name, rest.outputs
+        super().__init__(rest.inputs, rest.outputs, states=0)  # of which there are more, once they are found
+        self._unit, self._fmu = unit, rest.fmu
         self._held, self._given = rest.held, rest.held.copy()
         self._write = rest.fmu.writer(rest.inputs, self._given)
         self._found: Floats = np.zeros(len(rest.outputs))
@@ -78,52 +79,14 @@ class Tangent:
         self._known: dict[int, tuple[Floats, Floats]] = {}
         self._expect_one_rate()
         self._find_coordinates()
-        self.state: Floats = np.zeros(len(self._axes.T))
-        self.input: Floats = np.zeros(len(rest.inputs))
-        self._output: Floats = np.zeros(len(rest.outputs))
-
-    # -- a linear simulator --------------------------------------------------------------------------------------
-
-    def reader(self, names: Sequence[str], into: Floats) -> Transfer:
-        """As `Simulator`; what is no Real stays."""
-        chosen = [(i, self._outputs.index(name)) for i, name in enumerate(names) if name in self._outputs]
-        to, places = [i for i, _ in chosen], [place for _, place in chosen]
-
-        def read() -> None:
-            into[to] = self._output[places]
-
-        return read
-
-    def writer(self, names: Sequence[str], source: Floats) -> Transfer:
-        """As `Simulator`; what is no Real is left out."""
-        chosen = [(i, self._inputs.index(name)) for i, name in enumerate(names) if name in self._inputs]
-        of, places = [i for i, _ in chosen], [place for _, place in chosen]
-
-        def write() -> None:
-            self.input[places] = source[of]
-
-        return write
-
-    def enter_initialization(self, start: float, stop: float) -> None:
-        """At rest it is already."""
-
-    def exit_initialization(self) -> None:
-        """At rest it is already."""
+        self.state = np.zeros(self._axes.shape[1])
 
     def step(self, t: float, h: float) -> None:
         """The same at any time."""
-        by_state, by_input = self._derivatives(h)
+        by_state, by_input = self.derivatives(h)
         found = by_state @ self.state + by_input @ self.input
-        self._output[:] = found[: len(self._output)]
-        self.state[:] = found[len(self._output) :]
-
-    def save(self) -> bytes:
-        """State and inputs."""
-        return np.concatenate([self.state, self.input]).tobytes()
-
-    def restore(self, state: bytes) -> None:
-        """Put them back."""
-        self.state[:], self.input[:] = np.split(np.frombuffer(state), [len(self.state)])
+        self.output[:] = found[: len(self.output)]
+        self.state[:] = found[len(self.output) :]
 
     def _expect_one_rate(self) -> None:
         """Raise `UsageError` where samples answer a pulse differently: there are loops of several rates in it."""
@@ -143,7 +106,7 @@ class Tangent:
     def _find_coordinates(self) -> None:
         """As many points of the ladder as show states, and so many of these as have coordinates of their own."""
         made, before, rank = [self._struck()], 0, 0
-        fewest = max([FEWEST, *(self._dead_points(i) + 2 for i in range(len(self._inputs)))])
+        fewest = max([FEWEST, *(self._dead_points(i) + 2 for i in range(len(self.inputs)))])
         for shown in range(1, len(self._ladder) + 1):
             self._shown = shown
             columns = [self._futures(pairs) for pairs in made]
@@ -170,7 +133,7 @@ class Tangent:
         self._pairs = [pairs[i] for i in chosen]
         self._inverse = np.linalg.inv(coordinates[:, chosen]) if rank else np.zeros((0, 0))
 
-    def _derivatives(self, h: float) -> tuple[Floats, Floats]:
+    def derivatives(self, h: float) -> tuple[Floats, Floats]:
         """Of the outputs after a step of `h` [s] and of the coordinates then: by coordinates, and by inputs."""
         key = round(h * NANOSECONDS)
         if key not in self._known:
@@ -178,9 +141,9 @@ class Tangent:
             by_input = [
                 self._difference([self._stepped(self._rest, self._pulses(i, sign), h) for sign in (1, -1)])
                 / (self._pulse[i] / PULSE)
-                for i in range(len(self._inputs))
+                for i in range(len(self.inputs))
             ]
-            size = len(self._outputs) + self._axes.shape[1]
+            size = len(self.outputs) + self._axes.shape[1]
             after, moved = (np.column_stack(c) if c else np.zeros((size, 0)) for c in (by_pair, by_input))
             self._known[key] = after @ self._inverse, moved
         return self._known[key]
@@ -200,7 +163,7 @@ class Tangent:
         """For each input the states after a pulse on it over the first step of the ladder."""
         return [
             (self._stepped(self._rest, self._pulses(i, 1), h)[1], self._stepped(self._rest, self._pulses(i, -1), h)[1])
-            for i, h in enumerate([self._ladder[0]] * len(self._inputs))
+            for i, h in enumerate([self._ladder[0]] * len(self.inputs))
         ]
 
     def _dead_points(self, i: int) -> int:
@@ -224,7 +187,7 @@ class Tangent:
 
     def _futures(self, pairs: Sequence[_Pair]) -> Floats:
         columns = [self._future(pair) for pair in pairs]
-        return np.column_stack(columns) if columns else np.zeros((self._shown * len(self._outputs), 0))
+        return np.column_stack(columns) if columns else np.zeros((self._shown * len(self.outputs), 0))
 
     def _future(self, pair: _Pair) -> Floats:
         """The coordinates of a state before they are reduced: outputs at the points of the ladder, as differences."""
@@ -242,7 +205,7 @@ class Tangent:
         self._fmu.restore(start.saved)
         self._time, self._given[:] = start.time, held
         self._write()
-        found: Floats = np.zeros((len(steps), len(self._outputs)))
+        found: Floats = np.zeros((len(steps), len(self.outputs)))
         for k, h in enumerate(steps):
             count = 1 if self._unit is None else round(h / self._unit)
             for _ in range(count):

@@ -9,7 +9,7 @@ import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
-from orchestration.system.model import Component, Criterion, System
+from orchestration.system.model import Component, Criterion, Sampling, System
 from orchestration.system.paths import changed
 from orchestration.system.times import exact_nanoseconds
 
@@ -66,11 +66,14 @@ def common_period(system: System) -> Fraction | None:
 
 
 def _periods(system: System) -> list[Fraction]:
-    return [
-        exact_nanoseconds(one.sampling.period) / Fraction(repr(float(one.sampling.clock_ratio)))
-        for one in system.components.values()
-        if one.sampling is not None
-    ] or [exact_nanoseconds(one.step) for one in system.components.values() if one.step is not None]
+    return [true_period(one.sampling) for one in system.components.values() if one.sampling is not None] or [
+        exact_nanoseconds(one.step) for one in system.components.values() if one.step is not None
+    ]
+
+
+def true_period(sampling: Sampling) -> Fraction:
+    """Of a component whose clock may be fast or slow [ns]."""
+    return exact_nanoseconds(sampling.period) / Fraction(repr(float(sampling.clock_ratio)))
 
 
 def latest_offset(system: System) -> Fraction:

@@ -1,0 +1,86 @@
+"""A linear system in discrete time, and what of a larger one its inputs move and its outputs show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from orchestration.basics.extras import explained
+from orchestration.basics.simulator import Floats
+
+SAMPLES = (*range(32), 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024)
+"""at which a system is struck and looked at, as far as it stays small"""
+LARGEST = 1e6
+"""of what a pulse may make of it, by what it makes at first"""
+SEEN = 1e-7
+"""of the largest singular value between inputs and outputs, each by its own unit: what is smaller is none"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StateSpace:
+    """Deviations from an operating point: x(k+1) = A x(k) + B u(k), y(k) = C x(k) + D u(k), every `dt` seconds."""
+
+    A: Floats
+    """Of the states by the states a sample before."""
+    B: Floats
+    """Of the states by the inputs a sample before."""
+    C: Floats
+    """Of the outputs by the states."""
+    D: Floats
+    """Of the outputs by the inputs at the same sample."""
+    dt: float
+    """From sample to sample [s]."""
+    inputs: tuple[str, ...]
+    """What the entries of u are, in the units of the FMU."""
+    outputs: tuple[str, ...]
+    """What those of y are."""
+
+    def __repr__(self) -> str:
+        sizes = f"{len(self.inputs)} inputs, {len(self.A)} states, {len(self.outputs)} outputs"
+        return f"<StateSpace: {sizes}, every {self.dt:g} s>"
+
+    @explained
+    def to_control(self) -> Any:
+        """The same as a `StateSpace` of python-control, with the names of inputs and outputs.
+
+        Raises `QuadcosimError` where that is not installed.
+        """
+        import control
+
+        return control.ss(
+            self.A, self.B, self.C, self.D, self.dt, inputs=list(self.inputs), outputs=list(self.outputs)
+        )  # fmt: skip
+
+
+def reduced(A: Floats, B: Floats, C: Floats) -> tuple[Floats, Floats, Floats]:
+    """The part of a system that its inputs move and its outputs show, in balanced coordinates.
+
+    By the singular values of what the outputs are after pulses on the inputs (Ho and Kalman), over a finite time, so
+    that it need not be stable.
+    """
+    if not (B.any() and C.any()):
+        return np.zeros((0, 0)), np.zeros((0, B.shape[1])), np.zeros((C.shape[0], 0))
+    made, shown = _powers(A, B), _powers(A.T, C.T)
+    responses = np.concatenate([abs(C @ state).max(axis=1, keepdims=True) for state in made], axis=1).max(axis=1)
+    weight = np.tile(np.where(responses > 0.0, responses, 1.0), len(shown))
+    reached, seen = np.hstack(made), np.hstack(shown).T / weight[:, None]
+    left, values, right = np.linalg.svd(seen @ reached, full_matrices=False)
+    rank = int((values > SEEN * values[0]).sum())
+    root = np.sqrt(values[:rank])
+    back = reached @ right[:rank].T / root
+    onto = (left[:, :rank] / root).T @ seen
+    return onto @ A @ back, onto @ B, C @ back
+
+
+def _powers(A: Floats, B: Floats) -> list[Floats]:
+    """A^k B for k in `SAMPLES`, while it is small."""
+    found, state, k = [B], B, 0
+    for sample in SAMPLES[1:]:
+        while k < sample:
+            state, k = A @ state, k + 1
+        if np.abs(state).max() > LARGEST * np.abs(B).max():
+            break
+        found.append(state)
+    return found
