@@ -30,31 +30,47 @@ MOST_AHEAD = 10**6
 
 
 class _Collected:
-    """Instants of a window, and who is stepped to them: a component, or nobody (-1)."""
+    """Instants of a window, and who is stepped to them: a component in continuous time by its place, or nobody (-1)."""
 
-    def __init__(self) -> None:
+    def __init__(self, count: int) -> None:
+        """`count` components are in continuous time."""
+        self._count = count
         self._times: list[Integers] = []
-        self._who: list[Integers] = []
+        self._places: list[Integers] = []
 
-    def add(self, times: Integers, who: int | Integers = -1) -> None:
-        """Something happens at each of these times, to which each of these is stepped if it is in continuous time."""
+    def add(self, times: Integers, places: int | Integers = -1) -> None:
+        """Something happens at each of these times, to which the component in this place, or in each, is stepped."""
         self._times.append(times)
-        self._who.append(np.broadcast_to(np.asarray(who, dtype=np.int64), times.shape))
+        self._places.append(np.asarray(places))
 
-    def instants(self) -> Integers:
-        """In order, each once."""
-        times = np.sort(np.concatenate(self._times), kind="stable")
-        result: Integers = times[np.diff(times, prepend=-1) > 0]
-        return result
+    def instants(self) -> tuple[Integers, Integers, Integers]:
+        """In order, each once; the places of those that are stepped to them; and where those of each instant begin."""
+        times = np.concatenate(self._times)
+        order = np.argsort(times, kind="stable")  # what is in order already is only merged
+        times = times[order]
+        first = np.empty(len(times), dtype=np.bool_)
+        first[0:1] = True
+        np.not_equal(times[1:], times[:-1], out=first[1:])
+        instants = times[first]
+        which = np.empty(len(times), dtype=np.int64)
+        which[order] = np.cumsum(first) - 1
+        table = np.zeros((len(instants), self._count), dtype=np.bool_)
+        begin = 0
+        for added, places in zip(self._times, self._places, strict=True):
+            rows, begin = which[begin : begin + len(added)], begin + len(added)
+            if places.ndim:
+                rows, places = rows[places >= 0], places[places >= 0]
+            if places.ndim or places >= 0:
+                table[rows, places] = True
+        of, places = np.divmod(np.flatnonzero(table), max(self._count, 1))
+        return instants, places, _begins(of, len(instants))
 
-    def stepped(self, instants: Integers, order: Integers, place: Integers) -> tuple[Integers, Integers]:
-        """Who is stepped to each instant, by `order`, in which each has a `place` or -1; and where each begins."""
-        places = place[np.concatenate(self._who)]
-        moving = places >= 0
-        table = np.zeros((len(instants), len(order)), dtype=np.bool_)
-        table[np.searchsorted(instants, np.concatenate(self._times)[moving]), places[moving]] = True
-        _, columns = np.nonzero(table)
-        return order[columns], np.append(0, np.cumsum(table.sum(axis=1)))
+
+def _begins(instants: Integers, count: int) -> Integers:
+    """Where what belongs to each of `count` instants begins, and the last ends, given the instant of each."""
+    result = np.zeros(count + 1, dtype=np.int64)
+    np.cumsum(np.bincount(instants, minlength=count), out=result[1:])
+    return result
 
 
 class Timetable:
@@ -79,7 +95,7 @@ class Timetable:
             stepped = fixed.get(x.sender if i in plan.measured else x.receiver)
             links.append(Link(i, x, streams, stepped, self._refused))
         self._continuous = np.array([names.index(name) for name in plan.continuous], dtype=np.int64)
-        self._place = np.full(len(names) + 1, -1)  # the last one for nobody
+        self._place = np.full(len(names), -1)
         self._place[self._continuous] = np.arange(len(self._continuous))
         self._points = {
             i: Grid(Fraction(0), exact_nanoseconds(system.components[names[i]].step or 0.0))
@@ -133,7 +149,7 @@ class Timetable:
         """The instants from `begin` to before `end` [ns]."""
         for task in self._tasks:
             task.drawn_to(end)
-        found = _Collected()
+        found = _Collected(len(self._continuous))
         posted, later = self._post(begin, end, found)
         measured = self._measure(begin, end, found)
         samples, exchanged, sent = self._sample(begin, end, found)
@@ -141,21 +157,23 @@ class Timetable:
         self._step_all(begin, end, found)
         for task in self._tasks:
             task.rows = task.rows[task.rows[:, TIME] >= end]
-        instants = found.instants()
-        stepped, stepped_at = found.stepped(instants, self._continuous, self._place)
-        times = np.append(instants, end)
+        instants, places, stepped_at = found.instants()
+
+        def begins(times: Integers) -> Integers:
+            return _begins(np.searchsorted(instants, times), len(instants))
+
         return Schedule(
-            times=times,
-            stepped=stepped,
+            times=np.append(instants, end),
+            stepped=self._continuous[places],
             stepped_at=stepped_at,
             posted=np.ascontiguousarray(posted[:, :4]),
-            posted_at=np.searchsorted(posted[:, 4], times),
+            posted_at=begins(posted[:, 4]),
             measured=measured,
-            measured_at=np.searchsorted(measured[:, 2], times),
+            measured_at=begins(measured[:, 2]),
             arrivals=arrivals,
-            arrivals_at=np.searchsorted(arrivals[:, 3], times),
+            arrivals_at=begins(arrivals[:, 3]),
             samples=np.ascontiguousarray(samples[:, 1:]),
-            samples_at=np.searchsorted(samples[:, 0], times),
+            samples_at=begins(samples[:, 0]),
             exchanged=exchanged,
         )
 
@@ -166,9 +184,9 @@ class Timetable:
         for grid, receivers in self._changes:  # the value of the start is that of initialisation
             times = grid.between(max(grid.index_from(begin), 1), max(grid.index_from(end), 1))
             for receiver in receivers:
-                found.add(times, receiver)
+                found.add(times, self._place[receiver])
         if end > self.stop:
-            found.add(np.full(len(self._continuous), self.stop), self._continuous)
+            found.add(np.full(len(self._continuous), self.stop), np.arange(len(self._continuous)))
             found.add(np.full(1, self.stop))
 
     def _post(self, begin: int, end: int, found: _Collected) -> tuple[Integers, Integers]:
@@ -178,7 +196,7 @@ class Timetable:
         for component, grid in self._points.items():
             first, last = grid.index_from(begin), grid.index_from(end)
             points = grid.between(first, last)
-            found.add(points, component)
+            found.add(points, self._place[component])
             for place, link in enumerate(self._posted[component]):
                 sent = _Sent(link, np.arange(first, last), points, link.messages(points), points, 0, component, place)
                 tables.append(sent.table())
@@ -195,7 +213,7 @@ class Timetable:
                     taken = task.rows[:, MESSAGES + 2 * i]
                     now = (taken >= begin) & (taken < end)
                     tables.append(task.messages(task.rows[now])[:, i])
-                    found.add(taken[now], int(self._sender[link.index]))
+                    found.add(taken[now], self._place[self._sender[link.index]])
         table = np.concatenate(tables)
         return table[np.argsort(table[:, 2], kind="stable")]
 
@@ -209,7 +227,7 @@ class Timetable:
             rows = task.rows[(times >= begin) & (times < min(end, self.stop))]
             for link in task.incoming:
                 if link.index not in self._plan.read_ahead:
-                    found.add(rows[:, TIME], int(self._sender[link.index]))
+                    found.add(rows[:, TIME], self._place[self._sender[link.index]])
             messages, middle = task.messages(rows), len(task.incoming)
             samples = np.empty((len(rows), 6), dtype=np.int64)
             samples[:, 0], samples[:, 1], samples[:, 2], samples[:, 3] = rows[:, TIME], task.index, rows[:, NEXT], 0
@@ -223,7 +241,7 @@ class Timetable:
 
     def _under_way(self, sent: "_Sent", found: _Collected) -> Integers:
         """Messages that arrive later; for those that arrive at once their receiver is stepped."""
-        found.add(sent.time[sent.arrival == sent.time], int(self._receiver[sent.link.index]))
+        found.add(sent.time[sent.arrival == sent.time], self._place[self._receiver[sent.link.index]])
         return sent.table(sent.arrival > sent.time)
 
     def _arrive(self, end: int, more: Sequence[Integers], found: _Collected) -> Integers:
@@ -231,7 +249,7 @@ class Timetable:
         table = np.concatenate([self._on_their_way, *more])
         now = table[:, 3] < end
         self._on_their_way, table = table[~now], table[now]
-        found.add(table[:, 3], self._receiver[table[:, 0]])
+        found.add(table[:, 3], self._place[self._receiver[table[:, 0]]])
         return np.ascontiguousarray(table[np.lexsort(table[:, [1, 7, 6, 5, 4, 3]].T), :4])
 
 
