@@ -3,6 +3,7 @@
 import contextlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,11 +22,11 @@ from orchestration.studies.checks import described, expect_flyable
 from orchestration.studies.run_key import design_parts, difference, place_parts, run_key, study_parts
 from orchestration.studies.study import Study
 from orchestration.studies.swept import Swept
-from orchestration.studies.vouching import Fly, vouched
+from orchestration.studies.vouching import vouched, with_python_twins
 from orchestration.system.model import System
 from orchestration.workers.batching import chunks
 from orchestration.workers.choice import Chosen, EngineChoice, chosen
-from orchestration.workers.executors import expect_scheduler, run_locally, run_on_dask
+from orchestration.workers.executors import Fly, cluster, expect_scheduler, local_workers
 from orchestration.workers.pool import Inputs
 from orchestration.workers.provenance import versions
 from orchestration.workers.row import Row
@@ -77,25 +78,27 @@ def sweep(
         _describe(opened, study, files)
         missing = _missing(opened, study, retry_failed)
         counted = _Counted(len(study.points), opened, hear, announce)
-        fly = _flying(Inputs.of(files), workers, dask)
+        agreement = None
         if missing:
             opened.describe({ENGINE: how.name})
             if announce is not None and engine == "auto":
                 announce(str(how))
-        tasks = (_task(study, index, files, how.engine, time_limit) for index in missing)
-        lanes: dict[str, Row] = {}
-        try:
-            with contextlib.closing(fly(chunks(tasks, len(missing), workers) if how.in_lanes else tasks)) as outcomes:
-                for some in outcomes if missing else ():
-                    _keep(some, opened)
-                    counted.add(some)
-                    lanes |= {each.row.key: each.row for each in some if each.in_lanes}
-            agreement = vouched(
-                lanes, files, lambda index: _task(study, index, files, None, time_limit),
-                lambda inputs: _flying(inputs, workers, dask),
-            )  # fmt: skip
-        except KeyboardInterrupt:
-            raise Interrupted(f"with {counted.done} of {counted.total} runs done") from None
+            flown_with = with_python_twins(files) if how.in_lanes else files
+            tasks = (_task(study, index, files, how.engine, time_limit) for index in missing)
+            lanes: dict[str, Row] = {}
+            try:
+                with _workers(Inputs.of(flown_with), workers, dask) as fly:
+                    asked = chunks(tasks, len(missing), workers) if how.in_lanes else tasks
+                    with contextlib.closing(fly(asked)) as outcomes:
+                        for some in outcomes:
+                            _keep(some, opened)
+                            counted.add(some)
+                            lanes |= {each.row.key: each.row for each in some if each.in_lanes}
+                    agreement = vouched(
+                        lanes, flown_with, lambda index: _task(study, index, files, None, time_limit), fly
+                    )
+            except KeyboardInterrupt:
+                raise Interrupted(f"with {counted.done} of {counted.total} runs done") from None
         if agreement is not None:
             opened.describe({AGREEMENT: agreement.as_text()})
             agreement.expect()
@@ -133,11 +136,9 @@ def _expect_workers(workers: int, dask: str | None) -> None:
         expect_scheduler(dask)
 
 
-def _flying(inputs: Inputs, workers: int, dask: str | None) -> Fly:
-    """Flies tasks in worker processes, here or on a cluster."""
-    if dask is not None:
-        return lambda tasks: run_on_dask(tasks, inputs, dask)
-    return lambda tasks: run_locally(tasks, inputs, workers)
+def _workers(inputs: Inputs, workers: int, dask: str | None) -> AbstractContextManager[Fly]:
+    """Those that fly tasks, here or on a cluster."""
+    return local_workers(inputs, workers) if dask is None else cluster(inputs, dask)
 
 
 def expect_current(opened: store.Store, study: Study) -> None:

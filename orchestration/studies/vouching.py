@@ -8,48 +8,47 @@ compared.
 """
 
 import math
-from collections.abc import Callable, Generator, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from orchestration.building.fmus import looked_up, python_twin, python_twins
 from orchestration.building.inputs import Files
 from orchestration.fmi.model import Model, Variable
-from orchestration.system.model import Component
+from orchestration.system.model import Component, System
 from orchestration.workers.batching import TOLERATED, Agreement, Pair, sample
-from orchestration.workers.pool import Inputs
+from orchestration.workers.executors import Fly
 from orchestration.workers.row import Row
-from orchestration.workers.task import Chunk, Outcome, RunTask
+from orchestration.workers.task import Chunk, RunTask
 
-Fly = Callable[[Iterable[RunTask | Chunk]], Generator[list[Outcome], None, None]]
-"""The outcomes of tasks as they come."""
 BEGINNING, SHARE = 1.0, 0.05
 """[s] that FMUs in Python fly, and the least of a run: whole, one of theirs costs as much as hundreds in lanes"""
 _BEGUN, _NUDGED, _PYTHON = "begun ", "nudged ", "in Python "
 """before the key of a run: what of it is flown"""
 
 
-def vouched(
-    lanes: Mapping[str, Row], files: Files, task_of: Callable[[int], RunTask], flying: Callable[[Inputs], Fly]
-) -> Agreement | None:
+def with_python_twins(files: Files) -> Files:
+    """The files of a study, and of each native FMU the one in Python where there is such, built if need be."""
+    twins = {python_twin(fmu) for fmu in files.fmus} - files.fmus.keys()
+    paths = {twin: path for twin in twins if (path := looked_up(twin)) is not None}
+    return replace(files, fmus={**files.fmus, **paths})
+
+
+def vouched(lanes: Mapping[str, Row], files: Files, task_of: Callable[[int], RunTask], fly: Fly) -> Agreement | None:
     """How a sample of the runs that were flown in lanes compares with other ways to fly them; None if there were none.
 
-    `lanes` are their rows by key; `task_of` makes the task of a run by its index, to be flown with `files`.
+    `lanes` are their rows by key; `task_of` makes the task of a run by its index. `fly` has the `files`, which are
+    those `with_python_twins`.
     """
     chosen = [task_of(lanes[key].index) for key in sorted(sample(lanes))]
     if not chosen:
         return None
-    paths = _in_python({fmu for task in chosen for fmu in task.system.fmus.values()})
-    known = paths.keys() | files.fmus.keys()
-    twins = {task.key: {*python_twins(task.system).fmus.values()} for task in chosen}
-    begun = [_begun(task) for task in chosen if paths.keys() & twins[task.key] and twins[task.key] <= known]
+    begun = [_begun(task) for task in chosen if _has_twins(task.system, files)]
     tasks: list[RunTask | Chunk] = [*chosen, *map(_in_python_too, begun)]
     if begun:
         tasks.append(Chunk(tasks=(*begun, *(_nudged(one, files.models_of(one.system)) for one in begun))))
-    inputs = Inputs.of(Files(fmus={**files.fmus, **paths}, tables=files.tables))
     # One that takes too long alone says nothing: lanes take less.
-    rows = {one.row.key: one.row for some in flying(inputs)(tasks) for one in some if not one.ended}
+    rows = {one.row.key: one.row for some in fly(tasks) for one in some if not one.ended}
 
     def pairs(tasks: Iterable[RunTask], one: Mapping[str, Row], prefix: str) -> list[Pair]:
         both = ((task, one.get(task.key), rows.get(prefix + task.key)) for task in tasks)
@@ -64,10 +63,10 @@ def _told(row: Row) -> Mapping[str, Any]:
     return row.metrics or {"status": row.message}
 
 
-def _in_python(natives: set[str]) -> dict[str, Path]:
-    """The FMUs in Python of native ones, where there are such, by what systems call them; built if need be."""
-    twins = {python_twin(fmu) for fmu in natives} - natives
-    return {twin: path for twin in twins if (path := looked_up(twin)) is not None}
+def _has_twins(system: System, files: Files) -> bool:
+    """Whether each of its FMUs that should have one in Python has, and some have."""
+    own, twins = {*system.fmus.values()}, {*python_twins(system).fmus.values()}
+    return bool(twins - own) and twins <= files.fmus.keys()
 
 
 def _begun(task: RunTask) -> RunTask:

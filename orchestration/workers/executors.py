@@ -6,9 +6,10 @@ import concurrent.futures
 import re
 import socket
 import threading
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
+from functools import partial
 from itertools import islice
 from typing import Any
 
@@ -20,6 +21,8 @@ from orchestration.workers.batching import chunks
 from orchestration.workers.pool import Inputs, InterruptedWorker, Pool
 from orchestration.workers.task import Chunk, Outcome, RunTask
 
+Fly = Callable[[Iterable[RunTask | Chunk]], Generator[list[Outcome], None, None]]
+"""The outcomes of tasks, in any order, as they come."""
 Submit = Callable[[RunTask | Chunk], "Future[list[Outcome]]"]
 _PATIENCE = 10.0
 """[s], for a scheduler that is there"""
@@ -90,20 +93,23 @@ def _metrics(outcome: Outcome) -> Any:
     return outcome.row.metrics
 
 
-def run_locally(tasks: Iterable[RunTask | Chunk], inputs: Inputs, workers: int) -> Generator[list[Outcome], None, None]:
-    """Outcomes of `tasks` from `workers` processes, in any order.
+@contextmanager
+def local_workers(inputs: Inputs, workers: int) -> Iterator[Fly]:
+    """Flies tasks in `workers` processes of this machine, which start with the first of them.
 
     Raises `QuadcosimError` for what is not a run's own failure, `KeyboardInterrupt` if a worker is interrupted.
     """
     with ExitStack() as stack:
+        submit = _local_submit(stack, inputs, workers)
         try:
-            yield from _drain(tasks, _local_submit(stack, inputs, workers), 2 * workers)
+            yield partial(_drain, submit=submit, most=2 * workers)
         except InterruptedWorker as error:
             raise KeyboardInterrupt from error
 
 
-def run_on_dask(tasks: Iterable[RunTask | Chunk], inputs: Inputs, address: str) -> Generator[list[Outcome], None, None]:
-    """Outcomes of `tasks` from the workers of a dask scheduler, in any order.
+@contextmanager
+def cluster(inputs: Inputs, address: str) -> Iterator[Fly]:
+    """Flies tasks in the workers of a dask scheduler.
 
     Raises `QuadcosimError` if the scheduler cannot be reached or has no workers, or for what is not a run's own
     failure.
@@ -120,8 +126,12 @@ def run_on_dask(tasks: Iterable[RunTask | Chunk], inputs: Inputs, address: str) 
         scattered = client.scatter(inputs, broadcast=True, hash=True)
         executor = stack.enter_context(client.get_executor(pure=False))
         slots = sum(client.nthreads().values())
+
+        def submit(task: RunTask | Chunk) -> "Future[list[Outcome]]":
+            return executor.submit(fly_on_cluster, task, scattered)  # type: ignore[no-any-return]
+
         try:
-            yield from _drain(tasks, lambda task: executor.submit(fly_on_cluster, task, scattered), 2 * max(1, slots))
+            yield partial(_drain, submit=submit, most=2 * max(1, slots))
         except (concurrent.futures.CancelledError, OSError, distributed.KilledWorker) as error:
             raise QuadcosimError(
                 f"--dask {address}: the scheduler or its workers were lost ({type(error).__name__}); what was flown is "

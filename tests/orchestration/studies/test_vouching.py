@@ -1,17 +1,16 @@
 """What vouches for lanes: FMUs flown alone, and FMUs in Python for the beginning of the same runs."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import replace
 
 import pytest
 
 from orchestration.basics.errors import QuadcosimError
 from orchestration.studies.study import Study
-from orchestration.studies.vouching import vouched
+from orchestration.studies.vouching import vouched, with_python_twins
 from orchestration.system.model import System
 from orchestration.workers.batching import Agreement
-from orchestration.workers.pool import Inputs
 from orchestration.workers.row import Row
 from orchestration.workers.task import Chunk, Outcome, RunTask
 from tests.orchestration.fmi.small import needs_compiler
@@ -31,7 +30,7 @@ def chosen() -> Study:
 
 def agreement(chosen: Study, error: Error) -> Agreement | None:
     """What two runs are vouched for by, if each way to fly is off by so much."""
-    files = chosen.files()
+    files = with_python_twins(chosen.files())
 
     def row(task: RunTask, chunk: bool) -> Row:
         metrics = {"x": 1.0 + error(task, chunk)}
@@ -40,16 +39,13 @@ def agreement(chosen: Study, error: Error) -> Agreement | None:
     def task(index: int) -> RunTask:
         return RunTask(index=index, key=str(index), settings={}, system=chosen.system(index, {}), keep_signals=False)
 
-    def flying(inputs: Inputs) -> Callable[[Iterable[RunTask | Chunk]], Iterator[list[Outcome]]]:
-        def fly(tasks: Iterable[RunTask | Chunk]) -> Iterator[list[Outcome]]:
-            for each in tasks:
-                for one in each.tasks if isinstance(each, Chunk) else (each,):
-                    assert inputs.contents.keys() >= {*one.system.fmus.values()}
-                    yield [Outcome(row=row(one, isinstance(each, Chunk)))]
+    def fly(tasks: Iterable[RunTask | Chunk]) -> Generator[list[Outcome], None, None]:
+        for each in tasks:
+            for one in each.tasks if isinstance(each, Chunk) else (each,):
+                assert files.fmus.keys() >= {*one.system.fmus.values()}
+                yield [Outcome(row=row(one, isinstance(each, Chunk)))]
 
-        return fly
-
-    return vouched({str(i): row(task(i), True) for i in range(2)}, files, task, flying)  # type: ignore[arg-type]
+    return vouched({str(i): row(task(i), True) for i in range(2)}, files, task, fly)
 
 
 def in_python(task: RunTask) -> bool:
