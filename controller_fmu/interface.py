@@ -1,10 +1,11 @@
 """The variables that every controller FMU has; each law adds its own."""
 
 from controller_fmu.gain_scaling import GainScaling
+from fmu_kit import frames
 from fmu_kit.algebra import ZERO, Quaternion
+from fmu_kit.framed import Framed
 from fmu_kit.interface import FixedParameter, Input, Local, Output
 from fmu_kit.rigid_body import Body
-from fmu_kit.slave import Slave
 from fmu_kit.trajectory import Trajectory
 
 _BODY, _TRAJECTORY = Body(), Trajectory()
@@ -12,22 +13,30 @@ _UPRIGHT, _NONE = Quaternion(ZERO, 1.0), Quaternion(ZERO, 0.0)
 _USED = "used when use_reference_inputs is true"
 
 
-class ControllerInterface(Slave):
+class ControllerInterface(Framed):
     """What makes one controller FMU exchangeable for another."""
 
-    position = Input("measured position P, inertial frame (north-east-down)", "m", ZERO)
-    velocity = Input("measured velocity V, inertial frame", "m/s", ZERO)
-    quaternion = Input("measured attitude Q, inertial to body; all zero: no measurement", "1", _UPRIGHT)
-    angular_velocity = Input("measured angular velocity, body frame (forward-right-down)", "rad/s", ZERO)
+    position = Input("measured position P, inertial frame", "m", ZERO, frame=frames.inertial)
+    velocity = Input("measured velocity V, inertial frame", "m/s", ZERO, frame=frames.inertial)
+    quaternion = Input(
+        "measured attitude Q, inertial to body; all zero: no measurement", "1", _UPRIGHT, frame=frames.attitude
+    )
+    angular_velocity = Input("measured angular velocity, body frame", "rad/s", ZERO, frame=frames.body)
 
-    reference_position = Input(f"desired position, {_USED}", "m", ZERO, name="reference.position")
-    reference_velocity = Input(f"desired velocity, {_USED}", "m/s", ZERO, name="reference.velocity")
-    reference_acceleration = Input(f"desired acceleration, {_USED}", "m/s2", ZERO, name="reference.acceleration")
-    reference_jerk = Input(f"desired jerk, {_USED}", "m/s3", ZERO, name="reference.jerk")
-    reference_snap = Input(f"desired snap, {_USED}", "m/s4", ZERO, name="reference.snap")
+    reference_position = Input(
+        f"desired position, {_USED}", "m", ZERO, name="reference.position", frame=frames.inertial
+    )
+    reference_velocity = Input(
+        f"desired velocity, {_USED}", "m/s", ZERO, name="reference.velocity", frame=frames.inertial
+    )
+    reference_acceleration = Input(
+        f"desired acceleration, {_USED}", "m/s2", ZERO, name="reference.acceleration", frame=frames.inertial
+    )
+    reference_jerk = Input(f"desired jerk, {_USED}", "m/s3", ZERO, name="reference.jerk", frame=frames.inertial)
+    reference_snap = Input(f"desired snap, {_USED}", "m/s4", ZERO, name="reference.snap", frame=frames.inertial)
 
-    thrust = Output("total thrust along -z of the body, held between samples", "N", nominal=_BODY.mass * _BODY.gravity)
-    torque = Output("body torque, held between samples", "N.m", ZERO)
+    thrust = Output("total thrust, upward in the body, held between samples", "N", nominal=_BODY.mass * _BODY.gravity)
+    torque = Output("body torque, body frame, held between samples", "N.m", ZERO, frame=frames.body)
 
     trajectory_amplitude_x = FixedParameter(
         "a_x of [a_x sin wt cos wt, a_y sin wt, z0 + vz t]",
@@ -47,14 +56,22 @@ class ControllerInterface(Slave):
         quantity="AngularFrequency",
     )
     trajectory_start_z = FixedParameter(
-        "z0 of the built-in trajectory, positive down", "m", _TRAJECTORY.start_z, name="trajectory.start_z"
+        "z0 of the built-in trajectory, along z of the inertial frame",
+        "m",
+        _TRAJECTORY.start_z,
+        name="trajectory.start_z",
     )
     trajectory_rate_z = FixedParameter(
-        "vz of the built-in trajectory, positive down", "m/s", _TRAJECTORY.rate_z, name="trajectory.rate_z"
+        "vz of the built-in trajectory, along z of the inertial frame",
+        "m/s",
+        _TRAJECTORY.rate_z,
+        name="trajectory.rate_z",
     )
     mass = FixedParameter("nominal mass m", "kg", _BODY.mass, above=0.0)
     gravity = FixedParameter("nominal gravity g", "m/s2", _BODY.gravity, minimum=0.0)
-    inertia = FixedParameter("entry of the nominal inertia matrix J, body frame", "kg.m2", _BODY.inertia)
+    inertia = FixedParameter(
+        "entry of the nominal inertia matrix J, body frame", "kg.m2", _BODY.inertia, frame=frames.body_matrix
+    )
     sample_period = FixedParameter(
         "of the FMU's own clock; 0: sample at every communication point from sample_offset on",
         "s",
@@ -64,11 +81,13 @@ class ControllerInterface(Slave):
     )
     sample_offset = FixedParameter("time of the first sample of the FMU's own clock", "s", 0.0, minimum=0.0)
 
-    desired_quaternion = Local("desired attitude Q_d as of the last sample (12)", "1", _NONE)
-    position_error = Local("P - P_d as of the last sample, inertial frame", "m", ZERO)
-    velocity_error = Local("V - V_d as of the last sample, inertial frame", "m/s", ZERO)
-    attitude_error = Local("Q_d^-1 Q as of the last sample (8)", "1", _NONE)
-    angular_velocity_error = Local("angular velocity minus the desired one, body frame", "rad/s", ZERO)
+    desired_quaternion = Local("desired attitude Q_d as of the last sample (12)", "1", _NONE, frame=frames.attitude)
+    position_error = Local("P - P_d as of the last sample, inertial frame", "m", ZERO, frame=frames.inertial)
+    velocity_error = Local("V - V_d as of the last sample, inertial frame", "m/s", ZERO, frame=frames.inertial)
+    attitude_error = Local("Q_d^-1 Q as of the last sample (8)", "1", _NONE, frame=frames.rotation)
+    angular_velocity_error = Local(
+        "angular velocity minus the desired one, body frame", "rad/s", ZERO, frame=frames.body
+    )
 
     sample_count = Local("number of samples since the start, initialisation not counted", None, 0, minimum=0)
     use_reference_inputs = FixedParameter("true: follow reference.*; false: the built-in trajectory", start=False)

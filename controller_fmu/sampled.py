@@ -75,8 +75,13 @@ class SampledController(ControllerInterface):
 
     def _reference(self, t: float) -> Reference:
         if not self.use_reference_inputs:
-            return self._trajectory.at(t)
+            return self._built_in(t)
         return gathered(self, Reference, "reference_")
+
+    def _built_in(self, t: float) -> Reference:
+        """The trajectory, which is in the axes that the FMU is told in."""
+        built_in = self._trajectory.at(t)
+        return built_in if self.is_turned is False else built_in.turned(self.is_turned)
 
     def _hover(self) -> None:
         """A zero quaternion means that nothing is connected yet."""

@@ -24,13 +24,17 @@ from fmu_kit.errors import require
 from fmu_kit.units import base_unit_exponents
 from fmu_kit.variables import INDEX, Causality, Variability, Variable
 
+_Get = Callable[[Any], Any]
+_Put = Callable[[Any, Any], None]
+"""How an attribute of a slave is read, and set."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class _Kind:
     """What an attribute can hold, and how it is read from the place of its first variable on."""
 
     type: type
-    get: Callable[[int], Callable[[Any], Any]]
+    get: Callable[[int], _Get]
     is_real: bool = True
     axes: tuple[str, ...] = ()
     expected: str = "a number"
@@ -106,8 +110,11 @@ class Declared(property):
         above: float | None = None,
         nominal: float | None = None,
         quantity: str | None = None,
+        frame: Callable[[Any, Any], Any] | None = None,
     ) -> None:
-        """`name`: where that of the FMI variable is not the attribute's; all behind it is as in `Variable`.
+        """`name`: where that of the FMI variable is not the attribute's; what is between that and `frame`: `Variable`.
+
+        `frame`: the function of `fmu_kit.frames` by which it is told in other axes, of a slave that is `Framed`.
 
         Raises `ValueError` for a unit that is none, `TypeError` for a start that no variable can have.
         """
@@ -124,6 +131,7 @@ class Declared(property):
         self.name, self._variability = name or "", variability or self.usually
         bounds = {"minimum": minimum, "maximum": maximum, "above": above}
         self._said: dict[str, Any] = {**bounds, "nominal": nominal, "named_quantity": quantity}
+        self._frame = frame
 
     def __set_name__(self, owner: type, attribute: str) -> None:
         self.attribute, self.name = attribute, self.name or attribute
@@ -137,7 +145,7 @@ class Declared(property):
         """The same, read and set in slaves that have its first variable at a place."""
         placed = type(self).__new__(type(self))
         vars(placed).update(vars(self))
-        put = self._put_at(place)
+        get, put = self._turning(self._kind.get(place), self._put_at(place))
 
         def give(slave: Any, value: Any) -> None:
             if not slave.is_fresh:
@@ -145,10 +153,26 @@ class Declared(property):
                 raise AttributeError(f"self.{self.attribute} cannot be set: it is {what}, which is given to the FMU")
             put(slave, value)
 
-        property.__init__(placed, self._kind.get(place), put if self.own else give)
+        property.__init__(placed, get, put if self.own else give)
         return placed
 
-    def _put_at(self, place: int) -> Callable[[Any, Any], None]:
+    def _turning(self, get: _Get, put: _Put) -> tuple[_Get, _Put]:
+        """The same for a slave that may be told in other axes than those of its attributes."""
+        turn = self._frame
+        if turn is None:
+            return get, put
+
+        def get_turned(slave: Any) -> Any:
+            value, turned = get(slave), slave.is_turned
+            return value if turned is False else turn(turned, value)
+
+        def put_turned(slave: Any, value: Any) -> None:
+            turned = slave.is_turned
+            put(slave, value if turned is False else turn(turned, value))
+
+        return get_turned, put_turned
+
+    def _put_at(self, place: int) -> _Put:
         kind, end = self._kind, place + len(self._kind.axes)
 
         def put_vec3(slave: Any, value: Any) -> None:

@@ -4,15 +4,16 @@ One file for two readers: controller FMUs bundle it, and the metrics import it, 
 same P_d(t).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from fmu_kit.algebra import ZERO, Vec3
+from fmu_kit.frames import inertial
 from fmu_kit.scalar import FLOAT, Scalar, ScalarOps
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Reference:
-    """The desired motion at one time, inertial frame (NED)."""
+    """The desired motion at one time, inertial frame."""
 
     position: Vec3
     """P_d [m]"""
@@ -24,6 +25,10 @@ class Reference:
     """J_d [m/s³]"""
     snap: Vec3 = ZERO
     """S_d [m/s⁴]"""
+
+    def turned(self, turned: Scalar) -> "Reference":
+        """The same motion, told in another convention for axes if it is `turned` (`fmu_kit.frames`)."""
+        return Reference(**{each.name: inertial(turned, getattr(self, each.name)) for each in fields(self)})
 
     def after(self, time: Scalar) -> "Reference":
         """The desired motion `time` [s] later: its Taylor series, as far as there are terms."""
@@ -42,7 +47,7 @@ class Reference:
 class Trajectory:
     """P_d(t) = [a_x sin ωt cos ωt, a_y sin ωt, start_z + rate_z t], the paper's figure of eight (section V).
 
-    The defaults are the paper's. z points down, so a positive `rate_z` descends.
+    The defaults are the paper's, whose z points down, so that a positive `rate_z` descends.
     """
 
     amplitude_x: float = 4.0

@@ -2,10 +2,11 @@
 
 import math
 
+from fmu_kit import frames
 from fmu_kit.algebra import ZERO, Quaternion
+from fmu_kit.framed import Framed
 from fmu_kit.interface import FixedParameter, Input, Local, Output, Parameter
 from fmu_kit.rigid_body import Body
-from fmu_kit.slave import Slave
 from plant_fmu.actuators import Box, Motors
 from plant_fmu.wind import Wind
 
@@ -19,32 +20,38 @@ _BODY, _WIND, _BOX, _MOTORS = Body(), Wind(), Box(), Motors()
 _HOVER = _BODY.mass * _BODY.gravity
 
 
-class PlantInterface(Slave):
+class PlantInterface(Framed):
     """What goes in, what comes out, and of what the vehicle is."""
 
-    thrust = Input("total thrust along -z of the body, before limits and lag", "N", _HOVER, nominal=_HOVER)
-    torque = Input("body torque, before limits and lag", "N.m", ZERO)
-    external_force = Input("force in the inertial frame, added to the wind", "N", ZERO)
+    thrust = Input("total thrust, upward in the body, before limits and lag", "N", _HOVER, nominal=_HOVER)
+    torque = Input("body torque, body frame, before limits and lag", "N.m", ZERO, frame=frames.body)
+    external_force = Input("force in the inertial frame, added to the wind", "N", ZERO, frame=frames.inertial)
 
-    position = Output("position P, inertial frame (north-east-down)", "m", ZERO, variability="continuous")
-    velocity = Output("velocity V, inertial frame", "m/s", ZERO, variability="continuous")
+    position = Output("position P, inertial frame", "m", ZERO, variability="continuous", frame=frames.inertial)
+    velocity = Output("velocity V, inertial frame", "m/s", ZERO, variability="continuous", frame=frames.inertial)
     quaternion = Output(
-        "attitude Q, inertial to body, scalar last", "1", Quaternion(ZERO, 0.0), variability="continuous"
+        "attitude Q, inertial to body, scalar last",
+        "1",
+        Quaternion(ZERO, 0.0),
+        variability="continuous",
+        frame=frames.attitude,
     )
     angular_velocity = Output(
-        "angular velocity, body frame (forward-right-down)", "rad/s", ZERO, variability="continuous"
+        "angular velocity, body frame", "rad/s", ZERO, variability="continuous", frame=frames.body
     )
 
     mass = FixedParameter("mass m", "kg", _BODY.mass, above=0.0)
-    gravity = FixedParameter("gravity g, along +z of the inertial frame", "m/s2", _BODY.gravity, minimum=0.0)
-    inertia = FixedParameter("entry of the inertia matrix J, body frame", "kg.m2", _BODY.inertia)
-    initial_position = FixedParameter("P(0)", "m", ZERO, name="initial.position")
-    initial_velocity = FixedParameter("V(0)", "m/s", ZERO, name="initial.velocity")
+    gravity = FixedParameter("gravity g, downward", "m/s2", _BODY.gravity, minimum=0.0)
+    inertia = FixedParameter(
+        "entry of the inertia matrix J, body frame", "kg.m2", _BODY.inertia, frame=frames.body_matrix
+    )
+    initial_position = FixedParameter("P(0)", "m", ZERO, name="initial.position", frame=frames.inertial)
+    initial_velocity = FixedParameter("V(0)", "m/s", ZERO, name="initial.velocity", frame=frames.inertial)
     initial_quaternion = FixedParameter(
-        "Q(0), normalised at initialisation", "1", PAPER_ATTITUDE, name="initial.quaternion"
+        "Q(0), normalised at initialisation", "1", PAPER_ATTITUDE, name="initial.quaternion", frame=frames.attitude
     )
     initial_angular_velocity = FixedParameter(
-        "angular velocity at 0, body frame", "rad/s", ZERO, name="initial.angular_velocity"
+        "angular velocity at 0, body frame", "rad/s", ZERO, name="initial.angular_velocity", frame=frames.body
     )
     wind_amplitude = Parameter(
         "a of the wind force a cos(w t), inertial frame",
@@ -52,6 +59,7 @@ class PlantInterface(Slave):
         _WIND.amplitude,
         name="wind.amplitude",
         nominal=_WIND.amplitude.x,
+        frame=frames.inertial,
     )
     wind_frequency = Parameter(
         "w of the wind force a cos(w t)",
@@ -112,7 +120,7 @@ class PlantInterface(Slave):
         "when the payload is let go; 0: never", "s", 0.0, name="payload.drop_time", minimum=0.0
     )
 
-    acceleration = Local("dV/dt, inertial frame", "m/s2", ZERO, variability="continuous")
+    acceleration = Local("dV/dt, inertial frame", "m/s2", ZERO, variability="continuous", frame=frames.inertial)
     wind_force = Local(
         "wind force, inertial frame",
         "N",
@@ -120,6 +128,7 @@ class PlantInterface(Slave):
         name="wind.force",
         variability="continuous",
         nominal=_WIND.amplitude.x,
+        frame=frames.inertial,
     )
     tilt = Local(
         "angle between the z axes of body and inertial frame",

@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+from fmu_kit.algebra import Quaternion
 from fmu_kit.authors import AUTHOR, LICENSE
 from fmu_kit.errors import require, require_finite_state
 from fmu_kit.integrator import internal_steps, rk4_step
@@ -10,6 +11,7 @@ from fmu_kit.interface import gathered
 from fmu_kit.rigid_body import Body, RigidState, Wrench, acceleration, derivative, tilt
 from fmu_kit.saved_state import State
 from fmu_kit.scalar import FLOAT, repeat
+from fmu_kit.variables import INDEX
 from plant_fmu.actuators import Actuators, Box, Channels, Motors
 from plant_fmu.interface import PlantInterface
 from plant_fmu.payload import Payload
@@ -31,9 +33,11 @@ class QuadrotorPlant(PlantInterface):
 
     @classmethod
     def initial_dependencies(cls, output: str) -> frozenset[str]:
-        """The motion on where it starts; the quaternion, which is normalised, on all four parts of that."""
+        """The motion on where it starts; the quaternion on all four parts of that, and on how it is rounded."""
         vector, _, axis = output.rpartition(".")
-        return frozenset(f"initial.{vector}.{other}" for other in ("xyzw" if vector == "quaternion" else axis))
+        if vector == "quaternion":
+            return frozenset({"frame", f"frame{INDEX}", *(f"initial.quaternion.{other}" for other in "xyzw")})
+        return frozenset({f"initial.{vector}.{axis}"})
 
     def read_parameters(self) -> None:
         """Build the body, the wind, the payload and the actuators."""
@@ -87,14 +91,16 @@ class QuadrotorPlant(PlantInterface):
         self._write(t + h)
 
     def internal_state(self) -> State:
-        """The actuators; the motion is among the variables."""
-        return {"actuators": list(self._channels)}
+        """The actuators and the attitude; the rest of the motion is among the variables."""
+        return {"actuators": list(self._channels), "attitude": list(self._state.quaternion)}
 
     def restore(self, state: State) -> None:
         """Put the actuators and the motion back."""
         a, b, c, d = map(float, state["actuators"])
         self._channels = Channels(a, b, c, d)
-        self._state = RigidState(self.position, self.velocity, self.quaternion, self.angular_velocity)
+        x, y, z, w = map(float, state["attitude"])
+        attitude = Quaternion.from_xyzw(x, y, z, w)  # in other axes, the variable is not it to the last bit
+        self._state = RigidState(self.position, self.velocity, attitude, self.angular_velocity)
 
     def _read_actuators(self) -> Actuators:
         lag, motors = self.actuator_time_constant, gathered(self, Motors, "motor_")

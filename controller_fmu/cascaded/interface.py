@@ -6,6 +6,7 @@ from controller_fmu.cascaded.position_loop import PositionLoop
 from controller_fmu.cascaded.rate_loop import RateLoop
 from controller_fmu.cascaded.velocity_loop import VelocityLoop
 from controller_fmu.interface import ControllerInterface
+from fmu_kit import frames
 from fmu_kit.algebra import ZERO
 from fmu_kit.interface import FixedParameter, Local, Parameter
 
@@ -186,12 +187,16 @@ class CascadeInterface(ControllerInterface):
         minimum=0.0,
     )
 
-    desired_velocity = Local("velocity to fly, of the position loop, inertial frame", "m/s", ZERO)
-    held_velocity_integral = Local(
-        "integral of the velocity loop, inertial frame", "m/s2", ZERO, name="velocity_integral"
+    desired_velocity = Local(
+        "velocity to fly, of the position loop, inertial frame", "m/s", ZERO, frame=frames.inertial
     )
-    desired_angular_velocity = Local("of the attitude loop, body frame", "rad/s", ZERO)
-    held_rate_integral = Local("integral of the rate loop, body frame", "rad/s2", ZERO, name="rate_integral")
+    held_velocity_integral = Local(
+        "integral of the velocity loop, inertial frame", "m/s2", ZERO, name="velocity_integral", frame=frames.inertial
+    )
+    desired_angular_velocity = Local("of the attitude loop, body frame", "rad/s", ZERO, frame=frames.body)
+    held_rate_integral = Local(
+        "integral of the rate loop, body frame", "rad/s2", ZERO, name="rate_integral", frame=frames.body
+    )
 
     velocity_ratio = FixedParameter(
         "samples from one run of the position and velocity loops to the next", None, VELOCITY_RATIO, minimum=1

@@ -6,6 +6,7 @@ from controller_fmu.geometric.law import Evaluation, Gains, Heading, evaluate
 from controller_fmu.interface import ScaledGains
 from controller_fmu.redesign.controller import RedesignedController
 from controller_fmu.vehicle import Measurement
+from fmu_kit import frames
 from fmu_kit.algebra import ZERO, Vec3
 from fmu_kit.interface import Local, Parameter, gathered
 from fmu_kit.trajectory import Reference
@@ -30,11 +31,18 @@ class GeometricController(ScaledGains, RedesignedController):
         name="gain.angular_velocity",
         minimum=0.0,
     )
-    heading = Parameter("direction that the body's x axis is to have: from north, to the east", "rad", 0.0)
+    heading = Parameter(
+        "direction that the body's x axis is to have: from x of the inertial frame towards y",
+        "rad",
+        0.0,
+        frame=frames.heading,
+    )
 
-    rotation_error = Local("e_R as of the last sample, body frame", "1", ZERO)
+    rotation_error = Local("e_R as of the last sample, body frame", "1", ZERO, frame=frames.body)
     error_function = Local("attitude error function Psi as of the last sample: 0 none, 2 upside down", "1", minimum=0.0)
-    desired_angular_velocity = Local("Omega_c as of the last sample, desired body frame", "rad/s", ZERO)
+    desired_angular_velocity = Local(
+        "Omega_c as of the last sample, desired body frame", "rad/s", ZERO, frame=frames.body
+    )
     energy = Local("of position, velocity, attitude and angular velocity errors, at the last sample", "J")
 
     def read_parameters(self) -> None:

@@ -161,5 +161,5 @@ class RedesignedController(SampledController, RedesignInterface):
     def _reference_ahead(self, sampled: float, t: float) -> Reference:
         """The built-in trajectory at `t`; else what follows from the inputs as they are."""
         if not self.use_reference_inputs:
-            return self._trajectory.at(t)
+            return self._built_in(t)
         return self._reference(sampled).after(t - sampled)

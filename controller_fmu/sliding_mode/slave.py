@@ -4,6 +4,7 @@ from controller_fmu.interface import ScaledGains
 from controller_fmu.redesign.controller import RedesignedController
 from controller_fmu.sliding_mode.law import Evaluation, Gains, evaluate
 from controller_fmu.vehicle import Measurement
+from fmu_kit import frames
 from fmu_kit.algebra import ZERO
 from fmu_kit.interface import Local, Parameter, gathered
 from fmu_kit.trajectory import Reference
@@ -17,7 +18,12 @@ class UnifiedController(RedesignedController, ScaledGains):
     offers_semi_implicit = True
 
     k_t = Parameter(
-        "k_t, of tanh(s) in the virtual control (22)", "m/s2", _GAINS.k_t, name="gain.translation", minimum=0.0
+        "k_t, of tanh(s) in the virtual control (22)",
+        "m/s2",
+        _GAINS.k_t,
+        name="gain.translation",
+        minimum=0.0,
+        frame=frames.inertial_sizes,
     )
     beta = Parameter(
         "beta, of tanh(s) against the disturbance (32)", "m/s2", _GAINS.beta, name="gain.disturbance", minimum=0.0
@@ -51,9 +57,11 @@ class UnifiedController(RedesignedController, ScaledGains):
         name="coupling",
     )
 
-    sliding = Local("sliding variable s as of the last sample (19)-(21)", "m/s", ZERO)
-    theta = Local("Theta as of the last sample (9), body frame", "rad/s", ZERO)
-    desired_angular_velocity = Local("Omega_d as of the last sample (13), desired body frame", "rad/s", ZERO)
+    sliding = Local("sliding variable s as of the last sample (19)-(21)", "m/s", ZERO, frame=frames.inertial)
+    theta = Local("Theta as of the last sample (9), body frame", "rad/s", ZERO, frame=frames.body)
+    desired_angular_velocity = Local(
+        "Omega_d as of the last sample (13), desired body frame", "rad/s", ZERO, frame=frames.body
+    )
     energy = Local("energy function L_kappa as of the last sample (33), with coupling/2 s.s", "J")
 
     def read_parameters(self) -> None:

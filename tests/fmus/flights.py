@@ -70,6 +70,8 @@ FLIGHTS = {
     ),
     # A payload that is let go inside of a step, which has internal steps of other lengths before it than after it.
     "plant with payload": Flight("QuadrotorPlant", {"payload.mass": 0.4, "payload.drop_time": 0.1037}, 0.01),
+    # Other axes: what the plant shows of its attitude is rounded, and its own is not.
+    "plant in other axes": Flight("QuadrotorPlant", {"frame": 2, "initial.angular_velocity.y": 0.4}, 0.01),
     "controller": Flight("UnifiedController", {"gain.eta": 12.0}, 0.01),
     # 4 ms steps on a 10 ms clock: at most communication points the next sample is still to come.
     "controller between samples": Flight(

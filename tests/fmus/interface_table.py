@@ -45,6 +45,12 @@ def _motion(kind: str, starts: Iterable[float] = ()) -> Iterator[Row]:
     yield from row("angular_velocity", kind, "rad/s", at_rest, axes=XYZ)
 
 
+_FRAME = (
+    *row("frame", "parameter fixed", None, 1.0, type="Enumeration"),
+    *row("frame_index", "parameter fixed", None, 0, type="Integer"),
+)
+
+
 def _body() -> Iterator[Row]:
     yield from row("mass", "parameter fixed", "kg", 1.0)
     yield from row("gravity", "parameter fixed", "m/s2", 9.81)
@@ -52,6 +58,7 @@ def _body() -> Iterator[Row]:
 
 
 PLANT = (
+    *_FRAME,
     *row("thrust", "input continuous", "N", 9.81),
     *row("torque", "input continuous", "N.m", 0.0, axes=XYZ),
     *row("external_force", "input continuous", "N", 0.0, axes=XYZ),
@@ -83,6 +90,7 @@ PLANT = (
 _REFERENCE_UNITS = {"position": "m", "velocity": "m/s", "acceleration": "m/s2", "jerk": "m/s3", "snap": "m/s4"}
 
 _COMMON = (
+    *_FRAME,
     *_motion("input continuous", (0.0, 0.0, 0.0, 1.0)),
     *(
         variable

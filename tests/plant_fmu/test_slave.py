@@ -385,7 +385,10 @@ def test_input_that_is_not_finite_is_refused_between_steps(name: str, value: flo
 
 @pytest.mark.parametrize("name", [v.name for v in QUADROTOR if v.variability == "fixed"])
 def test_fixed_parameter_cannot_be_set_after_initialisation(name: str) -> None:
-    assert_fails(lambda: put(started(), {name: 1.0}), name, "a fixed parameter cannot be set after initialisation")
+    slave = started()
+    index = slave._index[name]
+    set_value = slave.set_real if QUADROTOR[index].type == "Real" else slave.set_integer
+    assert_fails(lambda: set_value([index], [1]), name, "a fixed parameter cannot be set after initialisation")
 
 
 @pytest.mark.parametrize("name", [v.name for v in QUADROTOR if v.causality in ("output", "local")])

@@ -81,6 +81,18 @@ def test_motors_written_out_as_c_are_those_in_python(on_libm: dict[str, Path]) -
     assert 0.01 < flown[0].metrics["saturation_share"] < 0.9
 
 
+@pytest.mark.parametrize("law", LAWS)
+def test_a_flight_in_other_axes_written_out_as_c_is_that_in_python(law: str, on_libm: dict[str, Path]) -> None:
+    tables = {"plant": {"frame": "enu"}, "controller": {"frame": "enu", "discretisation": "mean"}}
+    scenario = scenario_of({"stop_time": 2.0, "timing": {"period": 0.04}, **tables})
+    flown = [
+        quadcosim.run(scenario.with_fmus(plant=fmus["QuadrotorPlant"], controller=fmus[law]))
+        for fmus in (on_libm, {"QuadrotorPlant": "QuadrotorPlant", law: law})
+    ]
+    assert_the_same(*flown)
+    assert flown[0].divergence is None
+
+
 @pytest.mark.parametrize(
     ("law", "redesign"),
     [*((law, redesign) for law in LAWS for redesign in REDESIGNS.values()), ("UnifiedController", SEMI_IMPLICIT)],

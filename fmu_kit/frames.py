@@ -1,0 +1,63 @@
+"""Conventions for axes: what is told in one of them, in the other.
+
+The equations of this project are north-east-down, of a body whose axes are forward, right and down. Each variable of
+a slave that may be wired in another convention (`fmu_kit.framed`) says with `frame=` which function of this module
+takes it from one convention to the other; methods see what the equations have. Every function is its own inverse: what
+is `turned` is told in the axes of the other convention, all else stays as it is, to the bit.
+"""
+
+import enum
+import math
+
+from fmu_kit.algebra import Inertia, Quaternion, Vec3
+from fmu_kit.scalar import FLOAT, Scalar
+
+_HALF = math.sqrt(0.5)
+
+
+class Frame(enum.IntEnum):
+    """Along what the axes are, inertial and of the body."""
+
+    NED = 1
+    """north-east-down; forward-right-down"""
+    ENU = 2
+    """east-north-up; forward-left-up"""
+
+
+def inertial(turned: Scalar, v: Vec3) -> Vec3:
+    """A vector in the inertial frame: x and y change places, z changes its sign."""
+    where = FLOAT.where
+    return Vec3(where(turned, v.y, v.x), where(turned, v.x, v.y), where(turned, -v.z, v.z))
+
+
+def inertial_sizes(turned: Scalar, v: Vec3) -> Vec3:
+    """What there is along each inertial axis, in whatever direction, as gains: x and y change places."""
+    return Vec3(FLOAT.where(turned, v.y, v.x), FLOAT.where(turned, v.x, v.y), v.z)
+
+
+def body(turned: Scalar, v: Vec3) -> Vec3:
+    """A vector in the frame of the body: y and z change their signs."""
+    return Vec3(v.x, FLOAT.where(turned, -v.y, v.y), FLOAT.where(turned, -v.z, v.z))
+
+
+def body_matrix(turned: Scalar, J: Inertia) -> Inertia:
+    """An inertia matrix in the frame of the body: the products with x change their signs."""
+    xy, xz = FLOAT.where(turned, -J.xy, J.xy), FLOAT.where(turned, -J.xz, J.xz)
+    return Inertia(xx=J.xx, yy=J.yy, zz=J.zz, xy=xy, xz=xz, yz=J.yz)
+
+
+def attitude(turned: Scalar, Q: Quaternion) -> Quaternion:
+    """An attitude, inertial to body: turned half round about north-east before and about forward behind."""
+    x, y, z, w = Q
+    others = (_HALF * (x + y), _HALF * (x - y), _HALF * (w - z), _HALF * (w + z))
+    return Quaternion.from_xyzw(*(FLOAT.where(turned, other, own) for other, own in zip(others, Q)))
+
+
+def rotation(turned: Scalar, Q: Quaternion) -> Quaternion:
+    """A rotation from one frame of the body to another, as an attitude error: its axis is a vector there."""
+    return Quaternion(body(turned, Q.vector), Q.scalar)
+
+
+def heading(turned: Scalar, angle: Scalar) -> Scalar:
+    """An angle [rad] in the horizontal plane, from the first axis towards the second."""
+    return FLOAT.where(turned, 0.5 * math.pi - angle, angle)
