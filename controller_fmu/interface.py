@@ -5,10 +5,12 @@ from fmu_kit import frames
 from fmu_kit.algebra import ZERO, Quaternion
 from fmu_kit.framed import Framed
 from fmu_kit.interface import FixedParameter, Input, Local, Output
+from fmu_kit.mixer import Thrusts
 from fmu_kit.rigid_body import Body
 from fmu_kit.trajectory import Trajectory
 
 _BODY, _TRAJECTORY = Body(), Trajectory()
+_HOVER = _BODY.mass * _BODY.gravity
 _UPRIGHT, _NONE = Quaternion(ZERO, 1.0), Quaternion(ZERO, 0.0)
 _USED = "used when use_reference_inputs is true"
 
@@ -35,8 +37,15 @@ class ControllerInterface(Framed):
     reference_jerk = Input(f"desired jerk, {_USED}", "m/s3", ZERO, name="reference.jerk", frame=frames.inertial)
     reference_snap = Input(f"desired snap, {_USED}", "m/s4", ZERO, name="reference.snap", frame=frames.inertial)
 
-    thrust = Output("total thrust, upward in the body, held between samples", "N", nominal=_BODY.mass * _BODY.gravity)
+    thrust = Output("total thrust, upward in the body, held between samples", "N", nominal=_HOVER)
     torque = Output("body torque, body frame, held between samples", "N.m", ZERO, frame=frames.body)
+    motor_thrust = Output(
+        "what thrust and torque ask of each of four motors on an X frame, limited by nothing; 0 where motor.arm.* or "
+        "motor.drag_to_thrust are not known",
+        "N",
+        Thrusts(0.0, 0.0, 0.0, 0.0),
+        nominal=0.25 * _HOVER,
+    )
 
     trajectory_amplitude_x = FixedParameter(
         "a_x of [a_x sin wt cos wt, a_y sin wt, z0 + vz t]",
@@ -71,6 +80,15 @@ class ControllerInterface(Framed):
     gravity = FixedParameter("nominal gravity g", "m/s2", _BODY.gravity, minimum=0.0)
     inertia = FixedParameter(
         "entry of the nominal inertia matrix J, body frame", "kg.m2", _BODY.inertia, frame=frames.body_matrix
+    )
+    motor_arm_x = FixedParameter(
+        "from the centre to each motor along x of the body; 0: not known", "m", 0.0, name="motor.arm.x", minimum=0.0
+    )
+    motor_arm_y = FixedParameter(
+        "from the centre to each motor along y of the body; 0: not known", "m", 0.0, name="motor.arm.y", minimum=0.0
+    )
+    motor_drag_to_thrust = FixedParameter(
+        "torque about z by thrust of a propeller; 0: not known", "m", 0.0, name="motor.drag_to_thrust", minimum=0.0
     )
     sample_period = FixedParameter(
         "of the FMU's own clock; 0: sample at every communication point from sample_offset on",

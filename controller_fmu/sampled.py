@@ -9,6 +9,8 @@ from fmu_kit.algebra import ZERO
 from fmu_kit.authors import AUTHOR, LICENSE
 from fmu_kit.errors import require
 from fmu_kit.interface import gathered
+from fmu_kit.mixer import Mixer, Thrusts
+from fmu_kit.rigid_body import Wrench
 from fmu_kit.saved_state import State
 from fmu_kit.trajectory import Reference, Trajectory
 
@@ -31,6 +33,7 @@ class SampledController(ControllerInterface):
         """Build the nominal model and the trajectory, and check the clock; laws add what is theirs."""
         self._model = gathered(self, Model)
         self._trajectory = gathered(self, Trajectory, "trajectory_")
+        self._mixer = gathered(self, Mixer, "motor_")
         period = self.sample_period
         require(
             period == 0.0 or period >= SHORTEST_PERIOD, "sample_period", period, f"0 or at least {SHORTEST_PERIOD} s"
@@ -40,7 +43,7 @@ class SampledController(ControllerInterface):
         """Hold the command for the initial inputs; this is not a sample."""
         self._clock = SampleClock(self.sample_period, self.sample_offset)
         self._clock.start(t)
-        self.sample(t, 0.0)
+        self._hold(t, 0.0)
 
     def step(self, t: float, h: float) -> None:
         """Sample at `t` if it is time, and hold over [t, t + h]."""
@@ -50,7 +53,7 @@ class SampledController(ControllerInterface):
                 "long step", f"communication step {h} s is longer than sample_period {period} s: one sample a step"
             )
         if self._clock.is_due(t):
-            self.sample(t, h)
+            self._hold(t, h)
             self.sample_count = self.sample_count + 1
 
     def internal_state(self) -> State:
@@ -60,6 +63,17 @@ class SampledController(ControllerInterface):
     def restore(self, state: State) -> None:
         """Put the clock back."""
         self._clock = SampleClock(self.sample_period, self.sample_offset, int(state["next_index"]))
+
+    def _hold(self, t: float, h: float) -> None:
+        """Sample, and show what the command is of each motor."""
+        self.sample(t, h)
+        self.motor_thrust = self._mixed(Wrench(self.thrust, self.torque))
+
+    def _mixed(self, command: Wrench) -> Thrusts:
+        mixer = self._mixer
+        if min(mixer.arm_x, mixer.arm_y, mixer.drag_to_thrust) > 0.0:
+            return mixer.thrusts(command)
+        return Thrusts(0.0, 0.0, 0.0, 0.0)
 
     def sample(self, t: float, h: float) -> None:
         """Hold a command for what is measured at `t`, over [t, t + h]; of no length at initialisation."""

@@ -9,10 +9,11 @@
             self.u = -self.gain * self.x
 
 The type of the start value is the type of the attribute: a float, a `Vec3` (an FMI variable for each of .x, .y, .z), a
-`Quaternion` (.x, .y, .z, .w), an `Inertia` (.xx, .yy, .zz, .xy, .xz, .yz), a bool, a member of an `IntEnum`, which is
-read as its number, or an int if `unit` is None. Beside an Enumeration NAME, which such a member makes, there is an
-Integer NAME_index with the numbers of its items, for tools that set no Enumeration. Units are in SI, as in
-`fmu_kit.units`. What several slaves have in common is declared in a class that they inherit.
+`Quaternion` (.x, .y, .z, .w), an `Inertia` (.xx, .yy, .zz, .xy, .xz, .yz), a `NamedTuple` of floats (one for each of
+its fields), a bool, a member of an `IntEnum`, which is read as its number, or an int if `unit` is None. Beside an
+Enumeration NAME, which such a member makes, there is an Integer NAME_index with the numbers of its items, for tools
+that set no Enumeration. Units are in SI, as in `fmu_kit.units`. What several slaves have in common is declared in a
+class that they inherit.
 """
 
 from collections.abc import Callable, Iterable
@@ -82,6 +83,27 @@ _KINDS = (  # a bool is an int too, and an item of an IntEnum
     _Kind(type=Quaternion, get=_quaternion, axes=_QUATERNION_AXES, expected="a Quaternion"),
     _Kind(type=Inertia, get=_inertia, axes=_INERTIA_AXES, expected="an Inertia"),
 )
+
+
+def _kind_of(start: Any) -> _Kind:
+    """What holds a start; raises `TypeError` for one that no variable can have."""
+    for kind in _KINDS:
+        if isinstance(start, kind.type):
+            return kind
+    if isinstance(start, tuple) and hasattr(start, "_fields"):
+        return _named(type(start), start._fields)
+    expected = "a number, a truth value, a member of an IntEnum, a Vec3, a Quaternion, an Inertia or a NamedTuple"
+    raise TypeError(f"start = {start!r}: expected {expected}")
+
+
+def _named(record: type[Any], fields: tuple[str, ...]) -> _Kind:
+    def at(place: int) -> _Get:
+        end = place + len(fields)
+        return lambda slave: record(*slave._reals[place:end])
+
+    return _Kind(type=record, get=at, axes=fields, expected=f"a {record.__name__}")
+
+
 _NO_NUMBER = (Vec3, Quaternion, Inertia, str, tuple, list, dict, type(None))
 
 
@@ -119,12 +141,9 @@ class Declared(property):
         Raises `ValueError` for a unit that is none, `TypeError` for a start that no variable can have.
         """
         super().__init__()
-        if not isinstance(start, float | int | Vec3 | Quaternion | Inertia):
-            expected = "a number, a truth value, a member of an IntEnum, a Vec3, a Quaternion or an Inertia"
-            raise TypeError(f"start = {start!r}: expected {expected}")
         self.description = description
         self.start: Any = float(start) if type(start) is int and unit else start
-        self._kind = next(kind for kind in _KINDS if isinstance(self.start, kind.type))
+        self._kind = _kind_of(self.start)
         self.unit = unit if self._kind.is_real else None
         if self.unit is not None:
             base_unit_exponents(self.unit)

@@ -8,16 +8,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from fmu_kit.algebra import Vec3
+from fmu_kit.mixer import Mixer
 from fmu_kit.rigid_body import Wrench
 from fmu_kit.scalar import Scalar
 
 
 class Channels(NamedTuple):
-    """Four numbers that lag each on its own: thrust and torques x, y, z [N, N·m], or the thrusts of four motors [N].
-
-    The motors are front right, rear left, front left, rear right. Seen from above, the first two turn
-    anticlockwise, so that their drag turns the body to the right, and the others clockwise.
-    """
+    """Four numbers that lag each on its own: thrust and torques x, y, z [N, N·m], or `Thrusts` of four motors [N]."""
 
     a: Scalar
     b: Scalar
@@ -63,8 +60,8 @@ class Box:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Motors:
-    """Four motors at (±arm_x, ±arm_y), each with its limits and its lag.
+class Motors(Mixer):
+    """Four motors, each with its limits and its lag.
 
     What four motors cannot give is not shared out: each is cut to its own limits, and thrust and torques come out as
     they may. So a large torque costs thrust or adds to it, and a large thrust costs torque.
@@ -75,11 +72,8 @@ class Motors:
     thrust_min: float = 0.0
     """[N] of one motor"""
     arm_x: float = 0.1
-    """[m], from the centre to a motor along x of the body"""
     arm_y: float = 0.1
-    """[m], along y"""
     drag_to_thrust: float = 0.016
-    """[m], of a propeller: torque about z by thrust"""
     up: float = 0.0
     """[s], time constant of a thrust that grows; 0: no lag"""
     down: float = 0.0
@@ -87,14 +81,7 @@ class Motors:
 
     def limited(self, command: Wrench) -> Channels:
         """The thrusts that make up `command`, each within its limits."""
-        thrust, torque = 0.25 * command.thrust, 0.25 * command.torque
-        roll, pitch, yaw = torque.x / self.arm_y, torque.y / self.arm_x, torque.z / self.drag_to_thrust
-        return Channels(
-            self._cut(thrust - roll + pitch + yaw),
-            self._cut(thrust + roll - pitch + yaw),
-            self._cut(thrust + roll + pitch - yaw),
-            self._cut(thrust - roll - pitch - yaw),
-        )
+        return Channels(*(self._cut(thrust) for thrust in self.thrusts(command)))
 
     def response(self, start: Channels, target: Channels, elapsed: float) -> Channels:
         """The thrusts `elapsed` [s] after `start`, with the limited command held at `target`: the exact solution."""
@@ -104,18 +91,6 @@ class Motors:
             _between(start.b, target.b, rising, falling),
             _between(start.c, target.c, rising, falling),
             _between(start.d, target.d, rising, falling),
-        )
-
-    def wrench(self, thrusts: Channels) -> Wrench:
-        """What the motors exert on the body."""
-        front_right, rear_left, front_left, rear_right = thrusts
-        return Wrench(
-            front_right + rear_left + front_left + rear_right,
-            Vec3(
-                self.arm_y * (rear_left + front_left - front_right - rear_right),
-                self.arm_x * (front_right + front_left - rear_left - rear_right),
-                self.drag_to_thrust * (front_right + rear_left - front_left - rear_right),
-            ),
         )
 
     def _cut(self, thrust: Scalar) -> Scalar:

@@ -11,10 +11,11 @@ import math
 from dataclasses import dataclass
 
 from fmu_kit.algebra import Vec3
+from fmu_kit.mixer import Mixer
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Airframe:
+class Airframe(Mixer):
     """Four motors on an X frame, as the controller believes in them.
 
     The defaults are the quadrotor that PX4 simulates itself (`sih_params.c`: 1 kg, J = diag(0.025, 0.025, 0.03) kg·m²,
@@ -22,26 +23,23 @@ class Airframe:
     J = I₃ kg·m²: so a full command gives the paper's body the angular acceleration that it gives that one.
     """
 
-    motor_thrust: float = 5.0
+    thrust_max: float = 5.0
     """T_m [N], largest thrust of a motor"""
     arm_x: float = 0.2 / 0.025
-    """a_x [m], from the centre to each motor along x of the body"""
     arm_y: float = 0.2 / 0.025
-    """a_y [m], along y"""
     drag_to_thrust: float = 2.0 / 3.0
-    """κ_τ [m], torque about z by thrust of a propeller"""
 
     @property
     def full_thrust(self) -> float:
         """4 T_m [N], of a thrust command of 1."""
-        return 4.0 * self.motor_thrust
+        return 4.0 * self.thrust_max
 
     @property
     def full_torque(self) -> Vec3:
         """Γ [N·m], body, of a command of 1 about each axis: (2 √2 a_y, 2 √2 a_x, 4 κ_τ) T_m."""
-        roll_and_pitch = 2.0 * math.sqrt(2.0) * self.motor_thrust
+        roll_and_pitch = 2.0 * math.sqrt(2.0) * self.thrust_max
         return Vec3(
-            roll_and_pitch * self.arm_y, roll_and_pitch * self.arm_x, 4.0 * self.motor_thrust * self.drag_to_thrust
+            roll_and_pitch * self.arm_y, roll_and_pitch * self.arm_x, 4.0 * self.thrust_max * self.drag_to_thrust
         )
 
     def command(self, torque: Vec3) -> Vec3:

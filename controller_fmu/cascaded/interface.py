@@ -21,16 +21,16 @@ _POSITION, _VELOCITY, _ATTITUDE, _RATE, _FRAME = PositionLoop(), VelocityLoop(),
 class CascadeInterface(ControllerInterface):
     """Airframe, gains and limits of the loops, and how often each runs."""
 
-    motor_thrust = FixedParameter(
-        "largest thrust T_m of each motor", "N", _FRAME.motor_thrust, name="motor.thrust_max", above=0.0
+    motor_thrust_max = FixedParameter(
+        "largest thrust T_m of each motor", "N", _FRAME.thrust_max, name="motor.thrust_max", above=0.0
     )
-    arm_x = FixedParameter(
+    motor_arm_x = FixedParameter(
         "from the centre to each motor along x of the body", "m", _FRAME.arm_x, name="motor.arm.x", above=0.0
     )
-    arm_y = FixedParameter(
+    motor_arm_y = FixedParameter(
         "from the centre to each motor along y of the body", "m", _FRAME.arm_y, name="motor.arm.y", above=0.0
     )
-    drag_to_thrust = FixedParameter(
+    motor_drag_to_thrust = FixedParameter(
         "torque about z by thrust of a propeller", "m", _FRAME.drag_to_thrust, name="motor.drag_to_thrust", above=0.0
     )
 

@@ -31,7 +31,7 @@ class CascadedController(SampledController, CascadeInterface):
     def read_parameters(self) -> None:
         """Take over the airframe and the loops."""
         super().read_parameters()
-        self._airframe = gathered(self, Airframe)
+        self._airframe = gathered(self, Airframe, "motor_")
         self._read_translation()
         self._attitude_loop = AttitudeLoop(
             gain=self.attitude_gain, yaw_weight=self.yaw_weight, rate_limit=self.rate_limit

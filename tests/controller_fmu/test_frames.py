@@ -44,7 +44,7 @@ def told(slave: Any) -> dict[str, list[float]]:
 
 
 def as_vector(value: Any) -> Any:
-    return value if isinstance(value, Vec3 | Quaternion | Inertia) else (float(value),)
+    return (float(value),) if isinstance(value, float | int) else value
 
 
 def flight(controller: type[Slave], frame: Frame, reference: Callable[[float], Reference] | None, **values: Any) -> Any:

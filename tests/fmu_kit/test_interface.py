@@ -67,6 +67,29 @@ def test_attributes_are_fmi_variables_in_order_reals_first():
     ]  # fmt: skip
 
 
+class Motors(NamedTuple):
+    left: float
+    right: float
+
+
+def test_a_named_tuple_has_a_variable_for_each_of_its_fields():
+    class Cart(Slave):
+        """Two motors."""
+
+        measured = Input("of each motor", "N", Motors(1.0, 2.0))
+        force = Output("of each motor", "N", Motors(0.0, 0.0))
+
+        def step(self, t: float, h: float) -> None:
+            self.force = Motors(left=self.measured.right, right=-self.measured.left)
+
+    cart = ready(Cart(instance_name="it"))
+    assert [v.name for v in Cart.variables] == ["measured.left", "measured.right", "force.left", "force.right"]
+    cart.do_step(0.0, 1.0)
+    assert (cart.measured, cart.force) == (Motors(1.0, 2.0), Motors(2.0, -1.0))
+    with pytest.raises(TypeError, match=r"self.force = \(1.0, 2.0\): expected a Motors"):
+        cart.force = (1.0, 2.0)
+
+
 def test_a_variable_says_what_is_measured_its_usual_size_and_how_it_is_displayed():
     class Told(Slave):
         """Told."""

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 XYZ, XYZW, INERTIA = ("x", "y", "z"), ("x", "y", "z", "w"), ("xx", "yy", "zz", "xy", "xz", "yz")
+MOTORS = ("front_right", "rear_left", "front_left", "rear_right")
 PLANES = ("horizontal", "vertical")
 
 
@@ -106,6 +107,7 @@ _COMMON = (
     *row("thrust", "output discrete", "N"),
     *row("torque", "output discrete", "N.m", axes=XYZ),
     *_body(),
+    *row("motor_thrust", "output discrete", "N", axes=MOTORS),
     *row("sample_period", "parameter fixed", "s", 0.01),
     *row("sample_offset", "parameter fixed", "s", 0.0),
     *row("desired_quaternion", "local discrete", "1", axes=XYZW),
@@ -121,6 +123,11 @@ _SCALING = (
     *row("gain_scaling_index", "parameter fixed", None, 0, type="Integer"),
 )
 
+_MIXER = (
+    *row("motor.arm", "parameter fixed", "m", 0.0, axes=("x", "y")),
+    *row("motor.drag_to_thrust", "parameter fixed", "m", 0.0),
+)
+
 _REDESIGN = (
     *row("hold_period", "parameter fixed", "s", 0.0),
     *row("weight", "parameter fixed", "1", 1.0),
@@ -132,6 +139,7 @@ _REDESIGN = (
 
 UNIFIED = (
     *_COMMON,
+    *_MIXER,
     *_REDESIGN,
     *_SCALING,
     *row("gain.translation", "parameter tunable", "m/s2", 2.0, axes=XYZ),
@@ -151,6 +159,7 @@ UNIFIED = (
 
 GEOMETRIC = (
     *_COMMON,
+    *_MIXER,
     *_REDESIGN,
     *_SCALING,
     *row("gain.position", "parameter tunable", "1/s2", 4.0),

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from controller_fmu.cascaded.airframe import Airframe
 from fmu_kit.algebra import Vec3
 
-FRAME = Airframe(motor_thrust=3.0, arm_x=0.12, arm_y=0.12, drag_to_thrust=0.015)
+FRAME = Airframe(thrust_max=3.0, arm_x=0.12, arm_y=0.12, drag_to_thrust=0.015)
 COMMANDS = st.builds(Vec3, *[st.floats(-1.0, 1.0)] * 3)
 
 
@@ -33,12 +33,12 @@ def mixed(frame: Airframe) -> np.ndarray:
 
 @given(COMMANDS)
 def test_a_command_is_the_torque_that_motors_mixed_for_it_exert(command: Vec3) -> None:
-    torque = exerted(FRAME) @ (FRAME.motor_thrust * mixed(FRAME) @ [*command, 0.0])
+    torque = exerted(FRAME) @ (FRAME.thrust_max * mixed(FRAME) @ [*command, 0.0])
     assert [*FRAME.torque(command), 0.0] == pytest.approx(list(torque), abs=1e-12)
 
 
 def test_full_thrust_is_that_of_four_motors() -> None:
-    assert (exerted(FRAME) @ (FRAME.motor_thrust * mixed(FRAME) @ [0.0, 0.0, 0.0, 1.0]))[3] == pytest.approx(
+    assert (exerted(FRAME) @ (FRAME.thrust_max * mixed(FRAME) @ [0.0, 0.0, 0.0, 1.0]))[3] == pytest.approx(
         FRAME.full_thrust, rel=1e-12
     )
 

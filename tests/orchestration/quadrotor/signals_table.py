@@ -1,14 +1,14 @@
 """Signals of the quadrotor as hashes: `python -m tests.orchestration.quadrotor.signals_table` makes them anew.
 
-The command flies the scenarios of the table again and writes what has come of them. The table in the repository is
-that of the master of one plant and one controller, from before there were systems.
+The command flies the scenarios of the table again and writes what has come of them, in the columns that the table has.
+The table in the repository is that of the master of one plant and one controller, from before there were systems.
 """
 
 import hashlib
 import json
 import math
 import statistics
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
@@ -47,9 +47,9 @@ def flown(tables: dict[str, Any]) -> Result:
     return quadcosim.run(scenario_of(tables))
 
 
-def entry(result: Result) -> dict[str, Any]:
-    """What the table says of a flight; the signals of its reference belong to no FMU."""
-    own = [i for i, column in enumerate(result.columns) if not column.startswith("reference.")]
+def entry(result: Result, known: Collection[str]) -> dict[str, Any]:
+    """What the table says of a flight, of the columns that are known to it: variables may have come since."""
+    own = [i for i, column in enumerate(result.columns) if column in known]
     rows = np.ascontiguousarray(result.rows[:, own])
     events = "\n".join(f"{event.time} {event.kind} {event.what} {event.sample}" for event in result.events)
     columns = [result.columns[i] for i in own]
@@ -71,7 +71,9 @@ def flights() -> list[tuple[str, dict[str, Any]]]:
 
 def main() -> None:
     """Write the table of what is flown now."""
-    found = {name: {"scenario": old["scenario"], **entry(flown(old["scenario"]))} for name, old in flights()}
+    found = {
+        name: {"scenario": old["scenario"], **entry(flown(old["scenario"]), old["last"])} for name, old in flights()
+    }
     table = {"fingerprint": fingerprint(), "flights": found}
     TABLE.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
 
