@@ -247,7 +247,7 @@ def validate(
 ) -> Answer:
     """Check FMUs: archive, description, and what they do when they run; exit code 1 if there is any problem.
 
-    Any FMI 2.0 co-simulation FMU will do; those that quadcosim built must keep the rules of this project too.
+    Any co-simulation FMU of FMI 2.0 or 3.0 will do; those that quadcosim built must keep the rules of this project too.
     All of it is done in a process of its own within limits.
     """
     from orchestration.building import fmus

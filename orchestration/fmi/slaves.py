@@ -1,6 +1,7 @@
 """fmpy's instances of FMUs for co-simulation, of either version of FMI: what begins alike is one text here."""
 
-from collections.abc import Callable, Mapping
+import ctypes
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -44,6 +45,13 @@ class FMU3Slave(_Known, fmi3.FMU3Slave):  # type: ignore[misc]
     """Of FMI 3.0."""
 
     _known: ClassVar[dict[str, tuple[Any, Any, Any]]] = {}
+
+    def getString(self, vr: Sequence[int], nValues: int | None = None) -> list[bytes | None]:  # noqa: N802
+        """As they are, which may be none, or no text: fmpy's decodes them."""
+        count = len(vr) if nValues is None else nValues
+        values = (ctypes.c_char_p * count)()
+        self.fmi3GetString(self.component, (ctypes.c_uint * len(vr))(*vr), len(vr), values, count)
+        return list(values)
 
 
 def loaded(version: int, folder: Path, *, token: str, identifier: str, name: str) -> Any:

@@ -112,7 +112,7 @@ ARCHIVE = (
         name="description not XML", rule="readable", words=("well-formed",), damage=file(DESCRIPTION, b"<fmiModel"),
         keeps_guid=True,
     ),
-    Mutant(name="FMI 3", rule="readable", words=("fmiVersion = 3.0",), damage=root(fmiVersion="3.0")),
+    Mutant(name="FMI 1", rule="readable", words=("fmiVersion = 1.0",), damage=root(fmiVersion="1.0")),
     Mutant(name="path out of the archive", rule="paths", words=("../run.py",), damage=file("../run.py", b"")),
     Mutant(name="absolute path", rule="paths", words=("/etc/motd",), damage=file("/etc/motd", b"")),
     Mutant(

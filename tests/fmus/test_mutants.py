@@ -117,7 +117,7 @@ def test_what_a_look_finds_the_whole_validation_finds_too(
 # -- on the command line --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["date in local time", "process crashes", "archive cut short", "FMI 3"])
+@pytest.mark.parametrize("name", ["date in local time", "process crashes", "archive cut short", "FMI 1"])
 def test_the_command_names_what_it_finds_and_ends_with_1(
     name: str, built: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -12,18 +12,20 @@ import fmpy
 from orchestration.checks.validation import rules, run_rules
 from orchestration.checks.validation.archive_rules import can_be_unpacked
 from orchestration.checks.validation.description import standard
-from orchestration.checks.validation.fmu import Fmu, read_co_simulation, read_fmu
+from orchestration.checks.validation.fmu import Fmu
 from orchestration.checks.validation.instance import RefusedError
 from orchestration.checks.validation.own_description import own_description
 from orchestration.checks.validation.probe import Probe
 from orchestration.checks.validation.progress import Report
+from orchestration.checks.validation.reading import read_co_simulation, read_fmu
 from orchestration.fmi.archive import UnreadableFmuError, read_archive
 from orchestration.fmi.pythonfmu import expect_readable_place
+from orchestration.fmi.slaves import FOLDERS
 from orchestration.processes.channel import Parent
 from orchestration.processes.limits import Limits, restrict
 
 READABLE, PLATFORM = "readable", "platform"
-"""Rules that are kept here: there is an FMI 2.0 FMU to look at, and this machine can run it"""
+"""Rules that are kept here: there is an FMU to look at, and this machine can run it"""
 
 
 def main(path: Path, folder: Path, limits: Limits, report: Report) -> None:
@@ -62,10 +64,10 @@ def _run(probe: Probe, report: Report) -> None:
     fmu = probe.fmu
     if fmu.is_ours:
         report.tried((own_description,), probe, RefusedError)
-    platforms = fmpy.supported_platforms(str(fmu.archive.path))
-    if fmpy.platform not in platforms:
+    here, platforms = FOLDERS[fmu.version], fmu.platforms
+    if here not in platforms:
         report.rule(PLATFORM)
-        missing = f"expected a binary for {fmpy.platform}, found {', '.join(platforms) or 'none'}"
+        missing = f"expected a binary for {here}, found {', '.join(platforms) or 'none'}"
         report.found(f"what the FMU does was not checked: {missing}")
         return
     if any(report.tried([rule], probe, RefusedError) for rule in run_rules.FIRST):

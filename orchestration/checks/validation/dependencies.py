@@ -23,7 +23,7 @@ _FAR = tuple(sign * 10.0**k for k in range(5) for sign in (1.0, -1.0))
 """By how much an input is moved that moves nothing when it is moved a little"""
 
 Moved = dict[str, set[str]]
-"""Outputs that move, by the input that they move with"""
+"""Outputs that move, by the input that they move with; arrays are one"""
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ def idle_dependency(probe: Probe) -> Iterator[str]:
         return
     for mode in _modes(probe):
         for v in probe.inputs:
-            declaring = {output for output, inputs in mode.declared.items() if inputs is not None and v.name in inputs}
-            if declaring and not declaring & (mode.moved[v.name] or _moving_far(probe, v)):
+            declaring = {output for output, inputs in mode.declared.items() if inputs is not None and v.whole in inputs}
+            if declaring and not declaring & (mode.moved[v.whole] or _moving_far(probe, v)):
                 names = ", ".join(sorted(declaring))
                 yield f"{v.name} moves none of {names} {mode.where}: expected it not to be among their dependencies"
 
@@ -82,14 +82,14 @@ def _configurations(probe: Probe) -> Iterator[dict[str, Value]]:
     """Inputs a little away from their starts; and with them each Boolean parameter the other way round."""
     inputs = probe.inputs_at(0)
     yield inputs
-    switches = [v for v in probe.fmu.of_causality("parameter") if v.type == "Boolean"]
+    switches = [v for v in probe.of("parameter") if v.kind == "Boolean"]
     for v in switches[:MOST_SWITCHES]:
         yield {**inputs, v.name: not v.start_value}
 
 
 def _parameters(probe: Probe) -> list[Variable]:
     """Those that may be set in initialisation mode and moved a little; a text may be a path, which has no beside."""
-    found = [v for v in probe.fmu.of_causality("parameter") if v.initial == "exact" and v.type != "String"]
+    found = [v for v in probe.of("parameter") if v.initial == "exact" and v.kind not in ("String", "Binary")]
     return found[:MOST_PARAMETERS]
 
 
@@ -114,7 +114,7 @@ def _move(
             with contextlib.suppress(RefusedError):
                 while waiting:
                     v = waiting.popleft()
-                    moved[v.name] |= _moving(probe, instance, v, before)
+                    moved[v.whole] |= _moving(probe, instance, v, before)
 
 
 def _moving(probe: Probe, instance: Instance, v: Variable, before: Row) -> set[str]:
@@ -123,8 +123,7 @@ def _moving(probe: Probe, instance: Instance, v: Variable, before: Row) -> set[s
     outputs = set()
     for other in near:
         instance.set({v.name: other})
-        after = instance.get(probe.outputs)
-        outputs |= {output for output, old in before.items() if not same(old, after[output])}
+        outputs |= _other(probe, before, instance.get(probe.outputs))
     instance.set({v.name: value})
     return outputs
 
@@ -132,15 +131,19 @@ def _moving(probe: Probe, instance: Instance, v: Variable, before: Row) -> set[s
 def _moving_far(probe: Probe, v: Variable) -> set[str]:
     """The outputs that move in initialisation mode with a Real input that is moved far: a switch has a threshold."""
     outputs: set[str] = set()
-    for move in _FAR if v.type == "Real" else ():
+    for move in _FAR if v.kind == "Real" else ():
         with probe.instance() as instance, contextlib.suppress(RefusedError):
             values = probe.inputs_at(0)
             instance.begin(values, probe.start)
             before = instance.get(probe.outputs)
             instance.set({v.name: float(values[v.name]) + move})
-            after = instance.get(probe.outputs)
-            outputs |= {output for output, old in before.items() if not same(old, after[output])}
+            outputs |= _other(probe, before, instance.get(probe.outputs))
     return outputs
+
+
+def _other(probe: Probe, before: Row, after: Row) -> set[str]:
+    """The outputs that are not what they were, an array if any of its elements is not."""
+    return {v.whole for v in probe.outputs if not same(before[v.name], after[v.name])}
 
 
 def _prepare(probe: Probe, instance: Instance, values: Values, steps: int | None) -> None:
@@ -155,7 +158,7 @@ def _prepare(probe: Probe, instance: Instance, values: Values, steps: int | None
 def _declared(fmu: Fmu, unknowns: Iterable[Unknown]) -> dict[str, set[str] | None]:
     declared: dict[str, set[str] | None] = {}
     for unknown in unknowns:
-        output = fmu.variable(unknown.index)
+        output = fmu.variable(unknown.handle)
         if output is not None and output.causality == "output":
             listed = unknown.dependencies
             known = None if listed is None else {v.name for v in map(fmu.variable, listed) if v is not None}

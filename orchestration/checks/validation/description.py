@@ -5,10 +5,9 @@ import re
 from collections.abc import Iterator
 
 from fmu_kit.packaging import NATIVE_TABLES
-from orchestration.checks.validation.fmu import Fmu
+from orchestration.checks.validation.fmu import LIBRARIES, Fmu
 from orchestration.fmi.archive import Archive
 
-_PLATFORM_SUFFIXES = (".so", ".dll", ".dylib")
 SLAVE_MODULE = "resources/slavemodule.txt"
 """Where pythonfmu looks for the name of the script that it runs."""
 
@@ -31,19 +30,25 @@ def standard(archive: Archive) -> list[str]:
 def guid(fmu: Fmu) -> Iterator[str]:
     """An empty one passes the schema, but no library could tell by it whose description it was given."""
     if not fmu.guid.strip():
-        yield f"guid = {fmu.guid!r}: expected a text that is not empty"
+        yield f"{fmu.standard.token} = {fmu.guid!r}: expected a text that is not empty"
 
 
 def model_identifier(fmu: Fmu) -> Iterator[str]:
-    """It is the prefix of C functions and the name of a file (FMI 2.0.4, section 2.1.1)."""
+    """It is the name of a file, and can be the prefix of C functions (FMI 2.0.4, section 2.1.1; FMI 3.0, 2.4.2)."""
     if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", fmu.model_identifier):
         yield f"modelIdentifier = {fmu.model_identifier!r}: expected a name by C syntax"
 
 
 def capabilities(fmu: Fmu) -> Iterator[str]:
-    """What cannot be saved cannot be serialised."""
-    if fmu.can("canSerializeFMUstate") and not fmu.can("canGetAndSetFMUstate"):
-        yield "canGetAndSetFMUstate = false: expected true, since canSerializeFMUstate is"
+    """What cannot be saved cannot be serialised; in FMI 3.0 clocks want event mode, an early return wants updates."""
+    if fmu.serialises and not fmu.saves:
+        yield f"{fmu.standard.saves} = false: expected true, since {fmu.standard.serialises} is"
+    early, updates = "canReturnEarlyAfterIntermediateUpdate", "providesIntermediateUpdate"
+    if fmu.can(early) and not fmu.can(updates):
+        yield f"{updates} = false: expected true, since {early} is"
+    clocks = [v.name for v in fmu.variables if v.kind == "Clock"]
+    if clocks and not fmu.can("hasEventMode"):
+        yield f"hasEventMode = false: expected true, for the clocks {', '.join(clocks)}"
 
 
 def default_experiment(fmu: Fmu) -> Iterator[str]:
@@ -63,7 +68,7 @@ def default_experiment(fmu: Fmu) -> Iterator[str]:
 def binaries(fmu: Fmu) -> Iterator[str]:
     """A library for at least one platform goes by the model identifier, or the FMU comes as sources."""
     files = fmu.archive.files
-    libraries = [name for name in files if name.startswith("binaries/") and name.endswith(_PLATFORM_SUFFIXES)]
+    libraries = [name for name in files if name.startswith("binaries/") and name.endswith(LIBRARIES)]
     if any(name.rpartition("/")[2].rpartition(".")[0] == fmu.model_identifier for name in libraries):
         return
     if not any(name.startswith("sources/") for name in files):

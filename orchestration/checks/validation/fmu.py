@@ -1,33 +1,46 @@
-"""The one view of an FMU that the rules look at: what its description says, not yet judged."""
+"""The one view of an FMU that the rules look at, of either version of FMI: what it says of itself, not yet judged."""
 
-from dataclasses import dataclass
-from typing import NoReturn
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
 from xml.etree.ElementTree import Element
 
-from fmu_kit.packaging import SOURCE_HASH_FILE
-from orchestration.fmi.archive import DESCRIPTION, Archive, OtherVersionError, UnreadableFmuError, read_root, version_of
+import numpy as np
 
-TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
+from fmu_kit.packaging import SOURCE_HASH_FILE
+from orchestration.checks.validation.standards import Standard
+from orchestration.fmi.archive import Archive
+
 NUMBERS = ("Real", "Integer", "Enumeration")
 OUR_TOOL = "quadcosim"
+LIBRARIES = (".so", ".dll", ".dylib")
+"""How the names of libraries end"""
 
-_INITIAL = {"parameter": "exact", "calculatedParameter": "calculated", "independent": None, "input": None}
-"""What `initial` is when it is not written; constants aside, outputs and locals are calculated."""
+Start = float | int | bool | str | bytes
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Variable:
-    """A scalar variable with its defaults filled in, numbers still as they are written."""
+    """A variable with its defaults filled in, numbers still as they are written; or an element of an array."""
 
-    index: int
-    """Its place in the list, from 1"""
+    place: int
+    """In the list, from 1"""
+    handle: int
+    """By which the model structure names it: its place in FMI 2.0, its value reference in FMI 3.0"""
     name: str
+    further_names: tuple[str, ...] = ()
+    """Of aliases in FMI 3.0, which are no variables of their own"""
     reference: int
     type: str
+    kind: str
+    """Real, Integer …: its type as FMI 2.0 has it"""
     causality: str
     variability: str
     initial: str | None
-    start: str | None
+    starts: tuple[str, ...]
+    """None, or one, or one for each element of an array"""
     unit: str | None
     minimum: str | None
     maximum: str | None
@@ -35,43 +48,90 @@ class Variable:
     items: tuple[int, ...]
     """Values that an Enumeration may take"""
     derivative_of: int | None
-    """Index of the state that it is the derivative of"""
+    """Handle of the state that it is the derivative of"""
+    others: Mapping[str, tuple[int, ...]]
+    """Further variables that it names by their handles: its clocks, its previous value, what its dimensions are"""
+    shape: tuple[int, ...] | None = None
+    """Of an array, as far as it is known what it starts with; None for a scalar, and for an element"""
+    whole: str
+    """The array that it is an element of; its own name if it is none"""
+    element: int = 0
+    """Its place in the array"""
 
     @property
-    def start_value(self) -> float | int | bool | str:
+    def start(self) -> str | None:
+        """As it is written; None if there is none."""
+        return " ".join(self.starts) if self.starts else None
+
+    @property
+    def start_value(self) -> Start:
         """The start in its type; zero, false or an empty text if there is none."""
-        if self.type == "Real":
-            return float(self.start or 0.0)
-        if self.type == "Boolean":
-            return self.start in ("true", "1")
-        return self.start or "" if self.type == "String" else int(self.start or 0)
+        text = self.starts[0] if self.starts else ""
+        if self.kind == "Real":
+            return float(np.float32(text or 0.0)) if self.type == "Float32" else float(text or 0.0)
+        if self.kind == "Boolean":
+            return text in ("true", "1")
+        if self.kind == "Binary":
+            return bytes.fromhex(text)
+        return text if self.kind == "String" else int(text or 0)
 
     @property
     def keeps_start(self) -> bool:
         """Whether it is at its start after initialisation, unless it is set: no event of the model can change it."""
-        given = self.causality in ("input", "parameter") or self.variability == "constant"
-        return given and self.start is not None
+        given = self.causality in ("input", "parameter", "structuralParameter") or self.variability == "constant"
+        return given and bool(self.starts)
+
+    @property
+    def is_clocked(self) -> bool:
+        """Whether it is a clock, or has a value only when one ticks."""
+        return self.kind == "Clock" or bool(self.others.get("clocks"))
+
+    @property
+    def elements(self) -> "tuple[Variable, ...]":
+        """Itself, or the elements of an array, the last index first, which counts from 1."""
+        if self.shape is None:
+            return (self,)
+        indices = itertools.product(*(range(1, n + 1) for n in self.shape))
+        starts = self.starts * (math.prod(self.shape) if len(self.starts) == 1 else 1)
+        return tuple(
+            replace(
+                self,
+                name=f"{self.name}[{','.join(map(str, index))}]",
+                starts=starts[element : element + 1],
+                shape=None,
+                element=element,
+            )
+            for element, index in enumerate(indices)
+        )
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Unknown:
     """An entry of the model structure."""
 
-    index: int
+    handle: int
     dependencies: tuple[int, ...] | None
-    """Indices; None: it may depend on all there is"""
+    """Handles; None: it may depend on all there is"""
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
+@dataclass(frozen=True, kw_only=True)
 class Fmu:
-    """An FMU for co-simulation by FMI 2.0."""
+    """An FMU for co-simulation by FMI 2.0 or 3.0."""
 
+    standard: Standard
     archive: Archive
     root: Element
     variables: tuple[Variable, ...]
+    """As they are declared: an array is one"""
     outputs: tuple[Unknown, ...]
     derivatives: tuple[Unknown, ...]
     initial_unknowns: tuple[Unknown, ...]
+    further_lists: Mapping[str, tuple[Unknown, ...]]
+
+    @property
+    def version(self) -> int:
+        """2 or 3, of FMI."""
+        return self.standard.version
 
     @property
     def is_ours(self) -> bool:
@@ -81,8 +141,8 @@ class Fmu:
 
     @property
     def guid(self) -> str:
-        """As it is written."""
-        return self.root.get("guid", "")
+        """As it is written; in FMI 3.0 it is the instantiation token."""
+        return self.root.get(self.standard.token, "")
 
     @property
     def model_identifier(self) -> str:
@@ -95,126 +155,71 @@ class Fmu:
         element = self.root.find("DefaultExperiment")
         return {} if element is None else {name: float(value) for name, value in element.items()}
 
+    @property
+    def fixed_step(self) -> float | None:
+        """[s] that it takes inside, if it says so (FMI 3.0)."""
+        text = self._co_simulation.get("fixedInternalStepSize")
+        return None if text is None else float(text)
+
     def can(self, capability: str) -> bool:
         """A capability flag of the co-simulation part."""
         return self._co_simulation.get(capability) in ("true", "1")
+
+    @property
+    def saves(self) -> bool:
+        """Whether its state can be saved, and set."""
+        return self.can(self.standard.saves)
+
+    @property
+    def serialises(self) -> bool:
+        """Whether bytes can be made of its state."""
+        return self.can(self.standard.serialises)
+
+    @property
+    def platforms(self) -> list[str]:
+        """Folders with a library, and `c-code` for sources to compile."""
+        parts = [name.split("/") for name in self.archive.files if name.endswith((*LIBRARIES, ".c"))]
+        found = {part[1] for part in parts if part[0] == "binaries" and len(part) > 2 and part[-1][-2:] != ".c"}
+        return [*(["c-code"] if any(part[0] == "sources" for part in parts) else []), *sorted(found)]
+
+    @property
+    def lists(self) -> Iterator[tuple[str, tuple[Unknown, ...]]]:
+        """Those of the model structure, by what they are called."""
+        called = self.standard.lists
+        yield called.outputs[0], self.outputs
+        yield called.derivatives[0], self.derivatives
+        yield called.initial_unknowns[0], self.initial_unknowns
+        yield from self.further_lists.items()
 
     def of_causality(self, *causalities: str) -> tuple[Variable, ...]:
         """The variables of these causalities."""
         return tuple(v for v in self.variables if v.causality in causalities)
 
-    def variable(self, index: int) -> Variable | None:
-        """By its index; None if there is none."""
-        return self.variables[index - 1] if 1 <= index <= len(self.variables) else None
+    def variable(self, handle: int) -> Variable | None:
+        """By its handle; None if there is none."""
+        return self._by_handle.get(handle)
+
+    @cached_property
+    def elements(self) -> tuple[Variable, ...]:
+        """All that has a value of its own at any time: scalars and the elements of arrays, without what is clocked."""
+        return tuple(element for v in self.variables if not v.is_clocked for element in v.elements)
+
+    @cached_property
+    def elements_by_name(self) -> dict[str, Variable]:
+        """The same, by their names."""
+        return {v.name: v for v in self.elements}
+
+    @cached_property
+    def lengths(self) -> dict[str, int]:
+        """How many values a variable has, by its name."""
+        return {v.name: len(v.elements) for v in self.variables}
+
+    @cached_property
+    def _by_handle(self) -> dict[int, Variable]:
+        return {v.handle: v for v in self.variables}
 
     @property
     def _co_simulation(self) -> Element:
         element = self.root.find("CoSimulation")
         assert element is not None  # of an Fmu that was read
         return element
-
-
-def read_co_simulation(archive: Archive) -> Element:
-    """The description of an FMU; raises `UnreadableFmuError` if it is not of FMI 2.0 for co-simulation."""
-    root = read_root(archive)
-    if version_of(root) != 2:
-        raise OtherVersionError(
-            "fmiVersion = 3.0: expected 2.0; an FMU of FMI 3.0 is not checked here; "
-            "fmpy validate checks its description"
-        )
-    if root.find("CoSimulation") is None:
-        raise UnreadableFmuError(f"{DESCRIPTION}: expected a CoSimulation element, nothing else was checked")
-    return root
-
-
-def read_fmu(archive: Archive, root: Element) -> Fmu:
-    """The view of an archive and its description; raises `UnreadableFmuError` for a number that is none."""
-    types = {element.get("name"): element[0] for element in root.iterfind("TypeDefinitions/SimpleType") if len(element)}
-    structure = {
-        name: tuple(_unknown(e) for e in root.iterfind(f"ModelStructure/{name}/Unknown"))
-        for name in ("Outputs", "Derivatives", "InitialUnknowns")
-    }
-    fmu = Fmu(
-        archive=archive,
-        root=root,
-        variables=tuple(
-            _variable(index, element, types)
-            for index, element in enumerate(root.iterfind("ModelVariables/ScalarVariable"), start=1)
-        ),
-        outputs=structure["Outputs"],
-        derivatives=structure["Derivatives"],
-        initial_unknowns=structure["InitialUnknowns"],
-    )
-    _require_numbers(fmu)
-    return fmu
-
-
-def _variable(index: int, element: Element, types: dict[str | None, Element]) -> Variable:
-    name = element.get("name", f"variable {index}")
-    typed = next((child for child in element if child.tag in TYPES), None)
-    if typed is None:
-        _refuse(f"{name}: expected an element {', '.join(TYPES[:-1])} or {TYPES[-1]}")
-    declared = types.get(typed.get("declaredType"))
-
-    def attribute(key: str) -> str | None:
-        return typed.get(key, None if declared is None else declared.get(key))
-
-    causality, variability = element.get("causality", "local"), element.get("variability", "continuous")
-    derivative = typed.get("derivative")
-    return Variable(
-        index=index,
-        name=name,
-        reference=_whole(element.get("valueReference"), f"{name}: valueReference"),
-        type=typed.tag,
-        causality=causality,
-        variability=variability,
-        initial=element.get("initial", _initial(causality, variability)),
-        start=typed.get("start"),
-        unit=attribute("unit"),
-        minimum=attribute("min"),
-        maximum=attribute("max"),
-        nominal=attribute("nominal"),
-        items=tuple(
-            _whole(e.get("value"), f"{name}: Item") for e in (() if declared is None else declared.iter("Item"))
-        ),
-        derivative_of=None if derivative is None else _whole(derivative, f"{name}: derivative"),
-    )
-
-
-def _initial(causality: str, variability: str) -> str | None:
-    return "exact" if variability == "constant" else _INITIAL.get(causality, "calculated")
-
-
-def _unknown(element: Element) -> Unknown:
-    listed = element.get("dependencies")
-    index = _whole(element.get("index"), "ModelStructure: index")
-    indices = None if listed is None else tuple(_whole(t, f"Unknown {index}: dependencies") for t in listed.split())
-    return Unknown(index=index, dependencies=indices)
-
-
-def _require_numbers(fmu: Fmu) -> None:
-    """What the rules take for numbers are some."""
-    numbers = [
-        ("DefaultExperiment", key, text) for e in fmu.root.iterfind("DefaultExperiment") for key, text in e.items()
-    ]
-    numbers += [("BaseUnit", key, text) for e in fmu.root.iter("BaseUnit") for key, text in e.items()]
-    for v in fmu.variables:
-        if v.type in NUMBERS:
-            found = {"start": v.start, "min": v.minimum, "max": v.maximum, "nominal": v.nominal}
-            numbers += [(v.name, key, text) for key, text in found.items() if text is not None]
-    for where, key, text in numbers:
-        try:
-            float(text)
-        except ValueError:
-            _refuse(f"{where}: {key} = {text}, expected a number")
-
-
-def _whole(text: str | None, what: str) -> int:
-    try:
-        return int(text or "")
-    except ValueError:
-        _refuse(f"{what} = {text}, expected a whole number")
-
-
-def _refuse(text: str) -> NoReturn:
-    raise UnreadableFmuError(text)

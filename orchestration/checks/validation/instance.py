@@ -1,9 +1,11 @@
 """An instance of an FMU under validation, by plain FMI calls; any variable type, any order of calls."""
 
+import math
 import struct
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import islice
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
@@ -13,14 +15,14 @@ from orchestration.checks.validation.fmu import Fmu, Variable
 from orchestration.fmi.messages import Message, words
 from orchestration.fmi.slaves import instantiate, loaded
 
-Value: TypeAlias = float | int | bool | str
+Value: TypeAlias = float | int | bool | str | bytes
 Values: TypeAlias = Mapping[str, Value]
 Row: TypeAlias = dict[str, Value]
 """Values by the names of the variables"""
 
-_ACCESS = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean", "String": "String"}
 _CONVERT: dict[str, Callable[[Any], Value]] = {
-    "Real": float, "Integer": int, "Boolean": bool, "String": lambda text: (text or b"").decode("utf-8", "replace")
+    "Real": float, "Integer": int, "Enumeration": int, "Boolean": bool, "Binary": lambda content: bytes(content or b""),
+    "String": lambda text: (text or b"").decode("utf-8", "replace"),
 }  # fmt: skip
 
 
@@ -34,15 +36,15 @@ class Instance:
     def __init__(self, fmu: Fmu, folder: Path, name: str, beat: Callable[[], None]) -> None:
         self.fmu = fmu
         self.messages: list[Message] = []
-        self._variables = {v.name: v for v in fmu.variables}
+        self._arrays: dict[str, list[Any]] = {}  # as they were set: a call sets a whole one
         self._failed = True
         self._beat = beat
         beat()
         try:
-            self._slave = loaded(2, folder, token=fmu.guid, identifier=fmu.model_identifier, name=name)
+            self._slave = loaded(fmu.version, folder, token=fmu.guid, identifier=fmu.model_identifier, name=name)
             instantiate(self._slave, self.messages)
         except Exception as error:
-            raise RefusedError(f"fmi2Instantiate: {words(self.messages, str(error))[0]}") from error
+            raise RefusedError(f"{fmu.standard.instantiates}: {words(self.messages, str(error))[0]}") from error
         beat()
         self._failed = False
 
@@ -58,10 +60,9 @@ class Instance:
 
     def begin(self, values: Values, start: float, stop: float | None = None) -> None:
         """Set parameters, enter initialisation mode, set inputs; `stop` is None if no stop time is defined."""
-        inputs = {name: value for name, value in values.items() if self._variables[name].causality == "input"}
+        inputs = {name: value for name, value in values.items() if self.fmu.elements_by_name[name].causality == "input"}
         self.set({name: value for name, value in values.items() if name not in inputs})
-        self._call("setupExperiment", startTime=start, stopTime=stop)
-        self._call("enterInitializationMode")
+        self._enter(start, stop)
         self.set(inputs)
 
     def initialise(self, values: Values, start: float, stop: float | None = None) -> None:
@@ -71,17 +72,7 @@ class Instance:
 
     def step(self, t: float, h: float) -> bool:
         """From `t` to `t + h` seconds; whether the run goes on, for an FMU may say that it ends it here."""
-        if self._failed:
-            raise RefusedError("fmi2DoStep: the instance has failed and is not called again")
-        self._beat()
-        try:
-            self._slave.doStep(currentCommunicationPoint=t, communicationStepSize=h)
-        except FMICallException as error:
-            if error.status == fmi2.fmi2Discard and self._call("getBooleanStatus", fmi2.fmi2Terminated):
-                return False
-            raise self._refusal(error) from None
-        self._beat()
-        return True
+        raise NotImplementedError
 
     def terminate(self) -> None:
         """End the run."""
@@ -90,49 +81,78 @@ class Instance:
     def reset(self) -> None:
         """Back to the state after instantiation."""
         self._call("reset")
+        self._arrays.clear()
 
     # -- values ---------------------------------------------------------------------------------------------
 
     def set(self, values: Values) -> None:
-        """Set variables by name."""
+        """Set scalars, and elements of arrays, by name."""
+        whole: dict[str, tuple[Variable, list[Any]]] = {}
         for name, value in values.items():
-            variable = self._variables[name]
-            self._call(f"set{_ACCESS[variable.type]}", [variable.reference], [value])
+            v = self.fmu.elements_by_name[name]
+            _, content = whole.setdefault(v.whole, (v, self._content(v)))
+            content[v.element] = value
+        for v, content in whole.values():
+            self._call(f"set{self.fmu.standard.access[v.type]}", [v.reference], content)
 
     def get(self, variables: Iterable[Variable]) -> Row:
-        """The values of variables, asked for by type."""
-        by_access: dict[str, list[Variable]] = {}
-        for v in variables:
-            by_access.setdefault(_ACCESS[v.type], []).append(v)
-        row: Row = {}
-        for access, group in by_access.items():
-            values = self._call(f"get{access}", [v.reference for v in group])
-            row.update((v.name, _CONVERT[access](x)) for v, x in zip(group, values))
-        return row
+        """The values of scalars and of elements of arrays, asked for by type."""
+        by_type: dict[str, dict[str, Variable]] = {}
+        asked = list(variables)
+        for v in asked:
+            by_type.setdefault(v.type, {}).setdefault(v.whole, v)
+        found = {name: values for type, group in by_type.items() for name, values in self._got(type, group)}
+        return {v.name: found[v.whole][v.element] for v in asked}
+
+    def _got(self, type: str, group: Mapping[str, Variable]) -> Iterator[tuple[str, list[Value]]]:
+        """The values of variables of one type, each with all that it holds."""
+        access, convert = self.fmu.standard.access[type], _CONVERT[self.fmu.standard.types[type]]
+        lengths = [self.fmu.lengths[name] for name in group]
+        more = {} if lengths == [1] * len(lengths) else {"nValues": sum(lengths)}
+        values = iter(self._call(f"get{access}", [v.reference for v in group.values()], **more))
+        for name, length in zip(group, lengths):
+            yield name, [convert(value) for value in islice(values, length)]
+
+    def _content(self, v: Variable) -> list[Any]:
+        """What the variable that `v` is of was last set to, or else starts with, to be changed."""
+        if self.fmu.lengths[v.whole] == 1:
+            return [v.start_value]
+        if v.whole not in self._arrays:
+            self._arrays[v.whole] = [e.start_value for e in self.fmu.elements if e.whole == v.whole]
+        return self._arrays[v.whole]
 
     # -- state ----------------------------------------------------------------------------------------------
 
+    _states: ClassVar[tuple[str, str, str, str, str]]
+    """fmpy's names of the calls that get, serialise, free, deserialise and set a state"""
+
     def state(self) -> Any:
         """A copy of the state, to be given back to `put_back` or `serialised` of this instance."""
-        return self._call("getFMUstate")
+        return self._call(self._states[0])
 
     def put_back(self, state: Any) -> None:
         """Go on from a state, and free it."""
-        self._call("setFMUstate", state)
-        self._call("freeFMUstate", state)
+        _, _, free, _, put = self._states
+        self._call(put, state)
+        self._call(free, state)
 
     def serialised(self) -> bytes:
         """The state as bytes."""
-        state = self._call("getFMUstate")
-        content = bytes(self._call("serializeFMUstate", state))
-        self._call("freeFMUstate", state)
+        get, serialise, free, _, _ = self._states
+        state = self._call(get)
+        content = bytes(self._call(serialise, state))
+        self._call(free, state)
         return content
 
     def put_back_bytes(self, content: bytes) -> None:
         """Go on from what `serialised` of any instance of the FMU gave."""
-        self.put_back(self._call("deSerializeFMUstate", content))
+        self.put_back(self._call(self._states[3], content))
 
     # -- inside ---------------------------------------------------------------------------------------------
+
+    def _enter(self, start: float, stop: float | None) -> None:
+        """Into initialisation mode."""
+        raise NotImplementedError
 
     def _call(self, method: str, *args: Any, **kwargs: Any) -> Any:
         if self._failed:
@@ -141,13 +161,65 @@ class Instance:
         try:
             return getattr(self._slave, method)(*args, **kwargs)
         except FMICallException as error:
-            raise self._refusal(error) from None
+            raise self._refusal(error.function, f"status {error.status}") from None
         finally:
             self._beat()
 
-    def _refusal(self, error: FMICallException) -> RefusedError:
+    def _refusal(self, function: str, otherwise: str) -> RefusedError:
         self._failed = True
-        return RefusedError(f"{error.function}: {words(self.messages, f'status {error.status}')[0]}")
+        return RefusedError(f"{function}: {words(self.messages, otherwise)[0]}")
+
+
+class Instance2(Instance):
+    """Of FMI 2.0."""
+
+    _states = ("getFMUstate", "serializeFMUstate", "freeFMUstate", "deSerializeFMUstate", "setFMUstate")
+
+    def _enter(self, start: float, stop: float | None) -> None:
+        self._call("setupExperiment", startTime=start, stopTime=stop)
+        self._call("enterInitializationMode")
+
+    def step(self, t: float, h: float) -> bool:
+        """As any."""
+        if self._failed:
+            raise RefusedError("fmi2DoStep: the instance has failed and is not called again")
+        self._beat()
+        try:
+            self._slave.doStep(currentCommunicationPoint=t, communicationStepSize=h)
+        except FMICallException as error:
+            if error.status == fmi2.fmi2Discard and self._call("getBooleanStatus", fmi2.fmi2Terminated):
+                return False
+            raise self._refusal(error.function, f"status {error.status}") from None
+        self._beat()
+        return True
+
+
+class Instance3(Instance):
+    """Of FMI 3.0, without event mode and early return, which an importer need not have."""
+
+    _states = ("getFMUState", "serializeFMUState", "freeFMUState", "deserializeFMUState", "setFMUState")
+
+    def _enter(self, start: float, stop: float | None) -> None:
+        self._call("enterInitializationMode", startTime=start, stopTime=stop)
+
+    def step(self, t: float, h: float) -> bool:
+        """As any; what was not offered to the FMU it must not ask for."""
+        event, ends, early, reached = self._call("doStep", t, h)
+        if ends:
+            return False
+        if event or early:
+            asked = "eventHandlingNeeded" if event else "earlyReturn"
+            self._failed = True
+            raise RefusedError(f"fmi3DoStep: {asked} = true from {t} to {t + h}: expected false, it was not offered")
+        if not math.isfinite(reached):
+            self._failed = True
+            raise RefusedError(f"fmi3DoStep: lastSuccessfulTime = {reached} from {t} to {t + h}: expected a time")
+        return True
+
+
+def instance_of(fmu: Fmu, folder: Path, name: str, beat: Callable[[], None]) -> Instance:
+    """A fresh instance of the FMU unpacked in `folder`; raises `RefusedError`."""
+    return (Instance2 if fmu.version == 2 else Instance3)(fmu, folder, name, beat)
 
 
 def same(a: Value, b: Value) -> bool:

@@ -7,11 +7,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from orchestration.checks.validation.finding import Note
 from orchestration.checks.validation.fmu import Fmu, Variable
-from orchestration.checks.validation.instance import Instance, RefusedError, Row, Value, Values, same
+from orchestration.checks.validation.instance import Instance, RefusedError, Row, Value, Values, instance_of, same
 from orchestration.checks.validation.variables import limits
 from orchestration.fmi.messages import Message
+from orchestration.fmi.values import INTEGERS
 from orchestration.processes.waiting import own_clock
 
 STEPS = 100
@@ -71,7 +74,7 @@ class Probe:
 
     def instance(self) -> Instance:
         """A fresh one, of a name of its own."""
-        return Instance(self.fmu, self.folder, f"{self.fmu.model_identifier} {next(self._numbers)}", self.beat)
+        return instance_of(self.fmu, self.folder, f"{self.fmu.model_identifier} {next(self._numbers)}", self.beat)
 
     # -- time -----------------------------------------------------------------------------------------------
 
@@ -82,9 +85,13 @@ class Probe:
 
     @functools.cached_property
     def step(self) -> float:
-        """Communication step of the default experiment, in seconds; a hundredth of it, or 10 ms, if it has none."""
+        """Communication step of the default experiment, in seconds; if it has none, that which the FMU takes inside.
+
+        Without any a hundredth of the experiment, or 10 ms.
+        """
         experiment = self.fmu.experiment
-        given = experiment.get("stepSize", (experiment.get("stopTime", self.start + 1.0) - self.start) / STEPS)
+        share = (experiment.get("stopTime", self.start + 1.0) - self.start) / STEPS
+        given = experiment.get("stepSize", self.fmu.fixed_step or share)
         return given if math.isfinite(given) and given > 0.0 else 0.01
 
     def points(self, plan: Plan) -> list[tuple[float, float]]:
@@ -107,15 +114,19 @@ class Probe:
 
     # -- values ---------------------------------------------------------------------------------------------
 
+    def of(self, causality: str) -> tuple[Variable, ...]:
+        """Scalars and elements of arrays of this causality."""
+        return tuple(v for v in self.fmu.elements if v.causality == causality)
+
     @functools.cached_property
     def inputs(self) -> tuple[Variable, ...]:
         """All inputs."""
-        return self.fmu.of_causality("input")
+        return self.of("input")
 
     @functools.cached_property
     def outputs(self) -> tuple[Variable, ...]:
         """All outputs."""
-        return self.fmu.of_causality("output")
+        return self.of("output")
 
     @functools.cached_property
     def general_parameters(self) -> dict[str, Value]:
@@ -123,39 +134,41 @@ class Probe:
 
         At its defaults a model may leave out what it has: a lag of time constant zero has no state to lose.
         """
-        return {v.name: _moved(v) for v in self.fmu.of_causality("parameter") if v.type == "Real" and v.start}
+        return {v.name: _moved(v) for v in self.of("parameter") if v.kind == "Real" and v.start}
 
     def inputs_at(self, k: int) -> dict[str, Value]:
         """Values of the Real inputs at step `k`: each by its own amount away from its start, and swinging."""
         values: dict[str, Value] = {}
         for i, v in enumerate(self.inputs):
-            if v.type == "Real":
+            if v.kind == "Real":
                 away = 0.05 * (i % 7 + 1) + 0.1 * math.sin(0.7 * k + i)
-                values[v.name] = _within(v, float(v.start_value) + _scale(v) * away)
+                values[v.name] = _within(v, float(v.start or 0.0) + _scale(v) * away)
         return values
 
     def around(self, v: Variable) -> list[Value]:
         """The value of an input at step 0, or that a parameter starts at, and values near it that it may take."""
         value = v.start_value
-        if v.type == "Boolean":
+        if v.kind == "Boolean":
             return [value, not value]
         if isinstance(value, str):
             return [value, f"{value}+"]
-        if v.type == "Enumeration":
+        if isinstance(value, bytes):
+            return [value, value + b"+"]
+        if v.kind == "Enumeration":
             return [value, *(item for item in v.items if item != value)]
-        if v.type == "Real":
-            value = float(self.inputs_at(0).get(v.name, v.start_value))
+        if v.kind == "Real":
+            value = float(self.inputs_at(0).get(v.name, value))
             return [value, *(_within(v, value + sign * _scale(v) / 16.0) for sign in (1.0, -1.0))]
         return [value, *(int(_within(v, value + sign)) for sign in (1, -1))]
 
     @functools.cached_property
     def watched(self) -> tuple[Variable, ...]:
         """Variables that are compared between runs: all; of very many the outputs and some of the others."""
-        every = self.fmu.variables
+        every = self.fmu.elements
         if len(every) <= MOST_WATCHED or self.fmu.is_ours:
             return every
         some = every[:: math.ceil(len(every) / MOST_WATCHED)]
-        return tuple({v.index: v for v in (*self.outputs[:MOST_WATCHED], *some)}.values())
+        return tuple({v.name: v for v in (*self.outputs[:MOST_WATCHED], *some)}.values())
 
     # -- runs -----------------------------------------------------------------------------------------------
 
@@ -275,11 +288,11 @@ def _near(a: Value, b: Value, distance: float) -> bool:
 
 
 def _scale(v: Variable) -> float:
-    return abs(float(v.nominal)) if v.nominal is not None else max(1.0, abs(float(v.start_value)))
+    return abs(float(v.nominal)) if v.nominal is not None else max(1.0, abs(float(v.start or 0.0)))
 
 
 def _moved(v: Variable) -> float:
-    start = float(v.start_value)
+    start = float(v.start or 0.0)
     step = 0.05 * (start or _scale(v))
     up = _within(v, start + step)
     return up if up != start else _within(v, start - step)
@@ -287,4 +300,7 @@ def _moved(v: Variable) -> float:
 
 def _within(v: Variable, value: float) -> float:
     low, high = limits(v)
+    if v.type in INTEGERS:
+        of = np.iinfo(INTEGERS[v.type])
+        low, high = max(low, of.min), min(high, of.max)
     return min(max(value, low), high)

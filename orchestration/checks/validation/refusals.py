@@ -19,19 +19,19 @@ def general_run(probe: Probe) -> Iterator[str]:
 
 def fixed_parameters(probe: Probe) -> Iterator[str]:
     """A fixed parameter cannot be set after initialisation, not even to what it is."""
-    for v in probe.fmu.of_causality("parameter"):
+    for v in probe.of("parameter"):
         if v.variability == "fixed" and _accepts(probe, v, v.start_value, initialised=True):
             yield f"{v.name}: set after initialisation, expected a fixed parameter to be refused"
 
 
 def bounds_enforced(probe: Probe) -> Iterator[str]:
     """A parameter outside its bounds does not get past initialisation, a tunable one not past the next step."""
-    for v in probe.fmu.of_causality("parameter"):
+    for v in probe.of("parameter"):
         for bound, sign in zip(limits(v), (-1.0, 1.0)):
             if math.isinf(bound):
                 continue
             outside = bound + sign * max(1.0, abs(bound))
-            value = outside if v.type == "Real" else int(outside)
+            value = outside if v.kind == "Real" else int(outside)
             moments = (False, True) if v.variability == "tunable" else (False,)
             for initialised in moments:
                 if _accepts(probe, v, value, initialised=initialised):
@@ -41,8 +41,8 @@ def bounds_enforced(probe: Probe) -> Iterator[str]:
 
 def not_finite_refused(probe: Probe) -> Iterator[str]:
     """A value that is not finite is refused where it is set, so that the message can name the variable."""
-    for v in probe.fmu.of_causality("input", "parameter"):
-        if v.type != "Real":
+    for v in (*probe.inputs, *probe.of("parameter")):
+        if v.kind != "Real":
             continue
         cases = [(math.nan, False)]
         if v.causality == "input" or v.variability == "tunable":
@@ -78,7 +78,7 @@ def terminated_once(probe: Probe) -> Iterator[str]:
         probe.begin(instance, PLAIN)
         instance.terminate()
         if _done(instance.terminate):
-            yield "fmi2Terminate is done twice: expected the second refused"
+            yield f"fmi{probe.fmu.version}Terminate is done twice: expected the second refused"
 
 
 def _done(call: Callable[[], object]) -> bool:

@@ -17,7 +17,7 @@ _HANGS = 0.5
 
 
 def validate(path: str | Path, *, limits: Limits | None = None) -> list[Finding]:
-    """What is wrong with the FMU for co-simulation (FMI 2.0) at `path`; nothing for one that is as it should be.
+    """What is wrong with the FMU for co-simulation (FMI 2.0 or 3.0) at `path`; nothing for one that is as it should be.
 
     All that touches the file is done, and the FMU is run, in a process of its own within `limits`. Rules that are
     this project's and not the standard's are for FMUs that quadcosim built. Raises `QuadcosimError` if the

@@ -18,28 +18,30 @@ _NAMES = {
 
 
 def names(fmu: Fmu) -> Iterator[str]:
-    """A name is one by the convention that the FMU declares (FMI 2.0.4, section 2.2.9)."""
+    """A name is one by the convention that the FMU declares (FMI 2.0.4, section 2.2.9; FMI 3.0, section 2.4.7)."""
     convention = fmu.root.get("variableNamingConvention", "flat")
     legal = _NAMES.get(convention, _NAMES["flat"])  # that there is another one the schema finds
     for v in fmu.variables:
-        if not legal.fullmatch(v.name):
-            yield f"{v.name!r}: expected a name by the convention {convention}"
+        for name in (v.name, *v.further_names):
+            if not legal.fullmatch(name):
+                yield f"{name!r}: expected a name by the convention {convention}"
 
 
 def bounds(fmu: Fmu) -> Iterator[str]:
     """min, start and max are in this order."""
     for v in fmu.variables:
-        if v.type not in NUMBERS:
+        if v.kind not in NUMBERS:
             continue
-        if v.type == "Real" and v.start is not None and not math.isfinite(float(v.start)):
-            yield f"{v.name}: start = {v.start}, expected a finite value"
         low, high = limits(v)
         if not low <= high:
             yield f"{v.name}: min = {v.minimum} is above max = {v.maximum}"
-        if v.start is not None and float(v.start) < low:
-            yield f"{v.name}: start = {v.start}, expected at least min = {v.minimum}"
-        if v.start is not None and float(v.start) > high:
-            yield f"{v.name}: start = {v.start}, expected at most max = {v.maximum}"
+        for start in v.starts:
+            if v.kind == "Real" and not math.isfinite(float(start)):
+                yield f"{v.name}: start = {start}, expected a finite value"
+            if float(start) < low:
+                yield f"{v.name}: start = {start}, expected at least min = {v.minimum}"
+            if float(start) > high:
+                yield f"{v.name}: start = {start}, expected at most max = {v.maximum}"
 
 
 def limits(variable: Variable) -> tuple[float, float]:
@@ -49,14 +51,18 @@ def limits(variable: Variable) -> tuple[float, float]:
 
 
 def aliases(fmu: Fmu) -> Iterator[str]:
-    """Variables with one value reference are one value under several names (FMI 2.0.4, section 2.2.7)."""
+    """Variables with one value reference are one value under several names (FMI 2.0.4, section 2.2.7).
+
+    FMI 3.0 counts references over all types, and has its aliases inside of their variable (section 2.4.7).
+    """
     sets: dict[tuple[str, int], list[Variable]] = defaultdict(list)
     for v in fmu.variables:
-        sets["Integer" if v.type == "Enumeration" else v.type, v.reference].append(v)
+        sets["" if fmu.version > 2 else fmu.standard.access[v.type], v.reference].append(v)
     for (_, reference), members in sets.items():
         if len(members) > 1:
             names = ", ".join(v.name for v in members)
-            for problem in _wrong_with_aliases(members):
+            wrong = ["FMI 3.0 has one for each variable"] if fmu.version > 2 else _wrong_with_aliases(members)
+            for problem in wrong:
                 yield f"{names}: value reference {reference} for all of them, but {problem}"
 
 

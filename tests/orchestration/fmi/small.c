@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #define API __attribute__((visibility("default")))
-enum { U, Y, GAIN, ON, HIGH, COUNT, MODE, LABEL };
+enum { U, Y, GAIN, ON, HIGH, COUNT, MODE, LABEL, TIME = 10 };
 enum { OK, WARNING, DISCARD, ERROR };
 
 typedef void (*Log2)(void *, const char *, int, const char *, const char *, ...);
@@ -19,7 +19,7 @@ typedef void (*Log3)(void *, int, const char *, const char *);
 typedef struct { Log2 log; void *allocate, *release, *finished, *environment; } Callbacks;
 
 typedef struct { double u[2], x[2], gain, next, reached; int on, mode, count, ended; char label[32]; } State;
-typedef struct { State s; char name[64]; Log2 log2; Log3 log3; void *environment; } Model;
+typedef struct { State s; double stop; char name[64]; Log2 log2; Log3 log3; void *environment; } Model;
 
 /* What libraries of its own would keep for the whole process, copies of this one included. */
 static int instances_of_this_process(void) {
@@ -80,7 +80,7 @@ static void forget(Model *m) {
 }
 
 static void begin(Model *m, bool defined, double tolerance, double t) {
-    m->s.next = t;
+    m->s.next = m->s.reached = t;
 #ifdef TELLS_TOLERANCE
     m->s.x[0] = defined ? tolerance : -1.0;
 #endif
@@ -275,31 +275,44 @@ API void *fmi3InstantiateCoSimulation(const char *name, const char *token, const
     if (m == NULL) return NULL;
     m->log3 = log;
     m->environment = environment;
+    m->stop = INFINITY;
     return m;
 }
 API void fmi3FreeInstance(void *c) { free(c); }
 API int fmi3EnterInitializationMode(void *c, bool defined, double tolerance, double t, bool ends, double stop) {
     begin(c, defined, tolerance, t);
     forget(c);
+    ((Model *)c)->stop = ends ? stop : INFINITY;
     return OK;
 }
 API int fmi3ExitInitializationMode(void *c) { return OK; }
 API int fmi3Terminate(void *c) { return OK; }
 API int fmi3Reset(void *c) { return reset(c); }
 API int fmi3DoStep(void *c, double t, double h, bool no_set, bool *event, bool *ends, bool *early, double *last) {
+    *event = *early = *ends = false;
+#ifdef HEEDS_STOP
+    if (t + h > ((Model *)c)->stop + 1e-9) return ERROR;
+#endif
     int status = step(c, t, h);
-    *event = *early = false;
     *ends = ((Model *)c)->s.ended;
     *last = ((Model *)c)->s.reached;
 #ifdef NEEDS_EVENTS
     *event = true;
+#endif
+#ifdef RETURNS_EARLY
+    *early = true;
+#endif
+#ifdef LOSES_TIME
+    *last = NAN;
 #endif
     return status;
 }
 
 API int fmi3GetFloat64(void *c, const unsigned vr[], size_t n, double v[], size_t m) {
     State *s = &((Model *)c)->s;
-    for (size_t i = 0; i < n; i++, v += 2) memcpy(v, vr[i] == U ? s->u : s->x, sizeof s->u);
+    for (size_t i = 0; i < n; i++)
+        if (vr[i] == TIME) *v++ = s->reached;
+        else memcpy(v, vr[i] == U ? s->u : s->x, sizeof s->u), v += 2;
     return OK;
 }
 API int fmi3SetFloat64(void *c, const unsigned vr[], size_t n, const double v[], size_t m) {
