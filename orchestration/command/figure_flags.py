@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from orchestration.basics.errors import UsageError
-from orchestration.figures.names import COLUMNS, FORMATS, STYLES
+from orchestration.figures.names import COLUMNS, FORMATS, STYLES, WRITTEN
 
 if TYPE_CHECKING:
     from orchestration.figures.style import Style
@@ -19,8 +19,8 @@ class FigureFlags:
     format: Annotated[
         list[str] | None,
         typer.Option(
-            "--format", help="Of the files; default: png; may be repeated.", metavar="|".join(FORMATS),
-            show_default=False,
+            "--format", help=f"Of the files; default: {' and '.join(WRITTEN)}; may be repeated.",
+            metavar="|".join(FORMATS), show_default=False,
         ),
     ] = None  # fmt: skip
     style: Annotated[
@@ -60,7 +60,7 @@ class FigureFlags:
 
         from orchestration.figures.style import STYLES as KNOWN
 
-        style = replace(KNOWN[self.style], formats=tuple(dict.fromkeys(self.format or FORMATS[:1])), **self._extent)
+        style = replace(KNOWN[self.style], formats=tuple(dict.fromkeys(self.format or WRITTEN)), **self._extent)
         return style if self.font_size is None else replace(style, font=self.font_size)
 
     @property

@@ -51,7 +51,8 @@ def interop(
     if out is not None:
         from orchestration.interop.figure import draw
 
-        say(str(draw(found, out)))
+        for path in draw(found, out):
+            say(str(path))
     far = [agreement.tool.name for agreement in found if not table.agrees(agreement)]
     if far:
         say(f"farther than {table.AIM:g} from this project's master: {'; '.join(far)}")

@@ -1,11 +1,11 @@
 """Pictures of a comparison: basins, shares and limits with intervals, fronts; of who survives and who settles."""
 
+import itertools
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -13,6 +13,8 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 
 from orchestration.basics.simulator import Floats
 from orchestration.comparison.cells import CellSummary, Median, sizes
@@ -22,7 +24,7 @@ from orchestration.comparison.fronts import Point
 from orchestration.comparison.limits import Limit
 from orchestration.comparison.outcome import Outcome
 from orchestration.figures import cells
-from orchestration.figures.palette import BLUE, CYCLE, GREY, ORANGE
+from orchestration.figures.palette import BLUE, CYCLE, DASHES, GREY, MARKS, ORANGE
 from orchestration.figures.style import SCREEN, Style
 from orchestration.figures.ticks import plain
 from orchestration.results import display_names as labels
@@ -122,25 +124,32 @@ def shares(
 ) -> Figure:
     """The shares of all starts that survive and settle, with Wilson intervals, two lines for each controller.
 
+    Dashes tell controllers apart as colours do; in a panel alone their names stand on the lines.
+
     `found` are the cells of each panel, by its title; `colors` those of the controllers.
     """
     several = len(found) > 1
-    figure, panels = _panels(len(found), 20.0 if several else 26.0, style)
+    figure, panels = _panels(len(found), 20.0 if several else 30.0, style)
+    dashes = dict(zip(colors, itertools.cycle(DASHES)))
     for panel, (title, group) in zip(panels, found.items()):
-        for name, color in colors.items():
-            _shares_of(panel, axis, [cell for cell in group if cell.controller == name], color)
+        curves = {name: [cell for cell in group if cell.controller == name] for name in colors}
+        for name, those in curves.items():
+            _shares_of(panel, axis, those, color=colors[name], dashes=dashes[name])
         runs = max((cell.count for cell in group), default=0)
         panel.set_title(title if several else f"{title}; {runs} starts, 95 % intervals")
         panel.set_ylim(-0.02, 1.02)
-    told = {cell.controller for group in found.values() for cell in group}
-    for name, color in colors.items():
-        if name in told:
-            panels[0].plot([], [], ".-", color=color, label=name)
-    for line, fate in ((".-", "survive"), (".:", "settle")):
-        panels[0].plot([], [], line, color=GREY, label=fate)
-    figure.legend(loc="outside right center")
-    figure.supxlabel(axis.title)
-    figure.supylabel("share of the starts [1]")
+        if not several:
+            _name_curves(panel, axis, curves, colors, style)
+    told = [name for name in colors if any(cell.controller == name for group in found.values() for cell in group)]
+    handles = [Line2D([], [], color=colors[name], linestyle=dashes[name], label=name) for name in told if several]
+    handles += [Line2D([], [], color=GREY, label=fate, **how) for fate, how in _LINES.items()]
+    if several:
+        figure.legend(handles=handles, loc="outside right center")
+        figure.supxlabel(axis.title)
+        figure.supylabel("share of the starts [1]")
+    else:
+        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+        panels[0].set(xlabel=axis.title, ylabel="share of the starts [1]")
     return figure
 
 
@@ -156,7 +165,7 @@ class Reach:
 def reaches_of(comparison: Comparison, limits: Sequence[Limit]) -> list[Reach]:
     """Of each controller, also on each vehicle and under each condition if there are several."""
     several = len(comparison.vehicles) * len(comparison.conditions) > 1
-    groups = groupby(limits, lambda one: (one.vehicle, one.condition, one.controller))
+    groups = itertools.groupby(limits, lambda one: (one.vehicle, one.condition, one.controller))
     return [
         Reach(
             name=", ".join((key[2], *key[:2])) if several else key[2],
@@ -206,12 +215,13 @@ def fronts_of(
     `metrics` are effort and error in words, `colors` those of the controllers.
     """
     figure, panels = _panels(len(values), 20.0, style)
+    marks = dict(zip(colors, itertools.cycle(MARKS)))
     for panel, value in zip(panels, values):
         here = [point for point in points if point.value == value]
         for point in here:
             effort, error = _sides(point.effort), _sides(point.error)
             panel.errorbar(
-                *effort[0], *error[0], xerr=effort[1], yerr=error[1], fmt="o",
+                *effort[0], *error[0], xerr=effort[1], yerr=error[1], fmt=marks[point.controller],
                 mfc=colors[point.controller] if point.on_front else "none", color=colors[point.controller],
                 markersize=5, elinewidth=0.8,
             )  # fmt: skip
@@ -224,7 +234,7 @@ def fronts_of(
         plain(panel.yaxis)
     for name, color in colors.items():
         if any(point.controller == name for point in points):
-            panels[0].plot([], [], "o", color=color, label=name)
+            panels[0].plot([], [], marks[name], color=color, label=name)
     figure.legend(loc="outside right center")
     figure.supxlabel(metrics[0])
     figure.supylabel(metrics[1])
@@ -249,14 +259,41 @@ def _by_size(comparison: Comparison, rows: "pd.DataFrame", fate: str) -> Floats:
     return share
 
 
-def _shares_of(panel: Axes, axis: Quantity, group: Sequence[CellSummary], color: str) -> None:
+_LINES: Mapping[str, Mapping[str, Any]] = {
+    "survive": {"marker": "."},
+    "settle": {"marker": "o", "markerfacecolor": "white", "markersize": 3.5, "linewidth": 0.7},
+}
+"""How the two lines of a controller differ"""
+
+
+def _shares_of(panel: Axes, axis: Quantity, group: Sequence[CellSummary], *, color: str, dashes: str) -> None:
     """Two lines of one controller."""
     at = axis.of([cell.value for cell in group])
-    for line, those in ((".-", [cell.survives for cell in group]), (".:", [cell.settles for cell in group])):
-        panel.plot(at, [share.value for share in those], line, color=color)
+    for fate, those in (("settle", [cell.settles for cell in group]), ("survive", [cell.survives for cell in group])):
+        panel.plot(at, [share.value for share in those], color=color, linestyle=dashes, **_LINES[fate])
         panel.fill_between(
-            at, [share.low for share in those], [share.high for share in those], color=color, alpha=0.1, linewidth=0.0
+            at, [share.low for share in those], [share.high for share in those], color=color, alpha=0.08, linewidth=0.0
         )
+
+
+def _name_curves(
+    panel: Axes, axis: Quantity, curves: Mapping[str, Sequence[CellSummary]], colors: Mapping[str, str], style: Style
+) -> None:
+    """Names on the lines of those that survive, each at another height: the sooner a line falls, the lower."""
+    known = {name: group for name, group in curves.items() if group}
+    order = sorted(known, key=lambda name: sum(cell.survives.value for cell in known[name]))
+    for name, height in zip(order, np.linspace(0.1, 0.9, 2 * len(order) + 1)[1::2]):
+        at, share = axis.of([cell.value for cell in known[name]]), [cell.survives.value for cell in known[name]]
+        below = next((k for k in range(1, len(share)) if share[k] < height <= share[k - 1]), None)
+        place = (
+            (at[-1], share[-1])
+            if below is None
+            else (float(np.interp(height, (share[below], share[below - 1]), (at[below], at[below - 1]))), height)
+        )
+        panel.annotate(
+            name, place, color=colors[name], fontsize=0.85 * style.font, ha="center" if below else "right", va="center",
+            path_effects=[withStroke(linewidth=0.35 * style.font, foreground="white")],
+        )  # fmt: skip
 
 
 def _bar(panel: Axes, limit: Limit, last: float, factor: float, at: float, color: str, label: str | None) -> None:

@@ -43,5 +43,5 @@ class Figures(Mapping[str, Figure]):
         return base64.b64encode(file.getvalue()).decode()
 
     def save(self, folder: str | Path) -> list[Path]:
-        """Write them into a folder, each as NAME.png; their paths."""
+        """Write them into a folder, each as NAME.png and NAME.svg; their paths."""
         return save(self, Path(folder), self._style)

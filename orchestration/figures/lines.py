@@ -48,10 +48,10 @@ def legend_of_runs(figure: Figure, runs: Sequence[Run], style: Style) -> None:
         figure.legend(handles=handles, loc="outside upper center", ncols=columns)
 
 
-def abreast(names: Sequence[str], style: Style) -> int:
-    """How many entries of a legend stand side by side in the width of a figure."""
+def abreast(names: Sequence[str], style: Style, *, width: float = 1.0) -> int:
+    """How many entries of a legend stand side by side in a figure; `width` is its share of the style's."""
     longest = max(map(len, names)) + 6
-    return min(len(names), max(1, int(style.width / (0.5 * longest * style.font * 0.353))))
+    return min(len(names), max(1, int(width * style.width / (0.5 * longest * style.font * 0.353))))
 
 
 def quantity(name: str, unit: str | None) -> str:

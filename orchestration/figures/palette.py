@@ -6,7 +6,9 @@ PURPLE, SKY, BROWN, GREY, BLACK = "#b0568c", "#56b4e9", "#7a5c1e", "#8a8a8a", "#
 CYCLE = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY, BROWN, GREY)
 """One after the other for lines of one kind: neighbours differ in brightness too"""
 DASHES = ("-", "--", "-.", ":")
-"""Of runs that are laid over each other, so that a print in grey still tells them apart"""
+"""Of lines that are laid over each other, so that a print in grey still tells them apart"""
+MARKS = ("o", "s", "D", "^", "v", "P", "X", "*")
+"""Of points, likewise"""
 SHADES = "viridis"
 """For values: uniform to the eye, and in grey"""
 NOT_GOOD, DIVERGED = "#d9d9d9", "#6e6e6e"

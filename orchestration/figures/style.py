@@ -11,7 +11,7 @@ from cycler import cycler
 from matplotlib.figure import Figure
 
 from orchestration.basics.errors import UsageError
-from orchestration.figures.names import COLUMNS, FORMATS
+from orchestration.figures.names import COLUMNS, FORMATS, WRITTEN
 from orchestration.figures.palette import CYCLE
 
 INCH = 25.4
@@ -38,9 +38,11 @@ class Style:
     """[pt]"""
     has_titles: bool = True
     """a paper's captions say what titles would"""
-    dpi: float = 110.0
+    dpi: float = 200.0
     """of PNG"""
-    formats: tuple[str, ...] = FORMATS[:1]
+    colors: int | None = None
+    """that a PNG has at most; None: all"""
+    formats: tuple[str, ...] = WRITTEN
     """of the files"""
 
     def __post_init__(self) -> None:
@@ -110,10 +112,10 @@ class Style:
 STYLES: Mapping[str, Style] = {
     "screen": Style(),
     "paper": Style(width=COLUMNS["double"], font=8.0, serif=True, line=0.9, has_titles=False, dpi=300.0),
-    "slides": Style(width=254.0, height=142.9, font=16.0, line=2.2, dpi=150.0),
+    "slides": Style(width=254.0, height=142.9, font=16.0, line=2.2),
 }
 SCREEN = STYLES["screen"]
-DOCS = replace(SCREEN, dpi=80.0)
+DOCS = replace(SCREEN, colors=256, formats=("png",))
 """Files small enough for a repository"""
 
 
@@ -140,8 +142,34 @@ def save(figures: Mapping[str, Figure], folder: Path, style: Style = SCREEN) -> 
     written = []
     with style.applied():
         for name, figure in figures.items():
-            for ending in style.formats:
-                path = folder / f"{name}.{ending}"
-                figure.savefig(path, metadata=_UNDATED[ending])
-                written.append(path)
+            with _laid_out_once(figure):
+                for ending in style.formats:
+                    path = folder / f"{name}.{ending}"
+                    figure.savefig(path, metadata=_UNDATED[ending])
+                    if ending == "png" and style.colors is not None:
+                        _reduce(path, style.colors)
+                    written.append(path)
     return written
+
+
+@contextmanager
+def _laid_out_once(figure: Figure) -> Iterator[None]:
+    """Inside, things stay where they are: to lay out a figure takes as long as to write it."""
+    engine = figure.get_layout_engine()
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    try:
+        yield
+    finally:
+        figure.set_layout_engine(engine)
+
+
+def _reduce(path: Path, colors: int) -> None:
+    """A third of the bytes."""
+    from PIL import Image, PngImagePlugin
+
+    about = PngImagePlugin.PngInfo()
+    about.add_text("Software", str(_UNDATED["png"]["Software"]))
+    with Image.open(path) as image:
+        few = image.convert("RGB").quantize(colors, dither=Image.Dither.NONE)
+        few.save(path, optimize=True, dpi=image.info["dpi"], pnginfo=about)

@@ -1,19 +1,25 @@
 """The flight in space."""
 
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
+import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
+from matplotlib.transforms import Bbox
 
 from orchestration.basics.simulator import Floats
-from orchestration.figures.lines import legend_of_runs
+from orchestration.figures.lines import abreast
 from orchestration.figures.palette import BLUE, ORANGE
 from orchestration.figures.run import Run, title
 from orchestration.figures.style import Style
 from orchestration.quadrotor.wiring import POSITION, POSITION_REFERENCE
 
+ROUNDS = 4
+"""until nothing moves by more than a hair"""
 LEAST = 0.45
 """of the longest side: so long at least is each side of the box"""
 
@@ -21,13 +27,55 @@ LEAST = 0.45
 def path(runs: Sequence[Run], style: Style) -> Figure:
     """Where it flew and where it should have, a metre being as long along each axis, up being up."""
     figure = style.figure(38.0, width=0.75 if style.is_wide else 1.0)
+    figure.set_layout_engine("none")
     axes = figure.add_subplot(projection="3d")
     draw_in_space(axes, runs, style)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    handles, names = axes.get_legend_handles_labels()
+    if len(runs) > 1:
+        handles += [Line2D([], [], color=run.color, linestyle=run.dashes) for run in runs]
+        names += [run.name for run in runs]
+    figure.legend(handles, names, loc="lower center", ncols=abreast(names, style, width=0.75))
     if style.has_titles:
-        axes.set_title(title(runs))
-    legend_of_runs(figure, runs, style)
+        figure.suptitle(title(runs))
+    spare = _fill(figure, axes)
+    if style.height is None:
+        figure.set_figheight(figure.get_figheight() - spare / figure.dpi)
+        _fill(figure, axes)
     return figure
+
+
+def _fill(figure: Figure, axes: Any) -> float:
+    """Draw in space as large as there is room between title and legend; the height that is left over, in pixels.
+
+    The labels of three-dimensional axes do not grow with them, so that it takes a few rounds.
+    """
+    width, height = (float(side) for side in figure.get_size_inches() * figure.dpi)
+    figure.draw_without_rendering()
+    (legend,) = figure.legends
+    air = 0.5 * legend.get_window_extent().y0
+    bottom, top = legend.get_window_extent().y1 + air, height - air
+    if figure.get_suptitle():
+        top -= figure.texts[0].get_window_extent().height + 2.0 * air
+    room = np.array([width - 2.0 * air, top - bottom])
+    side, center = float(room.min()), np.array([0.5 * width, 0.5 * (top + bottom)])
+    middle = center
+    for _ in range(ROUNDS):
+        left, low = (middle - 0.5 * side).tolist()
+        axes.set_position((left / width, low / height, side / width, side / height))
+        figure.draw_without_rendering()
+        seen = extent(axes)
+        middle = middle + center - 0.5 * np.array([seen.x0 + seen.x1, seen.y0 + seen.y1])
+        side *= float((room / np.array([seen.width, seen.height])).min())
+    return float(room[1] - seen.height)
+
+
+def extent(axes: Any) -> Bbox:
+    """Of the box with all that is in it and the labels of its axes, in pixels."""
+    corners = np.array([*itertools.product(axes.get_xlim(), axes.get_ylim(), axes.get_zlim())])
+    projected = np.column_stack([corners, np.ones(len(corners))]) @ axes.get_proj().T
+    labels = [axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
+    seen = axes.transData.transform(projected[:, :2] / projected[:, 3:])
+    return Bbox.union([*labels, Bbox([seen.min(axis=0), seen.max(axis=0)])])
 
 
 def draw_in_space(axes: Any, runs: Sequence[Run], style: Style) -> None:
@@ -66,3 +114,4 @@ def _equal(axes: Any, points: Floats, *, is_wide: bool) -> None:
     axes.set_box_aspect(size, zoom=0.95 if is_wide and size[2] < size[:2].max() else 0.8)  # labels have room
     for axis, share in zip((axes.xaxis, axes.yaxis, axes.zaxis), size / size.max()):
         axis.set_major_locator(MaxNLocator(max(2, round(6 * share))))
+        axis.labelpad = 1.2 * matplotlib.rcParams["font.size"] - 8.0  # [pt]; large numbers are long

@@ -25,11 +25,11 @@ _KINDS = {
 """Of the quadrotor, by name: the signals' prefix, marker, colour; of any other system, by component."""
 
 
-def draw(agreements: Sequence[Agreement], folder: Path) -> Path:
-    """Write `interop.png` into `folder`; its path."""
+def draw(agreements: Sequence[Agreement], folder: Path) -> list[Path]:
+    """Write `interop` into `folder`; the paths."""
     with SCREEN.applied():
         chart = agreement_chart(agreements)
-    return save({"interop": chart}, folder)[0]
+    return save({"interop": chart}, folder)
 
 
 def agreement_chart(agreements: Sequence[Agreement]) -> Figure:

@@ -73,7 +73,7 @@ def test_figures_come_by_name_and_a_notebook_shows_them(flown: Result, tmp_path:
     assert set(figures) == {"errors", "path"}
     assert isinstance(figures["errors"], matplotlib.figure.Figure)
     assert figures._repr_html_().count("data:image/png;base64,") == 2
-    assert figures.save(tmp_path) == [tmp_path / "path.png", tmp_path / "errors.png"]
+    assert figures.save(tmp_path) == [tmp_path / name for name in ("path.png", "path.svg", "errors.png", "errors.svg")]
 
 
 def test_a_figure_that_there_is_not_is_refused_with_those_there_are(flown: Result) -> None:

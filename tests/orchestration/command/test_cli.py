@@ -249,7 +249,9 @@ def test_plot_zooms_on_a_window(main: Main, here: Path) -> None:
     save_run(run(native(stop_time=0.5)), here / "run")
     before = (here / "run" / "commands.png").read_bytes()
     done = main("plot", "run", "--from", "0.1", "--to", "0.2")
-    assert {Path(line).name for line in done.stdout.splitlines()} == {f"{name}.png" for name in FLIGHT}
+    assert {Path(line).name for line in done.stdout.splitlines()} == {
+        f"{name}.{ending}" for name in FLIGHT for ending in ("png", "svg")
+    }
     assert (here / "run" / "commands.png").read_bytes() != before
     for start, end in (("0.2", "0.1"), ("50", "60"), ("0.5", "0.6"), ("-1", "0.1"), ("0.1", "inf"), ("nan", "0.1")):
         line = error_line(main("plot", "run", "--from", start, "--to", end, code=2))

@@ -74,7 +74,8 @@ def test_a_store_goes_where_it_is_told_and_figures_beside_it(folder: Path, main:
     main("sweep", "study.toml", "--out", "elsewhere", "--workers", "1")
     assert store_path("study", folder / "elsewhere").is_file()
     drawn = main("draw", "study.toml", "--out", "elsewhere", "--metric", "position_rmse")
-    assert drawn.stdout == f"{Path('elsewhere') / 'position_rmse.png'}\n"
+    pictures = [str(Path("elsewhere") / f"position_rmse.{ending}") for ending in ("png", "svg")]
+    assert drawn.stdout.splitlines() == pictures
     assert (folder / "elsewhere" / "position_rmse.png").read_bytes().startswith(b"\x89PNG")
     assert not (folder / "results").exists()
 
@@ -219,10 +220,11 @@ def test_limit_prints_both_figures_and_says_that_they_differ(main: Main) -> None
 
 def test_limit_draws_what_it_measured_and_the_spectral_radius_on_request(tmp_path: Path, main: Main) -> None:
     done = main(*LIMIT, "--of", "delay", "--out", "drawn")
-    pictures = [Path("drawn") / name for name in ("limit_delay.png", "spectral_radius_delay.png")]
-    assert done.stderr.splitlines()[-2:] == [*map(str, pictures)]
+    names = ("limit_delay.png", "limit_delay.svg", "spectral_radius_delay.png", "spectral_radius_delay.svg")
+    pictures = [Path("drawn") / name for name in names]
+    assert done.stderr.splitlines()[-4:] == [*map(str, pictures)]
     for picture in pictures:
-        assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
+        assert (tmp_path / picture).read_bytes().startswith((b"\x89PNG", b"<?xml"))
 
 
 @pytest.mark.parametrize(

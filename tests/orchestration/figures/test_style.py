@@ -7,10 +7,11 @@ from typing import Any
 
 import pytest
 from matplotlib.figure import Figure
+from PIL import Image
 
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.figures.names import FORMATS
-from orchestration.figures.style import STYLES, Style, save
+from orchestration.figures.style import DOCS, STYLES, Style, save
 from quadcosim import UsageError
 
 
@@ -51,6 +52,33 @@ def test_a_figure_has_the_size_that_was_asked_for_to_a_tenth_of_a_millimetre(tmp
     assert "font-size: 8px; font-family: 'STIXGeneral'" in label or "font: 8px 'STIXGeneral'" in label, "8 pt"
     sized = FigureFlags(size="120x80mm", font_size=9.0).chosen
     assert (sized.width, sized.height, sized.font) == (120.0, 80.0, 9.0)
+
+
+def test_every_figure_is_written_as_a_sharp_picture_and_as_svg_unless_other_formats_are_asked_for(
+    tmp_path: Path,
+) -> None:
+    assert [path.name for path in save({"a": drawn(STYLES["screen"])}, tmp_path)] == ["a.png", "a.svg"]
+    with Image.open(tmp_path / "a.png") as picture:
+        assert picture.size[0] == int(203.0 / 25.4 * 200.0)
+    assert FigureFlags().chosen.formats == ("png", "svg")
+    assert FigureFlags(format=["pdf"]).chosen.formats == ("pdf",)
+
+
+def test_few_colours_make_a_smaller_file_that_is_the_same_each_time(tmp_path: Path) -> None:
+    def written(style: Style, folder: str) -> bytes:
+        (path,) = save({"a": drawn(style)}, tmp_path / folder, style)
+        return path.read_bytes()
+
+    few = [written(DOCS, folder) for folder in ("one", "two")]
+    assert few[0] == few[1]
+    assert len(few[0]) < 0.6 * len(written(replace(DOCS, colors=None), "all"))
+
+
+def test_writing_a_figure_leaves_it_to_be_laid_out_anew(tmp_path: Path) -> None:
+    figure = drawn(STYLES["screen"])
+    engine = figure.get_layout_engine()
+    save({"a": figure}, tmp_path)
+    assert figure.get_layout_engine() is engine
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from orchestration.figures.names import COLUMNS
 from orchestration.figures.style import SCREEN, STYLES, Style, save
 from orchestration.flight import commands
 from orchestration.flight.names import FIGURES as FLIGHT
+from orchestration.flight.path import extent
 from orchestration.flight.phase import surface
 from orchestration.flight.spectrum import welch
 from orchestration.runs.draw import draw
@@ -116,7 +117,7 @@ def test_a_legend_tells_what_differs_between_runs(flight: Result, slow: Result) 
     assert labels_of_runs([flight, heavy], ["a", "b"]) == ["mass 1 kg", "mass 1.2 kg"]
     assert labels_of_runs([flight, flight], ["a", "b"]) == ["a", "b"]
     for name, figure in draw([flight, slow]).items():
-        told = [[text.get_text() for text in legend.get_texts()] for legend in figure.legends]
+        told = [[text.get_text() for text in legend.get_texts()][-2:] for legend in figure.legends]
         assert ["period 10 ms", "period 30 ms"] in told, name
 
 
@@ -149,6 +150,20 @@ def test_a_metre_is_as_long_along_each_axis_of_the_path(flight: Result) -> None:
     spans = np.array([abs(np.subtract(*limits)) for limits in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())])
     scales = np.array(axes.get_box_aspect()) / spans
     assert scales == pytest.approx(scales[0])
+
+
+@pytest.mark.parametrize("style", [SCREEN, NARROW, STYLES["slides"]])
+def test_the_path_fills_its_figure_and_hides_nothing_of_it(flight: Result, style: Style) -> None:
+    figure = draw(flight, ["path"], style=style)["path"]
+    figure.draw_without_rendering()
+    axes: Any = figure.axes[0]
+    seen = extent(axes)
+    (legend,) = figure.legends
+    width, height = figure.get_size_inches() * figure.dpi
+    assert seen.x0 > 0.0
+    assert seen.x1 < width
+    assert legend.get_window_extent().y1 < seen.y0 < seen.y1 < height
+    assert max(seen.width / width, (seen.height + legend.get_window_extent().y1) / height) > 0.9
 
 
 def test_the_path_shows_reference_start_and_end(flight: Result) -> None:

@@ -142,7 +142,9 @@ def test_a_difference_of_zero_is_drawn_at_the_left_of_a_logarithmic_axis(tmp_pat
 
 def test_the_chart_is_written_into_a_folder_that_need_not_be_there(tmp_path: Path) -> None:
     all_tools = [agreement(name) for name in TOOLS]
-    pictures = [figure.draw(all_tools, tmp_path / "new" / folder) for folder in ("one", "two")]
+    pictures = [
+        picture for folder in ("one", "two") for picture in figure.draw(all_tools, tmp_path / "new" / folder)[:1]
+    ]
     assert pictures[0] == tmp_path / "new" / "one" / "interop.png"
     pixels = matplotlib.image.imread(pictures[0])
     assert min(pixels.shape[:2]) > 100

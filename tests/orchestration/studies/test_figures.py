@@ -15,6 +15,7 @@ from matplotlib.patches import Rectangle
 from orchestration.basics.by_kind import ByKind
 from orchestration.basics.statistics import wilson
 from orchestration.figures import cells
+from orchestration.figures.style import SCREEN
 from orchestration.fmi.foreign import LostError
 from orchestration.limits import figure as limit_figure
 from orchestration.limits.evaluation import Evaluation
@@ -33,6 +34,7 @@ from tests.orchestration.studies.common import OBJECTIVES, axis, row, short, stu
 
 PERIODS = axis("timing.period", 0.01, 0.02, 0.03, 0.04)
 WORDS = ("settled", "bounded")
+PNG = dataclasses.replace(SCREEN, formats=("png",), dpi=80.0)
 DELAYS = axis("timing.delay", 0.0, 0.005, 0.01)
 
 
@@ -93,14 +95,14 @@ def lines_of(figure: matplotlib.figure.Figure) -> list[Any]:
 
 
 def test_one_axis_is_drawn_as_a_line(tmp_path: Path) -> None:
-    (picture,) = draw_study(invented(tmp_path, study(PERIODS)), tmp_path, "ultimate_bound")
+    (picture,) = draw_study(invented(tmp_path, study(PERIODS)), tmp_path, "ultimate_bound", PNG)
     assert picture == tmp_path / "ultimate_bound.png"
     expect_picture(picture)
 
 
 def test_two_axes_are_drawn_as_lines_and_as_a_map(tmp_path: Path) -> None:
     wide = axis("timing.period", 0.01, 0.05, 0.1, 0.2)  # has runs that fly and runs that do not
-    pictures = draw_study(invented(tmp_path, study(wide, DELAYS)), tmp_path, "position_rmse")
+    pictures = draw_study(invented(tmp_path, study(wide, DELAYS)), tmp_path, "position_rmse", PNG)
     assert [picture.name for picture in pictures] == ["position_rmse.png", "position_rmse_map.png"]
     for picture in pictures:
         expect_picture(picture)
@@ -109,13 +111,13 @@ def test_two_axes_are_drawn_as_lines_and_as_a_map(tmp_path: Path) -> None:
 def test_sampled_axes_are_drawn_without_a_map(tmp_path: Path) -> None:
     sampled = Axis(name="mass", targets=("plant.mass",), low=0.01, high=0.05)
     chosen = invented(tmp_path, study(sampled, method="random", samples=6))
-    (picture,) = draw_study(chosen, tmp_path, "ultimate_bound")
+    (picture,) = draw_study(chosen, tmp_path, "ultimate_bound", PNG)
     expect_picture(picture)
 
 
 def test_more_axes_are_drawn_as_dots_over_each(tmp_path: Path) -> None:
     chosen = invented(tmp_path, study(PERIODS, DELAYS, axis("plant.mass", 0.01, 0.02)))
-    (picture,) = draw_study(chosen, tmp_path, "ultimate_bound")
+    (picture,) = draw_study(chosen, tmp_path, "ultimate_bound", PNG)
     assert picture == tmp_path / "ultimate_bound.png"
     expect_picture(picture)
 
@@ -206,7 +208,7 @@ def test_what_diverged_is_marked_in_a_row_for_each_line_below_all_values() -> No
 
 
 def test_without_a_metric_the_first_objective_that_varies_is_drawn(tmp_path: Path) -> None:
-    (picture,) = draw_study(invented(tmp_path, study(PERIODS)), tmp_path)
+    (picture,) = draw_study(invented(tmp_path, study(PERIODS)), tmp_path, style=PNG)
     assert picture.name == "position_rmse.png"
 
 
@@ -294,7 +296,7 @@ def test_the_spectral_radius_is_drawn_with_the_limits_that_there_are(
     assert unit.get_ydata() == [1.0, 1.0]
     assert [line.get_xdata()[0] for line in limits] == [1e3 * limit for limit in (local, large) if limit is not None]
     assert len(limits) == marks
-    expect_picture(*figures.save(lambda _: figure, tmp_path / "new" / "radius"))
+    expect_picture(*figures.save(lambda _: figure, tmp_path / "new" / "radius", PNG))
 
 
 def limit(of: str, **others: Any) -> Limit:
@@ -315,14 +317,14 @@ def limit(of: str, **others: Any) -> Limit:
 
 @pytest.mark.parametrize("of", ["period", "delay"])
 def test_a_limit_is_drawn_with_the_radius_that_crosses_one_there(tmp_path: Path, of: str) -> None:
-    pictures = draw_limit(short(), limit(of), tmp_path)
+    pictures = draw_limit(short(), limit(of), tmp_path, PNG)
     assert pictures == [tmp_path / f"limit_{of}.png", tmp_path / f"spectral_radius_{of}.png"]
     for picture in pictures:
         expect_picture(picture)
 
 
 def test_a_limit_that_linear_theory_does_not_have_is_drawn_without_the_radius(tmp_path: Path) -> None:
-    assert draw_limit(short(), limit("timing.loss"), tmp_path) == [tmp_path / "limit_timing_loss.png"]
+    assert draw_limit(short(), limit("timing.loss"), tmp_path, PNG) == [tmp_path / "limit_timing_loss.png"]
 
 
 def test_where_no_loop_is_known_no_process_is_started_for_its_radius(
@@ -330,7 +332,7 @@ def test_where_no_loop_is_known_no_process_is_started_for_its_radius(
 ) -> None:
     monkeypatch.setattr(limit_figure, "LOOPS", ByKind[Any]())
     monkeypatch.setattr(limit_figure, "computed", lambda *_: pytest.fail("it computes"))
-    assert draw_limit(short(), limit("period"), tmp_path) == [tmp_path / "limit_period.png"]
+    assert draw_limit(short(), limit("period"), tmp_path, PNG) == [tmp_path / "limit_period.png"]
 
 
 def test_a_limit_whose_fmus_lose_their_process_is_drawn_without_the_radius(
@@ -340,7 +342,7 @@ def test_a_limit_whose_fmus_lose_their_process_is_drawn_without_the_radius(
         raise LostError("the process of the FMUs ended")
 
     monkeypatch.setattr(limit_figure, "computed", lost)
-    assert draw_limit(short(), limit("period"), tmp_path) == [tmp_path / "limit_period.png"]
+    assert draw_limit(short(), limit("period"), tmp_path, PNG) == [tmp_path / "limit_period.png"]
 
 
 def xs(line: Line2D) -> list[float]:
@@ -431,10 +433,10 @@ def test_sensitivity_is_drawn_as_bars_with_their_confidence(tmp_path: Path) -> N
     panel = figure.axes[0]
     assert [bar.get_width() for bar in panel.patches if isinstance(bar, Rectangle)] == [0.3, 0.4, 0.5, 0.6]
     assert [label.get_text() for label in panel.get_yticklabels()] == ["a", "b"]
-    expect_picture(*figures.save(lambda _: figure, tmp_path / "bars"))
+    expect_picture(*figures.save(lambda _: figure, tmp_path / "bars", PNG))
 
 
 def test_figures_are_the_same_bytes_each_time(tmp_path: Path) -> None:
     chosen = invented(tmp_path, study(PERIODS))
-    pictures = [draw_study(chosen, tmp_path, "ultimate_bound")[0].read_bytes() for _ in range(2)]
+    pictures = [draw_study(chosen, tmp_path, "ultimate_bound", PNG)[0].read_bytes() for _ in range(2)]
     assert pictures[0] == pictures[1]

@@ -101,7 +101,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
 def test_a_screening_that_was_flown_gives_a_table_and_a_figure(flown: tuple[Study, Path]) -> None:
     chosen, folder = flown
     assert len(chosen.points) == 4 * 3
-    table, figure = draw_study(chosen, folder, "position_rmse")
+    table, figure, _ = draw_study(chosen, folder, "position_rmse")
     assert (table.name, figure.name) == ("sensitivity_position_rmse.csv", "sensitivity_position_rmse.png")
     read = pd.read_csv(table)
     assert list(read.columns) == ["axis", "kind", "value", "confidence"]
@@ -143,7 +143,7 @@ def test_a_metric_that_some_runs_do_not_have_is_refused(flown: tuple[Study, Path
 
 def test_the_outcome_has_indices_of_whether_a_run_flies(flown: tuple[Study, Path]) -> None:
     chosen, folder = flown
-    table, figure = draw_study(chosen, folder, "outcome")
+    table, figure, _ = draw_study(chosen, folder, "outcome")
     assert (table.name, figure.name) == ("sensitivity_outcome.csv", "sensitivity_outcome.png")
     assert (pd.read_csv(table)["value"] == 0.0).all()  # in this short a flight none has settled
 
