@@ -2,7 +2,6 @@
 
 const NOT_GOOD = { bad: "#c9ced4", diverged: "#5f666d" };
 const MARKS = { good: "circle", bad: "x-thin-open", diverged: "triangle-down-open" };
-const EDGE = "#D55E00";
 const MOST_SYMBOLS = 2500;
 const VALUE = "value";
 const [OUTER, MOST, LEAST, WIDE] = [0.02, 2.5, 0.05, 50]; // as in figures: figures/shades.py says what each is
@@ -19,6 +18,7 @@ function startMap() {
   byId("map-plot").setAttribute("aria-label", "Map of the runs. Arrow keys open the neighbouring run.");
   byId("map-plot").addEventListener("keydown", stepOnMap);
   buildMapControls();
+  redraws.push(drawMap);
   return drawMap();
 }
 
@@ -73,7 +73,7 @@ function drawMap() {
   map.shades = shadesOf(map.rows.filter((row) => kindOf(outcomeOf(row)) === "good").map((row) => cellOf(map.metric, row)));
   const traces = map.isGrid ? gridTraces() : pointTraces();
   const holder = byId("map-plot");
-  return Plotly.react(holder, [...traces, chosenTrace()], mapLayout(), PLOTLY).then(() => {
+  return drawPlot(holder, [...traces, chosenTrace()], mapLayout()).then(() => {
     if (!map.isDrawn) holder.on("plotly_click", (event) => openRow(rowOfPoint(event.points[0])));
     map.isDrawn = true;
     byId("map-hint").textContent = mapHint();
@@ -143,10 +143,17 @@ function colorOf(value) {
   return map.shades.isLogarithmic ? Math.log10(value) : value;
 }
 
+/** Whether the colour bar has to lie below the map. */
+function isNarrowMap() {
+  return byId("map-plot").clientWidth < NARROW;
+}
+
 /** The colour bar, its ticks in the metric's own numbers. */
 function colorBar() {
   const { low, high, isLogarithmic } = map.shades;
-  const bar = { title: { text: escaped(titled(map.metric.label, map.metric.unit)), side: "right" }, thickness: 14, outlinewidth: 0, len: 1 };
+  const title = { text: escaped(titled(map.metric.label, map.metric.unit)), side: isNarrowMap() ? "top" : "right" };
+  const lies = isNarrowMap() ? { orientation: "h", x: 0.5, y: -0.18, yanchor: "top", nticks: 5 } : {};
+  const bar = { title, thickness: 14, outlinewidth: 0, len: 1, ...lies };
   if (!isLogarithmic) return bar;
   const ticks = [];
   for (let power = Math.floor(low); power <= high; power += 1) {
@@ -223,7 +230,7 @@ function edgeTrace(kinds, across, up) {
       if (isThere(i + 1, j) && isThere(i, j) && isGood(i, j) !== isGood(i + 1, j)) { x.push(xs[j], xs[j + 1], null); y.push(ys[i + 1], ys[i + 1], null); }
     }
   }
-  return { type: "scatter", mode: "lines", x, y, line: { color: EDGE, width: 2.5 }, hoverinfo: "skip", showlegend: false };
+  return { type: "scatter", mode: "lines", x, y, line: { color: paint("edge-of-good"), width: 2.5 }, hoverinfo: "skip", showlegend: false };
 }
 
 // -- points of a sample -----------------------------------------------------------------------------------
@@ -246,7 +253,7 @@ function pointTraces() {
     };
     const word = { good: report.words[0], bad: report.words[1], diverged: "diverged" }[kind];
     const colored = kind === "good" && map.y !== VALUE;
-    const plain = { good: COLORS[0], bad: "#8a6d1f", diverged: COLORS[1] }[kind];
+    const plain = { good: COLORS[0], bad: paint("bad"), diverged: COLORS[1] }[kind];
     return {
       type: many ? "scattergl" : "scatter", mode: "markers", name: escaped(`${word} (${rows.length})`),
       x: rows.map((row) => cellOf(map.x, row)), y: rows.map(height), customdata: rows, text: rows.map(hoverOf),
@@ -320,15 +327,14 @@ function spreadOf(axis) {
 function mapLayout() {
   const y = map.y === VALUE ? { title: { text: escaped(titled(map.metric.label, map.metric.unit)) }, type: isWide(heights()) ? "log" : "linear" } : axisLayout(map.y);
   return {
-    height: 470, margin: { l: 66, r: 10, t: 26, b: 50 }, font: FONT, hovermode: "closest", dragmode: "pan",
-    paper_bgcolor: "#fff", plot_bgcolor: map.isGrid ? "#fff" : "#fbfcfd", xaxis: axisLayout(map.x),
-    yaxis: { ...y, gridcolor: "#e8ebee" }, showlegend: !map.isGrid,
-    legend: { orientation: "h", x: 0, y: 1.0, yanchor: "bottom" }, hoverlabel: HOVER,
+    height: isNarrowMap() ? 520 : 470, margin: { l: 66, r: 10, t: 26, b: isNarrowMap() ? 120 : 50 }, hovermode: "closest", dragmode: "pan", xaxis: axisLayout(map.x),
+    yaxis: y, showlegend: !map.isGrid,
+    legend: { orientation: "h", x: 0, y: 1.0, yanchor: "bottom" },
     uirevision: [map.x.name, map.y === VALUE ? VALUE : map.y.name].join(),
   };
 }
 
 function axisLayout(axis) {
   const type = axis.words ? "category" : axis.logarithmic ? "log" : "linear";
-  return { title: { text: escaped(titled(axis.label, axis.unit)), standoff: 8 }, type, gridcolor: "#e8ebee", zeroline: false, exponentformat: "power" };
+  return { title: { text: escaped(titled(axis.label, axis.unit)), standoff: 8 }, type, zeroline: false, exponentformat: "power" };
 }

@@ -12,6 +12,7 @@ function later(action) {
 
 function startPage() {
   document.body.classList.add(report.kind === "runs" ? "run-page" : "wide-page");
+  nameScheme();
   startHeader();
   startRun();
   startContents();

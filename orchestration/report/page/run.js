@@ -6,6 +6,7 @@ const controlsOf = {};
 
 function startRun() {
   startScene(byId("scene"));
+  redraws.push(drawScene, redrawSignals);
   buildPlayer();
   buildSignalControls();
   buildRunControls();
@@ -158,15 +159,19 @@ function showSignals() {
   pending = setTimeout(() => drawTimePlot(signals, beside, [player.run.name, player.beside ? player.beside.name : ""]).then(noteFirstPlot), 30);
 }
 
+function redrawSignals() {
+  if (timePlot.isDrawn) drawTimePlot(timePlot.signals, timePlot.beside, ["", player.beside ? player.beside.name : ""]);
+}
+
 function nameScene(beside) {
   const line = (color, dash, text) => {
     const item = element("li");
-    item.innerHTML = `<svg width="26" height="8" aria-hidden="true"><line x1="0" y1="4" x2="26" y2="4" stroke="${color}" stroke-width="2.4" stroke-dasharray="${dash}"/></svg>`;
+    item.innerHTML = `<svg width="26" height="8" aria-hidden="true"><line x1="0" y1="4" x2="26" y2="4" stroke="var(--${color})" stroke-width="2.4" stroke-dasharray="${dash}"/></svg>`;
     item.append(text);
     return item;
   };
   const reference = player.run.signals.layout.scene.reference;
-  byId("scene-key").replaceChildren(line(FLOWN, "", "flown"), ...(reference ? [line(WANTED, "6 4", "reference, ◇ now")] : []), ...(beside ? [line(BESIDE, "", player.beside.name)] : []));
+  byId("scene-key").replaceChildren(line("flown", "", "flown"), ...(reference ? [line("wanted", "6 4", "reference, ◇ now")] : []), ...(beside ? [line("beside", "", player.beside.name)] : []));
 }
 
 function buildSignalControls() {
@@ -180,7 +185,7 @@ function buildSignalControls() {
 function buildPanelChoice(layout) {
   const boxes = layout.panels.map((panel) => {
     const box = element("input", { type: "checkbox", checked: timePlot.shownPanels.get(panel.title) ?? panel.shown });
-    box.onchange = () => { timePlot.shownPanels.set(panel.title, box.checked); drawTimePlot(timePlot.signals, timePlot.beside, ["", player.beside ? player.beside.name : ""]); };
+    box.onchange = () => { timePlot.shownPanels.set(panel.title, box.checked); redrawSignals(); };
     return element("label", {}, box, titled(panel.title, panel.unit));
   });
   controlsOf.panels.querySelector("fieldset").replaceChildren(element("legend", { textContent: "Shown" }), ...boxes);

@@ -2,9 +2,6 @@
 // Space is north, east, down; up is up on the screen.
 
 const VIEWS = { "3-D": [-0.9, 0.42], side: [-Math.PI / 2, 0], top: [-Math.PI / 2, Math.PI / 2 - 1e-3] };
-const FLOWN = "#0072B2";
-const WANTED = "#D55E00";
-const BESIDE = "#8a4f7d";
 
 const scene = { canvas: null, tracks: [], t: 0, azimuth: VIEWS["3-D"][0], elevation: VIEWS["3-D"][1], zoom: 1, box: null };
 
@@ -156,7 +153,7 @@ function drawFloor(context, project) {
   const to = [0, 1].map((i) => Math.ceil(high[i] / step) * step);
   const down = Math.ceil(high[2] / step) * step;
   context.lineWidth = 1;
-  context.strokeStyle = "#dfe4e9";
+  context.strokeStyle = paint("grid");
   for (let n = from[0]; n <= to[0] + step / 2; n += step) stroke(context, project, [[n, from[1], down], [n, to[1], down]]);
   for (let e = from[1]; e <= to[1] + step / 2; e += step) stroke(context, project, [[from[0], e, down], [to[0], e, down]]);
   drawTicks(context, project, from, to, down, step);
@@ -166,7 +163,7 @@ function drawFloor(context, project) {
 function drawTicks(context, project, from, to, down, step) {
   const east = project([0, from[1], down])[2] < project([0, to[1], down])[2] ? from[1] : to[1];
   const north = project([from[0], 0, down])[2] < project([to[0], 0, down])[2] ? from[0] : to[0];
-  context.fillStyle = "#57606a";
+  context.fillStyle = paint("soft");
   context.font = "11px system-ui, sans-serif";
   context.textAlign = "center";
   const outward = (a, b) => (a === b ? -1 : 1);
@@ -179,7 +176,7 @@ function drawTicks(context, project, from, to, down, step) {
   const corner = [north, east === from[1] ? to[1] : from[1]];
   const top = Math.floor(scene.box.low[2] / step) * step;
   if (Math.cos(scene.elevation) < 0.3) return;
-  context.strokeStyle = "#c3cad1";
+  context.strokeStyle = paint("edge");
   stroke(context, project, [[...corner, down], [...corner, top]]);
   for (let z = top; z <= down + step / 2; z += step) text(`${shown(z)} `, [corner[0], corner[1] + shift * outward(corner[1], from[1]), z]);
   text("down [m]", [corner[0], corner[1], top - 0.35 * step]);
@@ -199,12 +196,12 @@ function drawFlight(context, project, signals, isBeside) {
   const { position, reference, quaternion } = signals.layout.scene;
   const t = Math.min(scene.t, signals.time[signals.time.length - 1]);
   const until = placeAt(signals.time, t);
-  const color = isBeside ? BESIDE : FLOWN;
+  const color = paint(isBeside ? "beside" : "flown");
   const here = position.map((name) => valueAt(signals, name, t));
   context.lineJoin = "round";
   if (reference && !isBeside) {
     context.setLineDash([6, 4]);
-    drawPath(context, project, signals, reference, 0, signals.time.length - 1, WANTED, 1.4);
+    drawPath(context, project, signals, reference, 0, signals.time.length - 1, paint("wanted"), 1.4);
     context.setLineDash([]);
   }
   drawPath(context, project, signals, position, until, signals.time.length - 1, color, 1.2, 0.45);
@@ -235,7 +232,7 @@ function drawPath(context, project, signals, names, first, last, color, width, a
 }
 
 function drawDiamond(context, [x, y]) {
-  context.strokeStyle = WANTED;
+  context.strokeStyle = paint("wanted");
   context.lineWidth = 2;
   context.beginPath();
   context.moveTo(x, y - 6);
@@ -262,12 +259,12 @@ function drawVehicle(context, project, here, q, color) {
   const size = (0.05 * scene.box.size) / scene.zoom ** 0.5;
   const at = (point) => rotated(q, point).map((value, i) => here[i] + value);
   const down = Math.ceil(scene.box.high[2] / niceStep(scene.box.size)) * niceStep(scene.box.size);
-  context.strokeStyle = "#b4bcc4";
+  context.strokeStyle = paint("edge");
   context.lineWidth = 1;
   context.setLineDash([2, 3]);
   stroke(context, project, [here, [here[0], here[1], down]]);
   context.setLineDash([]);
-  context.strokeStyle = "#1b1f24";
+  context.strokeStyle = paint("ink");
   context.lineWidth = 2.5;
   for (const side of [1, -1]) stroke(context, project, [at([size, side * size, 0]), at([-size, -side * size, 0])]);
   for (const [fore, side] of [[1, 1], [1, -1], [-1, 1], [-1, -1]]) drawRotor(context, project, at, size, fore, side, color);
@@ -284,7 +281,7 @@ function drawRotor(context, project, at, size, fore, side, color) {
     if (k) context.lineTo(x, y);
     else context.moveTo(x, y);
   }
-  context.fillStyle = fore > 0 ? color : "#fff";
+  context.fillStyle = fore > 0 ? color : paint("stage");
   context.globalAlpha = 0.75;
   context.fill();
   context.globalAlpha = 1;
@@ -294,10 +291,10 @@ function drawRotor(context, project, at, size, fore, side, color) {
 }
 
 function drawAxis(context, project, at, tip, name) {
-  context.strokeStyle = "#57606a";
+  context.strokeStyle = paint("soft");
   context.lineWidth = 1.2;
   stroke(context, project, [at([0, 0, 0]), at(tip)]);
-  context.fillStyle = "#1b1f24";
+  context.fillStyle = paint("ink");
   context.font = "italic 11px system-ui, sans-serif";
   context.textAlign = "center";
   context.fillText(name, ...project(at(tip.map((value) => 1.15 * value))).slice(0, 2));

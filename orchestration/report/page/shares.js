@@ -8,6 +8,7 @@ function startShares() {
   byId("shares-title").textContent = `Share that is ${report.words[0]}`;
   byId("shares-text").textContent = `All runs: ${shareText(report.overall)}.${report.overall.low === null ? " The runs are chosen, not drawn by chance, so that their shares have no interval." : " Bars: Wilson intervals at 95 %."}`;
   byId("shares-controls").replaceChildren(choice("along", report.shares.map((each, i) => [i, each.axis]), 0, (i) => { shares.of = Number(i); drawShares(); }));
+  redraws.push(drawShares);
   drawShares();
 }
 
@@ -23,11 +24,11 @@ function drawShares() {
     ...(has ? { error_y: { type: "data", symmetric: false, array: found.map((each, i) => each.high - share[i]), arrayminus: found.map((each, i) => share[i] - each.low), thickness: 1.4, width: 4 } } : {}),
   };
   const layout = {
-    height: 270, margin: { l: 60, r: 10, t: 10, b: 48 }, font: FONT, paper_bgcolor: "#fff", plot_bgcolor: "#fff", hovermode: "closest", hoverlabel: HOVER,
-    xaxis: { title: { text: escaped(titled(axis, unit)) }, type: isNumber ? (logarithmic ? "log" : "linear") : "category", gridcolor: "#e8ebee", zeroline: false },
-    yaxis: { title: { text: `share ${escaped(report.words[0])}` }, range: [-0.03, 1.03], tickformat: ".0%", gridcolor: "#e8ebee", zeroline: false },
+    height: 270, margin: { l: 60, r: 10, t: 10, b: 48 }, hovermode: "closest",
+    xaxis: { title: { text: escaped(titled(axis, unit)) }, type: isNumber ? (logarithmic ? "log" : "linear") : "category", zeroline: false },
+    yaxis: { title: { text: `share ${escaped(report.words[0])}` }, range: [-0.03, 1.03], tickformat: ".0%", zeroline: false },
   };
-  Plotly.react(byId("shares-plot"), [trace], layout, PLOTLY);
+  drawPlot(byId("shares-plot"), [trace], layout);
   const rows = found.map((each) => [each.label, `${each.good} of ${each.runs}`, percent(each.good / each.runs), each.low === null ? "–" : `${percent(each.low)} to ${percent(each.high)}`]);
   byId("shares-table").replaceChildren(tableOf(rows, [titled(axis, unit), report.words[0], "share", "95 % interval"]));
 }
@@ -53,11 +54,11 @@ function drawSharesOfCells() {
     });
   });
   const layout = {
-    height: 330, margin: { l: 60, r: 10, t: 10, b: 48 }, font: FONT, hovermode: "closest", hoverlabel: HOVER, legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom" },
-    xaxis: { title: { text: escaped(titled(axis, unit)) }, gridcolor: "#e8ebee", zeroline: false },
-    yaxis: { title: { text: "share of the starts" }, range: [-0.03, 1.03], tickformat: ".0%", gridcolor: "#e8ebee", zeroline: false },
+    height: 330, margin: { l: 60, r: 10, t: 10, b: 48 }, hovermode: "closest", legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom" },
+    xaxis: { title: { text: escaped(titled(axis, unit)) }, zeroline: false },
+    yaxis: { title: { text: "share of the starts" }, range: [-0.03, 1.03], tickformat: ".0%", zeroline: false },
   };
-  Plotly.react(byId("shares-plot"), traces, layout, PLOTLY);
+  drawPlot(byId("shares-plot"), traces, layout);
   const rows = cellsHere().map((cell) => [`${cell.controller}, ${withUnit(cell.value, unit)}`, `${cell.survives.good} of ${cell.survives.runs}`, `${percent(cell.survives.low)} to ${percent(cell.survives.high)}`, String(cell.settles.good), `${percent(cell.settles.low)} to ${percent(cell.settles.high)}`]);
   byId("shares-table").replaceChildren(tableOf(rows, ["cell", "survive", "95 % interval", "settle", "95 % interval"]));
 }
@@ -83,6 +84,7 @@ function startCells() {
     byId("map-controls").append(choice("Vehicle and condition", places.map((pair, i) => [i, pair.join(", ")]), 0, (i) => { cells.place = Number(i); drawCells(); drawSharesOfCells(); openCell(cellsHere()[0]); }));
   }
   byId("map-hint").textContent = `One row a controller, numbers in per cent. Click a cell, or move with the arrow keys, to see its runs below; hover for its 95 % interval.`;
+  redraws.push(drawCells, drawSharesOfCells, drawRunsOfCell);
   return drawCells();
 }
 
@@ -112,11 +114,11 @@ function drawCells() {
     colorbar: { tickformat: ".0%", thickness: 14, outlinewidth: 0, title: { text: "share that survives", side: "right" } },
   };
   const layout = {
-    height: Math.max(220, 110 + 42 * rows.length), margin: { l: 20, r: 10, t: 10, b: 50 }, font: FONT, dragmode: false, hoverlabel: HOVER,
+    height: Math.max(220, 110 + 42 * rows.length), margin: { l: 20, r: 10, t: 10, b: 50 }, dragmode: false,
     xaxis: { title: { text: escaped(titled(axis, unit)), standoff: 8 }, zeroline: false, showgrid: false }, yaxis: { type: "category", automargin: true },
   };
   const holder = byId("map-plot");
-  return Plotly.react(holder, [heat, chosenCell()], layout, PLOTLY).then(() => {
+  return drawPlot(holder, [heat, chosenCell()], layout).then(() => {
     if (!cells.isDrawn) holder.on("plotly_click", (event) => openCell(report.compared.cells.find((cell) => cell.number === event.points[0].customdata)));
     cells.isDrawn = true;
   });
@@ -176,8 +178,8 @@ function rowsOfCell(cell) {
 
 function drawRunsOfCell() {
   const holder = byId("cell-plot");
-  const layout = { ...mapLayout(), height: 260 };
-  return Plotly.react(holder, [...pointTraces(), chosenTrace()], layout, PLOTLY).then(() => {
+  const layout = { ...mapLayout(), height: 260, margin: { l: 66, r: 10, t: 26, b: 50 } };
+  return drawPlot(holder, [...pointTraces(), chosenTrace()], layout).then(() => {
     if (cells.hasRuns) return;
     cells.hasRuns = true;
     holder.setAttribute("aria-label", "Runs of the cell. Arrow keys open the neighbouring run.");

@@ -27,7 +27,7 @@ function drawTimePlot(signals, beside, names) {
   const traces = panels.flatMap((panel, k) => tracesOf(panel, k, signals, beside, names));
   const holder = byId("time-plot");
   holder.style.height = `${height}px`;
-  return Plotly.react(holder, traces, timeLayout(panels, height, signals), { ...PLOTLY, displayModeBar: false }).then(() => {
+  return drawPlot(holder, traces, timeLayout(panels, height, signals), { ...PLOTLY, displayModeBar: false }).then(() => {
     if (!timePlot.isDrawn) listenToTimePlot(holder);
     timePlot.isDrawn = true;
     moveCursor();
@@ -61,7 +61,7 @@ function traceOf(panel, line, i, k, signals, other) {
     mode: "lines",
     opacity: other ? 0.75 : 1,
     line: {
-      color: other ? (alone ? BESIDE : COLORS[place % 8]) : COLORS[place % 8],
+      color: other ? (alone ? paint("beside") : COLORS[place % 8]) : COLORS[place % 8],
       width: line.reference || other ? 1.1 : 1.7,
       dash: other || line.reference ? "dot" : DASHES[place % 8],
       shape: line.held ? "hv" : "linear",
@@ -74,20 +74,18 @@ function timeLayout(panels, height, signals) {
   const inner = height - topMargin() - MARGIN.b;
   const isNarrow = gap() > 46;
   const layout = {
-    height, margin: { ...MARGIN, t: topMargin() }, font: FONT, hovermode: "x", hoversubplots: "axis", hoverlabel: HOVER, dragmode: "zoom",
-    paper_bgcolor: "#fff", plot_bgcolor: "#fff", annotations: [],
+    height, margin: { ...MARGIN, t: topMargin() }, hovermode: "x", hoversubplots: "axis", dragmode: "zoom", annotations: [],
     xaxis: {
       title: { text: "time [s]", standoff: 6 }, anchor: panels.length > 1 ? `y${panels.length}` : "y", showgrid: true,
-      gridcolor: "#e8ebee", zeroline: false, range: [signals.time[0], signals.time[signals.time.length - 1]],
+      zeroline: false, range: [signals.time[0], signals.time[signals.time.length - 1]],
       hoverformat: ".4~f", ticksuffix: " s", showticksuffix: "last", showspikes: true, spikemode: "across", spikethickness: 1,
-      spikecolor: "#9aa4af", spikedash: "dot",
+      spikedash: "dot",
     },
   };
   panels.forEach((panel, k) => {
     const top = 1 - (k * (PANEL + gap())) / inner;
     layout[k ? `yaxis${k + 1}` : "yaxis"] = {
-      domain: [top - PANEL / inner, top], type: panel.logarithmic ? "log" : "linear", gridcolor: "#e8ebee",
-      zerolinecolor: "#c3cad1", nticks: 5, exponentformat: "e", ...(panel.logarithmic ? powersIn(panel, signals) : {}),
+      domain: [top - PANEL / inner, top], type: panel.logarithmic ? "log" : "linear", nticks: 5, exponentformat: "e", ...(panel.logarithmic ? powersIn(panel, signals) : {}),
     };
     layout[k ? `legend${k + 1}` : "legend"] = {
       orientation: "h", x: isNarrow ? 0 : 1, xanchor: isNarrow ? "left" : "right", y: top + 2 / inner, yanchor: "bottom", font: { size: 11 },

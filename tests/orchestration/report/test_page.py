@@ -196,6 +196,30 @@ def test_the_page_says_what_is_in_it_and_how_it_was_made(of_study: Any) -> None:
     assert "GUID of the plant" in contents
 
 
+def test_the_page_is_dark_where_the_system_is_and_plots_with_it_until_a_button_says_otherwise(of_runs: Any) -> None:
+    colors = """[getComputedStyle(document.querySelector('main section')).backgroundColor,
+        ...['layout.paper_bgcolor', 'data.0.line.color'].map((path) =>
+            path.split('.').reduce((found, key) => found[key], document.getElementById('time-plot')))]"""
+    light = of_runs.evaluate(colors)
+    of_runs.emulate_media(color_scheme="dark")
+    of_runs.wait_for_function("document.documentElement.dataset.scheme === 'dark'")
+    dark = of_runs.evaluate(colors)
+    assert all(one != other for one, other in zip(light, dark))
+    of_runs.get_by_role("button", name="Light").click()
+    assert of_runs.evaluate(colors) == light
+    of_runs.emulate_media(color_scheme="light")
+
+
+def test_on_a_phone_nothing_is_wider_than_the_page_and_signals_come_before_metrics(of_runs: Any, of_study: Any) -> None:
+    for page in (of_runs, of_study):
+        page.set_viewport_size({"width": 390, "height": 844})
+        page.wait_for_timeout(300)
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+        tops = [page.locator(f"#{name}").bounding_box()["y"] for name in ("run", "signals", "facts")]
+        assert tops == sorted(tops)
+        page.set_viewport_size({"width": 1400, "height": 900})
+
+
 def test_nobody_who_wants_no_motion_gets_more_than_a_picture_a_second(of_runs: Any) -> None:
     of_runs.emulate_media(reduced_motion="reduce")
     of_runs.get_by_label("Time", exact=True).fill("0")

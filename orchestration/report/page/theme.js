@@ -1,0 +1,51 @@
+// Light and dark: as the reader's system has it until a button says otherwise; on paper always light.
+
+const root = document.documentElement;
+const prefersDark = window.matchMedia("(prefers-color-scheme: dark)");
+const PALETTES = {
+  light: ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31"],
+  dark: ["#56B4E9", "#FF8A3D", "#2FCC9F", "#E8A0C6", "#F2C14E", "#9AD0F5", "#FFFFFF", "#C9A86A"],
+};
+const COLORS = [];
+const redraws = [];
+
+/** A colour of the style sheet by its name. */
+function paint(name) {
+  return getComputedStyle(root).getPropertyValue(`--${name}`).trim();
+}
+
+function takeScheme(scheme) {
+  root.dataset.scheme = scheme;
+  COLORS.splice(0, COLORS.length, ...PALETTES[scheme]);
+}
+
+function changeScheme(scheme) {
+  if (root.dataset.scheme === scheme) return;
+  takeScheme(scheme);
+  nameScheme();
+  for (const redraw of redraws) redraw();
+}
+
+function nameScheme() {
+  const other = root.dataset.scheme === "dark" ? "light" : "dark";
+  byId("scheme").textContent = other === "dark" ? "☾ Dark" : "☀ Light";
+  byId("scheme").onclick = () => changeScheme(other);
+}
+
+/** Draw a plot in the colours of the page. */
+function drawPlot(holder, traces, layout, options = PLOTLY) {
+  const themed = {
+    ...layout, font: { ...FONT, color: paint("ink") }, paper_bgcolor: paint("paper"), plot_bgcolor: paint("paper"),
+    hoverlabel: { ...HOVER, font: { ...HOVER.font } },
+  };
+  for (const [name, axis] of Object.entries(layout)) {
+    if (/^[xy]axis\d*$/.test(name)) themed[name] = { gridcolor: paint("grid"), zerolinecolor: paint("edge"), spikecolor: paint("edge"), ...axis };
+  }
+  return Plotly.react(holder, traces, themed, options);
+}
+
+takeScheme(prefersDark.matches ? "dark" : "light");
+prefersDark.addEventListener("change", () => changeScheme(prefersDark.matches ? "dark" : "light"));
+let beforePaper = "light";
+window.addEventListener("beforeprint", () => { beforePaper = root.dataset.scheme; changeScheme("light"); });
+window.addEventListener("afterprint", () => changeScheme(beforePaper));
