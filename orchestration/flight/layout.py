@@ -20,6 +20,8 @@ POSITION_ERROR = "position error"
 """A column that is computed: ‖P - P_d‖ [m]"""
 ANGLES = ("roll", "pitch", "yaw")
 """Columns that the page computes from the quaternion [deg]"""
+DESIRED_ANGLES = tuple(f"{angle} of the reference" for angle in ANGLES)
+"""likewise from the desired one"""
 OF_REFERENCE = ("x of the reference", "y of the reference", "z of the reference")
 
 
@@ -28,12 +30,15 @@ def _of_plant(names: Sequence[str]) -> tuple[str, ...]:
 
 
 PLACE, ATTITUDE = _of_plant(POSITION), _of_plant(QUATERNION)
+DESIRED = tuple(f"controller.{name}" for name in components("desired_quaternion", "xyzw"))
+"""Q_d as of the last sample, of controllers that say it"""
+THRUST = f"plant.{COMMAND[0]}"
 
 
 class FlightLayout:
     """Of runs with the columns of a quadrotor."""
 
-    compact = _of_plant((*POSITION, *QUATERNION, *ANGULAR_VELOCITY, *COMMAND))
+    compact = (*_of_plant((*POSITION, *QUATERNION, *ANGULAR_VELOCITY, *COMMAND)), *DESIRED)
     logarithmic = (POSITION_ERROR,)
 
     def fits(self, columns: Collection[str]) -> bool:
@@ -46,7 +51,7 @@ class FlightLayout:
 
     def panels(self, columns: Collection[str]) -> tuple[Panel, ...]:
         """Errors, position, attitude, commands and rates; velocity and energy for whoever opens them."""
-        aims = _aims(columns)
+        aims, told = _aims(columns), {*DESIRED} <= {*columns}
         panels = [
             Panel(
                 title="position error",
@@ -62,8 +67,15 @@ class FlightLayout:
                     *(_vector(POSITION_REFERENCE, OF_REFERENCE, reference=True) if aims else ()),
                 ),
             ),
-            Panel(title="attitude", unit="°", lines=(*_vector(ANGLES, ANGLES),)),
-            Panel(title="thrust", unit="N", lines=(Line(column="plant.thrust", label="thrust", held=True),)),
+            Panel(
+                title="attitude",
+                unit="°",
+                lines=(
+                    *_vector(ANGLES, ANGLES),
+                    *(_vector(DESIRED_ANGLES, DESIRED_ANGLES, held=True, reference=True) if told else ()),
+                ),
+            ),
+            Panel(title="thrust", unit="N", lines=(Line(column=THRUST, label="thrust", held=True),)),
             Panel(title="torque", unit="N·m", lines=(*_vector(_of_plant(components("torque")), "xyz", held=True),)),
             Panel(title="angular velocity", unit="rad/s", lines=(*_vector(_of_plant(ANGULAR_VELOCITY), "xyz"),)),
             Panel(title="velocity", unit="m/s", lines=(*_vector(_of_plant(VELOCITY), "xyz"),), shown=False),
@@ -72,7 +84,7 @@ class FlightLayout:
                 logarithmic=True, shown=False,
             ),
         ]  # fmt: skip
-        known = {*columns, *ANGLES, *([POSITION_ERROR] if aims else [])}
+        known = {*columns, *ANGLES, *DESIRED_ANGLES, *([POSITION_ERROR] if aims else [])}
         return tuple(panel for panel in panels if all(line.column in known for line in panel.lines))
 
     def scene(self, columns: Collection[str]) -> Scene:
@@ -81,6 +93,8 @@ class FlightLayout:
             position=(PLACE[0], PLACE[1], PLACE[2]),
             quaternion=(ATTITUDE[0], ATTITUDE[1], ATTITUDE[2], ATTITUDE[3]),
             reference=(POSITION_REFERENCE[0], POSITION_REFERENCE[1], POSITION_REFERENCE[2]) if _aims(columns) else None,
+            desired=(DESIRED[0], DESIRED[1], DESIRED[2], DESIRED[3]) if {*DESIRED} <= {*columns} else None,
+            thrust=THRUST if THRUST in columns else None,
         )
 
 

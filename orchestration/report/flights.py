@@ -8,11 +8,13 @@ from orchestration.basics.simulator import Floats
 from orchestration.building.inputs import Files, all_with_files
 from orchestration.engines.batch.batches import Batches
 from orchestration.engines.wiring import columns_of, source_signals
+from orchestration.fmi.model import Model
 from orchestration.report.known_layouts import layout_for
 from orchestration.report.tracks import Signals
 from orchestration.results.objectives import Metrics
 from orchestration.runs.simulation import run
 from orchestration.studies.study import Study
+from orchestration.system.check import recorded
 from orchestration.system.following import heard
 from orchestration.system.model import System
 from orchestration.workers.choice import chosen
@@ -58,8 +60,9 @@ def fly(
     for first in range(0, len(indices), SOME if lanes else 1):
         some = indices[first : first + (SOME if lanes else 1)]
         asked = [study.system(i, starts) for i in some]
-        systems = all_with_files([heard(system, files.models_of(system)) for system in asked], paths)
-        for index, system, found in zip(some, systems, _flown(systems, starts, batches)):
+        known = [heard(system, files.models_of(system)) for system in asked]
+        systems = all_with_files(known, paths)
+        for index, system, found in zip(some, systems, _flown(systems, starts, batches, _columns(known, files))):
             if found is not None:
                 signals, metrics, message = found
                 yield Flight(index=index, system=system, signals=signals, metrics=metrics, message=message)
@@ -70,17 +73,18 @@ def fly(
 Found = tuple[Signals, Metrics, str | None]
 
 
-def _flown(systems: Sequence[System], starts: Mapping[str, float], batches: Batches | None) -> Iterator[Found | None]:
-    """What runs of a study come to, in their order; their files are where they are."""
+def _flown(
+    systems: Sequence[System], starts: Mapping[str, float], batches: Batches | None, wanted: Sequence[str]
+) -> Iterator[Found | None]:
+    """What runs come to, in their order, with the columns that are wanted; their files are where they are."""
     if batches is None:
-        yield from map(_alone, systems)
+        yield from (_alone(system, wanted) for system in systems)
         return
-    wanted = _columns(systems[0])
     columns = [name for name in wanted if name.partition(".")[0] in systems[0].components]
     found: dict[int, Found | None] = {}
     for place, flown, rows in batches.each(systems, columns):
         if flown is None:
-            found[place] = _alone(systems[place])
+            found[place] = _alone(systems[place], wanted)
             continue
         signals = dict(zip(("time", *columns), rows.T.copy()))
         sources = _of_sources(systems[place], starts, signals["time"])
@@ -88,24 +92,31 @@ def _flown(systems: Sequence[System], starts: Mapping[str, float], batches: Batc
     yield from (found[place] for place in range(len(systems)))
 
 
-def _alone(system: System) -> Found | None:
+def _alone(system: System, wanted: Sequence[str]) -> Found | None:
     try:
         result = run(system)
     except QuadcosimError:
         return None
-    wanted = ("time", *_columns(system))
     message = result.divergence or result.termination
-    return {name: result.signals[name] for name in wanted}, result.metrics, message
+    return {name: result.signals[name] for name in ("time", *wanted)}, result.metrics, message
 
 
-def _columns(system: System) -> list[str]:
-    """What of a run is kept: what its known layout needs and its sources, else what is exchanged."""
-    there = columns_of(system)[1:]
-    known = layout_for(there)
+def _columns(systems: Sequence[System], files: Files) -> list[str]:
+    """What is kept, as all of the runs have it: what their known layout needs and sources, else what is exchanged."""
+    alike = {tuple(system.fmus.items()): system for system in systems}.values()
+    there = [_recorded(system, files.models_of(system)) for system in alike]
+    common = [name for name in there[0] if all(name in others for others in there[1:])]
+    known = layout_for(common)
     if known is not None:
-        sources = [name for name in there if name.partition(".")[0] in system.sources]
-        return [name for name in (*known.compact, *sources) if name in there]
-    return [*there[:MOST_COLUMNS]]
+        sources = [name for name in common if name.partition(".")[0] in systems[0].sources]
+        return [name for name in (*known.compact, *sources) if name in common]
+    return common[:MOST_COLUMNS]
+
+
+def _recorded(system: System, models: Mapping[str, Model]) -> list[str]:
+    """The columns that its run has: what is exchanged first."""
+    own = [f"{name}.{variable}" for name, some in recorded(system, models).items() for variable in some]
+    return [*dict.fromkeys((*columns_of(system)[1:], *own))]
 
 
 def _of_sources(system: System, starts: Mapping[str, float], t: Floats) -> dict[str, Floats]:

@@ -21,7 +21,8 @@ def layout_of(system: System | None, columns: Collection[str], about: About) -> 
     if known is None:
         return Layout(columns=tuple(columns), panels=(*_of_connections(system, columns, about),), scene=None)
     panels, scene = known.panels(columns), known.scene(columns)
-    drawn = {line.column for panel in panels for line in panel.lines} | {*scene.position, *scene.quaternion}
+    drawn = {line.column for panel in panels for line in panel.lines}
+    drawn |= {*scene.position, *scene.quaternion, *(scene.desired or ())}
     rest = [*_of_components(system, [name for name in columns if name not in drawn], about, shown=False)]
     return Layout(columns=tuple(columns), panels=(*panels, *rest), scene=scene)
 

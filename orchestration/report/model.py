@@ -39,11 +39,16 @@ class Panel:
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """The columns of what moves in space: z down, the quaternion (x, y, z, w) from body to space."""
+    """The columns of what moves in space: z down, quaternions (x, y, z, w) from body to space."""
 
     position: tuple[str, str, str]
     quaternion: tuple[str, str, str, str]
     reference: tuple[str, str, str] | None
+    """where it should be"""
+    desired: tuple[str, str, str, str] | None
+    """the attitude that it should have"""
+    thrust: str | None
+    """along the body's -z [N]"""
 
 
 @dataclass(frozen=True, kw_only=True)

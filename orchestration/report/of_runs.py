@@ -18,6 +18,8 @@ BYTES = 9_000_000
 MOST_ROWS, LEAST_ROWS = 6000, 200
 """of a run"""
 MOST_RUNS = 200
+SETTLING = "settling_time"
+"""The objective that says when a run settles, of systems that have it"""
 _CODED = 4.0 * 4.0 / 3.0
 """Characters of a number"""
 
@@ -82,9 +84,14 @@ def _settings(result: Result) -> dict[str, Setting]:
 
 
 def _told(name: str, result: Result) -> str:
-    outcome = result.metrics["outcome"]
-    said = "no criterion" if outcome is None else str(outcome)
-    return f"{name}: {said} after {number(result.end)} s"
+    """What became of a run, and when."""
+    metrics = result.metrics
+    said = "no criterion" if metrics["outcome"] is None else str(metrics["outcome"])
+    settled = metrics.get(SETTLING) if metrics["good"] else None
+    if settled is not None:
+        return f"{name}: {said} in {settled:.3g} s"
+    ended = result.divergence is not None or result.termination is not None
+    return f"{name}: {said} {'at' if ended else 'in a run of'} {number(result.end)} s"
 
 
 def _contents(results: Mapping[str, Result], rows: int) -> Sequence[str]:

@@ -35,7 +35,7 @@ AGREES = 1e-6
 
 Choose = Callable[[int], Sequence[int]]
 """Picks at most so many runs, by their indices in the design"""
-COLUMNS = 20
+COLUMNS = 24
 """About as many of them a track has, its time counted twice"""
 
 

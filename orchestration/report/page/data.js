@@ -39,15 +39,20 @@ function signalsOf(run) {
   return run.signals;
 }
 
-/** Roll, pitch and yaw [deg] about the body's axes, from the quaternion. */
+/** Roll, pitch and yaw [deg] about the body's axes, from the quaternion; of the attitude that it should have too. */
 function addAngles(signals) {
   const scene = signals.layout.scene;
   if (!scene) return;
-  const [x, y, z, w] = scene.quaternion.map((name) => signals.columns[name]);
+  addAnglesOf(signals, scene.quaternion, "");
+  if (scene.desired) addAnglesOf(signals, scene.desired, " of the reference");
+}
+
+function addAnglesOf(signals, quaternion, suffix) {
+  const [x, y, z, w] = quaternion.map((name) => signals.columns[name]);
   const degrees = (make) => Float64Array.from(x, (_, i) => (180 / Math.PI) * make(x[i], y[i], z[i], w[i]));
-  signals.columns.roll = degrees((a, b, c, d) => Math.atan2(2 * (d * a + b * c), 1 - 2 * (a * a + b * b)));
-  signals.columns.pitch = degrees((a, b, c, d) => Math.asin(Math.max(-1, Math.min(1, 2 * (d * b - c * a)))));
-  signals.columns.yaw = degrees((a, b, c, d) => Math.atan2(2 * (d * c + a * b), 1 - 2 * (b * b + c * c)));
+  signals.columns[`roll${suffix}`] = degrees((a, b, c, d) => Math.atan2(2 * (d * a + b * c), 1 - 2 * (a * a + b * b)));
+  signals.columns[`pitch${suffix}`] = degrees((a, b, c, d) => Math.asin(Math.max(-1, Math.min(1, 2 * (d * b - c * a)))));
+  signals.columns[`yaw${suffix}`] = degrees((a, b, c, d) => Math.atan2(2 * (d * c + a * b), 1 - 2 * (b * b + c * c)));
 }
 
 /** The last place whose time is not after t. */

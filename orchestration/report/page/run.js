@@ -12,9 +12,17 @@ function startRun() {
   buildRunControls();
 }
 
-/** Runs that the slider goes over: those with a flight, else all rows. */
+/** Runs that the slider goes over: those with a flight, in a comparison those of the open cell. */
 function sliderRuns() {
-  return report.runs;
+  return cells.open ? map.rows.map(runOfRow).filter(Boolean) : report.runs;
+}
+
+/** The slider over the runs that there are now. */
+function measureSlider() {
+  if (!controlsOf.slider) return;
+  const count = sliderRuns().length;
+  Object.assign(controlsOf.slider, { max: Math.max(0, count - 1), disabled: count < 2 });
+  controlsOf.over.textContent = cells.open ? `${count} of the cell` : report.table ? "Flights" : "Runs";
 }
 
 function buildRunControls() {
@@ -24,11 +32,13 @@ function buildRunControls() {
     const slider = element("input", { type: "range", min: 0, max: runs.length - 1, value: 0, step: 1 });
     slider.oninput = () => openPlace(Number(slider.value));
     controlsOf.slider = slider;
+    controlsOf.over = element("span");
     controls.append(
       button("‹", () => openPlace(placeOpen() - 1), { ariaLabel: "Previous run" }),
-      element("label", { className: "wide" }, report.table ? "Flights" : "Runs", slider),
+      element("label", { className: "wide" }, controlsOf.over, slider),
       button("›", () => openPlace(placeOpen() + 1), { ariaLabel: "Next run" }),
     );
+    measureSlider();
   }
   if (report.table) {
     const number = element("input", { type: "number", min: 0, step: 1 });
@@ -40,12 +50,24 @@ function buildRunControls() {
     controls.append(controlsOf.name.parentElement);
   }
   if (runs.length > 1 && runs.length <= 300) {
-    const options = [["", "none"], ...runs.map((run, i) => [i, run.name])];
-    controls.append(choice("Beside it", options, "", (i) => { player.beside = i === "" ? null : report.runs[i]; showSignals(); }));
+    const chosen = choice("Beside it", [], "", (i) => { player.beside = i === "" ? null : report.runs[i]; showSignals(); });
+    controlsOf.beside = chosen.select;
+    controls.append(chosen);
+    if (!report.table) player.beside = runs[1];
   } else if (runs.length > 1) {
     controlsOf.keep = button("Keep beside the next", () => { player.beside = player.beside ? null : player.run; showSignals(); nameKeeping(); });
     controls.append(controlsOf.keep);
   }
+}
+
+/** The runs that may be beside the open one: never itself, for which the one before takes its place. */
+function offerBeside(opened) {
+  const before = player.run;
+  if (player.beside === opened && opened) player.beside = before === opened ? null : before;
+  if (!controlsOf.beside) return;
+  const others = report.runs.map((run, i) => [run, i]).filter(([run]) => run !== opened);
+  controlsOf.beside.replaceChildren(element("option", { value: "", textContent: "none" }), ...others.map(([run, i]) => element("option", { value: i, textContent: run.name })));
+  controlsOf.beside.value = player.beside ? report.runs.indexOf(player.beside) : "";
 }
 
 function nameKeeping() {
@@ -55,11 +77,13 @@ function nameKeeping() {
 }
 
 function placeOpen() {
-  return Math.max(0, report.runs.indexOf(player.run));
+  return Math.max(0, sliderRuns().indexOf(player.run));
 }
 
 function openPlace(place) {
-  const run = report.runs[Math.max(0, Math.min(report.runs.length - 1, place))];
+  const runs = sliderRuns();
+  const run = runs[Math.max(0, Math.min(runs.length - 1, place))];
+  if (!run) return;
   if (report.table) openIndex(run.index);
   else openRun(run, null);
 }
@@ -82,6 +106,7 @@ function openRow(row) {
 /** Open a run; of one whose flight is not here, what the table has of it. */
 function openRun(run, row) {
   stop();
+  offerBeside(run);
   Object.assign(player, { run, row, t: 0 });
   const index = row === null ? null : cellOf(columnsByName.get("design_index"), row);
   const outcome = row === null ? run.metrics.outcome : outcomeOf(row);
@@ -92,7 +117,7 @@ function openRun(run, row) {
   if (controlsOf.slider && run) controlsOf.slider.value = placeOpen();
   if (controlsOf.slider) controlsOf.slider.setAttribute("aria-valuetext", run ? run.name : "no flight");
   if (controlsOf.number) controlsOf.number.value = index;
-  if (controlsOf.name) controlsOf.name.value = placeOpen();
+  if (controlsOf.name) controlsOf.name.value = report.runs.indexOf(run);
   showMetrics(run, row);
   showSignals();
 }
@@ -170,8 +195,9 @@ function nameScene(beside) {
     item.append(text);
     return item;
   };
-  const reference = player.run.signals.layout.scene.reference;
-  byId("scene-key").replaceChildren(line("flown", "", "flown"), ...(reference ? [line("wanted", "6 4", "reference, ◇ now")] : []), ...(beside ? [line("beside", "", player.beside.name)] : []));
+  const { reference, desired, thrust } = player.run.signals.layout.scene;
+  const sign = desired ? "outlined: now" : "◇ now";
+  byId("scene-key").replaceChildren(line("flown", "", "flown"), ...(reference ? [line("wanted", "6 4", `reference, ${sign}`)] : []), ...(thrust ? [line("thrust", "", "thrust")] : []), ...(beside ? [line("beside", "", player.beside.name)] : []));
 }
 
 function buildSignalControls() {
@@ -267,5 +293,7 @@ function readout(signals) {
   const place = position.map((name) => fixed(valueAt(signals, name, player.t), 3)).join(", ");
   const angles = ["roll", "pitch", "yaw"].map((name) => `${name} ${fixed(valueAt(signals, name, player.t), 1)}°`).join(", ");
   const error = "position error" in signals.columns ? `, ${Number(valueAt(signals, "position error", player.t).toPrecision(3))} m from the reference` : "";
-  return `north, east, down ${place} m${error}; ${angles}`;
+  const { thrust } = signals.layout.scene;
+  const force = thrust ? `; thrust ${fixed(valueAt(signals, thrust, player.t), 2)} N` : "";
+  return `north, east, down ${place} m${error}; ${angles}${force}`;
 }

@@ -3,6 +3,9 @@
 
 const VIEWS = { "3-D": [-0.9, 0.42], side: [-Math.PI / 2, 0], top: [-Math.PI / 2, Math.PI / 2 - 1e-3] };
 
+const ROTORS = [[1, 1], [1, -1], [-1, 1], [-1, -1]];
+const TRAIL = { seconds: 2, parts: 24 };
+
 const scene = { canvas: null, tracks: [], t: 0, azimuth: VIEWS["3-D"][0], elevation: VIEWS["3-D"][1], zoom: 1, box: null };
 
 function startScene(canvas) {
@@ -193,21 +196,55 @@ function stroke(context, project, points) {
 }
 
 function drawFlight(context, project, signals, isBeside) {
-  const { position, reference, quaternion } = signals.layout.scene;
+  const { position, reference, quaternion, desired, thrust } = signals.layout.scene;
   const t = Math.min(scene.t, signals.time[signals.time.length - 1]);
   const until = placeAt(signals.time, t);
   const color = paint(isBeside ? "beside" : "flown");
-  const here = position.map((name) => valueAt(signals, name, t));
+  const at = (names) => names.map((name) => valueAt(signals, name, t));
+  const here = at(position);
   context.lineJoin = "round";
   if (reference && !isBeside) {
     context.setLineDash([6, 4]);
     drawPath(context, project, signals, reference, 0, signals.time.length - 1, paint("wanted"), 1.4);
     context.setLineDash([]);
   }
-  drawPath(context, project, signals, position, until, signals.time.length - 1, color, 1.2, 0.45);
-  drawPath(context, project, signals, position, 0, until, color, isBeside ? 1.6 : 2.4, 1, here);
-  if (reference && !isBeside) drawDiamond(context, project(reference.map((name) => valueAt(signals, name, t))));
-  drawVehicle(context, project, here, attitudeAt(signals, quaternion, t), color);
+  drawPath(context, project, signals, position, until, signals.time.length - 1, color, 1, 0.3);
+  drawPath(context, project, signals, position, 0, until, color, 1.6, 0.6, here);
+  drawTrail(context, project, signals, t, color);
+  if (reference && !isBeside) {
+    if (desired) drawGhost(context, project, at(reference), attitudeAt(signals, desired, t));
+    else drawDiamond(context, project(at(reference)));
+  }
+  const force = thrust ? valueAt(signals, thrust, t) / mostOf(signals, thrust) : 0;
+  drawVehicle(context, project, here, attitudeAt(signals, quaternion, t), color, force);
+}
+
+/** The largest value of a column. */
+function mostOf(signals, name) {
+  signals.most = signals.most ?? {};
+  if (!(name in signals.most)) signals.most[name] = signals.columns[name].reduce((most, value) => Math.max(most, value), 1e-9);
+  return signals.most[name];
+}
+
+/** Where it was in the last seconds: thicker towards now. */
+function drawTrail(context, project, signals, t, color) {
+  const { position } = signals.layout.scene;
+  const places = [];
+  for (let k = 0; k <= TRAIL.parts; k += 1) {
+    const then = t - TRAIL.seconds * (1 - k / TRAIL.parts);
+    if (then >= signals.time[0]) places.push([k / TRAIL.parts, position.map((name) => valueAt(signals, name, then))]);
+  }
+  context.strokeStyle = color;
+  context.lineCap = "round";
+  for (let k = 1; k < places.length; k += 1) {
+    const [[share, point], [, before]] = [places[k], places[k - 1]];
+    if (![...point, ...before].every((value) => Math.abs(value) < 1e4)) continue;
+    context.globalAlpha = 0.15 + 0.75 * share;
+    context.lineWidth = 1 + 5 * share;
+    stroke(context, project, [before, point]);
+  }
+  context.globalAlpha = 1;
+  context.lineCap = "butt";
 }
 
 function drawPath(context, project, signals, names, first, last, color, width, alpha = 1, end = null) {
@@ -253,10 +290,15 @@ function rotated([x, y, z, w], [a, b, c]) {
   return [a + w * u + y * s - z * v, b + w * v + z * u - x * s, c + w * s + x * v - y * u];
 }
 
-/** Arms in a cross, rotors as discs (those in front filled), the axes of the body, and a plumb line to the floor. */
-function drawVehicle(context, project, here, q, color) {
+/** Half the length of an arm: much larger than it is. */
+function sizeOfVehicle() {
+  return (0.085 * scene.box.size) / scene.zoom ** 0.5;
+}
+
+/** Arms in a cross, rotors as discs (those in front filled), the axes of the body, thrust, and a plumb line to the floor. */
+function drawVehicle(context, project, here, q, color, force) {
   if (!here.every((value) => Math.abs(value) < 1e4)) return;
-  const size = (0.05 * scene.box.size) / scene.zoom ** 0.5;
+  const size = sizeOfVehicle();
   const at = (point) => rotated(q, point).map((value, i) => here[i] + value);
   const down = Math.ceil(scene.box.high[2] / niceStep(scene.box.size)) * niceStep(scene.box.size);
   context.strokeStyle = paint("edge");
@@ -265,15 +307,39 @@ function drawVehicle(context, project, here, q, color) {
   stroke(context, project, [here, [here[0], here[1], down]]);
   context.setLineDash([]);
   context.strokeStyle = paint("ink");
-  context.lineWidth = 2.5;
+  context.lineWidth = 4;
   for (const side of [1, -1]) stroke(context, project, [at([size, side * size, 0]), at([-size, -side * size, 0])]);
-  for (const [fore, side] of [[1, 1], [1, -1], [-1, 1], [-1, -1]]) drawRotor(context, project, at, size, fore, side, color);
+  for (const [fore, side] of ROTORS) {
+    drawRotor(context, project, at, size, fore, side);
+    context.fillStyle = fore > 0 ? color : paint("stage");
+    context.globalAlpha = 0.8;
+    context.fill();
+    context.globalAlpha = 1;
+    context.strokeStyle = color;
+    context.lineWidth = 2;
+    context.stroke();
+  }
   drawAxis(context, project, at, [1.9 * size, 0, 0], "x");
   drawAxis(context, project, at, [0, 1.9 * size, 0], "y");
   drawAxis(context, project, at, [0, 0, 1.9 * size], "z");
+  if (force > 0) drawArrow(context, project(at([0, 0, 0])), project(at([0, 0, -3 * size * force])), paint("thrust"));
 }
 
-function drawRotor(context, project, at, size, fore, side, color) {
+/** The attitude that it should have, where it should be. */
+function drawGhost(context, project, here, q) {
+  const size = sizeOfVehicle();
+  const at = (point) => rotated(q, point).map((value, i) => here[i] + value);
+  context.strokeStyle = paint("wanted");
+  context.lineWidth = 1.4;
+  for (const side of [1, -1]) stroke(context, project, [at([size, side * size, 0]), at([-size, -side * size, 0])]);
+  for (const [fore, side] of ROTORS) {
+    drawRotor(context, project, at, size, fore, side);
+    context.stroke();
+  }
+}
+
+/** The outline of a rotor, to be filled or stroked. */
+function drawRotor(context, project, at, size, fore, side) {
   context.beginPath();
   for (let k = 0; k <= 16; k += 1) {
     const angle = (k * Math.PI) / 8;
@@ -281,12 +347,21 @@ function drawRotor(context, project, at, size, fore, side, color) {
     if (k) context.lineTo(x, y);
     else context.moveTo(x, y);
   }
-  context.fillStyle = fore > 0 ? color : paint("stage");
-  context.globalAlpha = 0.75;
-  context.fill();
-  context.globalAlpha = 1;
+}
+
+function drawArrow(context, [x, y], [toX, toY], color) {
+  const angle = Math.atan2(toY - y, toX - x);
+  const length = Math.hypot(toX - x, toY - y);
+  if (length < 3) return;
   context.strokeStyle = color;
-  context.lineWidth = 1.5;
+  context.lineWidth = 3;
+  context.beginPath();
+  context.moveTo(x, y);
+  context.lineTo(toX, toY);
+  for (const turn of [2.6, -2.6]) {
+    context.moveTo(toX, toY);
+    context.lineTo(toX + Math.min(9, length) * Math.cos(angle + turn), toY + Math.min(9, length) * Math.sin(angle + turn));
+  }
   context.stroke();
 }
 

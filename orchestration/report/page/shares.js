@@ -155,6 +155,7 @@ function openCell(cell) {
   map.rows = rowsOfCell(cell);
   map.x = columnsByName.get("size of the initial error");
   map.y = VALUE;
+  measureSlider();
   byId("cell-controls").replaceChildren(choice("Metric", drawable.map((column) => [column.name, column.label]), map.metric.name, (name) => { map.metric = columnsByName.get(name); drawRunsOfCell(); }));
   drawRunsOfCell().then(() => openRow(firstOf(map.rows)));
 }

@@ -58,6 +58,7 @@ function traceOf(panel, line, i, k, signals, other) {
     yaxis: k ? `y${k + 1}` : "y",
     legend: k ? `legend${k + 1}` : "legend",
     showlegend: other ? place === 0 : line.reference ? place === 0 : !alone,
+    legendrank: other ? 1200 : line.reference ? 1100 : 1000,
     mode: "lines",
     opacity: other ? 0.75 : 1,
     line: {

@@ -8,9 +8,12 @@ from typing import Any
 
 import pytest
 
-from orchestration.report import html
+from orchestration.report import html, of_runs
 from orchestration.report.model import Report, Run
+from orchestration.runs.simulation import run
+from quadcosim import Timing
 from tests.commands import Main
+from tests.native import NATIVE
 
 NASTY = "</script><script>alert('!')</script> & \u2028 \"quoted\" <b>"
 
@@ -46,6 +49,15 @@ def test_the_page_forbids_itself_to_load_anything() -> None:
     assert "default-src 'none'" in text
     page = text.replace(re.findall(r"<script>(.*?)</script>", text, re.DOTALL)[0], "")  # the library's own text
     assert not re.search(r"""(src|href)=["']?(https?:)?//""", page)
+
+
+@pytest.mark.parametrize(
+    ("stop_time", "period", "said"),
+    [(9.0, 0.01, "r: settled in 4.98 s"), (1.0, 0.01, "r: bounded in a run of 1 s"), (3.0, 0.2, "r: diverged at ")],
+)
+def test_the_summary_says_what_became_of_a_run_and_when(stop_time: float, period: float, said: str) -> None:
+    flown = run(dataclasses.replace(NATIVE, stop_time=stop_time, timing=Timing(period=period)))
+    assert of_runs.report_of({"r": flown}, "").summary.startswith(said)
 
 
 @pytest.mark.parametrize(

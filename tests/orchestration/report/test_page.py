@@ -8,6 +8,8 @@ from typing import Any
 
 import pytest
 
+from orchestration.comparison.file import load_comparison
+from orchestration.comparison.run import compare
 from orchestration.report.writing import report
 from orchestration.runs.simulation import run
 from orchestration.studies.study import Study
@@ -85,6 +87,33 @@ def of_study(show: Show, tmp_path_factory: pytest.TempPathFactory) -> Any:
     return show(report(file, out=folder / "report.html", store=folder, flights=3, runs=[0, 1, 2]))
 
 
+@pytest.fixture(scope="module")
+def of_comparison(show: Show, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Two cells of three starts each, of which two have their flight in the file."""
+    folder = tmp_path_factory.mktemp("comparison")
+    file = folder / "comparison.toml"
+    file.write_text(
+        f'''name = "two"
+[base]
+stop_time = 0.5
+plant = {{ fmu = "{NATIVE.plant.fmu}" }}
+controller = {{ fmu = "{NATIVE.controller.fmu}" }}
+timing = {{ plant_interval = 0.005 }}
+[[controllers]]
+name = "own"
+[axis]
+name = "period"
+sets = ["timing.period"]
+values = [0.01, 0.02]
+[starts]
+count = 3
+''',
+        encoding="utf-8",
+    )
+    compare(load_comparison(file), folder=folder, progress=None, announce=None)
+    return show(report(file, out=folder / "report.html", store=folder, flights=4))
+
+
 def clock(page: Any) -> float:
     return float(page.inner_text("#player output").split()[0])
 
@@ -124,6 +153,33 @@ def test_the_arrow_keys_on_the_slider_over_runs_open_the_next_one(of_runs: Any) 
     assert "▼ diverged" in title(of_runs)
     of_runs.get_by_label("Runs", exact=True).press("ArrowLeft")
     assert "run 1" in title(of_runs)
+
+
+def test_another_run_is_beside_the_open_one_and_never_itself(of_runs: Any) -> None:
+    def offered() -> list[str]:
+        found: list[str] = of_runs.get_by_label("Beside it").locator("option").all_text_contents()
+        return found
+
+    def beside() -> str:
+        label: str = of_runs.locator("#scene-key").inner_text()
+        return label
+
+    assert offered() == ["none", "run 2"]
+    assert "run 2" in beside()
+    of_runs.get_by_label("Runs", exact=True).press("ArrowRight")
+    assert offered() == ["none", "run 1"]
+    assert "run 1" in beside()
+    of_runs.get_by_label("Runs", exact=True).press("ArrowLeft")
+
+
+def test_the_replay_shows_thrust_and_the_attitude_that_the_vehicle_should_have(of_runs: Any, of_study: Any) -> None:
+    for page in (of_runs, of_study):
+        key = page.locator("#scene-key").inner_text()
+        assert "reference, outlined: now" in key
+        assert "thrust" in key
+    assert "; thrust " in of_runs.inner_text("#readout")
+    lines = of_runs.evaluate("document.getElementById('time-plot').data.map((each) => each.hovertemplate)")
+    assert any("yaw of the reference" in line for line in lines)
 
 
 def test_hovering_over_a_plot_says_the_value_with_its_unit(of_runs: Any) -> None:
@@ -166,6 +222,21 @@ def test_a_click_on_a_cell_of_the_map_opens_the_run_behind_it(of_study: Any) -> 
     assert of_study.is_visible("#scene")
     of_study.locator("#map-plot").press("ArrowDown")
     assert title(of_study).startswith("Run 0")
+
+
+def test_the_slider_goes_over_the_flights_of_the_open_cell(of_comparison: Any) -> None:
+    slider = of_comparison.get_by_label("2 of the cell")
+    first = title(of_comparison)
+    slider.press("End")
+    last = title(of_comparison)
+    slider.press("ArrowRight")
+    assert title(of_comparison) == last != first
+    of_comparison.locator("#map-plot").press("ArrowRight")
+    of_comparison.wait_for_function("document.getElementById('cell-title').textContent.includes('20 ms')")
+    of_comparison.wait_for_function(f"document.getElementById('run-title').textContent !== {last!r}")
+    assert "period 20 ms" in of_comparison.inner_text("#run-text")
+    slider.press("End")
+    assert "period 20 ms" in of_comparison.inner_text("#run-text")
 
 
 def test_hovering_over_a_cell_says_settings_and_metric(of_study: Any) -> None:
