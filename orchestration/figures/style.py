@@ -8,6 +8,7 @@ from typing import Any
 
 import matplotlib
 from cycler import cycler
+from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.figure import Figure
 
 from orchestration.basics.errors import UsageError
@@ -145,7 +146,9 @@ def save(figures: Mapping[str, Figure], folder: Path, style: Style = SCREEN) -> 
             with _laid_out_once(figure):
                 for ending in style.formats:
                     path = folder / f"{name}.{ending}"
-                    figure.savefig(path, metadata=_UNDATED[ending])
+                    # As `Figure.savefig`, which draws twice for the sake of figures whose layout is not done.
+                    canvas = get_registered_canvas_class(ending)(figure)
+                    getattr(canvas, f"print_{ending}")(path, metadata=_UNDATED[ending])
                     if ending == "png" and style.colors is not None:
                         _reduce(path, style.colors)
                     written.append(path)
@@ -156,7 +159,8 @@ def save(figures: Mapping[str, Figure], folder: Path, style: Style = SCREEN) -> 
 def _laid_out_once(figure: Figure) -> Iterator[None]:
     """Inside, things stay where they are: to lay out a figure takes as long as to write it."""
     engine = figure.get_layout_engine()
-    figure.draw_without_rendering()
+    if engine is not None:
+        engine.execute(figure)
     figure.set_layout_engine("none")
     try:
         yield
