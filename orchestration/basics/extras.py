@@ -1,6 +1,7 @@
 """Packages that the base install does without, and what is said where one of them is needed and not there."""
 
 import functools
+import importlib.util
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
@@ -23,6 +24,23 @@ def extra_of(package: str | None) -> str | None:
     """The extra that brings a package; None if none does."""
     top = (package or "").partition(".")[0]
     return next((extra for extra, packages in EXTRAS.items() if top in packages), None)
+
+
+def needs(*packages: str) -> Callable[[Callable[Asked, Given]], Callable[Asked, Given]]:
+    """Makes a function one that is `explained`, and that says so before it does anything where a package is missing."""
+
+    def with_packages(function: Callable[Asked, Given]) -> Callable[Asked, Given]:
+        @explained
+        @functools.wraps(function)
+        def call(*unnamed: Asked.args, **given: Asked.kwargs) -> Given:
+            for name in packages:
+                if importlib.util.find_spec(name) is None:
+                    raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+            return function(*unnamed, **given)
+
+        return call
+
+    return with_packages
 
 
 def explained(function: Callable[Asked, Given]) -> Callable[Asked, Given]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from orchestration.basics.errors import UsageError
-from orchestration.basics.extras import explained
+from orchestration.basics.extras import explained, needs
 from orchestration.basics.progress import CountHeard
 from orchestration.basics.terminal import say
 from orchestration.building.inputs import Files
@@ -82,7 +82,7 @@ class Compared:
         return pd.DataFrame([one.row(self.axis) if isinstance(one, CellSummary) else vars(one) for one in found])
 
 
-@explained
+@needs("filelock", "pandas")
 def compare(
     comparison: Comparison,
     *,

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from orchestration.basics.errors import UsageError
-from orchestration.basics.extras import explained
+from orchestration.basics.extras import needs
 from orchestration.report import html, of_runs
 from orchestration.report.flights import Progress
 from orchestration.report.sources import report_of
@@ -14,7 +14,7 @@ from orchestration.runs.result import Result
 ENDINGS = (".html", ".htm")
 
 
-@explained
+@needs("plotly")
 def report(
     *what: Result | str | Path,
     out: str | Path | None = None,

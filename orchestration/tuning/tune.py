@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from orchestration.basics.extras import explained
+from orchestration.basics.extras import explained, needs
 from orchestration.basics.progress import ShareHeard, of_share
 from orchestration.basics.terminal import say
 from orchestration.building.inputs import Files
@@ -70,7 +70,7 @@ class Tuned:
         return table
 
 
-@explained
+@needs("cma", "filelock")
 def tune(
     tuning: Tuning,
     *,
