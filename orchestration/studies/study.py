@@ -85,7 +85,24 @@ class Study:
 
         Raises `UsageError` for a value that cannot be.
         """
-        point = self.points[index]
+        made, of = self._made
+        if of != starts:
+            of.clear()
+            made.clear()
+            of.update(starts)
+        if index not in made:
+            system = self._system(self.points[index], starts)
+            if len(made) == _KEPT:
+                return system
+            made[index] = system
+        return made[index]
+
+    @cached_property
+    def _made(self) -> tuple[dict[int, System], dict[str, float]]:
+        """Systems that are asked for again, to be checked, hashed and flown; and the FMUs' own parameters in them."""
+        return {}, {}
+
+    def _system(self, point: Mapping[str, Value], starts: Mapping[str, float]) -> System:
         changes: dict[str, Any] = {}
         if self.vary_seed and "seed" not in point:
             changes["seed"] = _own_seed(self.origin.seed, point)
@@ -129,6 +146,8 @@ class Study:
         )
 
 
+_KEPT = 2**14
+"""Systems of a study, some kB each"""
 _NAME = re.compile(r"[^\W_][\w .+-]{0,99}")
 
 

@@ -2,9 +2,10 @@
 
 import contextlib
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -84,7 +85,8 @@ def sweep(
             if announce is not None and engine == "auto":
                 announce(str(how))
             flown_with = with_python_twins(files) if how.in_lanes else files
-            tasks = (_task(study, index, files, how.engine, time_limit) for index in missing)
+            task_of = partial(_task, study, files, files.starts_of(study.origin), time_limit)
+            tasks = (task_of(index, how.engine) for index in missing)
             lanes: dict[str, Row] = {}
             try:
                 with _workers(Inputs.of(flown_with), workers, dask) as fly:
@@ -94,9 +96,7 @@ def sweep(
                             _keep(some, opened)
                             counted.add(some)
                             lanes |= {each.row.key: each.row for each in some if each.in_lanes}
-                    agreement = vouched(
-                        lanes, flown_with, lambda index: _task(study, index, files, None, time_limit), fly
-                    )
+                    agreement = vouched(lanes, flown_with, partial(task_of, engine=None), fly)
             except KeyboardInterrupt:
                 raise Interrupted(f"with {counted.done} of {counted.total} runs done") from None
         if agreement is not None:
@@ -182,8 +182,15 @@ class _Counted:
         self._hear(self.done, self.total)
 
 
-def _task(study: Study, index: int, files: Files, engine: Engine | None, time_limit: float | None) -> RunTask:
-    system = study.system(index, files.starts_of(study.origin))
+def _task(
+    study: Study,
+    files: Files,
+    starts: Mapping[str, float],
+    time_limit: float | None,
+    index: int,
+    engine: Engine | None,
+) -> RunTask:
+    system = study.system(index, starts)
     return RunTask(
         index=index, key=run_key(system, files), settings=dict(study.points[index]), system=system,
         keep_signals=study.keeps_signals(index), engine=engine, time_limit=time_limit,
