@@ -8,7 +8,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, fromstring, tostring
 
 from fmu_kit.loader import GUID_FILE
-from fmu_kit.packaging import content_guid
+from fmu_kit.packaging import NATIVE_TABLES, content_guid
 from tests.fmus.archive import files_of
 
 DESCRIPTION = "modelDescription.xml"
@@ -30,6 +30,12 @@ class Mutant:
     """What the text of the finding must name"""
     damage: Damage
     model: str = "QuadrotorPlant"
+    damage_3: Damage | None = None
+    """What does the same to an FMU of FMI 3.0, if that takes another damage"""
+    versions: tuple[int, ...] = (2, 3)
+    """Of FMI, in whose FMUs it can be done"""
+    words_3: tuple[str, ...] | None = None
+    """What it must name in FMI 3.0, if that is called otherwise"""
     keeps_guid: bool = False
     """Whether the GUID is left as the damage made it"""
     rewrite: Callable[[Path], None] | None = None
@@ -37,10 +43,15 @@ class Mutant:
     time_limit: float = 20.0
     """[s]; a mutant takes one or two"""
 
+    def words_of(self, version: int) -> tuple[str, ...]:
+        """What the text of the finding must name, in a version of FMI."""
+        return self.words if version == 2 or self.words_3 is None else self.words_3
+
     def write(self, fmu: Path, folder: Path) -> Path:
         """A damaged copy of `fmu` in `folder`."""
         files = files_of(fmu)
-        self.damage(files)
+        three = version_of(fromstring(files[DESCRIPTION])) == 3
+        (self.damage_3 if three and self.damage_3 is not None else self.damage)(files)
         path = folder / f"{self.name.replace(' ', '_')}.fmu"
         write_fmu(path, files if self.keeps_guid else with_its_guid(files))
         if self.rewrite is not None:
@@ -58,8 +69,8 @@ def write_fmu(path: Path, files: Files) -> None:
 def with_its_guid(files: Files) -> Files:
     """The files with the GUID that their content has."""
     guid = content_guid(files).encode()
-    described = re.sub(rb' guid="[^"]*"', b' guid="' + guid + b'"', files[DESCRIPTION], count=1)
-    return {**files, DESCRIPTION: described, GUID_FILE: guid}
+    described = re.sub(rb' (guid|instantiationToken)="[^"]*"', rb' \1="' + guid + b'"', files[DESCRIPTION], count=1)
+    return {**files, DESCRIPTION: described, **({} if NATIVE_TABLES in files else {GUID_FILE: guid})}
 
 
 def every(*damages: Damage) -> Damage:
@@ -105,11 +116,24 @@ def variable(name: str, /, **attributes: str | None) -> Damage:
     """Set attributes of a variable or of its type."""
 
     def change(root: Element) -> None:
-        scalar = found(root, f"ModelVariables/ScalarVariable[@name='{name}']")
-        put(scalar, {key: value for key, value in attributes.items() if key not in _OF_THE_TYPE})
-        put(scalar[0], {key: value for key, value in attributes.items() if key in _OF_THE_TYPE})
+        declared = found(root, f"ModelVariables/*[@name='{name}']")
+        typed = declared[0] if declared.tag == "ScalarVariable" else declared
+        put(declared, {key: value for key, value in attributes.items() if key not in _OF_THE_TYPE})
+        put(typed, {key: value for key, value in attributes.items() if key in _OF_THE_TYPE})
 
     return description(change)
+
+
+def version_of(root: Element) -> int:
+    """2 or 3, of FMI."""
+    return int(root.get("fmiVersion", "")[0])
+
+
+def depends(where: str, output: str, *names: str) -> Damage:
+    """The entry of an output in a list of the model structure has these dependencies alone."""
+    return description(
+        lambda root: entry(root, where, output).set("dependencies", " ".join(handle_of(root, name) for name in names))
+    )
 
 
 def unknown(where: str, name: str, /, **attributes: str | None) -> Damage:
@@ -119,17 +143,27 @@ def unknown(where: str, name: str, /, **attributes: str | None) -> Damage:
 
 def without_unknown(where: str, name: str) -> Damage:
     """Remove the entry of a variable from a list of the model structure."""
-    return description(lambda root: found(root, f"ModelStructure/{where}").remove(entry(root, where, name)))
+
+    def change(root: Element) -> None:
+        holder = f"ModelStructure/{where}" if version_of(root) == 2 else "ModelStructure"
+        found(root, holder).remove(entry(root, where, name))
+
+    return description(change)
 
 
-def index_of(root: Element, name: str) -> int:
-    """The index of a variable, from 1."""
-    return [v.get("name") for v in root.iterfind("ModelVariables/ScalarVariable")].index(name) + 1
+def handle_of(root: Element, name: str) -> str:
+    """By which the model structure names a variable: its place in the list, or its value reference in FMI 3.0."""
+    declared = list(found(root, "ModelVariables"))
+    place = [v.get("name") for v in declared].index(name)
+    return str(place + 1) if version_of(root) == 2 else declared[place].get("valueReference", "")
 
 
 def entry(root: Element, where: str, name: str) -> Element:
-    """The entry of a variable in a list of the model structure."""
-    return found(root, f"ModelStructure/{where}/Unknown[@index='{index_of(root, name)}']")
+    """The entry of a variable in a list of the model structure, which is called as in FMI 2.0."""
+    handle = handle_of(root, name)
+    if version_of(root) == 2:
+        return found(root, f"ModelStructure/{where}/Unknown[@index='{handle}']")
+    return found(root, f"ModelStructure/{where.removesuffix('s')}[@valueReference='{handle}']")
 
 
 def found(root: Element, path: str) -> Element:
@@ -156,6 +190,15 @@ def source(name: str, old: str, new: str) -> Damage:
 
     def damage(files: Files) -> None:
         (path,) = (path for path in files if path.startswith("resources/") and path.endswith(name))
+        replaced(path, old, new)(files)
+
+    return damage
+
+
+def replaced(path: str, old: str, new: str) -> Damage:
+    """Replace a text in a file, every time that it occurs."""
+
+    def damage(files: Files) -> None:
         assert old.encode() in files[path], f"{path}: expected {old!r}"
         files[path] = files[path].replace(old.encode(), new.encode())
 

@@ -1,5 +1,6 @@
 """FMUs of this project, each damaged in one way; `python -m tests.fmus.mutants` prints who notices.
 
+Those of FMI 2.0 have Python inside, which is damaged; those of FMI 3.0 a library that commits a fault (`faulty_3.c`).
 Each mutant but those of the GUID itself has the GUID of its own content, so that this one rule cannot do the work
 of all the others.
 """
@@ -7,10 +8,11 @@ of all the others.
 import sys
 import tempfile
 from pathlib import Path
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, SubElement
 
 import fmpy
 
+from fmu_kit.packaging import ICONS
 from orchestration.building import fmus
 from orchestration.building.models import MODELS
 from tests.fmus.damage import (
@@ -18,13 +20,15 @@ from tests.fmus.damage import (
     Damage,
     Files,
     Mutant,
+    depends,
     description,
     element,
     entry,
     every,
     file,
     found,
-    index_of,
+    handle_of,
+    replaced,
     root,
     source,
     unit,
@@ -33,7 +37,8 @@ from tests.fmus.damage import (
     without,
     without_unknown,
 )
-from tests.fmus.verdicts import as_markdown, verdicts
+from tests.fmus.faulty import fault, faulty
+from tests.fmus.verdicts import Verdict, as_markdown, verdicts
 
 PLANT, CONTROLLER = "QuadrotorPlant", "UnifiedController"
 
@@ -51,13 +56,13 @@ def _truncate(path: Path) -> None:
 
 def _flip_a_byte(path: Path) -> None:
     content = bytearray(path.read_bytes())
-    content[content.index(b"class Quadrotor")] ^= 1
+    content[content.index(b"fmiVersion=")] ^= 1
     path.write_bytes(content)
 
 
 def _add_a_second_entry(path: Path) -> None:
     content = path.read_bytes()
-    path.write_bytes(content.replace(b"resources/source_hash.txt", b"resources/slavemodule.txt"))
+    path.write_bytes(content.replace(b"resources/second", b"resources/first."))
 
 
 def _no_description(files: Files) -> None:
@@ -68,7 +73,7 @@ def _swap(key: str, first: str, second: str) -> Damage:
     """Swap an attribute of two variables."""
 
     def change(root: Element) -> None:
-        a, b = (found(root, f"ModelVariables/ScalarVariable[@name='{name}']") for name in (first, second))
+        a, b = (found(root, f"ModelVariables/*[@name='{name}']") for name in (first, second))
         mine, theirs = a.get(key, ""), b.get(key, "")
         a.set(key, theirs)
         b.set(key, mine)
@@ -79,7 +84,7 @@ def _swap(key: str, first: str, second: str) -> Damage:
 def _drop_dependency(output: str, dropped: str) -> Damage:
     def change(root: Element) -> None:
         listed = entry(root, "InitialUnknowns", output)
-        kept = [index for index in listed.get("dependencies", "").split() if index != str(index_of(root, dropped))]
+        kept = [handle for handle in listed.get("dependencies", "").split() if handle != handle_of(root, dropped)]
         listed.set("dependencies", " ".join(kept))
 
     return description(change)
@@ -93,11 +98,35 @@ def _without_base_unit(name: str) -> Damage:
     return description(change)
 
 
-def _retype(name: str, kind: str) -> Damage:
+def _retype(name: str, kind: str, type: str) -> Damage:
+    """Another type, `type` in FMI 3.0."""
+
     def change(root: Element) -> None:
-        found(root, f"ModelVariables/ScalarVariable[@name='{name}']")[0].tag = kind
+        declared = found(root, f"ModelVariables/*[@name='{name}']")
+        if declared.tag == "ScalarVariable":
+            declared[0].tag = kind
+        else:
+            declared.tag = type
 
     return description(change)
+
+
+_GUID = "a1b2c3d4-0000-4000-8000-000000000000"
+_BUILD = "sources/buildDescription.xml"
+"""What FMI 3.0 has of sources to be compiled"""
+
+
+def _compiled_of(name: str) -> Damage:
+    """The FMU of FMI 2.0 says to be compiled of a file."""
+
+    def change(root: Element) -> None:
+        SubElement(SubElement(found(root, "CoSimulation"), "SourceFiles"), "File", name=name)
+
+    return description(change)
+
+
+_HERE = f"binaries/{fmpy.platform}/", f"binaries/{fmpy.platform_tuple}/"
+"""In FMI 2.0 and 3.0"""
 
 
 # -- the mutants ----------------------------------------------------------------------------------------
@@ -116,37 +145,47 @@ ARCHIVE = (
     Mutant(name="path out of the archive", rule="paths", words=("../run.py",), damage=file("../run.py", b"")),
     Mutant(name="absolute path", rule="paths", words=("/etc/motd",), damage=file("/etc/motd", b"")),
     Mutant(
-        name="two files of one name", rule="entries", words=("resources/slavemodule.txt",), damage=_nothing,
-        rewrite=_add_a_second_entry,
+        name="two files of one name", rule="entries", words=("resources/first.",), rewrite=_add_a_second_entry,
+        damage=every(file("resources/first.", b""), file("resources/second", b"")),
     ),
-    Mutant(name="no binary", rule="binaries", words=(PLANT, "found none"), damage=without("binaries/")),
+    Mutant(
+        name="no binary", rule="binaries", words=(PLANT, "found none"), damage=without("binaries/"),
+        damage_3=every(without("binaries/"), without(_BUILD)),
+    ),
     Mutant(
         name="binary of another name", rule="binaries", words=("Quadrotor under",),
         damage=element("CoSimulation", modelIdentifier="Quadrotor"),
     ),
     Mutant(
-        name="no binary for this platform", rule="platform", words=(fmpy.platform,),
-        damage=without(f"binaries/{fmpy.platform}/"),
+        name="no binary for this platform", rule="platform", words=(fmpy.platform,), words_3=(fmpy.platform_tuple,),
+        damage=without(_HERE[0]), damage_3=without(_HERE[1]),
+    ),
+    Mutant(
+        name="source that is not there", rule="source-files", words=("sources/other.c",),
+        damage=_compiled_of("other.c"), damage_3=replaced(_BUILD, "fmi3.c", "other.c"),
     ),
     Mutant(
         name="script that is not there", rule="slave-module", words=("names slave,",),
-        damage=file("resources/slavemodule.txt", b"slave"),
+        damage=file("resources/slavemodule.txt", b"slave"), versions=(2,),
     ),
     Mutant(
         name="script not named", rule="slave-module", words=("slavemodule.txt",),
-        damage=without("resources/slavemodule.txt"),
+        damage=without("resources/slavemodule.txt"), versions=(2,),
     ),
 )  # fmt: skip
 
 WHOLE = (
-    Mutant(name="empty GUID", rule="guid", words=("guid = ''",), damage=root(guid=""), keeps_guid=True),
+    Mutant(
+        name="empty GUID", rule="guid", words=("guid = ''",), words_3=("instantiationToken = ''",),
+        damage=root(guid=""), damage_3=root(instantiationToken=""), keeps_guid=True,
+    ),
     Mutant(
         name="GUID of another content", rule="guid-of-content", words=("a1b2",),
-        damage=root(guid="a1b2c3d4-0000-4000-8000-000000000000"), keeps_guid=True,
+        damage=root(guid=_GUID), damage_3=root(instantiationToken=_GUID), keeps_guid=True,
     ),
     Mutant(
         name="source changed, GUID not", rule="guid-of-content", words=("expected",), keeps_guid=True,
-        damage=source("plant_fmu/interface.py", "0.9212", "0.9213"),
+        damage=source("plant_fmu/interface.py", "0.9212", "0.9213"), damage_3=file("sources/fmi3.c", b"int main;"),
     ),
     Mutant(
         name="date in local time", rule="date", words=("+01:00",),
@@ -158,7 +197,9 @@ WHOLE = (
     ),
     Mutant(
         name="serialises what it cannot save", rule="capabilities", words=("canGetAndSetFMUstate",),
+        words_3=("canGetAndSetFMUState",),
         damage=element("CoSimulation", canGetAndSetFMUstate="false"),
+        damage_3=element("CoSimulation", canGetAndSetFMUState="false"),
     ),
     Mutant(
         name="identifier not of C", rule="model-identifier", words=("Quadrotor-Plant",),
@@ -183,18 +224,21 @@ WHOLE = (
         name="page empty", rule="documentation", words=("documentation/index.html", "an empty file"),
         damage=file("documentation/index.html", b" "),
     ),
-    Mutant(name="icon missing", rule="documentation", words=("model.png", "none"), damage=without("model.png")),
     Mutant(
-        name="icon no picture", rule="documentation", words=("model.png", "another file"),
-        damage=file("model.png", b"<svg/>"),
+        name="icon missing", rule="documentation", words=(ICONS[2], "none"), words_3=(ICONS[3], "none"),
+        damage=without(ICONS[2]), damage_3=without(ICONS[3]),
+    ),
+    Mutant(
+        name="icon no picture", rule="documentation", words=(ICONS[2], "another file"), words_3=(ICONS[3], "another"),
+        damage=file(ICONS[2], b"<svg/>"), damage_3=file(ICONS[3], b"<svg/>"),
     ),
     Mutant(
         name="slave describes another", rule="own-description", words=("mass", "description", "payload"),
-        damage=source("plant_fmu/interface.py", '"mass m"', '"payload m"'),
+        damage=source("plant_fmu/interface.py", '"mass m"', '"payload m"'), versions=(2,),
     ),
     Mutant(
         name="slave does not describe itself", rule="own-description", words=("SyntaxError",),
-        damage=source("fmu_kit/model_description.py", "import os", "import os as"),
+        damage=source("fmu_kit/model_description.py", "import os", "import os as"), versions=(2,),
     ),
 )  # fmt: skip
 
@@ -241,7 +285,7 @@ VARIABLES = (
     ),
     Mutant(
         name="two names swapped", rule="own-description", words=("velocity.x", "velocity.y", "place"),
-        damage=_swap("name", "velocity.x", "velocity.y"),
+        damage=_swap("name", "velocity.x", "velocity.y"), versions=(2,),
     ),
     Mutant(
         name="name of no convention", rule="names", words=("velocity,x", "structured"),
@@ -254,7 +298,7 @@ VARIABLES = (
     ),
     Mutant(
         name="Integer declared Real", rule="getters", words=("sample_count", "Real"), model=CONTROLLER,
-        damage=_retype("sample_count", "Real"),
+        words_3=("sample_count", "Float64"), damage=_retype("sample_count", "Real", "Float64"),
     ),
     Mutant(name="input port missing", rule="ports", words=("torque.z",), damage=variable("torque.z", name="torque.w")),
     Mutant(
@@ -276,16 +320,20 @@ STRUCTURE = (
         damage=without_unknown("InitialUnknowns", "position.y"),
     ),
     Mutant(
-        name="index that there is none of", rule="indices", words=("Outputs", "999"),
+        name="index that there is none of", rule="indices", words=("Output", "999"),
         damage=unknown("Outputs", "position.y", dependencies="999"),
     ),
     Mutant(
         name="dependency on a parameter", rule="known-dependencies", words=("position.y", "mass"),
-        damage=unknown("Outputs", "position.y", dependencies="21"),
+        damage=depends("Outputs", "position.y", "mass"), versions=(2,),  # FMI 3.0 has them known at any time
+    ),
+    Mutant(
+        name="dependency on an output", rule="known-dependencies", words=("position.y depends on velocity.y",),
+        damage=depends("InitialUnknowns", "position.y", "velocity.y"),
     ),
     Mutant(
         name="dependency added", rule="idle-dependency", words=("thrust", "position.y"),
-        damage=unknown("Outputs", "position.y", dependencies="1"),
+        damage=depends("Outputs", "position.y", "thrust"),
     ),
     Mutant(
         name="dependency dropped", rule="undeclared-dependency", model=CONTROLLER,
@@ -311,15 +359,18 @@ BEHAVIOUR = (
     Mutant(
         name="output not finite", rule="finite-outputs", words=("position.x = nan",),
         damage=source("plant_fmu/slave.py", _TILT, f"{_TILT}\n        self.position = math.nan * self.position"),
+        damage_3=fault("not finite"),
     ),
     Mutant(
         name="output follows an input", rule="undeclared-dependency",
         words=("position.y moves with thrust at a communication point",),
         damage=source("fmu_kit/slave.py", "[reals[vr] for vr", "[reals[vr] + (vr == 8) * reals[0] for vr"),
+        damage_3=fault("follows"),
     ),
     Mutant(
         name="runs by chance", rule="repeatable", words=("as in an equal run before",),
         damage=source("plant_fmu/slave.py", _TILT, f'{_TILT}\n        self.tilt = __import__("random").random()'),
+        damage_3=fault("by chance"),
     ),
     Mutant(
         name="state kept over reset", rule="reset", words=("without the run and reset before it",),
@@ -328,18 +379,22 @@ BEHAVIOUR = (
             source("plant_fmu/slave.py", "_MOTION = ", "_KEPT = {}\n_MOTION = "),
             source("plant_fmu/slave.py", _INITIAL_VELOCITY, f"_KEPT.get(self.instance_name, {_INITIAL_VELOCITY})"),
         ),
+        damage_3=fault("keeps"),
     ),
     Mutant(
         name="state shared by instances", rule="instances", words=("position.x", "second instance"),
         damage=source("plant_fmu/slave.py", "self._state", "QuadrotorPlant._state"),
+        damage_3=fault("shares"),
     ),
     Mutant(
         name="saved state incomplete", rule="saved-state", words=("from the state",),
         damage=source("plant_fmu/slave.py", "list(self._channels)", "[0.0, 0.0, 0.0, 0.0]"),
+        damage_3=fault("forgets"),
     ),
     Mutant(
         name="saved clock incomplete", rule="saved-state", words=("from the state",), model=CONTROLLER,
         damage=source("controller_fmu/sampled.py", 'state["next_index"]', "0"),
+        versions=(2,),
     ),
     Mutant(
         name="serialised state rounded", rule="serialised-state", words=("from the bytes",),
@@ -347,12 +402,14 @@ BEHAVIOUR = (
             "fmu_kit/saved_state.py", "return state if checksum",
             'return {**state, "reals": [round(x, 9) for x in state["reals"]]} if checksum',
         ),
+        damage_3=fault("rounds"),
     ),
     Mutant(
         name="input added when set twice", rule="inputs-set-twice", words=("set once",),
         damage=source(
             "fmu_kit/slave.py", "    reals[vr] = value\n", "    reals[vr] = value + (reals[vr] == value)\n"
         ),
+        damage_3=fault("adds"),
     ),
     Mutant(
         name="steps of one length only", rule="variable-steps", words=("communicationStepSize = 0.004",),
@@ -360,12 +417,14 @@ BEHAVIOUR = (
             "fmu_kit/slave.py", 'self._expect(Phase.STEPPING, "fmi2DoStep")',
             'require(abs(step_size - 0.01) < 1e-9, "communicationStepSize", step_size, "0.01 s")',
         ),
+        damage_3=fault("one step only"),
     ),
     Mutant(
         name="torque refused", rule="general-run", words=("torque.x",),
         damage=source(
             "plant_fmu/slave.py", _STEP, f'require(self.torque.x == 0.0, "torque.x", 1, "0")\n        {_STEP}'
         ),
+        damage_3=fault("no torque"),
     ),
     Mutant(
         name="error logged, none returned", rule="runs", words=("status 3", "something is odd"),
@@ -373,54 +432,78 @@ BEHAVIOUR = (
             "fmu_kit/slave.py", "        self._take_parameters()\n        try:",
             '        self._take_parameters()\n        self.log("something is odd", Fmi2Status.error)\n        try:',
         ),
+        damage_3=fault("odd"),
     ),
     Mutant(
         name="step that fails", rule="runs", words=("fmi2DoStep", "ZeroDivisionError"),
         damage=source("fmu_kit/slave.py", "if self._stale:\n            self", "if 1 // 0:\n            self"),
+        damage_3=fault("fails"), words_3=("fmi3DoStep", "division by zero"),
     ),
     Mutant(
         name="script that does not run", rule="runs", words=("fmi2Instantiate",),
         damage=source("_entry.py", "super().__init__(**kwargs)", "raise RuntimeError('no')"),
+        damage_3=fault("no instance"), words_3=("fmi3InstantiateCoSimulation: no",),
+    ),
+    Mutant(
+        name="event mode asked for", rule="runs", words=("eventHandlingNeeded = true",), versions=(3,),
+        damage=fault("event"),
+    ),
+    Mutant(
+        name="early return", rule="runs", words=("earlyReturn = true",), versions=(3,), damage=fault("early"),
+    ),
+    Mutant(
+        name="step to no time", rule="runs", words=("lastSuccessfulTime = nan",), versions=(3,),
+        damage=fault("no time"),
     ),
     Mutant(
         name="process ends", rule="process", words=("exit code 3", "runs"),
         damage=source("plant_fmu/slave.py", _STEP, f"__import__('os')._exit(3)\n        {_STEP}"),
+        damage_3=fault("exits"),
     ),
     Mutant(
         name="process crashes", rule="process", words=("SIGSEGV" if sys.platform != "win32" else "exit code", "runs"),
         damage=source("plant_fmu/slave.py", _STEP, f"__import__('ctypes').string_at(0)\n        {_STEP}"),
+        versions=(2,),
     ),
     Mutant(
         name="step without end", rule="process", words=("limit of 8 s; a call does not return",), time_limit=8.0,
         damage=source("plant_fmu/slave.py", _STEP, f"__import__('time').sleep(1e6)\n        {_STEP}"),
+        versions=(2,),
     ),
     Mutant(
         name="bound not enforced", rule="bounds-enforced", words=("mass = -1",),
         damage=source("fmu_kit/slave.py", "if variable.causality == \"parameter\"", "if False"),
+        damage_3=fault("unbounded"),
     ),
     Mutant(
         name="value not finite taken", rule="not-finite-refused", words=("thrust = nan",),
         damage=source("fmu_kit/slave.py", "require(math.isfinite(value), ", "require(True, "),
+        damage_3=fault("not a number"),
     ),
     Mutant(
         name="step past the stop time", rule="stop-time", words=("stopTime = 0.02",),
         damage=source("fmu_kit/slave.py", "if t + h - self._stop_time > slack:", "if False:"),
+        damage_3=fault("stop not heeded"),
     ),
     Mutant(
         name="step anywhere", rule="consecutive-steps", words=("at the beginning of the step before",),
         damage=source("fmu_kit/slave.py", "abs(t - self._reached) > slack", "False"),
+        damage_3=fault("any time"),
     ),
     Mutant(
         name="step not looked back", rule="consecutive-steps", words=("a step after its end",),
         damage=source("fmu_kit/slave.py", "abs(t - self._reached) > slack", "t < self._reached - slack"),
+        damage_3=fault("not looked back"),
     ),
     Mutant(
         name="stop time before the start", rule="stop-before-start", words=("stopTime = -0.01",),
         damage=source("fmu_kit/slave.py", "require(stop_time >= start_time,", "require(True,"),
+        damage_3=fault("stop before start"),
     ),
     Mutant(
         name="terminated twice", rule="terminated-once", words=("fmi2Terminate",),
         damage=source("fmu_kit/slave.py", 'self._expect(Phase.STEPPING, "fmi2Terminate")', "pass"),
+        damage_3=fault("terminates twice"), words_3=("fmi3Terminate",),
     ),
     Mutant(
         name="fixed parameter set later", rule="fixed-parameters", words=("mass",),
@@ -428,17 +511,30 @@ BEHAVIOUR = (
             "fmu_kit/slave.py",
             'raise FmuError(f"{variable.name}: a fixed parameter cannot be set after initialisation")', "pass",
         ),
+        damage_3=fault("never fixed"),
     ),
 )  # fmt: skip
 
 MUTANTS = (*ARCHIVE, *WHOLE, *VARIABLES, *STRUCTURE, *BEHAVIOUR)
 
 
+def tables() -> dict[int, list[Verdict]]:
+    """What is said of every mutant of freshly built FMUs, by the version of FMI."""
+    found = {}
+    for version in (2, 3):
+        with tempfile.TemporaryDirectory() as folder:
+            if version == 2:
+                subjects = {path.stem: path for path in fmus.build(MODELS, Path(folder))}
+            else:
+                subjects = {model: faulty(model, Path(folder)) for model in (PLANT, CONTROLLER)}
+            mutants = [mutant for mutant in MUTANTS if version in mutant.versions]
+            found[version] = verdicts(mutants, subjects, Path(folder))
+    return found
+
+
 def main() -> None:
-    """Damage freshly built FMUs in every way and print the table."""
-    with tempfile.TemporaryDirectory() as folder:
-        built = {path.stem: path for path in fmus.build(MODELS, Path(folder))}
-        print(as_markdown(verdicts(MUTANTS, built, Path(folder))))
+    """Damage FMUs in every way and print the table."""
+    print(as_markdown(tables()))
 
 
 if __name__ == "__main__":

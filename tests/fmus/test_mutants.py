@@ -3,7 +3,7 @@
 import functools
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
@@ -18,6 +18,7 @@ from orchestration.checks.validation.validator import PROCESS, validate
 from orchestration.command import cli
 from orchestration.processes.limits import Limits
 from tests.fmus.damage import Mutant, every
+from tests.fmus.faulty import faulty
 from tests.fmus.making import PAIR
 from tests.fmus.mutants import MUTANTS
 from tests.fmus.process import run_script
@@ -25,31 +26,45 @@ from tests.fmus.scripts.find_mutants import WITHOUT_INSTANCES
 from tests.fmus.verdicts import as_markdown, fmpy_finds, fmutool_finds, verdicts
 
 BY_NAME = {mutant.name: mutant for mutant in MUTANTS}
+OF_VERSIONS = [(version, mutant) for version in (2, 3) for mutant in MUTANTS if version in mutant.versions]
 
-Findings = Callable[[Mutant], list[Finding]]
+Findings = Callable[[int, Mutant], list[Finding]]
 Make = Callable[[str], Path]
 
 
 @pytest.fixture(scope="module")
-def findings(built: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Findings:
+def subjects(built: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Mapping[int, dict[str, Path]]:
+    """The FMUs that are damaged, by the version of FMI and the model."""
+    folder = tmp_path_factory.mktemp("faulty")
+    return {2: built, 3: {model: faulty(model, folder) for model in PAIR}}
+
+
+@pytest.fixture(scope="module")
+def findings(subjects: Mapping[int, dict[str, Path]], tmp_path_factory: pytest.TempPathFactory) -> Findings:
     """What is found wrong with each mutant; those that run are run when the first of them is asked for."""
-    folder = tmp_path_factory.mktemp("mutants")
-    ends = [mutant for mutant in MUTANTS if mutant.rule == PROCESS]
-    run = [mutant for mutant in MUTANTS if mutant.rule not in {*WITHOUT_INSTANCES, PROCESS}]
+    folders = {version: tmp_path_factory.mktemp("mutants") for version in subjects}
 
     @functools.cache
-    def of_those_that_run() -> dict[str, list[Finding]]:
-        said = run_script("find_mutants", folder, os.pathsep.join(map(str, built.values())), *(m.name for m in run))
+    def of_those_that_run(version: int) -> dict[str, list[Finding]]:
+        run = [mutant.name for of, mutant in OF_VERSIONS if of == version and runs(mutant)]
+        fmus = os.pathsep.join(map(str, subjects[version].values()))
+        said = run_script("find_mutants", folders[version], fmus, *run)
         return {name: [Finding(*finding) for finding in found] for name, found in said.items()}
 
     @functools.cache
-    def found(mutant: Mutant) -> list[Finding]:
-        if mutant in run:
-            return of_those_that_run()[mutant.name]
-        path = mutant.write(built[mutant.model], folder)
-        return validate(path, limits=Limits(time=mutant.time_limit)) if mutant in ends else looked_at(path)
+    def found(version: int, mutant: Mutant) -> list[Finding]:
+        if runs(mutant):
+            return of_those_that_run(version)[mutant.name]
+        path = mutant.write(subjects[version][mutant.model], folders[version])
+        ends = mutant.rule == PROCESS
+        return validate(path, limits=Limits(time=mutant.time_limit)) if ends else looked_at(path)
 
     return found
+
+
+def runs(mutant: Mutant) -> bool:
+    """Whether it is found by what it does, and lives on."""
+    return mutant.rule not in {*WITHOUT_INSTANCES, PROCESS}
 
 
 def looked_at(path: Path) -> list[Finding]:
@@ -74,25 +89,39 @@ def make(native: dict[str, Path], tmp_path: Path) -> Make:
 # -- each of them ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.name.replace(" ", "-"))
-def test_the_rule_that_is_meant_for_it_finds_the_mutant(mutant: Mutant, findings: Findings) -> None:
-    found = findings(mutant)
+@pytest.mark.parametrize(
+    ("version", "mutant"),
+    [pytest.param(*each, id=f"FMI-{each[0]}-{each[1].name.replace(' ', '-')}") for each in OF_VERSIONS],
+)
+def test_the_rule_that_is_meant_for_it_finds_the_mutant(version: int, mutant: Mutant, findings: Findings) -> None:
+    found = findings(version, mutant)
     texts = [finding.text for finding in found if finding.rule == mutant.rule]
-    assert any(all(word in text for word in mutant.words) for text in texts), "\n".join(map(str, found))
+    assert any(all(word in text for word in mutant.words_of(version)) for text in texts), "\n".join(map(str, found))
     assert not any("\n" in finding.text for finding in found)
 
 
-def test_every_rule_has_a_mutant_that_it_finds() -> None:
-    names = {name_of(rule) for rule in (*rules.STANDARD, *rules.OURS)}
-    assert {mutant.rule for mutant in MUTANTS} == names | {READABLE, PROCESS, PLATFORM}
+@pytest.mark.parametrize(("version", "without"), [(2, set()), (3, {"slave-module", "own-description"})])
+def test_every_rule_has_a_mutant_that_it_finds(version: int, without: set[str]) -> None:
+    """Two rules are about Python inside, which those of FMI 3.0 have not."""
+    names = {name_of(rule) for rule in (*rules.STANDARD, *rules.OURS)} | {READABLE, PROCESS, PLATFORM}
+    assert {mutant.rule for of, mutant in OF_VERSIONS if of == version} == names - without
+
+
+@pytest.mark.parametrize("model", PAIR)
+def test_without_a_fault_nothing_is_wrong_with_what_faults_are_put_into(
+    model: str, subjects: Mapping[int, dict[str, Path]]
+) -> None:
+    assert validate(subjects[3][model]) == []
 
 
 def test_mutants_are_told_apart_by_their_names() -> None:
     assert len(BY_NAME) == len(MUTANTS)
 
 
-def test_only_mutants_of_the_guid_are_given_away_by_it(findings: Findings) -> None:
-    by_content = {m.name for m in MUTANTS if any(finding.rule == "guid-of-content" for finding in findings(m))}
+@pytest.mark.parametrize("version", [2, 3])
+def test_only_mutants_of_the_guid_are_given_away_by_it(version: int, findings: Findings) -> None:
+    mutants = [mutant for of, mutant in OF_VERSIONS if of == version]
+    by_content = {m.name for m in mutants if any(f.rule == "guid-of-content" for f in findings(version, m))}
     assert by_content == {
         "empty GUID",
         "GUID of another content",
@@ -112,6 +141,13 @@ def test_what_a_look_finds_the_whole_validation_finds_too(
     found = looked_at(path)
     assert {BY_NAME[name].rule for name in names} <= {finding.rule for finding in found}
     assert validate(path)[: len(found)] == found
+
+
+def test_one_that_ends_before_it_starts_is_looked_at_to_the_end(
+    subjects: Mapping[int, dict[str, Path]], tmp_path: Path
+) -> None:
+    path = BY_NAME["stop before start"].write(subjects[3]["QuadrotorPlant"], tmp_path)
+    assert {finding.rule for finding in validate(path)} == {"default-experiment"}
 
 
 # -- on the command line --------------------------------------------------------------------------------
@@ -176,10 +212,10 @@ def test_the_table_says_who_notices_what(native: dict[str, Path], tmp_path: Path
     assert [(bool(verdict.fmpy), bool(verdict.fmutool)) for verdict in table] == [
         (True, True), (False, False), (True, True),
     ]  # fmt: skip
-    assert as_markdown(table).splitlines() == [
-        "| damage | found by the rule | fmpy validate | fmutool -check |",
-        "|---|---|---|---|",
-        "| name twice | `standard` | yes | yes |",
-        "| empty GUID | `guid` | - | - |",
-        "| description not XML | `readable` | yes | yes |",
+    assert as_markdown({2: table, 3: table[:1]}).splitlines() == [
+        "| damage | rule | FMI 2.0: quadcosim | fmpy | fmutool | FMI 3.0: quadcosim | fmpy | fmutool |",
+        "|---|---|---|---|---|---|---|---|",
+        "| name twice | `standard` | yes | yes | yes | yes | yes | yes |",
+        "| empty GUID | `guid` | yes | - | - |  |  |  |",
+        "| description not XML | `readable` | yes | yes | yes |  |  |  |",
     ]

@@ -1,7 +1,7 @@
 """Who notices that an FMU is damaged: quadcosim, and the checkers of others."""
 
 import logging
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -55,8 +55,8 @@ def fmutool_finds(fmu: Path) -> list[str]:
     return errors
 
 
-def verdicts(mutants: Iterable[Mutant], built: dict[str, Path], folder: Path) -> list[Verdict]:
-    """What quadcosim, fmpy and fmutool say of mutants, which are written to `folder`."""
+def verdicts(mutants: Iterable[Mutant], built: Mapping[str, Path], folder: Path) -> list[Verdict]:
+    """What quadcosim, fmpy and fmutool say of mutants of the FMUs `built`, by model, which are written to `folder`."""
     paths = {mutant: mutant.write(built[mutant.model], folder) for mutant in mutants}
     with ThreadPoolExecutor() as pool:
         own = pool.map(lambda mutant: validate(paths[mutant], limits=Limits(time=mutant.time_limit)), paths)
@@ -71,12 +71,20 @@ def verdicts(mutants: Iterable[Mutant], built: dict[str, Path], folder: Path) ->
         ]
 
 
-def as_markdown(table: Iterable[Verdict]) -> str:
-    """The table of who notices what."""
-    lines = ["| damage | found by the rule | fmpy validate | fmutool -check |", "|---|---|---|---|"]
-    for verdict in table:
-        rules = {finding.rule for finding in verdict.quadcosim}
-        rule = f"`{verdict.mutant.rule}`" if verdict.mutant.rule in rules else "-"
-        others = ("yes" if texts else "-" for texts in (verdict.fmpy, verdict.fmutool))
-        lines.append(f"| {verdict.mutant.name} | {rule} | {' | '.join(others)} |")
+def as_markdown(tables: Mapping[int, Iterable[Verdict]]) -> str:
+    """The table of who notices what, of mutants of each version of FMI."""
+    by_mutant = [{verdict.mutant: verdict for verdict in table} for table in tables.values()]
+    columns = [column for version in tables for column in (f"FMI {version}.0: quadcosim", "fmpy", "fmutool")]
+    lines = [f"| damage | rule | {' | '.join(columns)} |", f"|---|---|{'---|' * len(columns)}"]
+    for mutant in dict.fromkeys(mutant for of in by_mutant for mutant in of):
+        cells = [cell for of in by_mutant for cell in _cells(of.get(mutant))]
+        lines.append(f"| {mutant.name} | `{mutant.rule}` | {' | '.join(cells)} |")
     return "\n".join(lines)
+
+
+def _cells(verdict: Verdict | None) -> list[str]:
+    """Whether each notices it; empty for what cannot be done to FMUs of that version."""
+    if verdict is None:
+        return [""] * 3
+    found = any(finding.rule == verdict.mutant.rule for finding in verdict.quadcosim)
+    return ["yes" if each else "-" for each in (found, verdict.fmpy, verdict.fmutool)]

@@ -71,9 +71,23 @@ def binaries(fmu: Fmu) -> Iterator[str]:
     libraries = [name for name in files if name.startswith("binaries/") and name.endswith(LIBRARIES)]
     if any(name.rpartition("/")[2].rpartition(".")[0] == fmu.model_identifier for name in libraries):
         return
-    if not any(name.startswith("sources/") for name in files):
+    if not _comes_as_sources(fmu):
         found = ", ".join(libraries) or "none"
         yield f"expected a library of the name {fmu.model_identifier} under binaries/, found {found}"
+
+
+def source_files(fmu: Fmu) -> Iterator[str]:
+    """Every file that is said to be compiled is in sources/, by the names that the FMU gives."""
+    for name in fmu.source_files:
+        if f"sources/{name}" not in fmu.archive.files:
+            yield f"expected sources/{name}, which is to be compiled, found none"
+
+
+def _comes_as_sources(fmu: Fmu) -> bool:
+    """In FMI 3.0 there are to be files for a library of that name."""
+    return bool(fmu.source_files) or (
+        fmu.version == 2 and any(name.startswith("sources/") for name in fmu.archive.files)
+    )
 
 
 def slave_module(fmu: Fmu) -> Iterator[str]:
@@ -88,4 +102,4 @@ def slave_module(fmu: Fmu) -> Iterator[str]:
         yield f"{SLAVE_MODULE}: it names {name}, expected a script in resources/; there is no resources/{name}.py"
 
 
-RULES = (guid, model_identifier, capabilities, default_experiment, binaries, slave_module)
+RULES = (guid, model_identifier, capabilities, default_experiment, binaries, source_files, slave_module)

@@ -127,6 +127,8 @@ class Fmu:
     derivatives: tuple[Unknown, ...]
     initial_unknowns: tuple[Unknown, ...]
     further_lists: Mapping[str, tuple[Unknown, ...]]
+    build: Element | None = None
+    """How it is compiled, where FMI 3.0 has that in a file of its own"""
 
     @property
     def version(self) -> int:
@@ -174,6 +176,18 @@ class Fmu:
     def serialises(self) -> bool:
         """Whether bytes can be made of its state."""
         return self.can(self.standard.serialises)
+
+    @property
+    def source_files(self) -> list[str]:
+        """What is to be compiled, as it is called in `sources/`."""
+        if self.version == 2:
+            return [e.get("name", "") for e in self._co_simulation.iterfind("SourceFiles/File")]
+        return [
+            e.get("name", "")
+            for built in ([] if self.build is None else self.build.iterfind("BuildConfiguration"))
+            if built.get("modelIdentifier") == self.model_identifier
+            for e in built.iterfind("SourceFileSet/SourceFile")
+        ]
 
     @property
     def platforms(self) -> list[str]:

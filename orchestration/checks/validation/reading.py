@@ -3,12 +3,14 @@
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import NoReturn
+from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from orchestration.checks.validation.fmu import NUMBERS, Fmu, Unknown, Variable
 from orchestration.checks.validation.standards import STANDARDS, Standard
 from orchestration.fmi.archive import DESCRIPTION, Archive, UnreadableFmuError, read_root, version_of
 
+BUILD_DESCRIPTION = "sources/buildDescription.xml"
 _INITIAL = {
     "parameter": "exact",
     "structuralParameter": "exact",
@@ -42,9 +44,19 @@ def read_fmu(archive: Archive, root: Element) -> Fmu:
         derivatives=_unknowns(root, standard, lists.derivatives),
         initial_unknowns=_unknowns(root, standard, lists.initial_unknowns),
         further_lists={each[0]: _unknowns(root, standard, each) for each in lists.others},
+        build=_build(archive) if standard.version > 2 else None,
     )
     _require_numbers(fmu)
     return fmu
+
+
+def _build(archive: Archive) -> Element | None:
+    if BUILD_DESCRIPTION not in archive.files:
+        return None
+    try:
+        return ElementTree.fromstring(archive.files[BUILD_DESCRIPTION])
+    except ElementTree.ParseError as error:
+        _refuse(f"{BUILD_DESCRIPTION}: expected well-formed XML: {error}")
 
 
 # -- variables ----------------------------------------------------------------------------------------------

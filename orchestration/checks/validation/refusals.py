@@ -59,9 +59,9 @@ def consecutive_steps(probe: Probe) -> Iterator[str]:
     for shift, where in ((-1.0, "at the beginning of the step before"), (1.0, "a step after its end")):
         with probe.instance() as instance:
             probe.begin(instance, PLAIN)
-            (t, h), (then, _), *_ = probe.points(PLAIN)
+            (t, h), *_ = probe.points(PLAIN)
             instance.step(t, h)
-            if _done(lambda: instance.step(then + shift * h, h)):  # noqa: B023
+            if _done(lambda: instance.step(t + h + shift * h, h)):  # noqa: B023
                 yield f"a second step begins {where}: expected it refused"
 
 
