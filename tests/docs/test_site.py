@@ -1,5 +1,6 @@
 """The site is built strictly from the repository: nothing comes from elsewhere, and no link leads nowhere."""
 
+import json
 import os
 import re
 import subprocess
@@ -63,6 +64,15 @@ def test_the_search_has_what_is_made_of_the_code(site: Path) -> None:
     index = (site / "search" / "search_index.js").read_text("utf-8")
     for word in ("--burst-length", "delay_jitter", "gain.disturbance", "save_run"):
         assert word in index
+
+
+def test_the_search_finds_pages_before_sources(site: Path) -> None:
+    index = json.loads((site / "search" / "search_index.js").read_text("utf-8").partition("=")[2].strip().rstrip(";"))
+    boosts = {entry["location"].partition("#")[0]: entry.get("boost", 1.0) for entry in index["docs"]}
+    sources = [boost for place, boost in boosts.items() if place.endswith((".py.html", ".toml.html", ".c.html"))]
+    assert len(sources) > 10
+    assert max(sources) < 1e-3
+    assert [boosts[page] for page in ("api.html", "commands.html", "figures.html", "timing.html")] == [1.0] * 4
 
 
 @pytest.mark.parametrize("page", [*pages_elsewhere().values(), *documentation().values()])
