@@ -48,7 +48,7 @@ def written(side: int, folder: Path) -> Path:
     started = time.perf_counter()
     summary = sweep(load_study(file), folder=folder, engine="batch")
     flown = time.perf_counter()
-    out = report(file, store=folder, out=folder / "report.html")
+    out = report(file, out=folder)
     print(
         f"{summary.total} runs flown in {flown - started:.1f} s, report written in {time.perf_counter() - flown:.1f} s"
     )

@@ -22,11 +22,13 @@ def report(
         ),
     ],
     out: Annotated[
-        Path | None, typer.Option("--out", help="The file; default: report_NAME.html here.", metavar="FILE.html")
-    ] = None,
-    store: Annotated[
         Path | None,
-        typer.Option("--store", help="Folder of the study's store; default: results/NAME.", metavar="DIR"),
+        typer.Option(
+            "--out",
+            help="The file, default report_NAME.html here; or the folder of the study's store, default results/NAME, "
+            "where the file goes then.",
+            metavar="FILE.html|DIR",
+        ),
     ] = None,
     flights: Annotated[
         int | None,
@@ -47,7 +49,7 @@ def report(
     from orchestration.report.writing import report as write
 
     with progress_bar("flying") as progress:
-        return of_files([write(*what, out=out, store=store, flights=flights, runs=run or [], progress=progress)])
+        return of_files([write(*what, out=out, flights=flights, runs=run or [], progress=progress)])
 
 
 def register(app: typer.Typer) -> None:

@@ -35,8 +35,8 @@ def report_of(
     if len(what) > 1 and set(kinds) != {"run"}:
         raise UsageError(f"{', '.join(map(str, what))}: expected directories of runs, or one study or comparison alone")
     if kinds[0] == "run":
-        if wanted or most is not None or store is not None:
-            raise UsageError("--run, --flights and --store: expected a study or a comparison with them")
+        if wanted or most is not None:
+            raise UsageError("--run and --flights: expected a study or a comparison with them")
         return of_runs.report_of(dict(_runs(what)), command)
     return _of_many(what[0], kinds[0], command, store=store, wanted=wanted, most=most, progress=progress)
 
@@ -78,8 +78,6 @@ def _of_many(
     from orchestration.studies.study_file import load_study
 
     if kind == "store":
-        if store is not None:
-            raise UsageError("--store: expected a study or comparison file with it")
         there = path / STORE if path.is_dir() else path
         name = there.resolve().parent.name
         return of_study.report_of(name, of_study.read(there), None, command, wanted=wanted, most=most)

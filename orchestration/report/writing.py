@@ -18,38 +18,41 @@ ENDINGS = (".html", ".htm")
 def report(
     *what: Result | str | Path,
     out: str | Path | None = None,
-    store: str | Path | None = None,
     flights: int | None = None,
     runs: Sequence[int] = (),
     progress: Progress | None = None,
 ) -> Path:
     """Write one HTML file of results or directories of runs, or of a study, its store or a comparison; its path.
 
-    It holds all that it needs and loads nothing. `out` is by default `report_NAME.html`. Of a study, whose store is
-    in the folder `store`, default `results/NAME`, so many `flights` are flown again for their signals, those of
-    the runs with the numbers `runs` among them. Raises `UsageError` for what no report can be made of,
-    `QuadcosimError` without the plotting library.
+    It holds all that it needs and loads nothing. `out` is the file, by default `report_NAME.html`, or the folder that
+    has the store of the study, by default `results/NAME`; the file of that name goes there then. Of a study so many
+    `flights` are flown again for their signals, those of the runs with the numbers `runs` among them.
+
+    Raises `UsageError` for what no report can be made of, `QuadcosimError` without the plotting library.
     """
     if not what:
         raise UsageError("report: expected runs, a study or a comparison")
     paths = [Path(each) for each in what if not isinstance(each, Result)]
     results = [each for each in what if isinstance(each, Result)]
-    to = Path(f"report_{paths[0].resolve().stem if paths else 'run'}.html" if out is None else out)
-    if to.suffix.lower() not in ENDINGS or to.is_dir():
-        raise UsageError(f"--out {to}: expected a file that ends in .html")
-    command = _again(paths, store, flights, runs)
+    name = f"report_{paths[0].resolve().stem if paths else 'run'}.html"
+    to = Path(name if out is None else out)
+    folder = to if to.is_dir() else None
+    if folder is not None:
+        to = folder / name
+    elif to.suffix.lower() not in ENDINGS:
+        raise UsageError(f"--out {to}: expected a file that ends in .html, or the folder of a store")
+    command = _again(paths, folder, flights, runs)
     if results:
         if paths:
             raise UsageError("report: expected results or paths, not both")
         named = {f"run {number}" if len(results) > 1 else "run": one for number, one in enumerate(results, start=1)}
         return html.write(of_runs.report_of(named, "quadcosim.report(...) in Python"), to)
-    folder = None if store is None else Path(store)
     return html.write(report_of(paths, command, store=folder, wanted=runs, most=flights, progress=progress), to)
 
 
-def _again(what: Sequence[Path], store: str | Path | None, flights: int | None, runs: Sequence[int]) -> str:
+def _again(what: Sequence[Path], folder: Path | None, flights: int | None, runs: Sequence[int]) -> str:
     """The command that makes this report."""
     words = ["quadcosim", "report", *map(str, what)]
-    words += ["--store", str(store)] if store is not None else []
+    words += ["--out", str(folder)] if folder is not None else []
     words += ["--flights", str(flights)] if flights is not None else []
     return shlex.join([*words, *(word for index in runs for word in ("--run", str(index)))])

@@ -12,7 +12,7 @@ SAID = {
     "--from 1 --to 0: expected finite numbers": "first = 1, last = 0: expected finite numbers",
     "--of x: expected --from and --to": "of = x: expected first and last",
     "--time-limit: expected without --in-process": "time_limit: expected without in_process",
-    "--run, --flights and --store: expected a study": "run, flights and store: expected a study",
+    "--run and --flights: expected a study": "run and flights: expected a study",
     "as quadcosim build --native makes them, for --engine batch": (
         "as quadcosim build --native makes them, for engine batch"
     ),

@@ -84,7 +84,7 @@ def of_study(show: Show, tmp_path_factory: pytest.TempPathFactory) -> Any:
         f'name = "{name}"\n[base]\nstop_time = 2.0\n[base.timing]\nplant_interval = 0.005\n{fmus}{axes}',
         encoding="utf-8",
     )
-    return show(report(file, out=folder / "report.html", store=folder, flights=3, runs=[0, 1, 2]))
+    return show(report(file, out=folder, flights=3, runs=[0, 1, 2]))
 
 
 @pytest.fixture(scope="module")
@@ -111,7 +111,7 @@ count = 3
         encoding="utf-8",
     )
     compare(load_comparison(file), folder=folder, progress=None, announce=None)
-    return show(report(file, out=folder / "report.html", store=folder, flights=4))
+    return show(report(file, out=folder, flights=4))
 
 
 def clock(page: Any) -> float:
