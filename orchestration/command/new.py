@@ -1,4 +1,4 @@
-"""The command that begins a controller, a plant or a filter of one's own."""
+"""The commands that write files to begin with: a controller, a plant or a filter of one's own, or the examples."""
 
 from pathlib import Path
 from typing import Annotated, get_args
@@ -10,6 +10,7 @@ from orchestration.basics.terminal import say
 from orchestration.command import registry as registering
 from orchestration.command.answer import Answer, of_files
 from orchestration.command.registry import FLY
+from orchestration.scaffold import examples as shipped
 from orchestration.scaffold.folder import Kind, git_author, write
 
 
@@ -33,6 +34,15 @@ def new(
     return of_files(written)
 
 
+def examples(
+    out: Annotated[Path, typer.Option("--out", help="Where the folders go.", metavar="DIR")] = Path(),
+) -> Answer:
+    """Write the folders examples, studies and gains here: the files that the pages' commands name."""
+    written = of_files(shipped.write(out))
+    say(f"next: quadcosim run {out / 'examples' / 'water_tank' / 'system.toml'}")
+    return written
+
+
 def register(app: typer.Typer) -> None:
-    """Add the command to the command line."""
-    registering.add(app, FLY, new)
+    """Add the commands to the command line."""
+    registering.add(app, FLY, new, examples)
