@@ -36,6 +36,13 @@ class ControllerInterface(Framed):
     )
     reference_jerk = Input(f"desired jerk, {_USED}", "m/s3", ZERO, name="reference.jerk", frame=frames.inertial)
     reference_snap = Input(f"desired snap, {_USED}", "m/s4", ZERO, name="reference.snap", frame=frames.inertial)
+    reference_yaw = Input(
+        f"desired direction of the nose, from x of the inertial frame towards y, {_USED}",
+        "rad",
+        name="reference.yaw",
+        frame=frames.yaw,
+    )
+    reference_yaw_rate = Input(f"its rate, {_USED}", "rad/s", name="reference.yaw_rate", frame=frames.about_z)
 
     thrust = Output("total thrust, upward in the body, held between samples", "N", nominal=_HOVER)
     torque = Output("body torque, body frame, held between samples", "N.m", ZERO, frame=frames.body)
@@ -76,6 +83,10 @@ class ControllerInterface(Framed):
         _TRAJECTORY.rate_z,
         name="trajectory.rate_z",
     )
+    trajectory_yaw = FixedParameter(
+        "of the nose at time 0, along the built-in trajectory", "rad", _TRAJECTORY.yaw, name="trajectory.yaw"
+    )
+    trajectory_yaw_rate = FixedParameter("rate of that", "rad/s", _TRAJECTORY.yaw_rate, name="trajectory.yaw_rate")
     mass = FixedParameter("nominal mass m", "kg", _BODY.mass, above=0.0)
     gravity = FixedParameter("nominal gravity g", "m/s2", _BODY.gravity, minimum=0.0)
     inertia = FixedParameter(

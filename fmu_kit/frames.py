@@ -58,6 +58,11 @@ def rotation(turned: Scalar, Q: Quaternion) -> Quaternion:
     return Quaternion(body(turned, Q.vector), Q.scalar)
 
 
-def heading(turned: Scalar, angle: Scalar) -> Scalar:
-    """An angle [rad] in the horizontal plane, from the first axis towards the second."""
+def yaw(turned: Scalar, angle: Scalar) -> Scalar:
+    """A direction [rad] in the horizontal plane, from x of the inertial frame towards y."""
     return FLOAT.where(turned, 0.5 * math.pi - angle, angle)
+
+
+def about_z(turned: Scalar, angle: Scalar) -> Scalar:
+    """A turn [rad] in the horizontal plane, or its rate, from x of the inertial frame towards y."""
+    return FLOAT.where(turned, -angle, angle)

@@ -7,7 +7,7 @@ same P_d(t).
 from dataclasses import dataclass, fields
 
 from fmu_kit.algebra import ZERO, Vec3
-from fmu_kit.frames import inertial
+from fmu_kit.frames import about_z, inertial, yaw
 from fmu_kit.scalar import FLOAT, Scalar, ScalarOps
 
 
@@ -25,10 +25,16 @@ class Reference:
     """J_d [m/s³]"""
     snap: Vec3 = ZERO
     """S_d [m/s⁴]"""
+    yaw: Scalar = 0.0
+    """ψ_d [rad], of the nose, from x towards y"""
+    yaw_rate: Scalar = 0.0
+    """dψ_d [rad/s]; its own rate is taken to be zero"""
 
     def turned(self, turned: Scalar) -> "Reference":
         """The same motion, told in another convention for axes if it is `turned` (`fmu_kit.frames`)."""
-        return Reference(**{each.name: inertial(turned, getattr(self, each.name)) for each in fields(self)})
+        turns = {"yaw": yaw, "yaw_rate": about_z}
+        told = {each.name: turns.get(each.name, inertial) for each in fields(self)}
+        return Reference(**{name: turn(turned, getattr(self, name)) for name, turn in told.items()})
 
     def after(self, time: Scalar) -> "Reference":
         """The desired motion `time` [s] later: its Taylor series, as far as there are terms."""
@@ -40,6 +46,8 @@ class Reference:
             acceleration=a.plus(time, j.plus(second, s)),
             jerk=j.plus(time, s),
             snap=s,
+            yaw=self.yaw + time * self.yaw_rate,
+            yaw_rate=self.yaw_rate,
         )
 
 
@@ -47,7 +55,8 @@ class Reference:
 class Trajectory:
     """P_d(t) = [a_x sin ωt cos ωt, a_y sin ωt, start_z + rate_z t], the paper's figure of eight (section V).
 
-    The defaults are the paper's, whose z points down, so that a positive `rate_z` descends.
+    With ψ_d(t) = yaw + yaw_rate t. The defaults are the paper's, whose z points down, so that a positive `rate_z`
+    descends.
     """
 
     amplitude_x: float = 4.0
@@ -60,6 +69,10 @@ class Trajectory:
     """[m]"""
     rate_z: float = 0.1
     """[m/s]"""
+    yaw: float = 0.0
+    """[rad]"""
+    yaw_rate: float = 0.0
+    """[rad/s]"""
 
     def position(self, t: Scalar, ops: ScalarOps = FLOAT) -> Vec3:
         """P_d [m] at `t` [s]."""
@@ -70,7 +83,7 @@ class Trajectory:
         )
 
     def at(self, t: Scalar, ops: ScalarOps = FLOAT) -> Reference:
-        """P_d and its first four time derivatives at `t` [s], each a `Vec3` of scalars shaped as `t`."""
+        """P_d and its first four time derivatives at `t` [s], each a `Vec3` of scalars shaped as `t`, and ψ_d."""
         w, w2 = self.frequency, 2.0 * self.frequency
         a, b = 0.5 * self.amplitude_x, self.amplitude_y  # a_x sin ωt cos ωt = ½ a_x sin 2ωt
         position = self.position(t, ops)
@@ -83,4 +96,6 @@ class Trajectory:
             acceleration=Vec3(-a * w2**2 * sin_x, -b * w**2 * sin_y, zero),
             jerk=Vec3(-a * w2**3 * cos_x, -b * w**3 * cos_y, zero),
             snap=Vec3(a * w2**4 * sin_x, b * w**4 * sin_y, zero),
+            yaw=self.yaw + self.yaw_rate * t,
+            yaw_rate=self.yaw_rate + zero,
         )

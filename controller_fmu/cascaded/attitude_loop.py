@@ -27,20 +27,25 @@ class AttitudeLoop:
     rate_limit: Vec3 = Vec3(math.radians(220.0), math.radians(220.0), math.radians(200.0))
     """[rad/s], body (MC_ROLLRATE_MAX, MC_PITCHRATE_MAX, MC_YAWRATE_MAX)"""
 
-    def angular_velocity(self, attitude: Quaternion, desired: Quaternion) -> Vec3:
-        """The desired angular velocity [rad/s], body: 2 K ∘ q of Q⁻¹ ⊙ Q_d with its yaw weighted, within the limits."""
+    def angular_velocity(self, attitude: Quaternion, desired: Quaternion, yaw_rate: float) -> Vec3:
+        """The desired angular velocity [rad/s], body: 2 K ∘ q of Q⁻¹ ⊙ Q_d with its yaw weighted, within the limits.
+
+        `yaw_rate` dψ_d [rad/s], about z of the inertial frame, is fed forward.
+        """
         error = attitude.inverse() * with_less_yaw(attitude, desired, self.yaw_weight)
         sign = FLOAT.where(error.scalar < 0.0, -2.0, 2.0)  # Q and -Q are one attitude: the short way round
         weighted = self.yaw_weight > SMALLEST_WEIGHT
         yaw_gain = self.gain.z / FLOAT.where(weighted, self.yaw_weight, 1.0)  # so the weight leaves small yaw errors be
-        return clamped_axes(Vec3(self.gain.x, self.gain.y, yaw_gain) * (sign * error.vector), self.rate_limit)
+        feedback = Vec3(self.gain.x, self.gain.y, yaw_gain) * (sign * error.vector)
+        return clamped_axes(feedback + attitude.to_body(Vec3(0.0, 0.0, yaw_rate)), self.rate_limit)
 
 
-def attitude_of(force: Vec3) -> Quaternion:
-    """The attitude whose thrust axis exerts `force` [N], inertial, with the nose to the north: z of `force` < 0."""
+def attitude_of(force: Vec3, yaw: float) -> Quaternion:
+    """The attitude whose thrust axis exerts `force` [N], inertial, its z negative, with the nose to `yaw` ψ_d [rad]."""
     z = -force / force.norm()
-    along = math.sqrt(z.x * z.x + z.z * z.z)
-    x = Vec3(z.z / along, 0.0, -z.x / along)  # the axis of the body in the plane of north and down
+    sine, cosine = math.sin(yaw), math.cos(yaw)
+    x = Vec3(cosine * z.z, sine * z.z, -(cosine * z.x + sine * z.y))  # in the vertical plane of the yaw
+    x = x / x.norm()
     return Quaternion.from_axes(x, z.cross(x), z)
 
 

@@ -54,7 +54,7 @@ class CascadedController(SampledController, CascadeInterface):
         if self._runs % self.velocity_ratio == 0:
             self._run_translation(measurement, reference)
         if self._runs % self.attitude_ratio == 0:
-            self._run_attitude(measurement.quaternion)
+            self._run_attitude(measurement.quaternion, reference.yaw_rate)
         self._run_rate(measurement)
         self._runs = self._runs + 1
         self._write_errors(measurement, reference)
@@ -116,11 +116,11 @@ class CascadedController(SampledController, CascadeInterface):
             self._airframe.full_thrust,
         )
         self._velocity_time = self._now
-        self._thrust, self._desired_attitude = force.norm(), attitude_of(force)
+        self._thrust, self._desired_attitude = force.norm(), attitude_of(force, reference.yaw)
         self.desired_velocity, self.held_velocity_integral = desired, self._velocity_state.integral
 
-    def _run_attitude(self, attitude: Quaternion) -> None:
-        self._desired_rate = self._attitude_loop.angular_velocity(attitude, self._desired_attitude)
+    def _run_attitude(self, attitude: Quaternion, yaw_rate: float) -> None:
+        self._desired_rate = self._attitude_loop.angular_velocity(attitude, self._desired_attitude, yaw_rate)
 
     def _run_rate(self, measurement: Measurement) -> None:
         torque, self._rate_state = control_rate(

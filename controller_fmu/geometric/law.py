@@ -58,6 +58,16 @@ class Heading(NamedTuple):
     direction_ddot: Vec3 = ZERO
     """[1/s²]"""
 
+    @classmethod
+    def at(cls, yaw: Scalar, rate: Scalar, ops: ScalarOps = FLOAT) -> "Heading":
+        """The one of a yaw [rad], from x of the inertial frame towards y, that has a steady rate [rad/s]."""
+        sine, cosine = ops.sin(yaw), ops.cos(yaw)
+        return cls(
+            Vec3(cosine, sine, 0.0),
+            Vec3(-rate * sine, rate * cosine, 0.0),
+            Vec3(-rate * rate * cosine, -rate * rate * sine, 0.0),
+        )
+
 
 NORTH = Heading()
 
@@ -183,7 +193,7 @@ def evaluate(
     ops: ScalarOps = FLOAT,
     heading: Heading = NORTH,
 ) -> Evaluation:
-    """Thrust and torque that track `reference` and `heading` from `state`, with all that they are made of.
+    """Thrust and torque that track the path of `reference` and `heading` from `state`, with all that they are made of.
 
     Scalars may be floats or batches; every component of the result has the (broadcast) shape of the inputs.
     `state.quaternion` must have unit length; Q and -Q give the same command. Rates are the model's predictions: they

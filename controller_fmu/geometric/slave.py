@@ -1,13 +1,11 @@
 """The geometric controller as an FMU: its parameters, and what it shows."""
 
-import math
-
 from controller_fmu.geometric.law import Evaluation, Gains, Heading, evaluate
 from controller_fmu.interface import ScaledGains
 from controller_fmu.redesign.controller import RedesignedController
 from controller_fmu.vehicle import Measurement
 from fmu_kit import frames
-from fmu_kit.algebra import ZERO, Vec3
+from fmu_kit.algebra import ZERO
 from fmu_kit.interface import Local, Parameter, gathered
 from fmu_kit.trajectory import Reference
 
@@ -32,10 +30,7 @@ class GeometricController(ScaledGains, RedesignedController):
         minimum=0.0,
     )
     heading = Parameter(
-        "direction that the body's x axis is to have: from x of the inertial frame towards y",
-        "rad",
-        0.0,
-        frame=frames.heading,
+        "direction of the nose that is added to the yaw that is asked for", "rad", 0.0, frame=frames.about_z
     )
 
     rotation_error = Local("e_R as of the last sample, body frame", "1", ZERO, frame=frames.body)
@@ -46,11 +41,11 @@ class GeometricController(ScaledGains, RedesignedController):
     energy = Local("of position, velocity, attitude and angular velocity errors, at the last sample", "J")
 
     def read_parameters(self) -> None:
-        """Take over the gains and the heading."""
+        """Take over the gains."""
         super().read_parameters()
         self._gains = gathered(self, Gains)
-        self._direction = Vec3(math.cos(self.heading), math.sin(self.heading), 0.0)
 
     def evaluation(self, measurement: Measurement, reference: Reference, implicit: float) -> Evaluation:
         """Evaluate the law; it has no semi-implicit form."""
-        return evaluate(measurement, reference, self._gains, self._model, heading=Heading(self._direction))
+        heading = Heading.at(self.heading + reference.yaw, reference.yaw_rate)
+        return evaluate(measurement, reference, self._gains, self._model, heading=heading)

@@ -137,6 +137,38 @@ def desired_attitude(F: Vec3, n: Scalar, gravity: float, ops: ScalarOps = FLOAT)
     return Quaternion(Vec3(F.y, -F.x, 0.0) / (2.0 * n * q_d0), q_d0)
 
 
+class Turn:
+    """The turn of the desired attitude about its thrust axis by a yaw ψ [rad] of a steady rate [rad/s]: ours.
+
+    Nothing else of the law changes with it: (3) asks of Q_d its thrust axis alone, and the proof that Ω_d is its rate.
+    """
+
+    def __init__(self, yaw: Scalar, rate: Scalar, ops: ScalarOps = FLOAT) -> None:
+        half = 0.5 * yaw
+        sine, cosine = ops.sin(half), ops.cos(half)
+        self._half_sine, self._half_cosine, self._rate = sine, cosine, rate
+        self._sine, self._cosine = 2.0 * sine * cosine, cosine * cosine - sine * sine
+
+    def attitude(self, Q_d: Quaternion) -> Quaternion:
+        """Q_d ⊙ Q_ψ, of a Q_d without yaw (12)."""
+        q, q0, s, c = Q_d.vector, Q_d.scalar, self._half_sine, self._half_cosine
+        return Quaternion(Vec3(c * q.x + s * q.y, c * q.y - s * q.x, s * q0), c * q0)
+
+    def angular_velocity(self, omega_d: Vec3) -> Vec3:
+        """R(Q_ψ) Ω_d + dψ z [rad/s], desired body frame."""
+        turned = self._turned(omega_d)
+        return Vec3(turned.x, turned.y, turned.z + self._rate)
+
+    def angular_acceleration(self, omega_d: Vec3, omega_d_dot: Vec3) -> Vec3:
+        """R(Q_ψ) dΩ_d - dψ z × R(Q_ψ) Ω_d [rad/s²], desired body frame."""
+        turned, rate = self._turned(omega_d), self._turned(omega_d_dot)
+        return Vec3(rate.x + self._rate * turned.y, rate.y - self._rate * turned.x, rate.z)
+
+    def _turned(self, v: Vec3) -> Vec3:
+        s, c = self._sine, self._cosine
+        return Vec3(c * v.x + s * v.y, c * v.y - s * v.x, v.z)
+
+
 class DesiredRate:
     """Φ(F) of (14) and its time derivative: from the rates of F to those of the desired attitude."""
 
@@ -227,7 +259,8 @@ def evaluate(
     n = u.norm(ops)
     thrust = model.mass * n  # (11)
 
-    Q_d = desired_attitude(F, n, g, ops)  # (12)
+    turn = Turn(reference.yaw, reference.yaw_rate, ops)
+    Q_d = turn.attitude(desired_attitude(F, n, g, ops))  # (12)
     Q_err = Q_d.inverse() * Q  # (8) (erratum 3)
     q, q0 = Q_err.vector, Q_err.scalar
     q_bar = Vec3(q.y, -q.x, -q0)
@@ -242,7 +275,8 @@ def evaluate(
     F_dot = reference.jerk - kD * s_dot  # (26)
     n_dot = -(u @ F_dot) / n
     rate = DesiredRate(F, F_dot, n, n_dot, g)
-    omega_d = rate.angular_velocity()  # (13), (14)
+    omega_tilt = rate.angular_velocity()  # (13), (14)
+    omega_d = turn.angular_velocity(omega_tilt)
 
     omega_d_body = Q_err.to_body(omega_d)
     omega_err = omega - omega_d_body  # erratum 5
@@ -255,7 +289,7 @@ def evaluate(
     s_ddot = gamma_second * ev * ev + gamma_prime * ea + ej  # (25)
     D_dot = -2.0 * (tanh_s * D * s_dot)
     F_ddot = reference.snap - k * (D_dot * s_dot) - kD * s_ddot  # (27)
-    omega_d_dot = rate.angular_acceleration(F_ddot)
+    omega_d_dot = turn.angular_acceleration(omega_tilt, rate.angular_acceleration(F_ddot))
 
     coupling = 2.0 * gains.kappa / gains.k_q  # the weight κ/k_q: erratum 8
     s_body = to_body(s)

@@ -44,6 +44,8 @@ trajectories = st.builds(
     frequency=between(0.0, 0.6),
     start_z=between(-5.0, 5.0),
     rate_z=between(-1.0, 1.0),
+    yaw=between(-4.0, 4.0),
+    yaw_rate=between(-1.0, 1.0),
 )
 
 STEP = 5e-5

@@ -30,7 +30,8 @@ KINDS: dict[str, tuple[Callable[[Any, Any], Any], st.SearchStrategy[Any]]] = {
     "body_matrix": (frames.body_matrix, matrices),
     "attitude": (frames.attitude, quaternions),
     "rotation": (frames.rotation, quaternions),
-    "heading": (frames.heading, number.map(lambda angle: (angle,))),
+    "yaw": (frames.yaw, number.map(lambda angle: (angle,))),
+    "about_z": (frames.about_z, number.map(lambda angle: (angle,))),
 }
 
 
@@ -81,7 +82,7 @@ def test_gains_along_inertial_axes_are_so_in_either_convention(k: Vec3, v: Vec3)
 
 
 @given(st.floats(-4.0, 4.0))
-def test_a_heading_is_the_direction_of_the_same_vector(angle: float) -> None:
-    there = frames.heading(True, angle)
+def test_a_yaw_is_the_direction_of_the_same_vector(angle: float) -> None:
+    there = frames.yaw(True, angle)
     direction = frames.inertial(True, Vec3(math.cos(angle), math.sin(angle), 0.0))
     near(direction, (math.cos(there), math.sin(there), 0.0))

@@ -98,12 +98,16 @@ _COMMON = (
         for derivative, unit in _REFERENCE_UNITS.items()
         for variable in row(f"reference.{derivative}", "input continuous", unit, 0.0, axes=XYZ)
     ),
+    *row("reference.yaw", "input continuous", "rad", 0.0),
+    *row("reference.yaw_rate", "input continuous", "rad/s", 0.0),
     *row("use_reference_inputs", "parameter fixed", None, False, type="Boolean"),
     *row("trajectory.amplitude_x", "parameter fixed", "m", 4.0),
     *row("trajectory.amplitude_y", "parameter fixed", "m", 4.0),
     *row("trajectory.frequency", "parameter fixed", "rad/s", 0.15),
     *row("trajectory.start_z", "parameter fixed", "m", 2.0),
     *row("trajectory.rate_z", "parameter fixed", "m/s", 0.1),
+    *row("trajectory.yaw", "parameter fixed", "rad", 0.0),
+    *row("trajectory.yaw_rate", "parameter fixed", "rad/s", 0.0),
     *row("thrust", "output discrete", "N"),
     *row("torque", "output discrete", "N.m", axes=XYZ),
     *_body(),

@@ -29,15 +29,17 @@ def about(axis: Vec3, angle: float) -> Quaternion:
 # -- from a force ---------------------------------------------------------------------------------------------
 
 
-@given(st.floats(-20.0, 20.0), st.floats(-20.0, 20.0), st.floats(-30.0, -0.5))
-def test_the_attitude_of_a_force_has_its_thrust_axis_and_the_nose_to_the_north(x: float, y: float, z: float) -> None:
+@given(st.floats(-20.0, 20.0), st.floats(-20.0, 20.0), st.floats(-30.0, -0.5), st.floats(-7.0, 7.0))
+def test_the_attitude_of_a_force_has_its_thrust_axis_and_the_nose_in_the_plane_of_the_yaw(
+    x: float, y: float, z: float, yaw: float
+) -> None:
     force = Vec3(x, y, z)
-    Q = attitude_of(force)
+    Q = attitude_of(force, yaw)
     assert Q.norm() == pytest.approx(1.0)
     assert [*Q.to_inertial(Vec3(0.0, 0.0, -force.norm()))] == pytest.approx([*force], abs=1e-9)
     nose = Q.to_inertial(Vec3(1.0, 0.0, 0.0))
-    assert nose.y == pytest.approx(0.0, abs=1e-12)
-    assert nose.x > 0.0
+    assert nose.y * math.cos(yaw) - nose.x * math.sin(yaw) == pytest.approx(0.0, abs=1e-12)
+    assert nose.x * math.cos(yaw) + nose.y * math.sin(yaw) > 0.0
 
 
 # -- from an attitude error -----------------------------------------------------------------------------------
@@ -50,7 +52,7 @@ def test_a_step_is_answered_as_the_sampled_loop_does(axis: int, gain: float) -> 
     unit = Vec3(*np.eye(3)[axis])
     Q, desired = about(unit, -angle), Quaternion.from_xyzw(0.0, 0.0, 0.0, 1.0)
     for _ in range(50):
-        rate = [*loop.angular_velocity(Q, desired)]
+        rate = [*loop.angular_velocity(Q, desired, 0.0)]
         assert rate == pytest.approx([*(2.0 * gain / weight * math.sin(0.5 * weight * angle) * unit)], abs=1e-12)
         Q = Q * about(unit, T * rate[axis])
         angle -= T * rate[axis]
@@ -83,7 +85,7 @@ def test_the_reduced_weight_of_yaw_is_that_of_rotation_matrices(Q: Quaternion, Q
     yaw = with_less_yaw(Q, Q_d, 0.0).inverse() * Q_d
     assume(abs(yaw.scalar) > 1e-3)
     loop = AttitudeLoop(gain=Vec3(1.0, 1.0, weight), yaw_weight=weight, rate_limit=FREE.rate_limit)
-    assert [*loop.angular_velocity(Q, Q_d)] == pytest.approx(list(second_form(Q, Q_d, weight)), abs=1e-9)
+    assert [*loop.angular_velocity(Q, Q_d, 0.0)] == pytest.approx(list(second_form(Q, Q_d, weight)), abs=1e-9)
 
 
 @given(attitudes(), attitudes())
@@ -97,16 +99,22 @@ def test_the_weight_of_one_is_the_whole_error_and_of_none_has_no_yaw(Q: Quaterni
 
 def test_both_quaternions_of_an_attitude_are_turned_to_alike() -> None:
     Q, Q_d = about(Vec3(0.6, 0.0, 0.8), 2.0), about(Vec3(0.0, 1.0, 0.0), 0.5)
-    rates = [[*FREE.angular_velocity(a, b)] for a in (Q, -Q) for b in (Q_d, -Q_d)]
+    rates = [[*FREE.angular_velocity(a, b, 0.0)] for a in (Q, -Q) for b in (Q_d, -Q_d)]
     assert rates == [pytest.approx(rates[0])] * 4
 
 
 def test_upside_down_the_whole_error_is_taken() -> None:
     Q, Q_d = about(Vec3(0.6, 0.8, 0.0), math.pi), Quaternion.from_xyzw(0.0, 0.0, 0.0, 1.0)
-    assert [*FREE.angular_velocity(Q, Q_d)][:2] == pytest.approx([-2.0 * 6.5 * 0.6, -2.0 * 6.5 * 0.8], abs=1e-9)
+    assert [*FREE.angular_velocity(Q, Q_d, 0.0)][:2] == pytest.approx([-2.0 * 6.5 * 0.6, -2.0 * 6.5 * 0.8], abs=1e-9)
+
+
+@given(attitudes(), attitudes(), st.floats(-1.0, 1.0))
+def test_the_rate_of_the_yaw_is_added_as_a_turn_about_the_vertical(Q: Quaternion, Q_d: Quaternion, rate: float) -> None:
+    added = FREE.angular_velocity(Q, Q_d, rate) - FREE.angular_velocity(Q, Q_d, 0.0)
+    assert [*Q.to_inertial(added)] == pytest.approx([0.0, 0.0, rate], abs=1e-9)
 
 
 def test_angular_velocities_have_limits_of_their_own() -> None:
     Q, Q_d = about(Vec3(0.6, 0.0, 0.8), 3.0), Quaternion.from_xyzw(0.0, 0.0, 0.0, 1.0)
-    rate = AttitudeLoop().angular_velocity(Q, Q_d)
+    rate = AttitudeLoop().angular_velocity(Q, Q_d, 0.0)
     assert [abs(rate.x), abs(rate.z)] == pytest.approx([math.radians(220.0), math.radians(200.0)])

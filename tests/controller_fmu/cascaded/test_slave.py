@@ -76,8 +76,8 @@ def one_rate(count: int, h: float = 0.01) -> list[list[float]]:
         force, velocity_state = control_velocity(
             VelocityLoop(), velocity_state, V, desired, reference.acceleration, elapsed, model, frame.full_thrust
         )
-        Q_d = attitude_of(force)
-        rate = AttitudeLoop().angular_velocity(Q, Q_d)
+        Q_d = attitude_of(force, 0.0)
+        rate = AttitudeLoop().angular_velocity(Q, Q_d, 0.0)
         torque, rate_state = control_rate(RateLoop(), rate_state, omega, rate, elapsed, model.inertia, frame)
         rows.append([force.norm(), *torque, *desired, *Q_d.vector])
     return rows

@@ -82,8 +82,9 @@ def test_motors_written_out_as_c_are_those_in_python(on_libm: dict[str, Path]) -
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_a_flight_in_other_axes_written_out_as_c_is_that_in_python(law: str, on_libm: dict[str, Path]) -> None:
-    tables = {"plant": {"frame": "enu"}, "controller": {"frame": "enu", "discretisation": "mean"}}
+def test_a_flight_that_turns_in_other_axes_is_in_c_what_it_is_in_python(law: str, on_libm: dict[str, Path]) -> None:
+    turning = {"frame": "enu", "discretisation": "mean", "trajectory": {"yaw": 0.3, "yaw_rate": 0.5}}
+    tables = {"plant": {"frame": "enu"}, "controller": turning}
     scenario = scenario_of({"stop_time": 2.0, "timing": {"period": 0.04}, **tables})
     flown = [
         quadcosim.run(scenario.with_fmus(plant=fmus["QuadrotorPlant"], controller=fmus[law]))
