@@ -110,8 +110,8 @@ def build(
         str | None,
         typer.Option(
             "--target",
-            metavar="all|linux64,win64,darwin64",
-            autocompletion=completion.among("all", "linux64", "win64", "darwin64"),
+            metavar="all|linux64,linux-aarch64,win64,darwin64",
+            autocompletion=completion.among("all", "linux64", "linux-aarch64", "win64", "darwin64"),
             help="Systems to build --native for, with the compiler of the package ziglang.",
             show_default=False,
         ),

@@ -25,10 +25,15 @@ _LINUX = ("-Wl,--build-id=none",)  # nothing that differs from one build to the 
 
 TARGETS = {
     "linux64": {"x86_64-linux": "x86_64-linux-gnu.2.17"},
+    "linux-aarch64": {"aarch64-linux": "aarch64-linux-gnu.2.17"},
     "win64": {"x86_64-windows": "x86_64-windows-gnu"},
     "darwin64": {"x86_64-darwin": "x86_64-macos.11.0", "aarch64-darwin": "aarch64-macos.11.0"},
 }
-"""The systems that zig builds for, by their names in FMI 2.0: those in FMI 3.0, and what zig calls them."""
+"""The systems that zig builds for: their names in FMI 3.0, and what zig calls them."""
+_ONLY_IN_3 = ("linux-aarch64",)
+"""Systems that FMI 2.0 has no names of its own for: it takes those of FMI 3.0 (FMI 2.0.4, section 2.3)"""
+_CROSS = {"linux-aarch64": "aarch64-linux-gnu-gcc"}
+"""Other compilers for a system, where there is no zig"""
 _SUFFIXES = {"windows": ".dll", "win64": ".dll", "darwin": ".dylib", "darwin64": ".dylib"}
 
 
@@ -84,19 +89,27 @@ def compiled_for(target: str, sources: dict[str, bytes], main: str, version: int
     """The libraries for a system of `TARGETS`, by the names that a version of FMI has for it; zig compiles them.
 
     In FMI 2.0 they are one for macOS, whatever the processor. Raises `PackagingError`, saying what to install without
-    zig.
+    zig, or another compiler for the system.
     """
-    if importlib.util.find_spec("ziglang") is None:
-        raise PackagingError("--target: expected zig, which compiles for all systems: pip install ziglang")
-    options = [*OPTIONS, *(_LINUX if target == "linux64" else ())]
+    options = [*OPTIONS, *(_LINUX if target.startswith("linux") else ())]
     slices = {
-        name: _compiled([sys.executable, "-m", "ziglang", "cc", "-target", called, *options], sources, main)
+        name: _compiled([*_compiler_for(target, called), *options], sources, main)
         for name, called in TARGETS[target].items()
     }
-    if version > 2:
+    if version > 2 or target in _ONLY_IN_3:
         return slices
     libraries = list(slices.values())
     return {target: libraries[0] if len(libraries) == 1 else universal(libraries)}
+
+
+def _compiler_for(target: str, called: str) -> list[str]:
+    """The command that compiles for a system, which zig calls so."""
+    if importlib.util.find_spec("ziglang") is not None:
+        return [sys.executable, "-m", "ziglang", "cc", "-target", called]
+    other = shutil.which(_CROSS.get(target, ""))
+    if other is None:
+        raise PackagingError("--target: expected zig, which compiles for all systems: pip install ziglang")
+    return [other]
 
 
 def _compiled(command: list[str], sources: dict[str, bytes], main: str, after: Sequence[str] = ()) -> bytes:

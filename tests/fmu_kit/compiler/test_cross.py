@@ -1,6 +1,8 @@
 """Libraries for other systems: what the system of each asks of them, and that they are of the same sources."""
 
 import importlib.util
+import io
+import shutil
 import struct
 import zipfile
 from collections import defaultdict
@@ -11,8 +13,10 @@ import pefile
 import pytest
 
 from fmu_kit.bundle import PackagingError
-from fmu_kit.compiler.pack.c_compiler import targets_of, universal
+from fmu_kit.compiler.pack.c_compiler import compiled_for, targets_of, universal
+from fmu_kit.compiler.pack.c_compiler import compiler as compiler_here
 from orchestration.building import fmus
+from orchestration.checks.doctor.binaries import newest, read
 
 needs_zig = pytest.mark.skipif(
     importlib.util.find_spec("ziglang") is None, reason="no zig: pip install 'quadcosim[cross]'"
@@ -20,9 +24,10 @@ needs_zig = pytest.mark.skipif(
 MODEL = "QuadrotorPlant"
 MACH_O, X86_64, ARM64 = 0xFEEDFACF, 0x01000007, 0x0100000C
 LIBRARIES = {
-    2: {f"linux64/{MODEL}.so", f"win64/{MODEL}.dll", f"darwin64/{MODEL}.dylib"},
+    2: {f"linux64/{MODEL}.so", f"aarch64-linux/{MODEL}.so", f"win64/{MODEL}.dll", f"darwin64/{MODEL}.dylib"},
     3: {
         f"x86_64-linux/{MODEL}.so",
+        f"aarch64-linux/{MODEL}.so",
         f"x86_64-windows/{MODEL}.dll",
         f"x86_64-darwin/{MODEL}.dylib",
         f"aarch64-darwin/{MODEL}.dylib",
@@ -81,10 +86,54 @@ def test_a_universal_library_has_each_of_its_slices_whole_and_aligned() -> None:
 
 
 def test_a_system_that_is_not_known_is_refused_with_those_that_are() -> None:
-    assert targets_of("all") == ("linux64", "win64", "darwin64")
+    assert targets_of("all") == ("linux64", "linux-aarch64", "win64", "darwin64")
     assert targets_of("win64,linux64") == ("win64", "linux64")
-    with pytest.raises(PackagingError, match=r"^target amiga: expected all, or some of linux64, win64, darwin64 "):
+    with pytest.raises(
+        PackagingError, match=r"^target amiga: expected all, or some of linux64, linux-aarch64, win64, "
+    ):
         targets_of("linux64,amiga")
+
+
+def without_zig(monkeypatch: pytest.MonkeyPatch, folder: Path, compiler: str = "") -> None:
+    """No zig from now on, and on the path one compiler alone, which is that of this machine under another name."""
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    if compiler:
+        (folder / compiler).symlink_to(compiler_here())
+    monkeypatch.setattr(shutil, "which", lambda name: str(path) if (path := folder / name).is_file() else None)
+
+
+SOURCES = {"main.c": b'__attribute__((visibility("default"))) int answer(void) { return 42; }'}
+
+
+@pytest.mark.parametrize("version", PACKINGS)
+def test_for_linux_on_arm_another_compiler_will_do(
+    version: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It has the name of FMI 3.0 in FMI 2.0 too, which has none of its own."""
+    without_zig(monkeypatch, tmp_path, "aarch64-linux-gnu-gcc")
+    found = compiled_for("linux-aarch64", SOURCES, "main.c", version)
+    assert [(name, content[:4]) for name, content in found.items()] == [("aarch64-linux", b"\x7fELF")]
+
+
+@pytest.mark.parametrize(("target", "compiler"), [("linux-aarch64", ""), ("linux64", "aarch64-linux-gnu-gcc")])
+def test_without_any_compiler_for_a_system_it_says_what_to_install(
+    target: str, compiler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    without_zig(monkeypatch, tmp_path, compiler)
+    with pytest.raises(
+        PackagingError, match=r"^--target: expected zig, which compiles for all systems: pip install zig"
+    ):
+        compiled_for(target, SOURCES, "main.c")
+
+
+@needs_zig
+@pytest.mark.parametrize("version", PACKINGS)
+def test_for_linux_on_arm_it_needs_what_old_systems_have(version: int, crossed: dict[int, Path]) -> None:
+    found = read(io.BytesIO(libraries(crossed[version])[f"aarch64-linux/{MODEL}.so"]))
+    assert (found.system, found.architectures) == ("Linux", ("aarch64",))
+    assert {library.name: newest(library.versions) for library in found.dependencies or ()} == {
+        "libc.so.6": ("GLIBC_2.17",)
+    }
 
 
 @needs_zig
