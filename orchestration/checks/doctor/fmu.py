@@ -30,8 +30,14 @@ ARCHITECTURES = {
 """By the names of the doctor, what FMI 3.0 calls them"""
 SYSTEMS = {LINUX: "linux", WINDOWS: "windows", MACOS: "darwin"}
 """By the names of the doctor, what FMI 3.0 calls them"""
+_TUPLES = {
+    f"{architecture}-{folder}": (system, (name,))
+    for name, architecture in ARCHITECTURES.items()
+    for system, folder in SYSTEMS.items()
+}
 PLATFORMS: Mapping[int, Mapping[str, tuple[str, tuple[str, ...]]]] = {
     2: {
+        **{folder: machine for folder, machine in _TUPLES.items() if not folder.startswith("x86")},
         "linux32": (LINUX, ("x86",)),
         "linux64": (LINUX, ("x86-64",)),
         "win32": (WINDOWS, ("x86",)),
@@ -39,13 +45,12 @@ PLATFORMS: Mapping[int, Mapping[str, tuple[str, tuple[str, ...]]]] = {
         "darwin32": (MACOS, ("x86",)),
         "darwin64": (MACOS, ("x86-64", "aarch64")),
     },
-    3: {
-        f"{architecture}-{folder}": (system, (name,))
-        for name, architecture in ARCHITECTURES.items()
-        for system, folder in SYSTEMS.items()
-    },
+    3: _TUPLES,
 }
-"""The folders that a version of FMI names, and the machines they stand for."""
+"""The folders that a version of FMI names, and the machines they stand for.
+
+For other processors than x86, FMI 2.0 takes the names of FMI 3.0 (FMI 2.0.4, section 2.3).
+"""
 
 _SUFFIXES = {"linux": ".so", "win": ".dll", "darwin": ".dylib"}
 

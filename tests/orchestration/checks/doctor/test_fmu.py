@@ -81,6 +81,16 @@ def test_a_folder_that_the_standard_does_not_name_is_read_as_well(plant: Path, t
     assert part.binary.target == "Linux, x86-64"
 
 
+def test_for_other_processors_the_folders_are_those_of_fmi_3(plant: Path, tmp_path: Path) -> None:
+    arm = for_machine(files_of(plant)[LINUX64], AARCH64)
+    files = {"binaries/aarch64-linux/QuadrotorPlant.so": arm, "binaries/aarch32-linux/QuadrotorPlant.so": arm}
+    parts = read_fmu(changed(plant, tmp_path / "a.fmu", files)).platforms
+    assert {part.platform: part.problem for part in parts if part.platform.startswith("aarch")} == {
+        "aarch64-linux": None,
+        "aarch32-linux": "a binary for Linux, aarch64, expected Linux, arm in this folder",
+    }
+
+
 def test_what_lies_where_a_library_looks_comes_with_the_fmu(plant: Path, tmp_path: Path) -> None:
     files = files_of(plant)
     libraries = {"binaries/linux64/libgcc_s.so.1": b"", "binaries/lib/libstdc++.so.6": b""}
