@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from orchestration.basics.errors import UsageError, shown
+from orchestration.basics.terminal import progress_bar
 from orchestration.command import registry as registering
 from orchestration.command.answer import Answer, of_files
 from orchestration.command.figure_flags import FigureFlags
@@ -46,16 +47,17 @@ def plot(
     look: FigureFlags,
 ) -> Answer:  # fmt: skip
     """Draw the figures of a run again, or of several runs laid over each other, for a screen, a paper or slides."""
-    from orchestration.figures.style import save
-    from orchestration.runs.draw import draw
-    from orchestration.runs.run_directory import load_run
-    from orchestration.runs.run_labels import labels_of_runs
+    with progress_bar("drawing") as progress:  # before what draws is loaded, which takes its time
+        from orchestration.figures.style import save
+        from orchestration.runs.draw import draw
+        from orchestration.runs.run_directory import load_run
+        from orchestration.runs.run_labels import labels_of_runs
 
-    results = [load_run(one) for one in directory]
-    names = labels_of_runs(results, [str(one) for one in directory])
-    made = draw(results, figure, names=names, window=_window(results, start, end), style=look.chosen)
-    place = out or (directory[0] if len(directory) == 1 else _beside(directory))
-    return of_files(save(made, place, look.chosen))
+        results = [load_run(one) for one in directory]
+        names = labels_of_runs(results, [str(one) for one in directory])
+        made = draw(results, figure, names=names, window=_window(results, start, end), style=look.chosen)
+        place = out or (directory[0] if len(directory) == 1 else _beside(directory))
+        return of_files(save(made, place, look.chosen, progress))
 
 
 def _window(results: "Sequence[Result]", start: float | None, end: float | None) -> tuple[float, float] | None:

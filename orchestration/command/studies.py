@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from orchestration.basics.errors import UsageError
-from orchestration.basics.terminal import say
+from orchestration.basics.terminal import progress_bar, say
 from orchestration.command import completion
 from orchestration.command import registry as registering
 from orchestration.command.answer import Answer, of_files
@@ -127,13 +127,14 @@ def draw(
     look: FigureFlags,
 ) -> Answer:
     """Draw a study: a metric over one or two axes with what is good, or sensitivity bars."""
-    from orchestration.studies.drawing import draw_study, expect_metric
-    from orchestration.studies.study_file import load_study
+    with progress_bar("drawing") as progress:  # before what draws is loaded, which takes its time
+        from orchestration.studies.drawing import draw_study, expect_metric
+        from orchestration.studies.study_file import load_study
 
-    chosen = load_study(study)
-    expect_metric(chosen, metric)
-    _current_store(study, out)
-    return of_files(draw_study(chosen, out, metric, look.chosen))
+        chosen = load_study(study)
+        expect_metric(chosen, metric)
+        _current_store(study, out)
+        return of_files(draw_study(chosen, out, metric, look.chosen, progress))
 
 
 @builds

@@ -12,6 +12,7 @@ from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.figure import Figure
 
 from orchestration.basics.errors import UsageError
+from orchestration.basics.terminal import Share
 from orchestration.figures.names import COLUMNS, FORMATS, WRITTEN
 from orchestration.figures.palette import CYCLE
 
@@ -134,10 +135,15 @@ _UNDATED: Mapping[str, dict[str, str | None]] = {
 }
 
 
-def save(figures: Mapping[str, Figure], folder: Path, style: Style = SCREEN) -> list[Path]:
+def save(
+    figures: Mapping[str, Figure],
+    folder: Path,
+    style: Style = SCREEN,
+    progress: Share = lambda share: None,
+) -> list[Path]:
     """Write figures by name, in each format of the style, into a folder that is made if need be; the paths.
 
-    The same data give the same bytes: nothing has a date.
+    The same data give the same bytes: nothing has a date. `progress` hears the share that is written.
     """
     folder.mkdir(parents=True, exist_ok=True)
     written = []
@@ -152,6 +158,7 @@ def save(figures: Mapping[str, Figure], folder: Path, style: Style = SCREEN) -> 
                     if ending == "png" and style.colors is not None:
                         _reduce(path, style.colors)
                     written.append(path)
+                    progress(len(written) / (len(figures) * len(style.formats)))
     return written
 
 

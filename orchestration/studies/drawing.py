@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
+from orchestration.basics.terminal import Share
 from orchestration.figures.style import SCREEN, Style, save
 from orchestration.results.criterion import edge, judged
 from orchestration.studies import figures, sensitivity
@@ -30,7 +31,13 @@ def expect_metric(study: Study, metric: str | None) -> None:
         raise UsageError(f"metric {metric}: expected one of {', '.join(known)}; every figure shows the outcome")
 
 
-def draw_study(study: Study, folder: Path | None, metric: str | None = None, style: Style = SCREEN) -> list[Path]:
+def draw_study(
+    study: Study,
+    folder: Path | None,
+    metric: str | None = None,
+    style: Style = SCREEN,
+    progress: Share = lambda share: None,
+) -> list[Path]:
     """Draw what is in the store of `study`, by default the first objective that varies; the paths.
 
     Raises `UsageError` for a metric that does not exist, or axes that no figure here is for.
@@ -38,7 +45,7 @@ def draw_study(study: Study, folder: Path | None, metric: str | None = None, sty
     path = store_path(study.name, folder)
     made, indices = study_figures(study, path, metric, style)
     listed = [sensitivity.write(indices, (path.parent / next(iter(made))).with_suffix(".csv"))] if indices else []
-    return listed + save(made, path.parent, style)
+    return listed + save(made, path.parent, style, progress)
 
 
 def study_figures(

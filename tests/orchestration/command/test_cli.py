@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import zipfile
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import pytest
 
 from orchestration.building import fmus
 from orchestration.building.models import MODELS
+from orchestration.command import plotting
 from orchestration.flight.names import FIGURES as FLIGHT
 from orchestration.processes import subprocesses
 from quadcosim import Scenario, Timing, load_run, run, save_run
@@ -243,6 +245,20 @@ def test_out_keeps_the_run_and_its_figures(main: Main, here: Path) -> None:
     names = {path.name for path in (here / "results/first").iterdir()}
     assert names >= {"signals.parquet", "events.parquet", "metrics.json", "scenario.toml", "commands.png", "path.png"}
     assert "results/first" in done.stderr.replace(os.sep, "/")
+
+
+def test_plot_shows_that_it_is_at_work_before_it_looks_at_anything(
+    main: Main, here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[str] = []
+
+    def bar(what: str) -> Any:
+        begun.append(what)
+        return nullcontext(lambda share: None)
+
+    monkeypatch.setattr(plotting, "progress_bar", bar)
+    error_line(main("plot", "nowhere", code=2))
+    assert begun == ["drawing"]
 
 
 def test_plot_zooms_on_a_window(main: Main, here: Path) -> None:

@@ -74,6 +74,12 @@ def test_few_colours_make_a_smaller_file_that_is_the_same_each_time(tmp_path: Pa
     assert len(few[0]) < 0.6 * len(written(replace(DOCS, colors=None), "all"))
 
 
+def test_who_waits_hears_of_each_file(tmp_path: Path) -> None:
+    heard: list[float] = []
+    save({"a": drawn(STYLES["screen"]), "b": drawn(STYLES["screen"])}, tmp_path, progress=heard.append)
+    assert heard == [0.25, 0.5, 0.75, 1.0]
+
+
 def test_writing_a_figure_leaves_it_to_be_laid_out_anew(tmp_path: Path) -> None:
     figure = drawn(STYLES["screen"])
     engine = figure.get_layout_engine()
