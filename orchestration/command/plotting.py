@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from orchestration.basics.errors import UsageError, shown
-from orchestration.basics.terminal import progress_bar
+from orchestration.basics.terminal import Share, progress_bar
 from orchestration.command import registry as registering
 from orchestration.command.answer import Answer, of_files
 from orchestration.command.figure_flags import FigureFlags
@@ -17,6 +17,7 @@ from orchestration.command.shared_flags import takes
 from orchestration.flight.names import FIGURES
 
 if TYPE_CHECKING:
+    from orchestration.figures.style import Style
     from orchestration.runs.result import Result
 
 TOGETHER = "overlay"
@@ -43,6 +44,13 @@ def plot(
             metavar="DIR", show_default=False,
         ),
     ] = None,
+    film: Annotated[
+        Path | None,
+        typer.Option(
+            "--film", help="Write the flight as a film instead; .mp4 needs ffmpeg.", metavar="FILE.gif|FILE.mp4",
+            show_default=False,
+        ),
+    ] = None,
     *,
     look: FigureFlags,
 ) -> Answer:  # fmt: skip
@@ -55,9 +63,28 @@ def plot(
 
         results = [load_run(one) for one in directory]
         names = labels_of_runs(results, [str(one) for one in directory])
-        made = draw(results, figure, names=names, window=_window(results, start, end), style=look.chosen)
+        window = _window(results, start, end)
+        if film is not None:
+            return of_files([_filmed(results, names, window, film, look.chosen, progress)])
+        made = draw(results, figure, names=names, window=window, style=look.chosen)
         place = out or (directory[0] if len(directory) == 1 else _beside(directory))
         return of_files(save(made, place, look.chosen, progress))
+
+
+def _filmed(
+    results: "Sequence[Result]",
+    names: Sequence[str],
+    window: tuple[float, float] | None,
+    film: Path,
+    style: "Style",
+    progress: Share,
+) -> Path:
+    from orchestration.flight import film as filming
+    from orchestration.runs.draw import runs_of
+
+    if not all({*result.recording.columns} >= filming.COLUMNS for result in results):
+        raise UsageError("--film: expected runs of a quadrotor; figures show what other systems do")
+    return filming.film(runs_of(results, names, filming.COLUMNS | {"time"}, window), film, style, progress)
 
 
 def _window(results: "Sequence[Result]", start: float | None, end: float | None) -> tuple[float, float] | None:

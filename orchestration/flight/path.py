@@ -26,6 +26,18 @@ LEAST = 0.45
 
 def path(runs: Sequence[Run], style: Style) -> Figure:
     """Where it flew and where it should have, a metre being as long along each axis, up being up."""
+    figure, axes = stage(runs, style)
+    if style.has_titles:
+        figure.suptitle(title(runs))
+    spare = fill(figure, axes)
+    if style.height is None:
+        figure.set_figheight(figure.get_figheight() - spare / figure.dpi)
+        fill(figure, axes)
+    return figure
+
+
+def stage(runs: Sequence[Run], style: Style) -> tuple[Figure, Any]:
+    """A figure with paths in space and its legend, and the axes, which do not `fill` it yet."""
     figure = style.figure(38.0, width=0.75 if style.is_wide else 1.0)
     figure.set_layout_engine("none")
     axes = figure.add_subplot(projection="3d")
@@ -35,16 +47,10 @@ def path(runs: Sequence[Run], style: Style) -> Figure:
         handles += [Line2D([], [], color=run.color, linestyle=run.dashes) for run in runs]
         names += [run.name for run in runs]
     figure.legend(handles, names, loc="lower center", ncols=abreast(names, style, width=0.75))
-    if style.has_titles:
-        figure.suptitle(title(runs))
-    spare = _fill(figure, axes)
-    if style.height is None:
-        figure.set_figheight(figure.get_figheight() - spare / figure.dpi)
-        _fill(figure, axes)
-    return figure
+    return figure, axes
 
 
-def _fill(figure: Figure, axes: Any) -> float:
+def fill(figure: Figure, axes: Any) -> float:
     """Draw in space as large as there is room between title and legend; the height that is left over, in pixels.
 
     The labels of three-dimensional axes do not grow with them, so that it takes a few rounds.

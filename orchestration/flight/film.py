@@ -1,0 +1,136 @@
+"""A flight that moves, as GIF or MP4."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
+
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats
+from orchestration.basics.terminal import Share
+from orchestration.figures.palette import BLACK, BLUE, GREEN, ORANGE
+from orchestration.figures.run import Run
+from orchestration.figures.style import Style
+from orchestration.flight.path import fill, stage
+from orchestration.quadrotor.wiring import COMMAND, POSITION, POSITION_REFERENCE, QUATERNION
+
+RATE = 20
+"""[pictures/s]"""
+MOST = 240
+"""pictures: a longer flight goes by faster"""
+DPI = 100.0
+TRAIL = 2.0
+"""[s] of the path that is drawn thick"""
+SIZE = 0.06
+"""Half the length of an arm, of the longest side of what is seen: much larger than it is"""
+
+PLACE, ATTITUDE = ([f"plant.{name}" for name in names] for names in (POSITION, QUATERNION))
+THRUST = f"plant.{COMMAND[0]}"
+COLUMNS = frozenset((*PLACE, *ATTITUDE, THRUST, *POSITION_REFERENCE))
+"""That a run needs to be filmed"""
+_CIRCLE = np.linspace(0.0, 2.0 * np.pi, 25)
+_ROTORS = [
+    np.column_stack([fore + 0.55 * np.cos(_CIRCLE), side + 0.55 * np.sin(_CIRCLE), np.zeros(len(_CIRCLE))])
+    for fore, side in ((1, 1), (1, -1), (-1, 1), (-1, -1))
+]
+_ARMS = [np.array([[1.0, side, 0.0], [-1.0, -side, 0.0]]) for side in (1, -1)]
+
+
+def writer(path: Path) -> AbstractMovieWriter:
+    """What writes a film in the format of its ending.
+
+    Raises `UsageError` for another ending, or one that nothing on this machine writes.
+    """
+    if path.suffix == ".gif":
+        return PillowWriter(fps=RATE)
+    if path.suffix != ".mp4":
+        raise UsageError(f"--film {path}: expected a file that ends in .gif or .mp4")
+    if not FFMpegWriter.isAvailable():
+        raise UsageError(f"--film {path}: expected ffmpeg on this machine; .gif needs nothing")
+    return FFMpegWriter(fps=RATE)
+
+
+def film(runs: Sequence[Run], path: Path, style: Style, progress: Share = lambda share: None) -> Path:
+    """Write runs that fly at the same time, each with its trail; the path. Raises `UsageError` as `writer` does."""
+    chosen = writer(path)
+    start, end = min(run.span[0] for run in runs), max(run.span[1] for run in runs)
+    count = max(2, min(MOST, round(RATE * (end - start))))
+    times = np.linspace(start, end, count)
+    pace = (end - start) * RATE / (count - 1)
+    style = replace(style, dpi=DPI)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with style.applied():
+        figure, axes = stage(runs, style)
+        for line in axes.get_lines():
+            line.set(alpha=0.35)
+        title = figure.suptitle("0.00 s")
+        fill(figure, axes)
+        size = SIZE * max(float(np.ptp(limits)) for limits in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim()))
+        craft = [_Craft.on(axes, run, BLUE if len(runs) == 1 else run.color, size) for run in runs]
+        with chosen.saving(figure, str(path), DPI):
+            for place, now in enumerate(times, start=1):
+                title.set_text(f"{now:.2f} s" + ("" if abs(pace - 1.0) < 0.1 else f", {pace:.2g} times as fast"))
+                for one in craft:
+                    one.move(float(now))
+                chosen.grab_frame()
+                progress(place / count)
+    return path
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Craft:
+    """A vehicle, its trail, its thrust and where it should be, as lines that are moved."""
+
+    run: Run
+    size: float
+    lines: dict[str, Any]
+    outlines: Sequence[Any]
+    most: float
+    """thrust of the run [N]"""
+
+    @classmethod
+    def on(cls, axes: Any, run: Run, color: str, size: float) -> "_Craft":
+        def line(**how: Any) -> Any:
+            return axes.plot([], [], [], **{"color": color, "zorder": 5, **how})[0]
+
+        return cls(
+            run=run, size=size,
+            lines={
+                "trail": line(linewidth=3.5, alpha=0.6), "thrust": line(color=GREEN, linewidth=2.5),
+                "reference": line(color=ORANGE, marker="D", markerfacecolor="none"),
+            },
+            outlines=[line(color=BLACK, linewidth=2.5) for _ in _ARMS] + [line(linewidth=1.6) for _ in _ROTORS],
+            most=max(float(np.nanmax(run.signals[THRUST])), 1e-9),
+        )  # fmt: skip
+
+    def move(self, now: float) -> None:
+        """To where it is at a time [s]; at its end if that is before."""
+        t = self.run.signals["time"]
+        now = min(now, float(t[-1]))
+        place, turned = self._at(PLACE, now), _rotation(self._at(ATTITUDE, now))
+        behind = np.linspace(max(now - TRAIL, float(t[0])), now, 30)
+        self.lines["trail"].set_data_3d(*(np.interp(behind, t, self.run.signals[name]) for name in PLACE))
+        self.lines["reference"].set_data_3d(*self._at(POSITION_REFERENCE, now)[:, None])
+        force = float(self._at([THRUST], now)[0]) / self.most
+        up = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, -3.0 * force]])
+        for drawn, points in zip((*self.outlines, self.lines["thrust"]), (*_ARMS, *_ROTORS, up), strict=True):
+            drawn.set_data_3d(*(place + self.size * points @ turned.T).T)
+
+    def _at(self, names: Sequence[str], now: float) -> Floats:
+        t = self.run.signals["time"]
+        return np.array([np.interp(now, t, self.run.signals[name]) for name in names])
+
+
+def _rotation(quaternion: Floats) -> Floats:
+    """From body to space, of a quaternion (x, y, z, w) of any length, shape (3, 3)."""
+    x, y, z, w = quaternion / max(float(np.linalg.norm(quaternion)), 1e-300)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
