@@ -9,8 +9,8 @@ from orchestration.basics.errors import UsageError
 from orchestration.report.model import Report, as_json
 
 SCRIPTS = (
-    "data.js", "words.js", "theme.js", "scene.js", "timeplots.js", "map.js", "shares.js", "run.js", "tables.js",
-    "page.js",
+    "data.js", "words.js", "theme.js", "scene.js", "peaks.js", "timeplots.js", "map.js", "shares.js", "run.js",
+    "tables.js", "page.js",
 )  # fmt: skip
 """In the order in which the page takes them; each needs those before it only"""
 _PAGE = resources.files("orchestration.report") / "page"

@@ -184,8 +184,8 @@ function showSignals() {
   pending = setTimeout(() => drawTimePlot(signals, beside, [player.run.name, player.beside ? player.beside.name : ""]).then(noteFirstPlot), 30);
 }
 
-function redrawSignals() {
-  if (timePlot.isDrawn) drawTimePlot(timePlot.signals, timePlot.beside, ["", player.beside ? player.beside.name : ""]);
+function redrawSignals(whole = true) {
+  if (timePlot.isDrawn) drawTimePlot(timePlot.signals, timePlot.beside, ["", player.beside ? player.beside.name : ""], whole);
 }
 
 function nameScene(beside) {

@@ -20,14 +20,17 @@ function panelsOf(layout) {
   return layout.panels.filter((panel) => timePlot.shownPanels.get(panel.title) ?? panel.shown);
 }
 
-function drawTimePlot(signals, beside, names) {
-  Object.assign(timePlot, { signals, beside });
+/** Draw them, `whole` with insets where peaks are clipped. */
+function drawTimePlot(signals, beside, names, whole = true) {
+  Object.assign(timePlot, { signals, beside, whole });
   const panels = panelsOf(signals.layout);
   const height = topMargin() + MARGIN.b + panels.length * PANEL + (panels.length - 1) * gap();
-  const traces = panels.flatMap((panel, k) => tracesOf(panel, k, signals, beside, names));
+  const byPanel = panels.map((panel, k) => tracesOf(panel, k, signals, beside, names));
+  const peaks = byPanel.map((traces, k) => (whole && !panels[k].logarithmic ? peakOf(traces) : null));
+  const traces = [...byPanel.flat(), ...peaks.flatMap((peak, k) => (peak ? tracesOfInset(byPanel[k], peak, panels.length + 1 + k) : []))];
   const holder = byId("time-plot");
   holder.style.height = `${height}px`;
-  return drawPlot(holder, traces, timeLayout(panels, height, signals), { ...PLOTLY, displayModeBar: false }).then(() => {
+  return drawPlot(holder, traces, timeLayout(panels, height, signals, peaks), { ...PLOTLY, displayModeBar: false }).then(() => {
     if (!timePlot.isDrawn) listenToTimePlot(holder);
     timePlot.isDrawn = true;
     moveCursor();
@@ -50,14 +53,15 @@ function traceOf(panel, line, i, k, signals, other) {
   const place = line.reference ? i - panel.lines.filter((each) => !each.reference).length : i;
   const alone = panel.lines.length === 1;
   const name = other ? `${line.label} (${other})` : line.label;
-  const inLegend = other || (line.reference ? "reference" : line.label);
+  const isNarrow = gap() > 46; // there is room for few words
+  const inLegend = other || (line.reference ? (isNarrow ? "ref." : "reference") : line.label);
   return {
     x: signals.time,
     y: signals.columns[line.column],
     name: escaped(inLegend),
     yaxis: k ? `y${k + 1}` : "y",
     legend: k ? `legend${k + 1}` : "legend",
-    showlegend: other ? place === 0 : line.reference ? place === 0 : !alone,
+    showlegend: other ? place === 0 && !(isNarrow && k) : line.reference ? place === 0 : !alone,
     legendrank: other ? 1200 : line.reference ? 1100 : 1000,
     mode: "lines",
     opacity: other ? 0.75 : 1,
@@ -71,7 +75,7 @@ function traceOf(panel, line, i, k, signals, other) {
   };
 }
 
-function timeLayout(panels, height, signals) {
+function timeLayout(panels, height, signals, peaks) {
   const inner = height - topMargin() - MARGIN.b;
   const isNarrow = gap() > 46;
   const layout = {
@@ -92,9 +96,15 @@ function timeLayout(panels, height, signals) {
       orientation: "h", x: isNarrow ? 0 : 1, xanchor: isNarrow ? "left" : "right", y: top + 2 / inner, yanchor: "bottom", font: { size: 11 },
       bgcolor: "rgba(0,0,0,0)",
     };
+    if (peaks[k]) {
+      const { axes: own, note } = layoutOfInset(peaks[k], panel.unit, panels.length + 1 + k, top, inner);
+      Object.assign(layout, own);
+      layout.annotations.push(note);
+      layout[k ? `yaxis${k + 1}` : "yaxis"].range = peaks[k].range;
+    }
     layout.annotations.push({
       text: `<b>${escaped(titled(panel.title, panel.unit))}</b>`, x: 0, xref: "paper", xanchor: "left",
-      y: top + (isNarrow && panel.lines.length > 1 ? 22 : 3) / inner, yref: "paper", yanchor: "bottom", showarrow: false,
+      y: top + (isNarrow && (panel.lines.length > 1 || (timePlot.beside && !k)) ? 22 : 3) / inner, yref: "paper", yanchor: "bottom", showarrow: false,
     });
   });
   return layout;
@@ -114,7 +124,10 @@ function powersIn(panel, signals) {
 
 function listenToTimePlot(holder) {
   holder.on("plotly_click", (event) => setTime(event.points[0].x));
-  holder.on("plotly_relayout", moveCursor);
+  holder.on("plotly_relayout", (change) => {
+    if (timePlot.whole && "xaxis.range[0]" in change) showSpan(change["xaxis.range[0]"], change["xaxis.range[1]"]);
+    else moveCursor();
+  });
   holder.on("plotly_doubleclick", () => { showSpan(...wholeSpan()); return false; });
   new ResizeObserver(moveCursor).observe(holder);
 }
@@ -127,6 +140,8 @@ function wholeSpan() {
 /** Show the signals from one time to another, within the run, each panel as high as what is seen there. */
 function showSpan(from, to) {
   const [first, last] = wholeSpan();
+  if (from <= first && to >= last) return redrawSignals();
+  if (timePlot.whole) redrawSignals(false); // who looks closer sees peaks where they are
   const range = [Math.max(first, from), Math.min(last, to)];
   const update = { "xaxis.range": range };
   panelsOf(timePlot.signals.layout).forEach((panel, k) => {

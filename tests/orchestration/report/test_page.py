@@ -203,6 +203,23 @@ def test_zooming_by_button_narrows_all_panels(of_runs: Any) -> None:
     of_runs.wait_for_function(f"{span} > {0.9 * whole}")
 
 
+def test_a_short_peak_is_clipped_said_and_shown_in_an_inset_until_one_looks_closer(show: Show, tmp_path: Path) -> None:
+    page = show(report(run(dataclasses.replace(scenario(), stop_time=12.0)), out=tmp_path / "report.html"))
+    found = """(() => {
+        const { data, layout } = document.getElementById('time-plot');
+        const notes = layout.annotations.filter((note) => note.text.startsWith('clipped: peak '));
+        return [notes.length, data.filter((each) => each.xaxis).length];
+    })()"""
+    notes, lines = page.evaluate(found)
+    assert notes > 0
+    assert lines >= notes
+    page.get_by_role("button", name="Zoom in").click()
+    page.wait_for_function(f"{found}.join() === '0,0'")
+    page.get_by_role("button", name="Whole run").click()
+    page.wait_for_function(f"{found}.join() === '{notes},{lines}'")
+    page.close()
+
+
 def test_every_control_has_a_name_and_can_be_reached_by_key(of_runs: Any, of_study: Any) -> None:
     nameless = """[...document.querySelectorAll('main button, main input, main select')]
         .filter((e) => !(e.textContent.trim() || e.labels?.[0]?.textContent.trim() || e.ariaLabel) || e.tabIndex < 0)
