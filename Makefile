@@ -60,6 +60,7 @@ figures: .venv/.base
 	$(BIN)/python -m docs.make_figures
 	$(BIN)/python -m docs.make_icons
 	$(BIN)/python examples/make_figures.py
+	$(BIN)/python examples/linear/design.py
 
 site: .venv/.test
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet

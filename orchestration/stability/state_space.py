@@ -43,15 +43,14 @@ class StateSpace:
 
     @explained
     def to_control(self) -> Any:
-        """The same as a `StateSpace` of python-control, with the names of inputs and outputs.
+        """The same as a `StateSpace` of python-control, whose names have underlines for dots.
 
         Raises `QuadcosimError` where that is not installed.
         """
         import control
 
-        return control.ss(
-            self.A, self.B, self.C, self.D, self.dt, inputs=list(self.inputs), outputs=list(self.outputs)
-        )  # fmt: skip
+        inputs, outputs = ([name.replace(".", "_") for name in names] for names in (self.inputs, self.outputs))
+        return control.ss(self.A, self.B, self.C, self.D, self.dt, inputs=inputs, outputs=outputs)
 
 
 def reduced(A: Floats, B: Floats, C: Floats) -> tuple[Floats, Floats, Floats]:

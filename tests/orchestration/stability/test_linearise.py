@@ -120,8 +120,9 @@ def test_a_component_that_samples_more_often_than_another_is_refused(system: Sys
 
 def test_it_is_a_system_of_python_control_with_its_names(system: System) -> None:
     control = pytest.importorskip("control")
-    found = linearise(changed(system, {PERIOD: 0.5})).rest.to_control()
-    assert (found.input_labels, found.output_labels, found.dt) == (["u"], ["x", "v"], 0.5)
+    rest = linearise(changed(system, {PERIOD: 0.5})).rest
+    found = dataclasses.replace(rest, inputs=("torque.x",)).to_control()
+    assert (found.input_labels, found.output_labels, found.dt) == (["torque_x"], ["x", "v"], 0.5)
     z = np.exp(0.3j)
     assert found(z)[1, 0] == pytest.approx(control.tf([0.5], [1, -1], 0.5)(z), rel=1e-6)
 

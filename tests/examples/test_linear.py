@@ -1,0 +1,109 @@
+"""LQR, LQI and PID: gains and margins as they are designed, and flights that are the same however they are made."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import quadcosim
+from orchestration.basics.documents import read_toml
+from quadcosim import Scenario
+from tests.examples.common import EXAMPLES
+from tests.orchestration.fmi.small import needs_compiler
+from tests.orchestration.stability.test_linearise import closed
+
+pytestmark = needs_compiler
+FOLDER = EXAMPLES / "linear"
+LAWS = ("lqr", "lqi", "pid")
+
+
+def gains_of(law: str) -> dict[str, list[float]]:
+    """Those of its file, as the law names them."""
+    found: dict[str, Any] = read_toml(FOLDER / f"{law}.toml", "gains")["controller"]
+    return {name: [each[axis] for axis in "xyz"] for name, each in found.items()}
+
+
+@pytest.fixture(scope="module")
+def design() -> Any:
+    pytest.importorskip("control")
+    from examples.linear import design
+
+    return design
+
+
+def test_the_gains_are_those_of_the_design(design: Any) -> None:
+    plant = design.loop_of().rest
+    for law in LAWS:
+        found = getattr(design, law)(plant)
+        for name, expected in gains_of(law).items():
+            assert found[name] == pytest.approx(expected, rel=1e-3, abs=1e-9), (law, name)
+
+
+def test_the_law_with_these_gains_is_the_feedback_of_least_squares(design: Any) -> None:
+    """Its derivatives, as its FMU has them, are the matrix that the Riccati equation gave."""
+    import control
+
+    loop = design.loop_of(gains_of("lqr"))
+    feedback, _, _ = control.dlqr(loop.rest.A, loop.rest.B, *design._weights(loop.rest))
+    assert pytest.approx(-feedback, rel=1e-4, abs=1e-4) == loop.component.D @ loop.rest.C
+
+
+def test_by_as_much_as_its_phase_margin_lets_it_a_command_may_be_late(design: Any) -> None:
+    """A delay of margin / crossover is the local limit, but for a hold that is moved by part of a sample."""
+    margin, crossover = design.margins(design.loop_of(gains_of("lqi")), "torque.y")
+    late = np.radians(margin) / crossover
+    for factor, is_stable in ((0.98, True), (1.02, False)):
+        loop = design.loop_of(gains_of("lqi"), delay=factor * late)
+        assert bool(np.abs(np.linalg.eigvals(closed(loop))).max() < 1.0) is is_stable
+
+
+COMPARISON = """
+[base]
+stop_time = 6.0
+[base.plant]
+fmu = "native/QuadrotorPlant"
+max_internal_step = 0.005
+[base.timing]
+plant_interval = 0.005
+[[controllers]]
+name = "unified"
+fmu = "native/UnifiedController"
+[[controllers]]
+name = "LQI"
+fmu = "{folder}/native/LinearFeedback.fmu"
+file = "{folder}/lqi.toml"
+[axis]
+name = "period"
+sets = ["timing.period"]
+values = [0.05]
+[starts]
+count = 12
+position = 4.0
+velocity = 4.0
+angle = 3.1
+rate = 8.0
+"""
+
+
+def test_an_lqi_against_the_law_of_the_paper_has_the_same_shares_through_compare_as_through_run(tmp_path: Path) -> None:
+    path = tmp_path / "lqi.toml"
+    path.write_text(COMPARISON.format(folder=FOLDER))
+    comparison = quadcosim.load_comparison(path)
+    cells = quadcosim.compare(comparison, folder=tmp_path, figures=False, progress=None, announce=None).outcome.cells
+    plant, law = "native/QuadrotorPlant", str(FOLDER / "native" / "LinearFeedback.fmu")
+    laws = {
+        "unified": Scenario().with_fmus(plant=plant, controller="native/UnifiedController"),
+        "LQI": quadcosim.load_scenario(FOLDER / "lqi.toml").with_fmus(plant=plant, controller=law),
+    }
+    assert [cell.controller for cell in cells] == [*laws]
+    for cell in cells:
+        asked = laws[cell.controller].with_changes(
+            stop_time=6.0, timing={"period": 0.05, "plant_interval": 0.005}, plant={"max_internal_step": 0.005}
+        )
+        flights = [asked.with_values(start.values).with_changes(seed=i) for i, start in enumerate(comparison.drawn)]
+        results = [result.metrics for result in quadcosim.run(flights)]
+        survive = [each["outcome"] != "diverged" for each in results]
+        settle = [lives and each["settling_time"] is not None for lives, each in zip(survive, results)]
+        assert 0 < sum(settle) < len(flights)
+        assert (cell.survives.count, cell.settles.count) == (sum(survive), sum(settle))
