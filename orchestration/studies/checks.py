@@ -22,7 +22,7 @@ def expect_flyable(study: Study, files: Files) -> tuple[str, ...]:
 
     Raises `UsageError` for the first run of `study` that cannot be, saying how many more there are.
     """
-    expect_columns(study.origin.objectives)
+    expect_columns(study.judged)
     first, wrong = "", 0
     starts, longest, alike = files.starts_of(study.origin), study.origin, _Alike(files)
     for index, point in enumerate(study.points):

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 def expect_metric(study: Study, metric: str | None) -> None:
     """Raise `UsageError` for a metric that was asked for and is none."""
-    known = [name for name in metrics_with(study.origin.objectives) if name not in TEXTS or _is_screened(study)]
+    known = [name for name in metrics_with(study.judged) if name not in TEXTS or _is_screened(study)]
     if metric is not None and metric not in known:
         raise UsageError(f"metric {metric}: expected one of {', '.join(known)}; every figure shows the outcome")
 

@@ -3,18 +3,19 @@
 import dataclasses
 import hashlib
 import json
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
 from orchestration.building.inputs import Files, tables_of
+from orchestration.results.own_metrics import OwnMetric
 from orchestration.studies.study import Study
 from orchestration.system.model import Component, Source, System
 from orchestration.workers.provenance import machine, versions
 
 
-def run_key(system: System, files: Files) -> str:
-    """The hash of everything that determines a run.
+def run_key(system: System, files: Files, metrics: Sequence[OwnMetric] = ()) -> str:
+    """The hash of everything that determines a run, and what it comes to.
 
     A parameter that has the value with which its FMU starts counts as not given.
     """
@@ -33,6 +34,8 @@ def run_key(system: System, files: Files) -> str:
         "criterion": _text_of(system.criterion, dataclasses.asdict),
         "versions": _text_of(versions(), dict),
     }
+    if metrics:
+        content["metrics"] = json.dumps([(metric.name, metric.source) for metric in metrics])
     text = ", ".join(f'"{key}": {content[key]}' for key in sorted(content))
     return hashlib.sha256(f"{{{text}}}".encode()).hexdigest()
 
@@ -91,6 +94,7 @@ def study_parts(study: Study) -> dict[str, str]:
     for name, source in system.sources.items():
         parts |= {f"sources.{name}.{key}": value for key, value in _source_of(source, tables).items()}
     parts |= {f"objectives.{name}": text for name, text in system.objectives.items()}
+    parts |= {f"metrics.{metric.name}": metric.source for metric in study.metrics}
     parts |= _parts("criterion", system.criterion)
     said: dict[str, str] = {}
     for path, value in parts.items():

@@ -12,6 +12,7 @@ from orchestration.basics.records import record
 from orchestration.building.fmus import native_twin, native_twins
 from orchestration.building.inputs import Files, files_of
 from orchestration.requests.ranges import paths_in
+from orchestration.results.own_metrics import OwnMetric
 from orchestration.studies.axes import Axis, Method, Points, Value
 from orchestration.studies.linked_settings import LinkedSettings
 from orchestration.studies.store import is_column
@@ -42,6 +43,8 @@ class Study:
     """Whether each run has a seed of its own, made of that of the base and the values of the axes."""
     keep_signals: tuple[int, ...] | bool = False
     """The indices of the runs whose signals are kept, or whether all are."""
+    metrics: tuple[OwnMetric, ...] = ()
+    """Functions of a result, which `sweep` is given, beside the objectives of the base."""
     native: bool = False
     """Whether it is flown by the native twins of its FMUs."""
 
@@ -55,7 +58,7 @@ class Study:
             )
         for axis in self.axes:
             is_of_seeds = (axis.name, axis.targets, axis.multiplies) == ("seed", ("seed",), False)
-            if is_column(axis.name, self.origin.objectives) and not is_of_seeds:
+            if is_column(axis.name, self.judged) and not is_of_seeds:
                 raise UsageError(f"axis {axis.name}: the table of runs has a column of that name, expected another")
         for each in self.together:
             if not set(each.axes) <= set(names):
@@ -67,6 +70,11 @@ class Study:
         """The system that the base means."""
         system = system_meant(self.base)
         return native_twins(system) if self.native else system
+
+    @property
+    def judged(self) -> tuple[str, ...]:
+        """What a run comes to, beside what every run does: the objectives, and metrics of its own."""
+        return (*self.origin.objectives, *(metric.name for metric in self.metrics))
 
     @cached_property
     def points(self) -> Sequence[Mapping[str, Value]]:

@@ -18,6 +18,8 @@ from orchestration.building.inputs import Files
 from orchestration.engines.engine import Engine
 from orchestration.engines.wiring import checked
 from orchestration.requests.ranges import paths_in, unit_at
+from orchestration.results.own_metrics import all_sourced
+from orchestration.runs.result import Result
 from orchestration.studies import store
 from orchestration.studies.checks import described, expect_flyable
 from orchestration.studies.run_key import design_parts, difference, place_parts, run_key, study_parts
@@ -47,6 +49,7 @@ _TOLD = 3
 def sweep(
     study: Study,
     *,
+    metrics: Mapping[str, Callable[[Result], float | None]] | None = None,
     folder: str | Path | None = None,
     workers: int = 1,
     dask: str | None = None,
@@ -57,6 +60,10 @@ def sweep(
     announce: Announce | None = say,
 ) -> Swept:
     """Fly the runs of a study that its store does not have, writing each row as it comes.
+
+    `metrics` are more of what each run comes to, by name: functions of its `Result` that give a number, or None for no
+    value. Their source is what is run, in other processes, and what a run is known by, so a function has all that it
+    uses in itself, but for modules. Such runs are flown one at a time.
 
     The store is in `folder`, default `results/NAME`: what is there is not flown again, so that a sweep may be
     stopped and called again. Runs are flown by `workers` processes of this machine, which need no guard of the main
@@ -73,9 +80,11 @@ def sweep(
     _expect_workers(workers, dask)
     if time_limit is not None and not time_limit > 0.0:
         raise UsageError(f"--time-limit {time_limit:g}: expected a positive number of seconds")
+    if metrics is not None:
+        study = replace(study, metrics=all_sourced(metrics))
     study, files, how, follows = ready(study, engine)
     path = store.store_path(study.name, folder)
-    with of_runs(progress) as hear, store.open_for_writing(path, study.origin.objectives) as opened:
+    with of_runs(progress) as hear, store.open_for_writing(path, study.judged) as opened:
         _describe(opened, study, files)
         missing = _missing(opened, study, retry_failed)
         counted = _Counted(len(study.points), opened, hear, announce)
@@ -122,7 +131,8 @@ def ready(study: Study, engine: EngineChoice) -> tuple[Study, Files, Chosen, tup
         found[native] = asked, files, expect_flyable(asked, files)
         return asked.system(0, files.starts_of(asked.origin)), files
 
-    how = chosen(engine, study.native, first)
+    apart = "metrics that are functions need whole runs, one at a time" if study.metrics else None
+    how = chosen(engine, study.native, first, apart=apart)
     if how.native not in found:
         first(how.native)
     flown, files, follows = found[how.native]
@@ -192,8 +202,8 @@ def _task(
 ) -> RunTask:
     system = study.system(index, starts)
     return RunTask(
-        index=index, key=run_key(system, files), settings=dict(study.points[index]), system=system,
-        keep_signals=study.keeps_signals(index), engine=engine, time_limit=time_limit,
+        index=index, key=run_key(system, files, study.metrics), settings=dict(study.points[index]), system=system,
+        keep_signals=study.keeps_signals(index), metrics=study.metrics, engine=engine, time_limit=time_limit,
     )  # fmt: skip
 
 
@@ -276,5 +286,5 @@ def _units(study: Study, files: Files) -> dict[str, str]:
 def _places(study: Study, files: Files) -> Iterator[store.DesignPoint]:
     starts = files.starts_of(study.origin)
     for index, point in enumerate(study.points):
-        key = run_key(study.system(index, starts), files)
+        key = run_key(study.system(index, starts), files, study.metrics)
         yield store.DesignPoint(index=index, key=key, settings=point)

@@ -50,15 +50,20 @@ def choice_named(name: str) -> EngineChoice:
     return cast(EngineChoice, name)
 
 
-def chosen(engine: EngineChoice, native: bool, first: Callable[[bool], tuple[System, Files]]) -> Chosen:
+def chosen(
+    engine: EngineChoice, native: bool, first: Callable[[bool], tuple[System, Files]], *, apart: str | None = None
+) -> Chosen:
     """How runs are flown by an engine, with `native` if that was asked for.
 
-    `first` gives the first run, checked, and its files, by native twins or not. Raises `UsageError` naming what
+    `first` gives the first run, checked, and its files, by native twins or not; `apart` is why runs are no lanes,
+    whatever they are. Raises `UsageError` naming what
     stands in the way of lanes if these were asked for.
     """
     if engine in ("python", "compiled"):
         return Chosen(native=native, in_lanes=False, engine=engine)
     if engine == "batch":
+        if apart is not None:
+            raise UsageError(f"--engine batch: {apart}")
         _expect_lanes(*first(True))
         return Chosen(native=True, in_lanes=True, engine=None)
     try:
@@ -66,6 +71,8 @@ def chosen(engine: EngineChoice, native: bool, first: Callable[[bool], tuple[Sys
     except QuadcosimError as error:  # what is wrong with the request is said by whoever flies it
         return Chosen(native=native, in_lanes=False, engine=None, reason=str(error))
     try:
+        if apart is not None:
+            raise UsageError(apart)
         _expect_lanes(system, files)
     except QuadcosimError as error:
         return Chosen(native=True, in_lanes=False, engine=None, reason=str(error))

@@ -13,6 +13,7 @@ from orchestration.engines.engine import Engine
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.model import read_model
 from orchestration.fmi.reuse import Instances
+from orchestration.results.own_metrics import OwnMetric
 from orchestration.runs.result import Result
 from orchestration.runs.simulation import prepared
 from orchestration.system.model import System
@@ -31,6 +32,8 @@ class RunTask:
     settings: dict[str, Any]
     system: System
     keep_signals: bool
+    metrics: tuple[OwnMetric, ...] = ()
+    """of the study's own, beside those of the system"""
     engine: Engine | None = None
     """that flies it; None: the fastest that can be had"""
     time_limit: float | None = None
@@ -102,7 +105,8 @@ class Runner:
                 flight.master.initialise()
                 flight.master.run()
                 result = flight.result()
-                metrics, message = result.metrics, result.divergence or result.termination
+                own = {metric.name: metric.of(result) for metric in task.metrics}
+                metrics, message = {**result.metrics, **own}, result.divergence or result.termination
                 signals = _parquet(result) if task.keep_signals else None
         except (SimulatorError, UsageError) as error:
             message = str(error)

@@ -13,8 +13,8 @@ FOLDER = Path(__file__).parents[2] / "docs" / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 
 
-def test_there_are_a_flight_a_limit_and_a_controller_of_ones_own() -> None:
-    assert [path.stem for path in NOTEBOOKS] == ["flight", "limit", "own_controller"]
+def test_there_are_a_flight_a_limit_a_controller_of_ones_own_and_arrays() -> None:
+    assert [path.stem for path in NOTEBOOKS] == ["arrays", "flight", "limit", "own_controller"]
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

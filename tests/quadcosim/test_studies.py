@@ -4,14 +4,16 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
 import quadcosim
 from orchestration.figures.style import STYLES
 from orchestration.tuning.tuning_file import load_tuning
-from quadcosim import Axis, QuadcosimError, Scenario, Study, Swept, UsageError
+from quadcosim import Axis, QuadcosimError, Result, Scenario, Study, Swept, Timing, UsageError
 from tests.orchestration.tuning.test_tuning import FILE
 from tests.patience import PATIENCE
 from tests.quadcosim.conftest import native
@@ -39,6 +41,80 @@ def test_a_sweep_is_not_flown_twice_and_tells_its_progress(swept: Swept) -> None
     again = quadcosim.sweep(STUDY, folder=swept.path.parent, progress=lambda done, total: heard.append((done, total)))
     assert (again.total, again.flown, heard) == (2, 0, [(2, 2)])
     assert repr(again) == f"<Swept: 2 runs, 0 flown now, in {again.path}>"
+
+
+MARGIN = 2.0
+
+
+def furthest(result: Result) -> float:
+    # a comment, and annotations, are no part of what is run
+    return float(np.abs(result.signals["plant.position.x"]).max())
+
+
+def test_functions_of_a_result_are_metrics_of_a_sweep_known_by_their_source(tmp_path: Path) -> None:
+    def nearest(result):
+        return np.abs(result.signals["plant.position.x"]).min()
+
+    def coarse(result):
+        return None if len(result.events) > 22 else len(result.events)
+
+    given = {"furthest": furthest, "nearest": nearest, "coarse": coarse}
+    found = quadcosim.sweep(STUDY, metrics=given, folder=tmp_path, progress=None)
+    table = found.to_pandas()
+    assert (table["furthest"] >= table["nearest"]).all()
+    alone = [quadcosim.run(native(stop_time=0.1, timing=Timing(period=period))) for period in (0.01, 0.02)]
+    assert table["furthest"].tolist() == [furthest(result) for result in alone]
+    assert table["coarse"].isna().tolist() == [True, False]
+    assert list(found.plot("furthest")) == ["furthest"]
+    assert quadcosim.sweep(STUDY, metrics=given, folder=tmp_path, progress=None).flown == 0
+    with pytest.raises(UsageError, match=r"holds another study \(metrics.nearest was .*\); expected the same one"):
+        quadcosim.sweep(STUDY, metrics={**given, "nearest": furthest}, folder=tmp_path, progress=None)
+
+
+def _uses_what_is_around(result):
+    return MARGIN * result.end
+
+
+def _of_two(result, other):
+    return 1.0
+
+
+def _scaled(scale):
+    def enclosed(result):
+        return scale * result.end
+
+    return enclosed
+
+
+@pytest.mark.parametrize(
+    ("function", "said"),
+    [
+        (_uses_what_is_around, "MARGIN is not in it: expected all that it uses in the function, but for modules"),
+        (_of_two, "expected a function of one argument, a Result, defined by def"),
+        (max, "has no source: expected a function of one argument"),
+        (_scaled(2.0), "scale is not in it: expected all that it uses in the function"),
+        (lambda result: 1.0, "expected a function of one argument, a Result, defined by def"),
+        (3, "has no source"),
+    ],
+    ids=["global", "two", "builtin", "enclosed", "lambda", "number"],
+)
+def test_a_function_that_its_source_does_not_say_as_a_whole_is_refused(function: Any, said: str) -> None:
+    with pytest.raises(UsageError, match=f"^metrics.own: .*{said}"):
+        quadcosim.sweep(STUDY, metrics={"own": function})
+
+
+def test_functions_and_lanes_do_not_go_together_and_an_error_in_one_is_that_of_its_run(tmp_path: Path) -> None:
+    with pytest.raises(
+        UsageError, match=r"^engine = batch: metrics that are functions need whole runs, one at a time$"
+    ):
+        quadcosim.sweep(STUDY, metrics={"furthest": furthest}, engine="batch")
+
+    def broken(result):
+        return result.signals["no.such"]
+
+    told: list[str] = []
+    quadcosim.sweep(STUDY, metrics={"broken": broken}, folder=tmp_path, progress=None, announce=told.append)
+    assert told[-1] == "run 1 (timing.period = 0.02) failed: metrics.broken: KeyError: 'no.such'"
 
 
 def test_a_notebook_shows_what_became_of_the_runs(swept: Swept) -> None:
