@@ -102,9 +102,9 @@ def numbers(table: "pd.DataFrame", metric: str) -> Floats:
 
 
 def _shown_first(study: Study, table: "pd.DataFrame") -> str:
-    good, system = figures.flew(table), study.origin
+    good = figures.flew(table)
     return shown_first(
-        system.objectives, lambda name: table[name].where(good).to_numpy(float, na_value=np.nan), judged(system)
+        study.judged, lambda name: table[name].where(good).to_numpy(float, na_value=np.nan), judged(study.origin)
     )
 
 
