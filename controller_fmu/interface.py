@@ -18,34 +18,57 @@ _USED = "used when use_reference_inputs is true"
 class ControllerInterface(Framed):
     """What makes one controller FMU exchangeable for another."""
 
-    position = Input("measured position P, inertial frame", "m", ZERO, frame=frames.inertial)
-    velocity = Input("measured velocity V, inertial frame", "m/s", ZERO, frame=frames.inertial)
+    position = Input("measured position P, inertial frame", "m", ZERO, frame=frames.inertial, terminal="motion")
+    velocity = Input("measured velocity V, inertial frame", "m/s", ZERO, frame=frames.inertial, terminal="motion")
     quaternion = Input(
-        "measured attitude Q, inertial to body; all zero: no measurement", "1", _UPRIGHT, frame=frames.attitude
+        "measured attitude Q, inertial to body; all zero: no measurement",
+        "1",
+        _UPRIGHT,
+        frame=frames.attitude,
+        terminal="motion",
     )
-    angular_velocity = Input("measured angular velocity, body frame", "rad/s", ZERO, frame=frames.body)
+    angular_velocity = Input(
+        "measured angular velocity, body frame", "rad/s", ZERO, frame=frames.body, terminal="motion"
+    )
 
     reference_position = Input(
-        f"desired position, {_USED}", "m", ZERO, name="reference.position", frame=frames.inertial
+        f"desired position, {_USED}", "m", ZERO, name="reference.position", frame=frames.inertial, terminal="reference"
     )
     reference_velocity = Input(
-        f"desired velocity, {_USED}", "m/s", ZERO, name="reference.velocity", frame=frames.inertial
+        f"desired velocity, {_USED}",
+        "m/s",
+        ZERO,
+        name="reference.velocity",
+        frame=frames.inertial,
+        terminal="reference",
     )
     reference_acceleration = Input(
-        f"desired acceleration, {_USED}", "m/s2", ZERO, name="reference.acceleration", frame=frames.inertial
+        f"desired acceleration, {_USED}",
+        "m/s2",
+        ZERO,
+        name="reference.acceleration",
+        frame=frames.inertial,
+        terminal="reference",
     )
-    reference_jerk = Input(f"desired jerk, {_USED}", "m/s3", ZERO, name="reference.jerk", frame=frames.inertial)
-    reference_snap = Input(f"desired snap, {_USED}", "m/s4", ZERO, name="reference.snap", frame=frames.inertial)
+    reference_jerk = Input(
+        f"desired jerk, {_USED}", "m/s3", ZERO, name="reference.jerk", frame=frames.inertial, terminal="reference"
+    )
+    reference_snap = Input(
+        f"desired snap, {_USED}", "m/s4", ZERO, name="reference.snap", frame=frames.inertial, terminal="reference"
+    )
     reference_yaw = Input(
         f"desired direction of the nose, from x of the inertial frame towards y, {_USED}",
         "rad",
         name="reference.yaw",
         frame=frames.yaw,
+        terminal="reference",
     )
-    reference_yaw_rate = Input(f"its rate, {_USED}", "rad/s", name="reference.yaw_rate", frame=frames.about_z)
+    reference_yaw_rate = Input(
+        f"its rate, {_USED}", "rad/s", name="reference.yaw_rate", frame=frames.about_z, terminal="reference"
+    )
 
-    thrust = Output("total thrust, upward in the body, held between samples", "N", nominal=_HOVER)
-    torque = Output("body torque, body frame, held between samples", "N.m", ZERO, frame=frames.body)
+    thrust = Output("total thrust, upward in the body, held between samples", "N", nominal=_HOVER, terminal="command")
+    torque = Output("body torque, body frame, held between samples", "N.m", ZERO, frame=frames.body, terminal="command")
     motor_thrust = Output(
         "what thrust and torque ask of each of four motors on an X frame, limited by nothing; 0 where motor.arm.* or "
         "motor.drag_to_thrust are not known",

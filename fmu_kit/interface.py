@@ -132,6 +132,7 @@ class Declared(property):
         above: float | None = None,
         nominal: float | None = None,
         quantity: str | None = None,
+        terminal: str | None = None,
         frame: Callable[[Any, Any], Any] | None = None,
     ) -> None:
         """`name`: where that of the FMI variable is not the attribute's; what is between that and `frame`: `Variable`.
@@ -149,7 +150,12 @@ class Declared(property):
             base_unit_exponents(self.unit)
         self.name, self._variability = name or "", variability or self.usually
         bounds = {"minimum": minimum, "maximum": maximum, "above": above}
-        self._said: dict[str, Any] = {**bounds, "nominal": nominal, "named_quantity": quantity}
+        self._said: dict[str, Any] = {
+            **bounds,
+            "nominal": nominal,
+            "named_quantity": quantity,
+            "terminal": terminal,
+        }
         self._frame = frame
 
     def __set_name__(self, owner: type, attribute: str) -> None:

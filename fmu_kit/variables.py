@@ -22,7 +22,7 @@ class Variable:
     The type of `start` is the type of the variable; one that is a member of an `IntEnum` makes an Enumeration of the
     members, named in lower case, for a parameter only. `minimum` and `maximum` are inclusive, `above` is an exclusive
     lower bound; they are checked for parameters when initialisation ends. `nominal` is a usual size, `named_quantity`
-    what is measured where the unit alone does not say it.
+    what is measured where the unit alone does not say it. Inputs and outputs of one `terminal` are wired as one.
     """
 
     name: str
@@ -36,6 +36,7 @@ class Variable:
     above: float | None = None
     nominal: float | None = None
     named_quantity: str | None = None
+    terminal: str | None = None
 
     def __post_init__(self) -> None:
         """Raise `TypeError` for an Enumeration whose range would not be checked."""

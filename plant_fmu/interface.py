@@ -23,21 +23,28 @@ _HOVER = _BODY.mass * _BODY.gravity
 class PlantInterface(Framed):
     """What goes in, what comes out, and of what the vehicle is."""
 
-    thrust = Input("total thrust, upward in the body, before limits and lag", "N", _HOVER, nominal=_HOVER)
-    torque = Input("body torque, body frame, before limits and lag", "N.m", ZERO, frame=frames.body)
+    thrust = Input(
+        "total thrust, upward in the body, before limits and lag", "N", _HOVER, nominal=_HOVER, terminal="command"
+    )
+    torque = Input("body torque, body frame, before limits and lag", "N.m", ZERO, frame=frames.body, terminal="command")
     external_force = Input("force in the inertial frame, added to the wind", "N", ZERO, frame=frames.inertial)
 
-    position = Output("position P, inertial frame", "m", ZERO, variability="continuous", frame=frames.inertial)
-    velocity = Output("velocity V, inertial frame", "m/s", ZERO, variability="continuous", frame=frames.inertial)
+    position = Output(
+        "position P, inertial frame", "m", ZERO, variability="continuous", frame=frames.inertial, terminal="motion"
+    )
+    velocity = Output(
+        "velocity V, inertial frame", "m/s", ZERO, variability="continuous", frame=frames.inertial, terminal="motion"
+    )
     quaternion = Output(
         "attitude Q, inertial to body, scalar last",
         "1",
         Quaternion(ZERO, 0.0),
         variability="continuous",
         frame=frames.attitude,
+        terminal="motion",
     )
     angular_velocity = Output(
-        "angular velocity, body frame", "rad/s", ZERO, variability="continuous", frame=frames.body
+        "angular velocity, body frame", "rad/s", ZERO, variability="continuous", frame=frames.body, terminal="motion"
     )
 
     mass = FixedParameter("mass m", "kg", _BODY.mass, above=0.0)

@@ -11,9 +11,14 @@ from controller_fmu.geometric.slave import GeometricController
 from controller_fmu.redesign.interface import Discretisation
 from controller_fmu.sliding_mode.slave import UnifiedController
 from fmu_kit.algebra import Inertia, Quaternion, Vec3
+from fmu_kit.bundle import Target
+from fmu_kit.compiler.emit.c_code import c_code
+from fmu_kit.compiler.pack.building import modules_of
+from fmu_kit.compiler.trace.tracing import trace
 from fmu_kit.frames import Frame
 from fmu_kit.slave import Slave
 from fmu_kit.trajectory import Trajectory
+from orchestration.building.models import MODELS
 from plant_fmu.slave import QuadrotorPlant
 from tests.controller_fmu.wired import Rows, flight
 
@@ -57,6 +62,19 @@ def test_a_redesign_knows_the_built_in_trajectory_along_the_axes_that_are_chosen
     mean: dict[str, Any] = {"discretisation": Discretisation.MEAN, "stages": 1}
     one = flight(controller, Frame.ENU, None, **still, **rising, **mean)
     assert_same_flight(one, flight(controller, Frame.NED, None, **still, **sinking, **turning, **mean))
+
+
+def test_a_variant_with_its_axes_fixed_has_no_trace_of_others() -> None:
+    target = Target.parse(MODELS["QuadrotorPlant"])
+
+    def text(**fixed: str) -> str:
+        variant = type("Variant", (QuadrotorPlant,), {"fixed": fixed})
+        return c_code(trace(variant, modules_of(target)))
+
+    def turns(code: str) -> bool:
+        return f"{math.sqrt(0.5)!r}" in code
+
+    assert (turns(text()), turns(text(frame="enu")), turns(text(frame="ned"))) == (True, True, False)
 
 
 @pytest.mark.parametrize("slave", [QuadrotorPlant, *CONTROLLERS])

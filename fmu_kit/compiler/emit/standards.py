@@ -8,7 +8,7 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 from fmu_kit import model_description
-from fmu_kit.compiler.emit import description_3
+from fmu_kit.compiler.emit import description_3, terminals
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,20 +20,30 @@ class Standard:
     """the file to compile; it includes the others"""
     describe: Callable[[Any, str], Element]
     """the model description of a slave class, from it and the file to compile"""
-    sources: Callable[[str, str], Mapping[str, bytes]]
-    """files that say how to compile it, from the model's name and the file to compile"""
+    beside: Callable[[Any, str], Mapping[str, bytes]]
+    """files that say how to compile and how to wire a slave class, from it and the file to compile"""
     calls: Mapping[str, str]
     """the functions that a phase may refuse, by what instance.h calls them"""
     types: Mapping[str, str]
     """whose functions get and set values of a type: that type's name, by what FMI 2.0 calls the first"""
 
 
-def _build_description(model: str, main: str) -> dict[str, bytes]:
+def _build_description(model: str, main: str) -> Element:
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = SubElement(root, "BuildConfiguration", modelIdentifier=model)
     files = SubElement(configuration, "SourceFileSet", language="C11")
     SubElement(files, "SourceFile", name=main)
-    return {"sources/buildDescription.xml": tostring(root, encoding="UTF-8", xml_declaration=True)}
+    return root
+
+
+def _beside_3(slave: Any, main: str) -> dict[str, bytes]:
+    found = {
+        "sources/buildDescription.xml": _build_description(slave.__name__, main),
+        terminals.TERMINALS: terminals.to_xml(slave),
+    }
+    return {
+        path: tostring(root, encoding="UTF-8", xml_declaration=True) for path, root in found.items() if root is not None
+    }
 
 
 STANDARDS = {
@@ -41,7 +51,7 @@ STANDARDS = {
         version=2,
         main="fmi2.c",
         describe=lambda slave, main: model_description.to_xml(slave, [main]),
-        sources=lambda model, main: {},
+        beside=lambda slave, main: {},
         calls={
             "SETUP_EXPERIMENT": "fmi2SetupExperiment",
             "ENTER_INITIALIZATION_MODE": "fmi2EnterInitializationMode",
@@ -61,7 +71,7 @@ STANDARDS = {
         version=3,
         main="fmi3.c",
         describe=lambda slave, main: description_3.to_xml(slave),
-        sources=_build_description,
+        beside=_beside_3,
         calls={
             "SETUP_EXPERIMENT": "fmi3EnterInitializationMode",
             "ENTER_INITIALIZATION_MODE": "fmi3EnterInitializationMode",

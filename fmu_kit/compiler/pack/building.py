@@ -87,7 +87,7 @@ def build(
     except TraceError as error:
         raise PackagingError(f"{target.name}: {error}") from error
     files = {f"sources/{name}": text for name, text in sources.items()}
-    files |= standard.sources(target.name, standard.main)
+    files |= standard.beside(slave_class(target), standard.main)
     files |= {f"documentation/{_PYTHON}/{path}": text.encode() for path, text in _python_sources(target).items()}
     files |= licences_and_icon(target, version)
     files[SOURCE_HASH_FILE] = source_hash(target, version).encode()

@@ -11,14 +11,16 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import FMU3Slave
 from fmpy.model_description import ModelDescription
 from fmpy.validation import validate_fmu
+from lxml import etree
 
 import quadcosim
 from orchestration.building import fmus
+from orchestration.building.models import MODELS
 from orchestration.quadrotor.scenario import Scenario
 from tests.commands import Main
 from tests.fmu_kit.compiler.compiled import compiled
 from tests.fmus.archive import files_of
-from tests.fmus.expected import MEASUREMENT
+from tests.fmus.expected import COMMAND, MEASUREMENT
 from tests.fmus.making import PAIR
 from tests.fmus.process import run, run_script
 from tests.native import assert_the_same
@@ -111,6 +113,34 @@ def test_its_icon_is_where_fmi_3_has_icons(name: str) -> None:
     two, three = (files_of(fmus.locate(f"native/{folder}{name}")) for folder in ("", "fmi3/"))
     assert three["terminalsAndIcons/icon.png"] == two["model.png"]
     assert "model.png" not in three
+
+
+def terminals(name: str) -> dict[str, list[str]]:
+    """Members of each terminal of an FMU, which is what the standard asks for."""
+    document = etree.fromstring(files_of(fmus.locate(f"native/fmi3/{name}"))["terminalsAndIcons/terminalsAndIcons.xml"])
+    schema = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
+    etree.XMLSchema(etree.parse(str(schema))).assertValid(document)
+    found = {}
+    for terminal in document.iter("Terminal"):
+        members = terminal.findall("TerminalMemberVariable")
+        assert [each.get("memberName") for each in members] == [each.get("variableName") for each in members]
+        found[terminal.get("name")] = [each.get("variableName") for each in members]
+    return found
+
+
+@pytest.mark.parametrize("controller", [name for name in MODELS if name != "QuadrotorPlant"])
+def test_terminals_of_one_name_fit_together_and_are_the_whole_loop(controller: str) -> None:
+    plant, law = terminals("QuadrotorPlant"), terminals(controller)
+    assert plant == {"command": [*COMMAND], "motion": [*MEASUREMENT]}
+    assert law == {**plant, "reference": law["reference"]}
+    causalities = [
+        {v.name: v.causality for v in read(f"native/fmi3/{name}").modelVariables}
+        for name in ("QuadrotorPlant", controller)
+    ]
+    for name in (*MEASUREMENT, *COMMAND):
+        assert {each[name] for each in causalities} == {"input", "output"}
+    inputs = [name for name, causality in causalities[1].items() if causality == "input"]
+    assert law["reference"] == [name for name in inputs if name not in MEASUREMENT]
 
 
 @pytest.mark.parametrize(
