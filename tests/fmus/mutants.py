@@ -28,6 +28,7 @@ from tests.fmus.damage import (
     file,
     found,
     handle_of,
+    put,
     replaced,
     root,
     source,
@@ -112,6 +113,18 @@ def _retype(name: str, kind: str, type: str) -> Damage:
 
 
 _GUID = "a1b2c3d4-0000-4000-8000-000000000000"
+
+
+def _dimension(name: str, start: str | None = None, of: str | None = None) -> Damage:
+    """It is an array of FMI 3.0: with so many elements, or with as many as another variable says."""
+
+    def change(root: Element) -> None:
+        dimension = SubElement(found(root, f"ModelVariables/*[@name='{name}']"), "Dimension")
+        put(dimension, {"start": start} if of is None else {"valueReference": handle_of(root, of)})
+
+    return description(change)
+
+
 _BUILD = "sources/buildDescription.xml"
 """What FMI 3.0 has of sources to be compiled"""
 
@@ -271,6 +284,18 @@ VARIABLES = (
     Mutant(name="radian left out", rule="unit-meaning", words=("unit rad/s:", "rad=1"), damage=unit("rad/s", rad=None)),
     Mutant(name="factor wrong", rule="unit-meaning", words=("unit kg:", "0.001"), damage=unit("kg", factor="0.001")),
     Mutant(name="unit without base units", rule="units", words=("unit m:",), damage=_without_base_unit("m")),
+    Mutant(
+        name="array of no elements", rule="arrays", words=("velocity.y: dimensions 0",), versions=(3,),
+        damage=_dimension("velocity.y", start="0"),
+    ),
+    Mutant(
+        name="as many elements as a number", rule="arrays", words=("velocity.y", "mass", "of Float64"), versions=(3,),
+        damage=_dimension("velocity.y", of="mass"),
+    ),
+    Mutant(
+        name="start of another length", rule="arrays", words=("mass: it starts with 2 values",), versions=(3,),
+        damage=variable("mass", start="1.0 1.0"),
+    ),
     Mutant(
         name="value reference twice", rule="value-references", words=("velocity.y", "10"),
         damage=variable("velocity.y", valueReference="10"),

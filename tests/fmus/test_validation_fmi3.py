@@ -11,7 +11,7 @@ from orchestration.checks.validation.fmu import Fmu
 from orchestration.checks.validation.reading import read_co_simulation, read_fmu
 from orchestration.checks.validation.structure import RULES, known_dependencies
 from orchestration.checks.validation.validator import validate
-from orchestration.checks.validation.variables import aliases, bounds, names
+from orchestration.checks.validation.variables import aliases, arrays, bounds, names
 from orchestration.fmi.archive import Archive, UnreadableFmuError
 from tests.fmus.archive import files_of
 from tests.fmus.damage import DESCRIPTION, write_fmu
@@ -195,6 +195,13 @@ def test_an_output_that_ticks_may_be_an_initial_unknown_and_need_not() -> None:
          "a, b: value reference 0 for all of them, but FMI 3.0 has one for each variable"),
         (names, '<Float64 name="a" valueReference="0"><Alias name="a b"/></Float64>',
          "'a b': expected a name by the convention structured"),
+        (arrays, '<Int32 name="n" valueReference="0" start="2" causality="parameter"/>'
+         '<Float64 name="a" valueReference="1"><Dimension valueReference="0"/></Float64>',
+         "a: its dimension is n, a fixed parameter of Int32: expected a structural or constant UInt64"),
+        (arrays, '<UInt64 name="n" valueReference="0" start="2" causality="structuralParameter">'
+         '<Dimension start="1"/></UInt64>', "n: a structural parameter with dimensions, expected a scalar"),
+        (arrays, '<Float64 name="a" valueReference="1" start="1 2 3"><Dimension start="2"/></Float64>',
+         "a: it starts with 3 values, expected 1 or 2"),
         (bounds, '<Float64 name="a" valueReference="0" start="1 3" max="2"><Dimension start="2"/></Float64>',
          "a: start = 3, expected at most max = 2"),
     ],

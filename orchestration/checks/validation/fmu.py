@@ -88,9 +88,9 @@ class Variable:
 
     @property
     def elements(self) -> "tuple[Variable, ...]":
-        """Itself, or the elements of an array, the last index first, which counts from 1."""
+        """Itself, or the elements of an array, of which the last index moves first; each has one start at most."""
         if self.shape is None:
-            return (self,)
+            return (self if len(self.starts) < 2 else replace(self, starts=self.starts[:1]),)
         indices = itertools.product(*(range(1, n + 1) for n in self.shape))
         starts = self.starts * (math.prod(self.shape) if len(self.starts) == 1 else 1)
         return tuple(

@@ -148,16 +148,19 @@ def _with_shape(found: Variable, element: Element, sizes: dict[str | None, str |
     dimensions = list(element.iterfind("Dimension"))
     named = [each.get("valueReference") for each in dimensions]
     shape = [
-        _whole(each.get("start"), what) if each.get("valueReference") is None else _size(sizes, each, what)
+        _whole(each.get("start"), what) if each.get("valueReference") is None else _size(sizes, each)
         for each in dimensions
     ]
     others = {**found.others, "dimension": tuple(_whole(each, what) for each in named if each is not None)}
     return replace(found, shape=tuple(shape), others=others)
 
 
-def _size(sizes: dict[str | None, str | None], dimension: Element, what: str) -> int:
-    start = sizes.get(dimension.get("valueReference"))
-    return 0 if start is None else _whole(start, what)
+def _size(sizes: dict[str | None, str | None], dimension: Element) -> int:
+    """What the variable starts with that is named; that it is a whole number is for a rule to say."""
+    try:
+        return int(float(sizes.get(dimension.get("valueReference")) or 0))
+    except ValueError:
+        return 0
 
 
 # -- the model structure ------------------------------------------------------------------------------------

@@ -50,6 +50,22 @@ def limits(variable: Variable) -> tuple[float, float]:
     return low, math.inf if variable.maximum is None else float(variable.maximum)
 
 
+def arrays(fmu: Fmu) -> Iterator[str]:
+    """An array has dimensions above 0 and a start for all of it, or one for each element (FMI 3.0, section 2.4.7)."""
+    for v in fmu.variables:
+        count = 1 if v.shape is None else math.prod(v.shape)
+        if len(v.starts) not in (0, 1, count):
+            yield f"{v.name}: it starts with {len(v.starts)} values, expected {'1' if count == 1 else f'1 or {count}'}"
+        if v.shape is not None and v.causality == "structuralParameter":
+            yield f"{v.name}: a structural parameter with dimensions, expected a scalar"
+        if not all(n > 0 for n in v.shape or ()):
+            yield f"{v.name}: dimensions {', '.join(map(str, v.shape or ()))}, expected each above 0"
+        for size in filter(None, map(fmu.variable, v.others.get("dimension", ()))):
+            if size.type != "UInt64" or not (size.causality == "structuralParameter" or size.variability == "constant"):
+                found = f"a {size.variability} {size.causality} of {size.type}"
+                yield f"{v.name}: its dimension is {size.name}, {found}: expected a structural or constant UInt64"
+
+
 def aliases(fmu: Fmu) -> Iterator[str]:
     """Variables with one value reference are one value under several names (FMI 2.0.4, section 2.2.7).
 
@@ -82,4 +98,4 @@ def _wrong_with_aliases(members: list[Variable]) -> Iterator[str]:
         yield f"their units are {', '.join(str(v.unit) for v in members)}"
 
 
-RULES = (names, bounds, aliases)
+RULES = (names, bounds, arrays, aliases)
