@@ -2,8 +2,8 @@
 
 import math
 import struct
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from itertools import islice
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, ClassVar, TypeAlias
 
@@ -97,21 +97,24 @@ class Instance:
 
     def get(self, variables: Iterable[Variable]) -> Row:
         """The values of scalars and of elements of arrays, asked for by type."""
-        by_type: dict[str, dict[str, Variable]] = {}
-        asked = list(variables)
-        for v in asked:
-            by_type.setdefault(v.type, {}).setdefault(v.whole, v)
-        found = {name: values for type, group in by_type.items() for name, values in self._got(type, group)}
-        return {v.name: found[v.whole][v.element] for v in asked}
+        by_type: dict[str, list[Variable]] = {}
+        for v in variables:
+            by_type.setdefault(v.type, []).append(v)
+        row: Row = {}
+        for type, group in by_type.items():
+            row.update(self._got(type, group))
+        return row
 
-    def _got(self, type: str, group: Mapping[str, Variable]) -> Iterator[tuple[str, list[Value]]]:
-        """The values of variables of one type, each with all that it holds."""
+    def _got(self, type: str, group: Sequence[Variable]) -> Iterator[tuple[str, Value]]:
+        """The values of variables of one type by their names, of which an array is asked for once."""
         access, convert = self.fmu.standard.access[type], _CONVERT[self.fmu.standard.types[type]]
-        lengths = [self.fmu.lengths[name] for name in group]
-        more = {} if lengths == [1] * len(lengths) else {"nValues": sum(lengths)}
-        values = iter(self._call(f"get{access}", [v.reference for v in group.values()], **more))
-        for name, length in zip(group, lengths):
-            yield name, [convert(value) for value in islice(values, length)]
+        references = {v.whole: v.reference for v in group}
+        lengths = [self.fmu.lengths[name] for name in references]
+        more = {} if sum(lengths) == len(lengths) else {"nValues": sum(lengths)}
+        values = self._call(f"get{access}", list(references.values()), **more)
+        first = dict(zip(references, accumulate(lengths, initial=0)))
+        for v in group:
+            yield v.name, convert(values[first[v.whole] + v.element])
 
     def _content(self, v: Variable) -> list[Any]:
         """What the variable that `v` is of was last set to, or else starts with, to be changed."""

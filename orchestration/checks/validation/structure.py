@@ -59,6 +59,7 @@ def known_dependencies(fmu: Fmu) -> Iterator[str]:
     Derivatives are not looked at: for co-simulation they mean nothing, and the FMI project's own FMUs list parameters.
     """
     called = fmu.standard.lists
+    states = {v.derivative_of for v in fmu.variables if v.derivative_of is not None}
     for (where, _), unknowns in ((called.outputs, fmu.outputs), (called.initial_unknowns, fmu.initial_unknowns)):
         initially = unknowns is fmu.initial_unknowns
         for unknown in unknowns:
@@ -67,14 +68,9 @@ def known_dependencies(fmu: Fmu) -> Iterator[str]:
             if fmu.version == 2 and list(listed) != sorted(set(listed)):
                 yield f"{where}: {name}: expected its dependencies once each, in the order of their indices"
             for known in filter(None, map(fmu.variable, listed)):
-                if not (_is_known(fmu, known) or (known.initial == "exact" if initially else _is_kept(fmu, known))):
+                given = known.causality in ("input", "independent") or known.handle in states or known.is_clocked
+                if not (given or (known.initial == "exact" if initially else _is_kept(fmu, known))):
                     yield f"{where}: {name} depends on {known.name}, a {known.causality}: expected an input"
-
-
-def _is_known(fmu: Fmu, variable: Variable) -> bool:
-    """Whether it is given from outside in every mode, or a state."""
-    states = {v.derivative_of for v in fmu.variables if v.derivative_of is not None}
-    return variable.causality in ("input", "independent") or variable.handle in states or variable.is_clocked
 
 
 def _is_kept(fmu: Fmu, variable: Variable) -> bool:
