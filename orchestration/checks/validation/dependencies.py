@@ -6,7 +6,8 @@ from collections import defaultdict, deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
-from orchestration.checks.validation.fmu import Fmu, Unknown, Variable
+from orchestration.checks.validation.declared import Unknown, Variable
+from orchestration.checks.validation.fmu import Fmu
 from orchestration.checks.validation.instance import Instance, RefusedError, Row, Value, Values, same
 from orchestration.checks.validation.probe import Plan, Probe
 

@@ -11,7 +11,8 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
 from orchestration.basics.errors import QuadcosimError
-from orchestration.checks.validation.fmu import Fmu, Variable
+from orchestration.checks.validation.declared import Variable
+from orchestration.checks.validation.fmu import Fmu
 from orchestration.fmi.messages import Message, words
 from orchestration.fmi.slaves import instantiate, loaded
 

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from fmu_kit.loader import GUID_FILE
 from fmu_kit.packaging import ICONS, NATIVE_TABLES, content_guid
 from orchestration.building.models import MODELS
-from orchestration.checks.validation.fmu import Fmu, Variable
+from orchestration.checks.validation.declared import Variable
+from orchestration.checks.validation.fmu import Fmu
 from orchestration.checks.validation.roles import ROLES
 from orchestration.checks.validation.units import base_units, dimensions
 

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from orchestration.checks.validation.declared import Variable
 from orchestration.checks.validation.finding import Note
-from orchestration.checks.validation.fmu import Fmu, Variable
+from orchestration.checks.validation.fmu import Fmu
 from orchestration.checks.validation.instance import Instance, RefusedError, Row, Value, Values, instance_of, same
 from orchestration.checks.validation.variables import limits
 from orchestration.fmi.messages import Message

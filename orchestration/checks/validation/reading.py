@@ -6,7 +6,8 @@ from typing import NoReturn
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from orchestration.checks.validation.fmu import NUMBERS, Fmu, Unknown, Variable
+from orchestration.checks.validation.declared import NUMBERS, Unknown, Variable
+from orchestration.checks.validation.fmu import Fmu
 from orchestration.checks.validation.standards import STANDARDS, Standard
 from orchestration.fmi.archive import DESCRIPTION, Archive, UnreadableFmuError, read_root, version_of
 

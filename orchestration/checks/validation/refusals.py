@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterator
 
-from orchestration.checks.validation.fmu import Variable
+from orchestration.checks.validation.declared import Variable
 from orchestration.checks.validation.instance import RefusedError, Value
 from orchestration.checks.validation.probe import PLAIN, Probe
 from orchestration.checks.validation.variables import limits

@@ -5,8 +5,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
+from orchestration.checks.validation.declared import Variable
 from orchestration.checks.validation.finding import Note
-from orchestration.checks.validation.fmu import Variable
 from orchestration.checks.validation.instance import RefusedError, Row, Value, same
 from orchestration.checks.validation.probe import FEWEST, PLAIN, Plan, Probe
 from orchestration.fmi.messages import WARNING

@@ -3,7 +3,8 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator
 
-from orchestration.checks.validation.fmu import Fmu, Unknown, Variable
+from orchestration.checks.validation.declared import Unknown, Variable
+from orchestration.checks.validation.fmu import Fmu
 
 
 def indices(fmu: Fmu) -> Iterator[str]:

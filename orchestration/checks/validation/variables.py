@@ -5,7 +5,8 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator
 
-from orchestration.checks.validation.fmu import NUMBERS, Fmu, Variable
+from orchestration.checks.validation.declared import NUMBERS, Variable
+from orchestration.checks.validation.fmu import Fmu
 
 _QUOTED = r"""'(?:[0-9A-Za-z_!#$%&()*+,\-./:;<>=?@\[\]^{}|~ ]|\\['"?\\abfnrtv])+'"""
 _PART = rf"(?:[A-Za-z_][0-9A-Za-z_]*|{_QUOTED})(?:\[[0-9]+(?:,[0-9]+)*\])?"
