@@ -87,28 +87,50 @@ function boxOf(tracks) {
     }
   }
   const middle = low.map((value, i) => (value + high[i]) / 2);
+  const points = tracks.flatMap((signals) => sampled(signals, low, high));
   const size = Math.max(0.5, ...low.map((value, i) => high[i] - value));
-  return { low, high, middle, size };
+  return { low, high, middle, size, points };
 }
 
-/** What turns a point (north, east, down) into a place on the screen, with its depth. */
+/** Some points of a path and its reference that lie in the box. */
+function sampled({ layout, columns, time }, low, high) {
+  const { position, reference } = layout.scene;
+  const step = Math.max(1, Math.floor(time.length / 150));
+  return [position, reference].filter(Boolean).flatMap((names) => {
+    const found = [];
+    for (let i = 0; i < time.length; i += step) found.push(names.map((name) => columns[name][i]));
+    return found.filter((point) => point.every((value, i) => value >= low[i] && value <= high[i]));
+  });
+}
+
+/** What turns a point (north, east, down) into a place on the screen, with its depth: all that is drawn fills it. */
 function camera(width, height) {
-  const fit = { scale: 1, right: 0, top: 0 };
-  const raw = projection(width, height, fit);
-  const corners = cornersOf(scene.box).map(raw);
-  const ends = (i) => [Math.min(...corners.map((c) => c[i])), Math.max(...corners.map((c) => c[i]))];
-  const [[left, right], [top, bottom]] = [ends(0), ends(1)];
-  const scale = scene.zoom * Math.min((width - 90) / (right - left || 1), (height - 70) / (bottom - top || 1));
-  return projection(width, height, { scale, right: (left + right) / 2 - width / 2, top: (top + bottom) / 2 - height / 2 });
+  const raw = projection(width, height, { scale: 1, right: 0, top: 0 });
+  const floor = floorOf(scene.box);
+  const { corner, top } = uprightOf(raw, floor);
+  const { from, to, down } = floor;
+  const ground = [from[0], to[0]].flatMap((n) => [from[1], to[1]].map((e) => [n, e, down]));
+  const places = [...ground, [...corner, top], ...scene.box.points].map(raw);
+  const ends = (i) => places.reduce(([a, b], place) => [Math.min(a, place[i]), Math.max(b, place[i])], [Infinity, -Infinity]);
+  const [[left, right], [high, low]] = [ends(0), ends(1)];
+  const scale = scene.zoom * Math.min((width - 100) / (right - left || 1), (height - 80) / (low - high || 1));
+  return projection(width, height, { scale, right: (left + right) / 2 - width / 2, top: (high + low) / 2 - height / 2 });
 }
 
-/** The corners of what is to be seen, the floor with them. */
-function cornersOf({ low, high, size }) {
+/** The floor: a grid of round numbers below all that is to be seen. */
+function floorOf({ low, high, size }) {
   const step = niceStep(size);
   const from = [0, 1].map((i) => Math.floor(low[i] / step) * step);
   const to = [0, 1].map((i) => Math.ceil(high[i] / step) * step);
-  const levels = [(Math.floor(low[2] / step) - 0.6) * step, Math.ceil(high[2] / step) * step];
-  return levels.flatMap((z) => [from[0], to[0]].flatMap((n) => [from[1], to[1]].map((e) => [n, e, z])));
+  return { step, from, to, down: Math.ceil(high[2] / step) * step };
+}
+
+/** The edges of the floor that are nearer, and the corner with the upright axis, which ends at `top`. */
+function uprightOf(project, { step, from, to, down }) {
+  const east = project([0, from[1], down])[2] < project([0, to[1], down])[2] ? from[1] : to[1];
+  const north = project([from[0], 0, down])[2] < project([to[0], 0, down])[2] ? from[0] : to[0];
+  const corner = [north, east === from[1] ? to[1] : from[1]];
+  return { north, east, corner, top: Math.floor(scene.box.low[2] / step) * step };
 }
 
 /** As `camera`, at a scale and moved by some pixels of the picture at scale 1. */
@@ -150,22 +172,19 @@ function niceStep(length) {
 }
 
 function drawFloor(context, project) {
-  const { low, high, size } = scene.box;
-  const step = niceStep(size);
-  const from = [0, 1].map((i) => Math.floor(low[i] / step) * step);
-  const to = [0, 1].map((i) => Math.ceil(high[i] / step) * step);
-  const down = Math.ceil(high[2] / step) * step;
+  const floor = floorOf(scene.box);
+  const { step, from, to, down } = floor;
   context.lineWidth = 1;
   context.strokeStyle = paint("grid");
   for (let n = from[0]; n <= to[0] + step / 2; n += step) stroke(context, project, [[n, from[1], down], [n, to[1], down]]);
   for (let e = from[1]; e <= to[1] + step / 2; e += step) stroke(context, project, [[from[0], e, down], [to[0], e, down]]);
-  drawTicks(context, project, from, to, down, step);
+  drawTicks(context, project, floor);
 }
 
 /** Numbers along the two edges of the floor that are nearer, and up a corner. */
-function drawTicks(context, project, from, to, down, step) {
-  const east = project([0, from[1], down])[2] < project([0, to[1], down])[2] ? from[1] : to[1];
-  const north = project([from[0], 0, down])[2] < project([to[0], 0, down])[2] ? from[0] : to[0];
+function drawTicks(context, project, floor) {
+  const { step, from, to, down } = floor;
+  const { north, east, corner, top } = uprightOf(project, floor);
   context.fillStyle = paint("soft");
   context.font = "11px system-ui, sans-serif";
   context.textAlign = "center";
@@ -176,8 +195,6 @@ function drawTicks(context, project, from, to, down, step) {
   for (let e = from[1]; e <= to[1] + step / 2; e += step) text(shown(e), [north + shift * outward(north, from[0]), e, down]);
   text("north [m]", [(from[0] + to[0]) / 2, east + 2.4 * shift * outward(east, from[1]), down]);
   text("east [m]", [north + 2.4 * shift * outward(north, from[0]), (from[1] + to[1]) / 2, down]);
-  const corner = [north, east === from[1] ? to[1] : from[1]];
-  const top = Math.floor(scene.box.low[2] / step) * step;
   if (Math.cos(scene.elevation) < 0.3) return;
   context.strokeStyle = paint("edge");
   stroke(context, project, [[...corner, down], [...corner, top]]);
@@ -300,7 +317,7 @@ function drawVehicle(context, project, here, q, color, force) {
   if (!here.every((value) => Math.abs(value) < 1e4)) return;
   const size = sizeOfVehicle();
   const at = (point) => rotated(q, point).map((value, i) => here[i] + value);
-  const down = Math.ceil(scene.box.high[2] / niceStep(scene.box.size)) * niceStep(scene.box.size);
+  const { down } = floorOf(scene.box);
   context.strokeStyle = paint("edge");
   context.lineWidth = 1;
   context.setLineDash([2, 3]);
