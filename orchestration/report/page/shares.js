@@ -56,11 +56,30 @@ function drawSharesOfCells() {
   const layout = {
     height: 330, margin: { l: 60, r: 10, t: 10, b: 48 }, hovermode: "closest", legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom" },
     xaxis: { title: { text: escaped(titled(axis, unit)) }, zeroline: false },
+    annotations: namesOnLines(controllers.map((controller) => cellsHere().filter((cell) => cell.controller === controller))),
     yaxis: { title: { text: "share of the starts" }, range: [-0.03, 1.03], tickformat: ".0%", zeroline: false },
   };
   drawPlot(byId("shares-plot"), traces, layout);
   const rows = cellsHere().map((cell) => [`${cell.controller}, ${withUnit(cell.value, unit)}`, `${cell.survives.good} of ${cell.survives.runs}`, `${percent(cell.survives.low)} to ${percent(cell.survives.high)}`, String(cell.settles.good), `${percent(cell.settles.low)} to ${percent(cell.settles.high)}`]);
   byId("shares-table").replaceChildren(tableOf(rows, ["cell", "survive", "95 % interval", "settle", "95 % interval"]));
+}
+
+/** Names on the lines of those that survive, each at another height: the sooner a line falls, the lower, as in figures. */
+function namesOnLines(groups) {
+  const mean = (group) => group.reduce((sum, cell) => sum + cell.survives.good / cell.survives.runs, 0) / group.length;
+  const ordered = groups.filter((group) => group.length).sort((a, b) => mean(a) - mean(b));
+  return ordered.map((group, k) => {
+    const height = 0.1 + (0.8 * (2 * k + 1)) / (2 * ordered.length);
+    const share = group.map((cell) => cell.survives.good / cell.survives.runs);
+    const below = share.findIndex((each, i) => i > 0 && each < height && share[i - 1] >= height);
+    const last = group.length - 1;
+    const along = below > 0 ? (share[below - 1] - height) / (share[below - 1] - share[below]) : 0;
+    const x = below > 0 ? group[below - 1].value + along * (group[below].value - group[below - 1].value) : group[last].value;
+    return {
+      x, y: below > 0 ? height : share[last], text: escaped(group[0].controller), showarrow: false, xanchor: below > 0 ? "center" : "right",
+      font: { size: 11, color: COLORS[report.compared.controllers.indexOf(group[0].controller) % 8] }, bgcolor: paint("paper"), opacity: 0.9, borderpad: 1,
+    };
+  });
 }
 
 const cells = { place: 0, open: null };

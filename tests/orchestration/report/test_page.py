@@ -256,6 +256,11 @@ def test_the_slider_goes_over_the_flights_of_the_open_cell(of_comparison: Any) -
     assert "period 20 ms" in of_comparison.inner_text("#run-text")
 
 
+def test_the_lines_of_a_comparison_have_the_names_of_their_controllers(of_comparison: Any) -> None:
+    of_comparison.wait_for_function("document.getElementById('shares-plot').layout?.annotations?.length === 1")
+    assert of_comparison.evaluate("document.getElementById('shares-plot').layout.annotations[0].text") == "own"
+
+
 def test_hovering_over_a_cell_says_settings_and_metric(of_study: Any) -> None:
     box = of_study.locator("#map-plot .nsewdrag").bounding_box()
     of_study.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 0.7 * box["height"])
