@@ -297,12 +297,20 @@ def ssp(
         Path | None,
         typer.Option("--out", help="The file; default: QuadrotorLoop.ssp in fmus/, or NAME.ssp here.", metavar="FILE"),
     ] = None,
+    read_back: Annotated[
+        bool,
+        typer.Option(
+            "--read-back", help="Begin to fly it in libcosim, ecos and fmpy, where installed, and tell what each says."
+        ),
+    ] = False,
     *,
     flags: FlightFlags,
 ) -> Answer:
     """Write FMUs, connections and parameters as one SSP 1.0 file for other tools, and beside it its timing."""
     from orchestration.building import fmus
+    from orchestration.interop.reading_back import readings
     from orchestration.requests.ssp import writing
+    from orchestration.requests.ssp.carried import carried
 
     asked = request_from(scenario, flags)
     if asked.title is not None or scenario is None:
@@ -311,7 +319,14 @@ def ssp(
         usual = Path(f"{scenario.stem}.ssp")
     written, timing = writing.write_with_timing(asked, out or usual, say, warn)
     say(f"{timing} has its timing, for quadcosim run")
-    return Answer(document={"files": [written, timing]}, lines=[str(written)])
+    masters: dict[str, str | None] = {}
+    for reading in readings(written, carried(asked)) if read_back else ():
+        masters[reading.master] = reading.refusal
+        if reading.refusal is None:
+            say(f"{reading.master} flies it")
+        else:
+            warn(f"{reading.master} does not fly it: {reading.refusal}")
+    return Answer(document={"files": [written, timing], "masters": masters}, lines=[str(written)])
 
 
 registering.add(app, FLY, run)
