@@ -26,6 +26,7 @@ OPTIONS = ("-std=c99", "-fno-math-errno")
 FLIGHT = ("-DSTEPS=3000", "-DH=0.01", "-DSAMPLE_PERIOD=0")
 WITHOUT_TEXTS = "-DUNIFIEDCONTROLLER_NO_TEXTS"
 OFF: dict[str, Value] = {
+    "frame": "ned",
     "discretisation": "explicit",
     "prediction": 0.0,
     "gain_scaling": "absolute",
