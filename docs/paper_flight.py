@@ -1,7 +1,6 @@
 """The paper's flight beside what the paper says of it: its Fig. 3 drawn anew, and a table of statements."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,11 +23,11 @@ BELOW = (0.05, 0.01)
 def figure_3(result: Result, style: Style) -> Figure:
     """Arranged as the caption of Fig. 3 says: the path at the left, the four errors at the right."""
     (run,) = runs_of([result], [""], None, None)
-    figure = style.figure(46.0)
-    halves: Any = figure.subfigures(1, 2, width_ratios=(1.0, 1.15))
+    figure = style.figure(44.0)
+    halves: Any = figure.subfigures(1, 2, width_ratios=(1.2, 1.0))
     left, right = halves
     axes: Any = left.add_subplot(projection="3d")
-    draw_in_space(axes, [run], replace(style, width=0.5 * style.width))
+    draw_in_space(axes, [run], style)
     left.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     panels = right.subplots(4, 1, sharex=True)
     for panel, error in zip(panels, _as_printed(), strict=True):
