@@ -1,8 +1,25 @@
-"""Whether the model that the controller believes in is the plant that it flies."""
+"""Whether plant and controller mean the same: by the model that the controller believes in, and by their axes."""
 
 from collections.abc import Mapping
 
 from orchestration.quadrotor.wiring import RIGID_BODY
+
+_FRAME, _INDEX = "frame", "frame_index"
+"""Parameters of both: their axes, and what sets them too unless it is 0"""
+
+
+def axes_differ(parameters: Mapping[str, float]) -> str | None:
+    """What is wrong with the axes of plant and controller; None if they are the same, or one has no other axes.
+
+    The map holds the parameters of a run by their paths.
+    """
+    frames = [
+        parameters.get(f"{side}.{_INDEX}") or parameters.get(f"{side}.{_FRAME}") for side in ("controller", "plant")
+    ]
+    if None in frames or frames[0] == frames[1]:
+        return None
+    there, here = (f"{frame:g}" for frame in frames)
+    return f"controller.{_FRAME} is item {there}, plant.{_FRAME} item {here}: expected the same axes on both sides"
 
 
 def mismatch(plant: Mapping[str, float], controller: Mapping[str, float]) -> str | None:

@@ -14,7 +14,7 @@ from orchestration.basics.errors import UsageError, no_such_key, shown
 from orchestration.basics.records import record
 from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD, USE_REFERENCE_INPUTS
 from orchestration.quadrotor.initial_conditions import Starts, starts_in
-from orchestration.quadrotor.nominal_model import mismatch
+from orchestration.quadrotor.nominal_model import axes_differ, mismatch
 from orchestration.quadrotor.quantities import range_of
 from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.timing import Timing
@@ -213,8 +213,9 @@ class Scenario:
         return dataclasses.replace(self, timing=timing, record=Record(plant=(), controller=()))
 
     def warnings(self, parameters: Mapping[str, float]) -> tuple[str, ...]:
-        """What may not be meant: a nominal model that is not the plant's, a run too short for its timing."""
-        found = []
+        """What may not be meant: a nominal model or axes that are not the plant's, a run too short for its timing."""
+        other_axes = axes_differ(parameters)
+        found = [] if other_axes is None else [other_axes]
         if not self.model_mismatch:
             sides = [
                 {name: parameters[f"{side}.{name}"] for name in RIGID_BODY if f"{side}.{name}" in parameters}

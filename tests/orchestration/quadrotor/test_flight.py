@@ -431,6 +431,13 @@ def test_nominal_model_that_is_not_the_plant_is_warned_of_unless_it_is_meant() -
     assert quadcosim.run(both).warnings == ()
 
 
+def test_axes_of_one_side_are_warned_of_however_they_are_set() -> None:
+    one_side = native(stop_time=0.02).with_changes(parameters={"plant.frame_index": 2})
+    (warning,) = quadcosim.run(one_side).warnings
+    assert warning == "controller.frame is item 1, plant.frame item 2: expected the same axes on both sides"
+    assert quadcosim.run(one_side.with_changes(parameters={"controller.frame": "enu"})).warnings == ()
+
+
 def test_progress_and_announcements_are_heard() -> None:
     heard: list[float] = []
     quadcosim.run(native(stop_time=1.0), progress=heard.append)
