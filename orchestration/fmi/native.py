@@ -26,7 +26,7 @@ from orchestration.fmi import pythonfmu
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.messages import WARNING, Messages, words
 from orchestration.fmi.model import Variable, read_model
-from orchestration.fmi.slaves import instantiate, loaded
+from orchestration.fmi.slaves import binary_folders, folder_here, instantiate, loaded
 from orchestration.fmi.surroundings import FOLDER, ROUNDING, Surroundings, sentence
 from orchestration.fmi.values import Value, number_of, same, taken
 
@@ -83,9 +83,10 @@ class NativeInstance(Instance):
         self._tolerance = self.model.tolerance
         self._expect_supported()
         self.guard = None if self.model.is_of_this_kit else Surroundings()
-        found = fmpy.supported_platforms(str(path))
-        if fmpy.platform not in found:
-            raise QuadcosimError(f"{path}: has no binary for {fmpy.platform}, only for {', '.join(found) or 'none'}")
+        try:
+            folder_here(self.model.version, binary_folders(path))
+        except QuadcosimError as error:
+            raise QuadcosimError(f"{path}: {error}") from None
         try:
             self._folder = scratch.temporary()
             fmpy.extract(str(path), str(self._folder.path))

@@ -1,6 +1,7 @@
 """fmpy's instances of FMUs for co-simulation, of either version of FMI: what begins alike is one text here."""
 
 import ctypes
+import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
@@ -8,11 +9,19 @@ from typing import Any, ClassVar
 import fmpy
 from fmpy import fmi2, fmi3
 
+from orchestration.basics.errors import QuadcosimError
 from orchestration.fmi.messages import Message, collecting_callbacks
 from orchestration.fmi.pythonfmu import release_interpreter_state
 
-FOLDERS: Mapping[int, str] = {2: fmpy.platform, 3: fmpy.platform_tuple}
-"""The folder in `binaries/` that is for this machine, by the version of FMI"""
+_IS_X86 = fmpy.platform_tuple.startswith("x86")
+FOLDERS: Mapping[int, tuple[str, ...]] = {
+    2: (fmpy.platform,) if _IS_X86 else (fmpy.platform_tuple, fmpy.platform),
+    3: (fmpy.platform_tuple,),
+}
+"""The folders in `binaries/` that are for this machine, by the version of FMI: the first that there is.
+
+For other processors than x86, FMI 2.0 takes the names of FMI 3.0 (FMI 2.0.4, section 2.3), and tools take `linux64`.
+"""
 
 
 class _Known:
@@ -54,10 +63,29 @@ class FMU3Slave(_Known, fmi3.FMU3Slave):  # type: ignore[misc]
         return list(values)
 
 
+def binary_folders(path: Path) -> list[str]:
+    """The folders with binaries of an FMU."""
+    with zipfile.ZipFile(path) as archive:
+        parts = [name.split("/") for name in archive.namelist()]
+    return sorted({part[1] for part in parts if part[0] == "binaries" and len(part) > 2 and part[2]})
+
+
+def folder_here(version: int, found: Sequence[str]) -> str:
+    """Of the folders with binaries that an FMU has, the one for this machine; raises `QuadcosimError` for none."""
+    for folder in FOLDERS[version]:
+        if folder in found:
+            return folder
+    raise QuadcosimError(f"has no binary for {' or '.join(FOLDERS[version])}, only for {', '.join(found) or 'none'}")
+
+
 def loaded(version: int, folder: Path, *, token: str, identifier: str, name: str) -> Any:
     """The library of an FMU that is unpacked in `folder`, for an instance of that name; `token` is its GUID."""
-    kind = FMU3Slave if version == 3 else FMU2Slave
-    return kind(guid=token, unzipDirectory=str(folder), modelIdentifier=identifier, instanceName=name)
+    known = {"guid": token, "unzipDirectory": str(folder), "modelIdentifier": identifier, "instanceName": name}
+    if version == 3:
+        return FMU3Slave(**known)
+    here = folder_here(version, sorted(each.name for each in (folder / "binaries").iterdir()))
+    library = folder / "binaries" / here / f"{identifier}{fmpy.sharedLibraryExtension}"
+    return FMU2Slave(**known, libraryPath=str(library))
 
 
 def instantiate(slave: Any, messages: list[Message]) -> None:

@@ -17,8 +17,9 @@ _REDISTRIBUTABLE = "the Microsoft Visual C++ Redistributable"
 
 def part_for(fmu: Fmu, machine: Machine) -> PlatformBinary | None:
     """The FMU's binary that loads on this machine, if any."""
-    for part in fmu.platforms:
-        if part.platform == machine.platform(fmu.version) and part.binary is not None:
+    parts = {part.platform: part for part in fmu.platforms}
+    for part in map(parts.get, machine.platforms(fmu.version)):
+        if part is not None and part.binary is not None:
             return part if part.binary.fits(machine.system, machine.architecture) else None
     return None
 

@@ -104,11 +104,9 @@ def _load(fmu: Fmu, folder: Path) -> None:
 
     from orchestration.fmi.messages import Message, words
     from orchestration.fmi.pythonfmu import expect_readable_place
-    from orchestration.fmi.slaves import FOLDERS, instantiate, loaded
+    from orchestration.fmi.slaves import folder_here, instantiate, loaded
 
-    here = FOLDERS[fmu.version]
-    if here not in {part.platform for part in fmu.platforms}:
-        raise QuadcosimError(f"has no binary for {here}")
+    folder_here(fmu.version, [part.platform for part in fmu.platforms])
     fmpy.extract(str(fmu.path), str(folder))
     expect_readable_place(folder)
     messages: list[Message] = []

@@ -59,11 +59,16 @@ class Machine:
     modules: Mapping[str, bool] = field(default_factory=dict)
     """Whether this Python can import a module."""
 
-    def platform(self, version: int) -> str:
-        """The folder in `binaries/` that tools of a version of FMI look into here."""
+    def platforms(self, version: int) -> tuple[str, ...]:
+        """The folders in `binaries/` that are for it in a version of FMI, the first that there is being taken.
+
+        For other processors than x86, FMI 2.0 takes the names of FMI 3.0 (FMI 2.0.4, section 2.3), tools as for x86.
+        """
+        name = f"{ARCHITECTURES.get(self.architecture, self.architecture)}-{SYSTEMS.get(self.system, self.system)}"
         if version == 3:
-            return f"{ARCHITECTURES.get(self.architecture, self.architecture)}-{SYSTEMS.get(self.system, self.system)}"
-        return _FOLDERS.get(self.system, self.system) + ("64" if self.architecture in _ON_64_BITS else "32")
+            return (name,)
+        usual = _FOLDERS.get(self.system, self.system) + ("64" if self.architecture in _ON_64_BITS else "32")
+        return (usual,) if self.architecture.startswith("x86") else (name, usual)
 
 
 def this_machine(fmus: Iterable[Fmu]) -> Machine:

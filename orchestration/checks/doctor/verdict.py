@@ -40,8 +40,8 @@ class Verdict:
     """An FMU on a machine."""
 
     fmu: Fmu
-    platform: str
-    """The folder in `binaries/` that is for the machine."""
+    platforms: tuple[str, ...]
+    """The folders in `binaries/` that are for the machine."""
     python_host: Host
     other_host: Host
     failure: str | None
@@ -69,7 +69,7 @@ class Verdict:
         return self.python_host.ready and self.other_host.ready and self.failure is None and not self.problems
 
     def _of_parts(self, *, here: bool) -> list[str]:
-        parts = [part for part in self.fmu.platforms if (part.platform == self.platform) == here]
+        parts = [part for part in self.fmu.platforms if (part.platform in self.platforms) == here]
         return [f"{part.platform}: {part.problem}" for part in parts if part.problem is not None]
 
 
@@ -91,7 +91,7 @@ def judge(fmu: Fmu, machine: Machine, failure: str | None) -> Verdict:
     """Compare; `failure` is what trying to load it here gave."""
     hosts = python_host(fmu, machine), other_host(fmu, machine)
     return Verdict(
-        fmu=fmu, platform=machine.platform(fmu.version), python_host=hosts[0], other_host=hosts[1], failure=failure
+        fmu=fmu, platforms=machine.platforms(fmu.version), python_host=hosts[0], other_host=hosts[1], failure=failure
     )
 
 

@@ -65,9 +65,9 @@ def _run(probe: Probe, report: Report) -> None:
     if fmu.is_ours:
         report.tried((own_description,), probe, RefusedError)
     here, platforms = FOLDERS[fmu.version], fmu.platforms
-    if here not in platforms:
+    if not set(here) & set(platforms):
         report.rule(PLATFORM)
-        missing = f"expected a binary for {here}, found {', '.join(platforms) or 'none'}"
+        missing = f"expected a binary for {' or '.join(here)}, found {', '.join(platforms) or 'none'}"
         report.found(f"what the FMU does was not checked: {missing}")
         return
     if any(report.tried([rule], probe, RefusedError) for rule in run_rules.FIRST):

@@ -9,17 +9,20 @@ import textwrap
 from pathlib import Path
 from typing import Any
 
+import fmpy
 import numpy as np
 import pytest
 
-from orchestration.basics.errors import SimulatorError, UsageError
-from orchestration.fmi import instances
+from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageError
+from orchestration.fmi import instances, slaves
 from orchestration.fmi.isolated import IsolatedInstance
 from orchestration.fmi.native import NativeInstance
 from orchestration.processes import subprocesses
 from orchestration.runs.result import Result
 from orchestration.runs.simulation import prepared
 from orchestration.system.model import Component, Connection, Sampling, Source, System
+from tests.fmus.archive import files_of
+from tests.fmus.damage import write_fmu
 from tests.orchestration.fmi.small import BINARY, CLOCK, SIZE, needs_compiler, nothing_known, small
 
 pytestmark = needs_compiler
@@ -413,3 +416,20 @@ def test_a_banner_does_not_spoil_the_json_of_a_command(tmp_path: Path) -> None:
     )  # fmt: skip
     assert json.loads(done.stdout)["peak"] == 0.0
     assert "SMALL FMU, version 1" in done.stderr
+
+
+def test_on_other_processors_an_fmu_of_fmi_2_is_found_by_the_name_of_fmi_3(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As if this machine were one: the folder of the standard goes before that which tools have for all processors."""
+    monkeypatch.setitem(slaves.FOLDERS, 2, ("aarch64-linux", fmpy.platform))
+    path = small(tmp_path)
+    with instances.open_here(path, "it") as it:
+        assert it.get("gain") == 1.0
+    content = {name.replace(fmpy.platform, "aarch64-linux"): each for name, each in files_of(path).items()}
+    write_fmu(path, {**content, f"binaries/{fmpy.platform}/Small{fmpy.sharedLibraryExtension}": b"of x86"})
+    with instances.open_here(path, "it") as it:
+        assert it.get("gain") == 1.0
+    write_fmu(path, {name.replace("aarch64-linux", "win64"): each for name, each in content.items()})
+    with pytest.raises(QuadcosimError, match=f"no binary for aarch64-linux or {fmpy.platform}, only for win64$"):
+        instances.open_here(path, "it")

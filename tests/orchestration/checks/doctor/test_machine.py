@@ -18,20 +18,25 @@ from orchestration.checks.doctor.verdict import judge
 @pytest.mark.parametrize(
     ("name", "machine", "system", "architecture", "folders"),
     [
-        ("Linux", "x86_64", LINUX, "x86-64", ("linux64", "x86_64-linux")),
-        ("Linux", "aarch64", LINUX, "aarch64", ("linux64", "aarch64-linux")),
-        ("Windows", "AMD64", WINDOWS, "x86-64", ("win64", "x86_64-windows")),
-        ("Darwin", "arm64", MACOS, "aarch64", ("darwin64", "aarch64-darwin")),
+        ("Linux", "x86_64", LINUX, "x86-64", (("linux64",), ("x86_64-linux",))),
+        ("Linux", "aarch64", LINUX, "aarch64", (("aarch64-linux", "linux64"), ("aarch64-linux",))),
+        ("Windows", "AMD64", WINDOWS, "x86-64", (("win64",), ("x86_64-windows",))),
+        ("Darwin", "arm64", MACOS, "aarch64", (("aarch64-darwin", "darwin64"), ("aarch64-darwin",))),
     ],
 )
 def test_every_system_is_called_as_binaries_call_it(
-    name: str, machine: str, system: str, architecture: str, folders: tuple[str, str], monkeypatch: pytest.MonkeyPatch
+    name: str,
+    machine: str,
+    system: str,
+    architecture: str,
+    folders: tuple[tuple[str, ...], tuple[str, ...]],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(platform, "system", lambda: name)
     monkeypatch.setattr(platform, "machine", lambda: machine)
     looked_at = this_machine(())
     assert (looked_at.system, looked_at.architecture) == (system, architecture)
-    assert (looked_at.platform(2), looked_at.platform(3)) == folders
+    assert (looked_at.platforms(2), looked_at.platforms(3)) == folders
 
 
 @pytest.mark.parametrize("name", ["Windows", "Darwin", "FreeBSD", ""])
@@ -63,4 +68,4 @@ def test_libraries_are_looked_for_under_the_names_that_binaries_give(built: dict
 def test_a_process_of_32_bits_is_one_on_a_machine_of_64(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(platform, "machine", lambda: "x86_64")
     monkeypatch.setattr("struct.calcsize", lambda kind: 4)
-    assert (this_machine(()).platform(2), this_machine(()).platform(3)) == ("linux32", "x86-linux")
+    assert (this_machine(()).platforms(2), this_machine(()).platforms(3)) == (("linux32",), ("x86-linux",))

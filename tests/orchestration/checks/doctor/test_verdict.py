@@ -100,6 +100,16 @@ def test_the_header_decides_not_the_folder(plant: Path, tmp_path: Path) -> None:
     assert not on_arm.good
 
 
+def test_on_arm_the_folder_of_fmi_3_goes_before_that_of_x86(plant: Path, tmp_path: Path) -> None:
+    elf = files_of(plant)[LINUX64]
+    files = {"binaries/aarch64-linux/QuadrotorPlant.so": for_machine(elf, AARCH64)}
+    fmu = read_fmu(changed(plant, tmp_path / "both.fmu", files))
+    on_arm = judged(fmu, architecture="aarch64")
+    assert needs(on_arm) == ((), ())
+    assert on_arm.problems == ()
+    assert judged(fmu).good
+
+
 def test_an_old_glibc_is_told_what_is_wanted(fmu: Fmu) -> None:
     machine = machine_for(fmu)
     old = without(machine, "libc.so.6", "GLIBC_2.2.5", "GLIBC_2.4", "GLIBC_2.14", "GLIBC_2.31")
