@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
+from fmu_kit.frames import Frame
 from orchestration.basics.simulator import Floats
 from orchestration.quadrotor.measures import position_error
 from orchestration.quadrotor.wiring import (
@@ -15,6 +16,7 @@ from orchestration.quadrotor.wiring import (
     components,
 )
 from orchestration.report.model import Line, Panel, Scene
+from orchestration.system.model import System
 
 POSITION_ERROR = "position error"
 """A column that is computed: ‖P - P_d‖ [m]"""
@@ -60,7 +62,7 @@ class FlightLayout:
                 logarithmic=True,
             ),
             Panel(
-                title="position (x north, y east, z down)",
+                title="position",
                 unit="m",
                 lines=(
                     *_vector(PLACE, "xyz"),
@@ -87,8 +89,11 @@ class FlightLayout:
         known = {*columns, *ANGLES, *DESIRED_ANGLES, *([POSITION_ERROR] if aims else [])}
         return tuple(panel for panel in panels if all(line.column in known for line in panel.lines))
 
-    def scene(self, columns: Collection[str]) -> Scene:
-        """The vehicle, and what it follows."""
+    def scene(self, columns: Collection[str], system: System | None) -> Scene | None:
+        """The vehicle, and what it follows, in north-east-down."""
+        given = {} if system is None else system.components["plant"].parameters
+        if given.get("frame") in ("enu", Frame.ENU) or given.get("frame_index") == Frame.ENU:
+            return None
         return Scene(
             position=(PLACE[0], PLACE[1], PLACE[2]),
             quaternion=(ATTITUDE[0], ATTITUDE[1], ATTITUDE[2], ATTITUDE[3]),

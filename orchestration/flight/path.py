@@ -11,11 +11,13 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Bbox
 
+from fmu_kit.frames import Frame
 from orchestration.basics.simulator import Floats
 from orchestration.figures.lines import abreast
 from orchestration.figures.palette import BLUE, ORANGE
 from orchestration.figures.run import Run, title
 from orchestration.figures.style import Style
+from orchestration.quadrotor.nominal_model import frame_of
 from orchestration.quadrotor.wiring import POSITION, POSITION_REFERENCE
 
 ROUNDS = 4
@@ -104,19 +106,24 @@ def draw_in_space(axes: Any, runs: Sequence[Run], style: Style) -> None:
                 *points[place, :, None], marker, color=color, zorder=3, label=what if run.place == 0 else None,
                 markerfacecolor="white" if what == "start" else color,
             )  # fmt: skip
-    _equal(axes, np.concatenate([*flown, *wanted]), is_wide=style.is_wide)
-    axes.set(xlabel="x, north [m]", ylabel="y, east [m]", zlabel="z, down [m]")
+    is_enu = frame_of(runs[0].parameters, "plant") == Frame.ENU
+    _equal(axes, np.concatenate([*flown, *wanted]), is_enu=is_enu, is_wide=style.is_wide)
+    names = ("east", "north", "up") if is_enu else ("north", "east", "down")
+    axes.set(**{f"{axis}label": f"{axis}, {name} [m]" for axis, name in zip("xyz", names, strict=True)})
     axes.view_init(elev=24, azim=-50)
 
 
-def _equal(axes: Any, points: Floats, *, is_wide: bool) -> None:
-    """Equal scales in a box that holds all points; x to the viewer's right, z down."""
+def _equal(axes: Any, points: Floats, *, is_enu: bool, is_wide: bool) -> None:
+    """Equal scales in a box that holds all points; x to the viewer's right, up up."""
     points = points[np.isfinite(points).all(axis=1)]
     low, high = points.min(axis=0), points.max(axis=0)
     middle, size = 0.5 * (low + high), 1.08 * (high - low)
     size = np.maximum(size, max(LEAST * float(size.max()), 1e-6))
     starts, ends = middle - 0.5 * size, middle + 0.5 * size
-    axes.set(xlim=(starts[0], ends[0]), ylim=(ends[1], starts[1]), zlim=(ends[2], starts[2]))
+    axes.set(xlim=(starts[0], ends[0]), ylim=(starts[1], ends[1]), zlim=(starts[2], ends[2]))
+    if not is_enu:
+        axes.invert_yaxis()
+        axes.invert_zaxis()
     axes.set_box_aspect(size, zoom=0.95 if is_wide and size[2] < size[:2].max() else 0.8)  # labels have room
     for axis, share in zip((axes.xaxis, axes.yaxis, axes.zaxis), size / size.max()):
         axis.set_major_locator(MaxNLocator(max(2, round(6 * share))))

@@ -13,13 +13,16 @@ def axes_differ(parameters: Mapping[str, float]) -> str | None:
 
     The map holds the parameters of a run by their paths.
     """
-    frames = [
-        parameters.get(f"{side}.{_INDEX}") or parameters.get(f"{side}.{_FRAME}") for side in ("controller", "plant")
-    ]
+    frames = [frame_of(parameters, side) for side in ("controller", "plant")]
     if None in frames or frames[0] == frames[1]:
         return None
     there, here = (f"{frame:g}" for frame in frames)
     return f"controller.{_FRAME} is item {there}, plant.{_FRAME} item {here}: expected the same axes on both sides"
+
+
+def frame_of(parameters: Mapping[str, float], side: str) -> float | None:
+    """The item of `fmu_kit.frames.Frame` that a run's plant or controller is told in; None if it has no choice."""
+    return parameters.get(f"{side}.{_INDEX}") or parameters.get(f"{side}.{_FRAME}")
 
 
 def mismatch(plant: Mapping[str, float], controller: Mapping[str, float]) -> str | None:

@@ -10,6 +10,7 @@ from orchestration.basics.by_kind import ByKind
 if TYPE_CHECKING:
     from orchestration.basics.simulator import Floats
     from orchestration.report.model import Panel, Scene
+    from orchestration.system.model import System
 
     Signals = Mapping[str, Floats]
     """Columns of shape (n,), the `time` [s] among them"""
@@ -35,8 +36,8 @@ class KnownLayout(Protocol):
     def panels(self, columns: Collection[str]) -> tuple[Panel, ...]:
         """For the columns that are there, computed ones among them; what is left over gets panels as in any run."""
 
-    def scene(self, columns: Collection[str]) -> Scene:
-        """What moves in space."""
+    def scene(self, columns: Collection[str], system: System | None) -> Scene | None:
+        """What moves in space; None where the system is told in axes that the page does not know."""
 
 
 LAYOUTS: ByKind[KnownLayout] = ByKind()

@@ -20,9 +20,10 @@ def layout_of(system: System | None, columns: Collection[str], about: About) -> 
     known = layout_for(columns)
     if known is None:
         return Layout(columns=tuple(columns), panels=(*_of_connections(system, columns, about),), scene=None)
-    panels, scene = known.panels(columns), known.scene(columns)
+    panels, scene = known.panels(columns), known.scene(columns, system)
     drawn = {line.column for panel in panels for line in panel.lines}
-    drawn |= {*scene.position, *scene.quaternion, *(scene.desired or ())}
+    if scene is not None:
+        drawn |= {*scene.position, *scene.quaternion, *(scene.desired or ())}
     rest = [*_of_components(system, [name for name in columns if name not in drawn], about, shown=False)]
     return Layout(columns=tuple(columns), panels=(*panels, *rest), scene=scene)
 

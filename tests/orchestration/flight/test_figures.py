@@ -88,6 +88,24 @@ def test_signals_of_any_fmus_have_their_descriptions_and_units(tank: Result) -> 
     assert not any("." in name for name in named)
 
 
+def test_up_is_up_and_axes_have_their_names_in_both_conventions() -> None:
+    still = {f"plant.{name}": 0.0 for name in ("initial.quaternion.x", "initial.quaternion.y", "initial.quaternion.z")}
+    flown = {
+        frame: quadcosim.run(
+            native(stop_time=0.2).with_changes(
+                parameters={"plant.frame": frame, "controller.frame": frame, "plant.initial.quaternion.w": 1.0, **still}
+            )
+        )
+        for frame in ("ned", "enu")
+    }
+    (ned,), (enu,) = (draw(result, ["path"])["path"].axes for result in flown.values())
+    for axes, names in ((ned, ("north", "east", "down")), (enu, ("east", "north", "up"))):
+        labels = (axes.get_xlabel(), axes.get_ylabel(), axes.get_zlabel())  # type: ignore[attr-defined]
+        assert labels == tuple(f"{axis}, {name} [m]" for axis, name in zip("xyz", names, strict=True))
+    assert ned.zaxis_inverted()  # type: ignore[attr-defined]
+    assert not enu.zaxis_inverted()  # type: ignore[attr-defined]
+
+
 def test_a_system_with_the_variables_of_a_quadrotor_is_drawn_as_a_flight_also_over_one(flight: Result) -> None:
     system = quadcosim.run(flight.asked.as_system())
     assert set(draw(system)) == set(draw([flight, system])) == set(FLIGHT)

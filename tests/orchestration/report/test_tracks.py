@@ -1,15 +1,20 @@
 """Thinned signals keep what a reader looks for: peaks, and what is held between rows."""
 
+from typing import Any
+
 import numpy as np
+import pytest
 
 from orchestration.basics.simulator import Floats
 from orchestration.flight.layout import POSITION_ERROR, FlightLayout
 from orchestration.quadrotor.translation import quadrotor
 from orchestration.quadrotor.wiring import POSITION_REFERENCE
 from orchestration.report.blobs import Blobs
+from orchestration.report.layouts import layout_of
 from orchestration.report.model import Track
 from orchestration.report.tracks import Signals, Tracks
 from orchestration.results.column_info import Described
+from orchestration.system.paths import changed
 from tests.orchestration.report.test_blobs import read
 
 ABOUT = {"tank.level": Described(unit="m", text="of the water")}
@@ -81,3 +86,12 @@ def test_runs_that_are_alike_share_a_layout() -> None:
     tracks = Tracks(Blobs())
     assert [tracks.whole(quadrotor(), flight(20), {}, 10).layout for _ in range(2)] == [0, 0]
     assert len(tracks.layouts) == 1
+
+
+@pytest.mark.parametrize("given", [{"frame": "enu"}, {"frame_index": 2}])
+def test_axes_that_the_page_does_not_know_have_panels_and_no_replay(given: dict[str, Any]) -> None:
+    turned = changed(quadrotor(), {f"components.plant.parameters.{name}": value for name, value in given.items()})
+    known, other = (layout_of(system, [*flight()], {}) for system in (quadrotor(), turned))
+    assert known.scene is not None
+    assert other.scene is None
+    assert {panel.title for panel in known.panels} <= {panel.title for panel in other.panels}
