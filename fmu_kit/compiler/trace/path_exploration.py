@@ -33,7 +33,7 @@ from fmu_kit.compiler.trace.symbols import (
     token,
     truth,
 )
-from fmu_kit.compiler.trace.tree import difference, expect_no_twins, is_number, leaves, mapped, shape
+from fmu_kit.compiler.trace.tree import difference, expect_no_twins, expect_unchanged, is_number, leaves, mapped, shape
 from fmu_kit.errors import DivergenceError, FmuError
 from fmu_kit.failure import is_of_a_model
 
@@ -229,7 +229,7 @@ class Explorer:
         before = dict(memory.written)
         key = (of, shape(arguments), shape(memory.attributes()))
         if key not in self._traced:
-            self._traced[key] = self.function(method, of.__name__.lstrip("_"), arguments)
+            self._traced[key] = self.function(method, of.__name__, arguments)
         function, exit_view, returned = self._traced[key]
         call = statement("call", given, Call(function, memory.version))
         self.add(call)
@@ -262,6 +262,7 @@ class Explorer:
             return node("parameter", (), lifted(leaf).kind, len(names) - 1)
 
         given = mapped(arguments, parameter)
+        told = leaves(given)
         memory.enter()
         start = memory.snapshot(given, ())
         self._path, self._catches = None, catches
@@ -279,6 +280,7 @@ class Explorer:
         results: list[Symbol] = []
         if leaf is not None:
             memory.install(leaf.view, leaf.holders, given)
+            expect_unchanged(told, given, name)
             memory.written, memory.version = dict(leaf.written), leaf.version
             exit_view, value = memory.attributes(), leaf.value
             expect_no_twins(exit_view)
@@ -287,7 +289,11 @@ class Explorer:
         held.restore()
         memory.written, memory.version = written, version
         parameters = tuple(lifted(leaf) for _, leaf in leaves(given) if is_number(leaf))
-        return self._kept_function(name, method, (parameters, tuple(names)), block, len(results)), exit_view, value
+        return (
+            self._kept_function(name.lstrip("_"), method, (parameters, tuple(names)), block, len(results)),
+            exit_view,
+            value,
+        )
 
     def _kept_function(
         self, name: str, method: Any, head: tuple[tuple[Symbol, ...], tuple[str, ...]], block: Block, results: int

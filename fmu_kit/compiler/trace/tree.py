@@ -7,8 +7,9 @@ import collections
 import copy
 import enum
 import functools
+import itertools
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Literal
 
 from fmu_kit.compiler.trace.symbols import Symbol, TraceError
@@ -171,6 +172,25 @@ def expect_no_twins(value: Any) -> None:
 
     for key, child in children(value):
         note(child, (key,))
+
+
+def expect_unchanged(before: Sequence[tuple[Path, Any]], given: Any, name: str) -> None:
+    """Raise `TraceError` if what a method of this name was given has other leaves now: in C that would be a copy."""
+    for one, other in itertools.zip_longest(before, leaves(given)):
+        if one is None or other is None or one[0] != other[0] or not _are_same(one[1], other[1]):
+            path = (one or other)[0]
+            raise TraceError(
+                f"{name} changes {path[0]}, which it is given: expected it to return what is new, or to change self"
+            )
+
+
+def _are_same(one: Any, other: Any) -> bool:
+    return one is other or (
+        not isinstance(one, Symbol)
+        and type(one) is type(other)
+        and type(one) in USUAL_LEAVES
+        and repr(one) == repr(other)
+    )
 
 
 def _is_frozen(value: Any) -> bool:

@@ -52,11 +52,31 @@ class Refused(Slave):
             self.warn_once("large", "x is large")
         return x > 1.0
 
+    def _filling(self, given):
+        for i in range(len(given)):
+            given[i] += 1.0
+
+    def _adding(self, given):
+        given["new"] = 1.0
+        return 1.0
+
+    def _moving(self, helper):
+        helper.value = 2.0
+
     def step(self, t, h):
         a = self.a
         {step}
 """
 IN_A_STEP = [
+    (
+        "kept = [a, a]; self._filling(kept); self.y = kept[0]",
+        "_filling changes given, which it is given: expected it to",
+    ),
+    ("kept = {}; self._adding(kept); self.y = kept['new']", "_adding changes given, which it is given: expected it to"),
+    (
+        "kept = Helper(a); self._moving(kept); self.y = kept.value",
+        "_moving changes helper, which it is given: expected",
+    ),
     ("self.y = '{}'.isdigit() + math.hypot(a, 1.0)", "a function that takes floats only was given a computed"),
     ("self.y = round(a)", "round() of a computed value: expected math.floor or math.ceil"),
     ("self.y = int(a)", "int() of a computed float: expected math.floor or math.ceil"),
