@@ -39,6 +39,8 @@ LARGEST = 400
 """of a loop: numbers that go through a period"""
 RUNGS, FINEST = 12, 0.25
 """of the ladder of a component in continuous time: points, each twice the one before; the first by the period"""
+LONGER = (1, 4, 16, 64)
+"""times as long steps are tried in turn, for as long as they tell more states: a fast loop leaves slow ones no time"""
 RUNGS_OF_FIXED = 5
 """where a component takes short steps of one length only"""
 RUNGS_OF_TASK = 32
@@ -58,12 +60,9 @@ class AtRest:
 
 
 @contextmanager
-def at_rest(
-    system: System, instances: Instances, pulse: float = PULSE, *, longer: Sequence[int] = (1,)
-) -> Iterator[AtRest]:
+def at_rest(system: System, instances: Instances, pulse: float = PULSE) -> Iterator[AtRest]:
     """`system` at its operating point, punctual and without loss, noise and quantisation.
 
-    Steps that are so many times as `longer` are tried in turn, for as long as they tell more states of a component.
     Raises `UsageError` where it does not rest there, or cannot be put into a linear loop, saying why.
     """
     calm = deterministic(system)
@@ -74,7 +73,7 @@ def at_rest(
     with prepared(calm, load=_watching(instances)) as simulation:
         _expect_states(simulation)
         _come_to_rest(simulation, begin, period)
-        tangents = {name: _tangent(simulation, name, period, pulse, longer) for name in calm.components}
+        tangents = {name: _tangent(simulation, name, period, pulse) for name in calm.components}
         yield AtRest(simulation=simulation, tangents=tangents, begin=begin, period=period)
 
 
@@ -111,7 +110,7 @@ def _come_to_rest(simulation: PreparedRun, begin: Fraction, period: Fraction) ->
     expect_rest(system, np.array(rows))
 
 
-def _tangent(simulation: PreparedRun, name: str, period: Fraction, pulse: float, longer: Sequence[int]) -> Tangent:
+def _tangent(simulation: PreparedRun, name: str, period: Fraction, pulse: float) -> Tangent:
     fmu, system = cast("Watched", simulation.instances[name]), simulation.system
     given = {variable_of(end): 0.0 for x in system.connections for end in x.end if component_of(end) == name}
     inputs = tuple(end for end in given if fmu.model.variables[end].kind == "Real")
@@ -129,7 +128,7 @@ def _tangent(simulation: PreparedRun, name: str, period: Fraction, pulse: float,
     first = FINEST * float(period) / NANOSECONDS
     if fmu.model.varies_step:
         ladder = np.array([first * 2 ** max(i - 1, 0) for i in range(RUNGS)])
-        return _telling_most(rest, [(times * ladder).tolist() for times in longer], pulse)
+        return _telling_most(rest, [(times * ladder).tolist() for times in LONGER], pulse)
     assert component.step is not None
     points = (round(first * 2**i / component.step) for i in range(RUNGS_OF_FIXED))
     counts = np.diff(sorted({0, *(max(1, point) for point in points)}))

@@ -16,10 +16,6 @@ from orchestration.stability.state_space import StateSpace, reduced
 from orchestration.system.request import in_its_own_words
 from orchestration.system.times import NANOSECONDS
 
-LONGER = (1, 4, 16, 64)
-"""steps by which the states of a component are told, by those of a local limit, for as long as they tell more: what
-moves next to nothing within a period, as the position of a fast loop, is else taken for noise"""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Linearised:
@@ -53,7 +49,7 @@ def linearise(asked: Asked, component: str | None = None) -> Linearised:
             name = component_named(system, component, "at which to cut the loop open")
             if system.components[name].sampling is None:
                 raise UsageError(f"component: {name}: expected one that is sampled")
-            with at_rest(system, instances, longer=LONGER) as loop:
+            with at_rest(system, instances) as loop:
                 return _opened(loop, name)
     finally:
         instances.close()

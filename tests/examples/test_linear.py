@@ -8,8 +8,14 @@ import pytest
 
 import quadcosim
 from orchestration.basics.documents import read_toml
-from quadcosim import Scenario
+from orchestration.flight.hover_loop import at_hover
+from orchestration.fmi.reuse import Instances
+from orchestration.quadrotor.scenario import FmuChoice
+from orchestration.stability.monodromy import growth_of_loop
+from orchestration.system.model import Parameter
+from quadcosim import Scenario, Timing
 from tests.examples.common import EXAMPLES
+from tests.native import native
 from tests.orchestration.fmi.small import needs_compiler
 from tests.orchestration.stability.test_linearise import closed
 
@@ -56,6 +62,23 @@ def test_by_as_much_as_its_phase_margin_lets_it_a_command_may_be_late(design: An
     for factor, is_stable in ((0.98, True), (1.02, False)):
         loop = design.loop_of(gains_of("lqi"), delay=factor * late)
         assert bool(np.abs(np.linalg.eigvals(closed(loop))).max() < 1.0) is is_stable
+
+
+@pytest.mark.parametrize("period", [0.05, 0.01, 0.002])
+def test_what_is_slowest_decays_alike_however_fast_it_is_sampled(period: float) -> None:
+    """Nearly: the states of the plant move by next to nothing within a short period, and are found all the same."""
+    gains: dict[str, Parameter] = {
+        f"{name}.{axis}": value for name, each in gains_of("lqr").items() for axis, value in zip("xyz", each)
+    }
+    scenario = native(
+        controller=FmuChoice(fmu=str(FOLDER / "native" / "LinearFeedback.fmu"), parameters=gains),
+        timing=Timing(period=period, plant_interval=min(period, 0.01)),
+    )
+    instances = Instances()
+    try:
+        assert growth_of_loop(at_hover(scenario), instances) == pytest.approx(-1.728, abs=5e-3)
+    finally:
+        instances.close()
 
 
 COMPARISON = """

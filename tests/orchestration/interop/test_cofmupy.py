@@ -96,7 +96,12 @@ def test_a_parameter_that_is_no_real_is_left_where_it_starts() -> None:
     assert given.parameters["stages"] == 3
     assert parameters_for(TOOLS["ecos"], given) == given.parameters
     reals = parameters_for(TOOLS["cofmupy"], given)
-    assert given.parameters.keys() - reals.keys() == {"stages", "discretisation_index", "gain_scaling_index"}
+    assert given.parameters.keys() - reals.keys() == {
+        "stages",
+        "discretisation_index",
+        "gain_scaling_index",
+        "frame_index",
+    }
     assert reals["coupling"] == 2.0
 
 
