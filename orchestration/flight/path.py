@@ -128,3 +128,5 @@ def _equal(axes: Any, points: Floats, *, is_enu: bool, is_wide: bool) -> None:
     for axis, share in zip((axes.xaxis, axes.yaxis, axes.zaxis), size / size.max()):
         axis.set_major_locator(MaxNLocator(max(2, round(6 * share))))
         axis.labelpad = 1.2 * matplotlib.rcParams["font.size"] - 8.0  # [pt]; large numbers are long
+    if is_enu:
+        axes.zaxis.labelpad += 0.8 * matplotlib.rcParams["font.size"]  # upward, numbers lie where the name is

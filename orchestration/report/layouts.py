@@ -21,6 +21,8 @@ def layout_of(system: System | None, columns: Collection[str], about: About) -> 
     if known is None:
         return Layout(columns=tuple(columns), panels=(*_of_connections(system, columns, about),), scene=None)
     panels, scene = known.panels(columns), known.scene(columns, system)
+    if scene is None:  # and so nothing that the page computes from it
+        panels = tuple(panel for panel in panels if all(line.column in columns for line in panel.lines))
     drawn = {line.column for panel in panels for line in panel.lines}
     if scene is not None:
         drawn |= {*scene.position, *scene.quaternion, *(scene.desired or ())}
