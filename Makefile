@@ -11,6 +11,8 @@ COFMUPY := .venv-cofmupy/bin/python
 export CI
 # Tests start many processes: each finds the modules compiled that another has compiled.
 unexport PYTHONDONTWRITEBYTECODE
+# In each, threads of numpy's BLAS would take 0.1 s and be of no use.
+export OPENBLAS_NUM_THREADS ?= 1
 # Other people's masters that need an environment of their own are flown where they are: make interop makes it.
 export QUADCOSIM_COFMUPY ?= $(abspath $(wildcard $(COFMUPY)))
 

@@ -3,7 +3,7 @@
 import os
 import sys
 
-from orchestration.processes.subprocesses import ROOT, misleading_variables
+from orchestration.processes.subprocesses import ROOT, misleading_variables, one_thread
 
 _AGAIN = "import sys; sys.path.insert(0, sys.argv.pop(1)); from orchestration.command.start import main; main()"
 
@@ -14,6 +14,7 @@ def main() -> None:
     `doctor` goes on without it, to say what that does to FMUs. A Python that PYTHONHOME keeps from starting at all
     never comes here.
     """
+    one_thread()
     try:
         from orchestration.command import cli
     except Exception as error:
