@@ -1,6 +1,7 @@
 """A controller behind its own sample clock: what the FMUs of all controllers do, whatever their law."""
 
 from abc import abstractmethod
+from types import MappingProxyType
 
 from controller_fmu.interface import ControllerInterface
 from controller_fmu.sample_clock import SampleClock
@@ -24,6 +25,7 @@ class SampledController(ControllerInterface):
     author, license = AUTHOR, LICENSE
     initial_outputs_depend_on_inputs = True
     initially_idle = frozenset({"sample_offset"})
+    usually = MappingProxyType({"sample_period": 0.0})  # the master's clock decides when it samples
 
     @abstractmethod
     def control(self, measurement: Measurement, reference: Reference) -> None:

@@ -80,6 +80,10 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     initially_idle: ClassVar[frozenset[str]] = frozenset()
     """Inputs and parameters on which not even the first outputs depend."""
 
+    usually: ClassVar[Mapping[str, float | int | bool]] = {}
+    """Parameters that a master which computes many runs in lanes sets, by name, where they differ from their starts:
+    the straight line of a step is that of a slave which has these."""
+
     author: ClassVar[str] = ""
     license: ClassVar[str] = ""
     copyright: ClassVar[str] = ""

@@ -15,10 +15,13 @@ from fmu_kit.compiler.trace.symbols import Symbol
 from fmu_kit.compiler.trace.tracing import Program
 
 
-def lane_code(program: Program) -> str:
-    """The functions of a program in lanes, each after those that it calls."""
+def lane_code(program: Program, line: Function | None = None) -> str:
+    """The functions of a program in lanes, each after those that it calls, and its step as a straight line."""
     names = place_names(program.places)
-    return "\n\n".join(LaneWriter(function, program, names).text() for function in program.functions) + "\n"
+    written = [LaneWriter(function, program, names).text() for function in program.functions]
+    if line is not None:
+        written += [LineWriter(line, program, names).text(), f"#define STRAIGHT_STEP {c_name(line.name)}"]
+    return "\n\n".join(written) + "\n"
 
 
 class LaneWriter(FunctionWriter):
@@ -171,6 +174,17 @@ class LaneWriter(FunctionWriter):
         self._line(f"*failed = q_select({mask}, q_all({1 + ERRORS.index(kind)}.0), *failed); /* {kind} */")
         if len(self.masks) == 1:
             self._line(f"return {'done' if self.returns_early else 'q_known(0)'};")
+
+
+class LineWriter(LaneWriter):
+    """Writes a step that is a straight line: nothing is stored where a guard holds in a lane, and 0 returned."""
+
+    always: ClassVar[tuple[str, ...]] = ("v",)
+    first: ClassVar[tuple[str, ...]] = ("q_place *v", "q_mask live")
+
+    def _check(self, checks: list[Statement]) -> None:
+        guards = " | ".join(self.value(each.symbols[0]) for each in checks)
+        self._line(f"Q_IF_EVER(q_any(live & ({guards}))) return q_known(0);")
 
 
 def _returns(block: Block) -> bool:

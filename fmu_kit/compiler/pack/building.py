@@ -32,6 +32,7 @@ from fmu_kit.compiler.pack.c_compiler import (
 from fmu_kit.compiler.pack.freshness import source_hash
 from fmu_kit.compiler.passes.derivatives import with_tangents
 from fmu_kit.compiler.passes.precomputing import precomputed
+from fmu_kit.compiler.passes.straightening import straightened
 from fmu_kit.compiler.runtime import FOLDER
 from fmu_kit.compiler.trace.symbols import TraceError
 from fmu_kit.compiler.trace.tracing import Program, trace
@@ -121,7 +122,7 @@ def c_sources(program: Program, guid: str, standard: Standard) -> dict[str, byte
         "places.h": places(program),
         TABLES: tables(program, guid, standard),
         "functions.h": f"{c_code(program)}\n{UNOPTIMISED}\n{c_code(derivatives)}\n{OPTIMISED}\n",
-        "lane_functions.h": lane_code(program),
+        "lane_functions.h": lane_code(program, straightened(program)),
     }
     return {**fixed, **{name: text.encode() for name, text in made.items()}}
 

@@ -62,6 +62,13 @@ class Lanes:
         self.divergence: int = self._library.quadcosim_divergence()
         """the status of a lane that has diverged"""
 
+    @property
+    def line(self) -> tuple[int, int]:
+        """How many steps were tried as a straight line (`passes/straightening.py`), and how many of them left it."""
+        tried, left = ctypes.c_int64(), ctypes.c_int64()
+        self._library.quadcosim_line(ctypes.byref(tried), ctypes.byref(left))
+        return tried.value, left.value
+
     def begin(self, memory: int) -> None:
         """Put the start values into all lanes of a memory."""
         self._library.quadcosim_begin(*map(ctypes.c_void_p, (memory,)))

@@ -1,1 +1,1 @@
-"""From statements to statements: derivatives, and what follows from parameters alone."""
+"""From statements to statements: derivatives, what follows from parameters alone, and a step as one straight line."""

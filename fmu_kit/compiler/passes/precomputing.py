@@ -20,15 +20,10 @@ _CHEAP = frozenset(
 
 def precomputed(program: Program) -> Program:
     """The program with a place for each costly value that follows from parameters alone."""
-    (taking,) = (f for f in program.functions if f.name == TAKING)
-    before = _called_by(taking) | {taking}
-    later = [f for f in program.functions if f not in before]
-    changed = {name for f in later for name in _stored_directly(f.body)}
-    parameters = {v.name for v in program.slave.variables if v.causality == "parameter"}
-    fixed = (taking.stores | parameters) - changed
-    whole = _Precomputing(program, frozenset(fixed))
+    taking, before = _taking(program)
+    whole = _Precomputing(program, fixed_places(program))
     whole.made.update({f: f for f in before})
-    for f in later:
+    for f in _others(program, before):
         if f not in (program.initialise, program.do_step):  # in these, the parameters are taken over
             whole.function(f)
     if not whole.places:
@@ -50,6 +45,24 @@ def precomputed(program: Program) -> Program:
         do_step=whole.function(program.do_step),
         versions={**program.versions, **whole.versions},
     )
+
+
+def fixed_places(program: Program) -> frozenset[str]:
+    """The places that hold the same from when the parameters are taken over until they are again."""
+    taking, before = _taking(program)
+    changed = {name for f in _others(program, before) for name in _stored_directly(f.body)}
+    parameters = {v.name for v in program.slave.variables if v.causality == "parameter"}
+    return frozenset((taking.stores | parameters) - changed)
+
+
+def _taking(program: Program) -> tuple[Function, set[Function]]:
+    """The function in which parameters are taken over; it and those that it calls."""
+    (taking,) = (f for f in program.functions if f.name == TAKING)
+    return taking, _called_by(taking) | {taking}
+
+
+def _others(program: Program, before: set[Function]) -> list[Function]:
+    return [f for f in program.functions if f not in before]
 
 
 def _called_by(function: Function) -> set[Function]:

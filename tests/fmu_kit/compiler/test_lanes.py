@@ -1,6 +1,7 @@
 """A slave in lanes has, in every lane, the bits of an instance alone, whatever the others do."""
 
 import shutil
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import fmpy
@@ -31,22 +32,22 @@ FMU_ERROR, DIVERGENCE = (1 + ERRORS.index(name) for name in ("FmuError", "Diverg
 STRANGE = (0.0, -0.0, 1.0, -1.0, 3.0, 1e3, 1e200, -1e308)
 
 
-def _value(rng: np.random.Generator, variable: Variable) -> float | int | bool:
-    """Near the start value, or, seldom, anything."""
+def _value(rng: np.random.Generator, variable: Variable, strange: float) -> float | int | bool:
+    """Near the start value, or, in a share of all cases, anything."""
     if variable.type == "Boolean":
         return bool(rng.integers(2))
     if variable.type == "Integer":
         return int(rng.integers(-3, 12))
     if variable.type == "Enumeration":
         return int(rng.integers(0, 4))
-    if rng.random() < 0.02:
+    if rng.random() < strange:
         return float(rng.choice(STRANGE))
     return float(variable.start + rng.normal() * max(abs(variable.start), 0.3) * 0.1)
 
 
-def _given(rng: np.random.Generator, variables: list[Variable], causality: str, share: float) -> Values:
+def _given(rng: np.random.Generator, variables: list[Variable], causality: str, share: float, strange: float) -> Values:
     return {
-        k: _value(rng, variable)
+        k: _value(rng, variable, strange)
         for k, variable in enumerate(variables)
         if variable.causality == causality and variable.has_start and rng.random() < share
     }
@@ -89,19 +90,47 @@ def _come_to(folder: Path, target: Target, guid: str) -> set[int]:
     together = Together(folder / "lanes.so")
     types = [variable.type.replace("Enumeration", "Integer") for variable in variables]
     alone = [Alone.made(folder / "alone.so", together.lanes.places, types, guid) for _ in range(together.count)]
-    return {status for _ in range(12) for status in _fly(together, alone, variables, rng)}
+    usual = (slave_class(target).usually, 0.0, 0.0, (0.0,))
+    unusual: tuple[Mapping[str, float], float, float, tuple[float, ...]] = ({}, 0.3, 0.02, (0.0, 0.5, -1.0))
+    found = {
+        status for flight in (usual, unusual, unusual) * 6 for status in _fly(together, alone, variables, rng, *flight)
+    }
+    tried, left = together.lanes.line
+    if target.model == "Loops":
+        assert tried == 0, "a loop of any number of rounds is no straight line"
+    else:
+        assert left < tried, "some steps are done as a straight line"
+    return found
 
 
-def _fly(together: Together, alone: list[Alone], variables: list[Variable], rng: np.random.Generator) -> list[int]:
-    """Both from initialisation on, each lane with values, times and steps of its own, until it fails."""
+def _fly(
+    together: Together,
+    alone: list[Alone],
+    variables: list[Variable],
+    rng: np.random.Generator,
+    usually: Mapping[str, float | int | bool],
+    changed: float,
+    strange: float,
+    starts: Sequence[float],
+) -> list[int]:
+    """Both from initialisation on, each lane with values, times and steps of its own, until it fails.
+
+    A share `changed` of the parameters is not what it is at the start, a share `strange` of what is given anything.
+    Lanes start at one of `starts` [s].
+    """
+    usual = {k: usually[variable.name] for k, variable in enumerate(variables) if variable.name in usually}
     together.begin()
     for lane, instance in enumerate(alone):
         instance.fmu.reset()
-        given = {**_given(rng, variables, "parameter", 0.3), **_given(rng, variables, "input", 0.8)}
+        given = {
+            **usual,
+            **_given(rng, variables, "parameter", changed, strange),
+            **_given(rng, variables, "input", 0.8, strange),
+        }
         instance.put(given)
         together.put(lane, given)
     active = rng.random(together.count) < 0.9
-    start = rng.choice([0.0, 0.5, -1.0], together.count)
+    start = rng.choice(starts, together.count)
     period = float(rng.choice([0.001, 0.01, 0.25]))
     before = together.held()
     together.initialise(active, start)
@@ -113,7 +142,7 @@ def _fly(together: Together, alone: list[Alone], variables: list[Variable], rng:
         active &= together.status == 0
         h = period * rng.choice([0.5, 1.0, 1.0, 2.0], together.count)
         for lane in np.flatnonzero(active).tolist():
-            given = dict(_given(rng, variables, "input", 0.5))
+            given = dict(_given(rng, variables, "input", 0.5, strange))
             together.put(lane, given)
             alone[lane].put(given)
             alone[lane].step(t[lane], h[lane])

@@ -1,0 +1,162 @@
+"""States that a slave comes to, and what is computed of them: by these is seen which way a step usually takes.
+
+They decide how fast a kernel is, never what it computes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import operator
+import random
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from fmu_kit.compiler.passes.precomputing import TAKING
+from fmu_kit.compiler.trace.memory import Memory, name_of_kept
+from fmu_kit.compiler.trace.statements import each_of
+from fmu_kit.compiler.trace.symbols import Symbol, value_of
+from fmu_kit.compiler.trace.tracing import Program
+from fmu_kit.compiler.trace.tree import is_number, leaves
+from fmu_kit.errors import FmuError
+from fmu_kit.slave import Phase, Slave
+from fmu_kit.variables import Variable
+
+_SIZES = (0.02, 0.3, 3.0)
+"""By how much inputs differ from their starts, of what they usually are"""
+_STEPS = 8
+"""After so many of them a state is taken"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class State:
+    """The memory before a step, by place, and the step: from t, of length h [s]."""
+
+    memory: Mapping[str, float]
+    t: float
+    h: float
+
+
+def states_of(program: Program, count: int = 24) -> list[State]:
+    """States of a slave with its own parameters, after steps with inputs that are drawn; fewer where steps fail."""
+    drawn = random.Random(0)
+    found = []
+    for k in range(count):
+        with contextlib.suppress(FmuError, ArithmeticError, ValueError):
+            found.append(_state(program.slave, drawn, _SIZES[k % len(_SIZES)]))
+    return found
+
+
+def _state(slave: type[Slave], drawn: random.Random, size: float) -> State:
+    step = float(slave.default_experiment.step_size) / drawn.choice((1.0, 10.0, 11.0, 13.0))
+    made, t = slave(instance_name="sample"), 0.0
+    for variable in made.variables:
+        if variable.causality == "parameter" and variable.name in slave.usually:
+            setattr(made, variable.name, slave.usually[variable.name])
+    made._phase = Phase.INITIALIZATION
+    _set_inputs(made, drawn, size)
+    made._initialise()
+    made._phase = Phase.STEPPING
+    for _ in range(drawn.randrange(1, _STEPS)):
+        _set_inputs(made, drawn, size)
+        made._advance(t, step)  # an instance would also log that it failed
+        t += step
+    _set_inputs(made, drawn, size)
+    memory = {
+        _name(made, path): float(value) for path, value in leaves(Memory(made, {}).attributes()) if is_number(value)
+    }
+    return State(memory=memory, t=t, h=step)
+
+
+def _set_inputs(made: Slave, drawn: random.Random, size: float) -> None:
+    for reference, variable in enumerate(made.variables):
+        if variable.causality == "input" and variable.type == "Real":
+            made.set_real([reference], [_near_its_start(variable, drawn, size)])
+
+
+def _near_its_start(variable: Variable, drawn: random.Random, size: float) -> float:
+    usual = variable.nominal if variable.nominal is not None else max(abs(float(variable.start)), 1.0)
+    low = -math.inf if variable.minimum is None else variable.minimum
+    high = math.inf if variable.maximum is None else variable.maximum
+    return min(max(float(variable.start) + size * usual * (2.0 * drawn.random() - 1.0), low), high)
+
+
+def _name(made: Slave, path: tuple[Any, ...]) -> str:
+    is_variable = path[0] in ("_reals", "_others") and len(path) > 1
+    return made.variables[path[1]].name if is_variable else name_of_kept(path)
+
+
+class Values:
+    """What symbols of a step are in each state: as near as the functions of this Python come."""
+
+    def __init__(self, program: Program, states: Sequence[State]) -> None:
+        self.states = states
+        taking = [f for f in program.functions if f.name == TAKING]
+        self._computed = {each.data: each.symbols[0] for f in taking for each in each_of(f.body) if each.op == "store"}
+        """what is computed when parameters are taken over, by its place"""
+        self._known: dict[int, list[float]] = {}
+
+    def of(self, symbol: Symbol) -> list[float]:
+        """A value for each state, NaN where there is none; raises `KeyError` for what is not known by values alone."""
+        waiting = [symbol]
+        while waiting:  # not by recursion: the graph is deep
+            one = waiting[-1]
+            before = [arg for arg in self._operands(one) if id(arg) not in self._known]
+            if before and id(one) not in self._known:
+                waiting += before
+                continue
+            waiting.pop()
+            if id(one) not in self._known:
+                self._known[id(one)] = list(self._values(one))
+        return self._known[id(symbol)]
+
+    def _operands(self, symbol: Symbol) -> tuple[Symbol, ...]:
+        if symbol.op == "load" and not self._is_kept(symbol):
+            return (self._computed[symbol.data[0]],)
+        return symbol.args
+
+    def _is_kept(self, symbol: Symbol) -> bool:
+        return all(symbol.data[0] in state.memory for state in self.states)
+
+    def _values(self, symbol: Symbol) -> Iterator[float]:
+        operands = [self._known[id(each)] for each in self._operands(symbol)]
+        for k, state in enumerate(self.states):
+            if symbol.op == "constant":
+                yield value_of(symbol)
+            elif symbol.op == "parameter":
+                yield (state.t, state.h)[symbol.data]
+            elif symbol.op == "load":
+                yield operands[0][k] if operands else state.memory[symbol.data[0]]
+            else:
+                yield _result(_FUNCTIONS[symbol.op], [values[k] for values in operands])
+
+
+def _result(function: Callable[..., float], given: list[float]) -> float:
+    try:
+        return float(function(*given))
+    except (ArithmeticError, ValueError):
+        return math.nan
+
+
+_FUNCTIONS: dict[str, Callable[..., Any]] = {
+    **{name: getattr(operator, name) for name in ("add", "sub", "mul", "neg", "lt", "le", "gt", "ge", "eq", "ne")},
+    **{
+        name: getattr(math, name)
+        for name in ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "tanh", "exp", "expm1", "log", "pow",
+                     "floor", "ceil", "copysign", "isfinite", "isinf", "isnan")
+    },
+    "div": operator.truediv,
+    "mod": operator.mod,
+    "floordiv": operator.floordiv,
+    "abs": abs,
+    "and": lambda a, b: a and b,
+    "or": lambda a, b: a or b,
+    "not": operator.not_,
+    "select": lambda condition, a, b: a if condition else b,
+    "bit_and": lambda a, b: int(a) & int(b),
+    "bit_or": lambda a, b: int(a) | int(b),
+    "bit_xor": lambda a, b: int(a) ^ int(b),
+    "narrow": lambda whole: whole,
+    "beyond": lambda whole: abs(whole) >= 2.0**53,
+}  # fmt: skip

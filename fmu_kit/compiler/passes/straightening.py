@@ -1,0 +1,305 @@
+"""A step as one straight line: along the way that it usually takes, with what would lead off it as guards.
+
+Calls are put in their place, loops unrolled, and of each `if` the way is taken that all sampled states take; where they
+differ, both are, and the values selected. What is left are values, then what is stored, if no guard holds. Each value
+is computed as on the way through the branches: the same operations on the same numbers, so the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from fmu_kit.compiler.passes.precomputing import fixed_places
+from fmu_kit.compiler.passes.samples import Values, states_of
+from fmu_kit.compiler.trace.statements import Block, Call, Function, Statement, statement
+from fmu_kit.compiler.trace.symbols import (
+    Symbol,
+    both,
+    closure,
+    constant,
+    either,
+    lifted,
+    negation,
+    node,
+    select,
+    truth,
+)
+from fmu_kit.compiler.trace.tracing import Program
+
+LEAVES = "leaves the straight line"
+"""What the function that is made raises where a guard holds"""
+MOST_ROUNDS = 4
+"""of a loop that is unrolled"""
+
+
+class _NoLineError(Exception):
+    """There is no straight line."""
+
+
+def straightened(program: Program) -> Function | None:
+    """The step of a program as a straight line; None if there is none.
+
+    The function stores nothing, but fails, where a guard holds.
+    """
+    states = states_of(program)
+    if not states:
+        return None
+    line = _Line(program, Values(program, states))
+    step = program.do_step
+    try:
+        line.call(step, list(step.parameters), None)
+    except (_NoLineError, KeyError):  # of what values are not known, the way cannot be seen
+        return None
+    fails = statement("raise", (), (LEAVES, ()))
+    guards = [statement("if", (guard,), None, ((fails,), ())) for guard in dict.fromkeys(line.guards)]
+    stores = [
+        statement("store", (value,), place)
+        for place, value in line.memory.items()
+        if value is not node("load", (), value.kind, (place, 0))
+    ]
+    return replace(
+        step,
+        name=f"{step.name} in a line",
+        body=(*guards, *stores, statement("return", ())),
+        stores=frozenset(each.data for each in stores),
+        raises=frozenset({LEAVES}),
+        doc="As do_step, where it takes its usual way; it does nothing where it does not.",
+    )
+
+
+@dataclass(frozen=True)
+class _Returned:
+    values: list[Symbol]
+
+
+class _Line:
+    """What is computed on the way, and what would lead off it."""
+
+    def __init__(self, program: Program, values: Values) -> None:
+        self.program = program
+        self.values = values
+        self.memory: dict[str, Symbol] = {}
+        """what lies in each place now, as far as it was written"""
+        self.guards: list[Symbol] = []
+        self.decided: dict[Symbol, bool] = {}
+        """conditions that have a guard"""
+        self.fixed = fixed_places(program)
+
+    def call(self, function: Function, given: Sequence[Symbol], under: Symbol | None) -> list[Symbol]:
+        """What a function returns, if it is called where `under` holds; None: in any case."""
+        returned = _Frame(self, function, given).block(function.body, under)
+        return [] if returned is None else returned.values
+
+    def read(self, place: str, symbol: Symbol, memory: dict[str, Symbol]) -> Symbol:
+        """What is read of a place."""
+        found = memory.get(place)
+        return node("load", (), symbol.kind, (place, 0)) if found is None else _as(symbol, found)
+
+    def expect_not(self, condition: Any, under: Symbol | None) -> None:
+        """Leave the line where a condition holds."""
+        guard = condition if under is None else both(under, condition)
+        if guard is True:
+            raise _NoLineError
+        if guard is not False:
+            self.guards.append(truth(guard))
+            if under is None:
+                self.decided[guard] = False
+                self.decided[negation(guard)] = True
+
+    def settle(self, condition: Any) -> Any:
+        """A condition; where it follows from parameters alone, what it is in the sampled states, and a guard."""
+        if not isinstance(condition, Symbol) or condition.op == "constant" or not self._is_fixed(condition):
+            return condition
+        ways = self.ways(condition, None)
+        if len(ways) != 1:
+            return condition
+        (way,) = ways
+        self.expect_not(negation(condition) if way else condition, None)
+        return way
+
+    def _is_fixed(self, condition: Symbol) -> bool:
+        return all(
+            each.args or each.op == "constant" or (each.op == "load" and each.data[0] in self.fixed)
+            for each in closure([condition]).values()
+        )
+
+    def ways(self, condition: Symbol, under: Symbol | None) -> set[bool]:
+        """Which ways the sampled states take."""
+        chosen = [True] * len(self.values.states) if under is None else self.values.of(under)
+        return {bool(value) for value, here in zip(self.values.of(condition), chosen) if here == 1.0}
+
+
+class _Frame:
+    """One call of a function."""
+
+    def __init__(self, line: _Line, function: Function, given: Sequence[Symbol]) -> None:
+        self.line = line
+        self.given = [_as(parameter, value) for parameter, value in zip(function.parameters, given)]
+        self.memories = {0: dict(line.memory)}
+        """by version: as it was when the function was called, and after each call in it"""
+        self.results: dict[int, list[Symbol]] = {}
+        self.rounds: dict[int, tuple[int, list[Symbol]]] = {}
+        """of loops, by their depth: which round it is, and what its variables are"""
+        self.outcomes: dict[Statement, list[Symbol]] = {}
+        self.chosen: dict[Symbol, Symbol] = {}
+        """what is either of two values, and what it is"""
+        self.known: dict[Symbol, Symbol] = {}
+
+    # -- statements ------------------------------------------------------------------------------------------
+
+    def block(self, block: Block, under: Symbol | None) -> _Returned | None:
+        """Do the statements of a block, where a condition holds."""
+        for each in block:
+            returned: _Returned | None = getattr(self, f"_{each.op}")(each, under)
+            if returned is not None:
+                return returned
+        return None
+
+    def _if(self, each: Statement, under: Symbol | None) -> _Returned | None:
+        then, otherwise = each.blocks
+        if not (_does(then) or _does(otherwise)):
+            return None
+        condition = self.value(each.symbols[0])
+        if condition.op == "constant":
+            return self.block(then if condition is constant(True) else otherwise, under)
+        ways = self.line.ways(condition, under)
+        if _raises(then) or ways == {False}:
+            self.line.expect_not(condition, under)
+            return self.block(otherwise, under)
+        if _raises(otherwise) or ways == {True}:
+            self.line.expect_not(negation(condition), under)
+            return self.block(then, under)
+        if not ways:
+            raise _NoLineError
+        self._both_ways(condition, then, otherwise, under)
+        return None
+
+    def _both_ways(self, condition: Symbol, then: Block, otherwise: Block, under: Symbol | None) -> None:
+        line = self.line
+        before, chosen = dict(line.memory), dict(self.chosen)
+        left = []
+        for block, holds in ((then, condition), (otherwise, negation(condition))):
+            line.memory, self.chosen, self.known = dict(before), dict(chosen), {}
+            if self.block(block, holds if under is None else both(under, holds)) is not None:
+                raise _NoLineError
+            left.append((line.memory, self.chosen))
+        (memory_a, chosen_a), (memory_b, chosen_b) = left
+        self.known = {}
+        self.chosen = {
+            key: lifted(select(condition, chosen_a.get(key, value), chosen_b.get(key, value)))
+            for key, value in {**chosen_a, **chosen_b}.items()
+        }
+        line.memory = before
+        for place, value in {**memory_a, **memory_b}.items():
+            a, b = (line.read(place, value, memory) for memory in (memory_a, memory_b))
+            line.memory[place] = lifted(select(condition, a, b))
+
+    def _assign(self, each: Statement, under: Symbol | None) -> None:
+        target, value = each.symbols
+        self.chosen[target] = _as(target, self.value(value))
+        self.known = {}
+
+    def _store(self, each: Statement, under: Symbol | None) -> None:
+        self.line.memory[each.data] = self.value(each.symbols[0])
+
+    def _call(self, each: Statement, under: Symbol | None) -> None:
+        call: Call = each.data
+        after = self.line.program.versions[call.memory, each]
+        self.results[after] = self.line.call(call.function, [self.value(symbol) for symbol in each.symbols], under)
+        self.memories[after] = dict(self.line.memory)
+        self.known = {}
+
+    def _loop(self, each: Statement, under: Symbol | None) -> None:
+        size = (len(each.symbols) - 1) // 2
+        count, starts, nexts = each.symbols[0], each.symbols[1 : 1 + size], each.symbols[1 + size :]
+        states = [self.value(symbol) for symbol in starts]
+        times = self.value(count)
+        least = min((value for value in self.line.values.of(times) if value >= 1.0), default=0.0)
+        if not 1.0 <= least <= MOST_ROUNDS:
+            raise _NoLineError
+        if times.op != "constant":
+            self.line.expect_not(node("ne", (times, constant(least)), "bool"), under)
+        for k in range(int(least)):
+            self.rounds[each.data], self.known = (k, states), {}
+            if self.block(each.blocks[0], under) is not None:
+                raise _NoLineError
+            states = [_as(symbol, self.value(symbol)) for symbol in nexts]
+        self.outcomes[each], self.known = states, {}
+
+    def _warn(self, each: Statement, under: Symbol | None) -> None:
+        pass
+
+    def _raise(self, each: Statement, under: Symbol | None) -> None:
+        self.line.expect_not(True, under)
+
+    def _return(self, each: Statement, under: Symbol | None) -> _Returned:
+        return _Returned([self.value(symbol) for symbol in each.symbols])
+
+    # -- values ------------------------------------------------------------------------------------------------
+
+    def value(self, symbol: Symbol) -> Symbol:
+        """A symbol of the function, on the line."""
+        waiting = [symbol]
+        while waiting:  # not by recursion: the graph is deep
+            one = waiting[-1]
+            args = () if one.op == "phi" else one.args
+            before = [arg for arg in args if arg not in self.known]
+            if before and one not in self.known:
+                waiting += before
+                continue
+            waiting.pop()
+            if one not in self.known:
+                made = self._made(one, [self.known[arg] for arg in args])
+                self.known[one] = constant(self.line.decided[made]) if made in self.line.decided else made
+        return self.known[symbol]
+
+    def _made(self, symbol: Symbol, args: list[Symbol]) -> Symbol:
+        op, data = symbol.op, symbol.data
+        if op == "select":
+            return lifted(select(self.line.settle(args[0]), *args[1:]))
+        if op in _SETTLED:
+            return lifted(_SETTLED[op](*args))
+        if op == "load":
+            place, version = data
+            return self.line.read(place, symbol, self.memories[version])
+        if op == "result":
+            return _as(symbol, self.results[data[1]][data[0]])
+        if op == "failed":
+            return constant(False)  # what fails leaves the line
+        if op == "outcome":
+            return _as(symbol, self.outcomes[data[1]][data[0]])
+        if op == "variable":
+            return _as(symbol, self.rounds[data[0]][1][data[1]])
+        if op == "index":
+            return constant(self.rounds[data][0])
+        if op == "parameter":
+            return self.given[int(data)]
+        if op == "phi":
+            return self.chosen[symbol]
+        return node(op, args, symbol.kind, data) if args else symbol
+
+
+_SETTLED: dict[str, Callable[..., Any]] = {"and": both, "or": either, "not": negation}
+
+
+def _as(wanted: Symbol, value: Symbol) -> Symbol:
+    """A value of the kind of a symbol, as C keeps it there."""
+    if wanted.kind == "bool":
+        return truth(value)
+    made: Symbol = node("select", (value, constant(1.0), constant(0.0)), "real") if value.kind == "bool" else value
+    return made
+
+
+def _does(block: Block) -> bool:
+    """Whether a block does more than speak."""
+    return any(each.op != "warn" and (each.op != "if" or any(map(_does, each.blocks))) for each in block)
+
+
+def _raises(block: Block) -> bool:
+    """Whether a block ends in an error, whatever way it takes."""
+    if not block:
+        return False
+    last = block[-1]
+    return last.op == "raise" or (last.op == "if" and all(map(_raises, last.blocks)))
