@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from orchestration.studies.study_file import load_study
     from orchestration.studies.sweep import sweep
     from orchestration.studies.swept import Swept
+    from orchestration.system.distribution import Distribution
     from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
     from orchestration.system.paths import changed
     from orchestration.system.system_file import load_system
@@ -96,6 +97,7 @@ _HOMES = {
     "Sampling": "orchestration.system.model",
     "Connection": "orchestration.system.model",
     "Source": "orchestration.system.model",
+    "Distribution": "orchestration.system.distribution",
     "Criterion": "orchestration.system.model",
     "load_system": "orchestration.system.system_file",
     "changed": "orchestration.system.paths",
@@ -139,6 +141,7 @@ __all__ = [
     "Component",
     "Connection",
     "Criterion",
+    "Distribution",
     "DisturbanceChoice",
     "Flights",
     "FmuChoice",

@@ -2,7 +2,7 @@
 
 import types
 import typing
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from typing import Any, NamedTuple
 
@@ -57,12 +57,17 @@ def page() -> str:
 
 def _file(title: str, shape: Any, said: str) -> str:
     tables = {"": shape, **dict(_tables_in(shape, "")), **OF_THE_BASE.get(title, {})}
-    sections = "".join(_section(place, each, title) for place, each in tables.items())
+    places: dict[Any, list[str]] = {}
+    for place, each in tables.items():
+        places.setdefault(each, []).append(place)
+    sections = "".join(_section(of, each, title) for each, of in places.items())
     return f"## {title}\n\n{said}\n\n{sections}"
 
 
-def _section(place: str, shape: Any, file: str) -> str:
-    heading = f"### `{place}` of a {file.lower()}\n\n{_summary(shape)}\n\n" if place else ""
+def _section(places: Sequence[str], shape: Any, file: str) -> str:
+    """Of a table that may stand in one place of a file, or in several."""
+    named = ", ".join(f"`{place}`" for place in places)
+    heading = f"### {named} of a {file.lower()}\n\n{_summary(shape)}\n\n" if named != "``" else ""
     rows = [(f"<code>{key.name}</code>", _kind(key.kind), key.default, words(key.said)) for key in _keys(shape)]
     return heading + table(rows, columns=("Key", "Value", "Without it", "Meaning"))
 

@@ -120,7 +120,7 @@ def parsed(tables: Mapping[str, Any], shape: type[Shape]) -> Shape:
     try:
         return pydantic.TypeAdapter(shape).validate_json(json.dumps(tables, default=str))
     except pydantic.ValidationError as error:
-        raise UsageError(_first_problem(error, shape)) from error
+        raise UsageError(_first_problem(error, shape, tables)) from error
     except RecursionError:
         raise UsageError("nested too deeply; expected the tables of a file of this kind") from None
 
@@ -128,27 +128,48 @@ def parsed(tables: Mapping[str, Any], shape: type[Shape]) -> Shape:
 _MISSING = ("missing", "missing_argument", "missing_keyword_only_argument")
 _UNREAD = ("unexpected_keyword_argument", "extra_forbidden")
 """What pydantic calls a key that nobody reads"""
-_OF_TYPES = ("float", "dict[")
-"""Parts of a place that say by which type of several a value was read"""
 
 
 def _telling(error: pydantic.ValidationError) -> Any:
     """The first thing wrong with a document; where a key is missing, one beside it that nobody reads: it was meant."""
     problems = error.errors()
-    first = problems[0]
+    first = _of_a_table(problems)
     if first["type"] not in _MISSING:
         return first
     beside = [each for each in problems if each["type"] in _UNREAD and each["loc"][:-1] == first["loc"][:-1]]
     return next(iter(beside), first)
 
 
-def _first_problem(error: pydantic.ValidationError, file: type) -> str:
+def _of_a_table(problems: Sequence[Any]) -> Any:
+    """The first thing wrong; of a table where there may also be a number, what is wrong in the table."""
+    first = problems[0]
+    if first["type"] != "float_type" or not isinstance(first["input"], Mapping):
+        return first
+    place = first["loc"][:-1]
+    within = [each for each in problems if each["loc"][: len(place)] == place and len(each["loc"]) > len(place) + 1]
+    return next(iter(within), first)
+
+
+def _place(problem: Any, document: Any) -> list[Any]:
+    """Where a problem is, without the parts that say by which type of several a value was read."""
+    parts, value = [], document
+    for part in problem["loc"]:
+        try:
+            value = value[part]
+        except (LookupError, TypeError):
+            continue
+        parts.append(part)
+    return parts if problem["type"] not in _MISSING else [*parts, problem["loc"][-1]]
+
+
+def _first_problem(error: pydantic.ValidationError, file: type, document: Mapping[str, Any]) -> str:
     """The first thing wrong with a document of the shape `file`, in one line that says what is valid."""
     problem = _telling(error)
-    place = ".".join(str(part) for part in problem["loc"] if not str(part).startswith(_OF_TYPES))
+    parts = _place(problem, document)
+    place = ".".join(map(str, parts))
     if problem["type"] in _UNREAD:
-        key = str(problem["loc"][-1])
-        return no_such_key(place.removesuffix(key), key, keys_at(file, problem["loc"][:-1]))
+        key = str(parts[-1])
+        return no_such_key(place.removesuffix(key), key, keys_at(file, parts[:-1]))
     if problem["type"] in _MISSING:
         return f"{place}: expected a value"
     value = problem["input"]

@@ -10,7 +10,9 @@ from typing import Any, TypeVar
 from orchestration.basics.errors import QuadcosimError
 from orchestration.building import fmus
 from orchestration.fmi.model import Model, read_model
-from orchestration.system.model import Component, Source, System
+from orchestration.system.distribution import with_traces_at
+from orchestration.system.files_read import files_read
+from orchestration.system.model import Component, Connection, Source, System
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,8 +71,8 @@ def files_of(system: System, fmus_too: Iterable[str] = (), tables_too: Iterable[
 
 
 def tables_of(system: System) -> dict[str, Path]:
-    """The files of the sources of a system, by what it calls them."""
-    return {str(source.file): source.file for source in system.sources.values() if source.file is not None}
+    """The files that a system reads beside its FMUs, by what it calls them."""
+    return {str(file): file for file in files_read(system).values()}
 
 
 def with_files(system: System, paths: Mapping[str, Path]) -> System:
@@ -85,21 +87,24 @@ def all_with_files(systems: Iterable[System], paths: Mapping[str, Path]) -> list
         replace(
             system,
             components={name: _at(each, paths, made) for name, each in system.components.items()},
+            connections=tuple(_at(each, paths, made) for each in system.connections),
             sources={name: _at(each, paths, made) for name, each in system.sources.items()},
         )
         for system in systems
     ]
 
 
-Part = TypeVar("Part", Component, Source)
+Part = TypeVar("Part", Component, Connection, Source)
 
 
 def _at(part: Part, paths: Mapping[str, Path], made: dict[int, Any]) -> Part:
-    if isinstance(part, Source) and part.file is None:
-        return part
     if id(part) not in made:
-        of_file = {"fmu": str(paths[part.fmu])} if isinstance(part, Component) else {"file": paths[str(part.file)]}
-        fields: dict[str, Any] = dict(of_file)
-        made[id(part)] = replace(part, **fields)
+        fields: dict[str, Any] = {}
+        if isinstance(part, Component):
+            fields["fmu"] = str(paths[part.fmu])
+        elif isinstance(part, Source) and part.file is not None:
+            fields["file"] = paths[str(part.file)]
+        moved = with_traces_at(part, paths)
+        made[id(part)] = replace(moved, **fields) if fields else moved
     found: Part = made[id(part)]
     return found

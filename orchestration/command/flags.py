@@ -12,7 +12,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.command import completion
 from orchestration.command.build_flag import builds
 from orchestration.command.shared_flags import Command, takes
-from orchestration.system.choices import Clock, Distribution, Hold, Order
+from orchestration.system.choices import Clock, Hold, Order, Spread
 
 if TYPE_CHECKING:
     from orchestration.quadrotor.scenario import Scenario
@@ -69,7 +69,7 @@ class FlightFlags:
     delay: Annotated[float | None, _of_timing("delay")] = None
     delay_jitter: Annotated[float | None, _of_timing("delay_jitter")] = None
     jitter: Annotated[float | None, _of_timing("jitter")] = None
-    jitter_distribution: Annotated[str | None, _of_timing("jitter_distribution", words=Distribution)] = None
+    jitter_distribution: Annotated[str | None, _of_timing("jitter_distribution", words=Spread)] = None
     measurement_loss: Annotated[float | None, _of_timing("measurement_loss", metavar="P")] = None
     command_loss: Annotated[float | None, _of_timing("command_loss", metavar="P")] = None
     loss: Annotated[float | None, _option("--loss", panel=EFFECTS, metavar="P", text="Both losses at once.")] = None

@@ -24,8 +24,8 @@ def is_good(metrics: dict[str, Any]) -> bool:
 def is_random(system: System) -> bool:
     """Whether seeds make a difference."""
     return (
-        any(one.sampling is not None and one.sampling.jitter > 0.0 for one in system.components.values())
-        or any(x.delay_jitter > 0.0 or x.loss > 0.0 or any(x.noise.values()) for x in system.connections)
+        any(one.sampling is not None and one.sampling.is_random for one in system.components.values())
+        or any(x.is_random or any(x.noise.values()) for x in system.connections)
         or any(source.is_random and source.noise != 0.0 for source in system.sources.values())
     )
 

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from orchestration.basics.errors import shown
 from orchestration.basics.records import record
-from orchestration.system.choices import Clock, Distribution, Hold, Order
+from orchestration.system.choices import Clock, Hold, Order, Spread
 from orchestration.system.requirements import (
     is_finite,
     require,
@@ -49,7 +49,7 @@ class Timing:
     """The largest random addition J_d to the delay [s], drawn for each command."""
     jitter: float = 0.0
     """The largest lateness J of a sampling instant [s], drawn for each; it is less than the period."""
-    jitter_distribution: Distribution = "uniform"
+    jitter_distribution: Spread = "uniform"
     """How both are drawn over [0, J]; normal is centred at J/2 with standard deviation J/6, cut to the range."""
     measurement_loss: float = 0.0
     """The probability that a measurement is lost."""

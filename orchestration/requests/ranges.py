@@ -9,6 +9,7 @@ from orchestration.basics.errors import UsageError, expected_name
 from orchestration.basics.units import after
 from orchestration.fmi.model import Model
 from orchestration.results.quantities import is_in_seconds
+from orchestration.system.distribution import Distribution
 from orchestration.system.model import System
 from orchestration.system.paths import TOP, changed, value_at
 from orchestration.system.request import Request, in_its_own_words, system_meant
@@ -31,7 +32,7 @@ class Varied:
     def __post_init__(self) -> None:
         for path in self.paths:
             value = value_at(self.system, path)
-            if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float))):
+            if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float, Distribution))):
                 raise UsageError(f"--of {self.of}: expected the path of a number")
 
     @property

@@ -18,6 +18,7 @@ from orchestration.runs.meant import Announce, Progress
 from orchestration.runs.result import Result
 from orchestration.runs.run_directory import METRICS, SCENARIO, STATE, keep_flight
 from orchestration.runs.simulation import PreparedRun, flown
+from orchestration.system.files_read import files_read
 from orchestration.system.request import system_meant
 from orchestration.system.times import nanoseconds
 
@@ -153,10 +154,9 @@ def _digest(text: str, parts: dict[str, bytes]) -> str:
 
 def _hashes(flight: PreparedRun) -> dict[str, str]:
     """Of everything that a run goes on from beside its state."""
-    files = {name: source.file for name, source in flight.system.sources.items() if source.file is not None}
     return {
         SCENARIO: hashlib.sha256(flight.asked.to_toml().encode()).hexdigest(),
-        **{f"the file of {name}": _hash(path) for name, path in files.items()},
+        **{f"the file of {name}": _hash(path) for name, path in files_read(flight.system).items()},
         **{f"the FMU of {name}": _hash(instance.path) for name, instance in flight.instances.items()},
     }
 

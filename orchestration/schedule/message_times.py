@@ -5,29 +5,36 @@ from collections.abc import Callable
 
 import numpy as np
 
-from orchestration.basics.simulator import Booleans, Integers
+from orchestration.basics.simulator import Booleans
+from orchestration.schedule.drawing import Lateness, Stream, in_order, index_from, times
 from orchestration.schedule.streams import cut_normal
+from orchestration.system.distribution import Distribution, Varying
+from orchestration.system.times import nanoseconds
 
-Stream = Callable[[], np.random.Generator]
-"""Gives the generator; called only if something is drawn"""
-Lateness = Callable[[int], Integers]
-"""The next so many latenesses [ns]"""
 Losses = Callable[[int], Booleans]
 """Whether the next so many messages are lost"""
 
 
-def lateness(largest: int, distribution: str, stream: Stream) -> Lateness:
-    """Latenesses in [0, `largest`] ns; nothing is drawn if that is 0."""
+def lateness(jitter: Varying, spread: str, stream: Stream) -> Lateness:
+    """Latenesses [ns] up to a largest one, or as they are distributed; nothing is drawn if that is 0."""
+    if isinstance(jitter, Distribution):
+        return times(jitter, stream)
+    largest = nanoseconds(jitter)
     if largest == 0:
         return lambda count: np.zeros(count, dtype=np.int64)
     draw = stream().random
-    if distribution == "normal":
+    if spread == "normal":
         return lambda count: np.array([math.floor(cut_normal(u) * largest) for u in draw(count).tolist()], np.int64)
     return lambda count: np.floor(draw(count) * largest).astype(np.int64)
 
 
-def losses(probability: float, burst_length: float | None, stream: Stream) -> Losses:
-    """Losses, independent or in bursts of a mean length (Gilbert-Elliott); nothing is drawn if nothing is ever lost."""
+def losses(probability: Varying, burst_length: float | None, stream: Stream) -> Losses:
+    """Losses, independent or in bursts of a mean length (Gilbert-Elliott), or of values of 0 and 1.
+
+    Nothing is drawn if nothing is ever lost.
+    """
+    if isinstance(probability, Distribution):
+        return _recorded_losses(probability, stream)
     if probability == 0.0:
         return lambda count: np.zeros(count, dtype=np.bool_)
     draw = stream().random
@@ -43,3 +50,11 @@ def losses(probability: float, burst_length: float | None, stream: Stream) -> Lo
         return in_burst
 
     return lambda count: np.array([lost(share) for share in draw(count).tolist()], dtype=np.bool_)
+
+
+def _recorded_losses(of: Distribution, stream: Stream) -> Losses:
+    lost = of.table() != 0.0
+    if of.order == "as recorded":
+        return in_order(lost)
+    draw, index = stream().random, index_from(of)
+    return lambda count: lost[index(draw(count))]

@@ -7,10 +7,12 @@ from functools import partial
 import numpy as np
 
 from orchestration.basics.simulator import Integers
+from orchestration.schedule.drawing import times
 from orchestration.schedule.fixed_step import FixedStep, Refusal, seconds
 from orchestration.schedule.message_times import lateness, losses
 from orchestration.schedule.plan import Plan
-from orchestration.schedule.streams import DELAY_JITTER, JITTER, LOSS, Streams
+from orchestration.schedule.streams import DELAY, DELAY_JITTER, JITTER, LOSS, Streams
+from orchestration.system.distribution import highest
 from orchestration.system.model import Connection
 from orchestration.system.times import Grid, exact_nanoseconds, nanoseconds
 
@@ -22,24 +24,25 @@ class Link:
         self, index: int, x: Connection, streams: Streams, fixed: FixedStep | None, refused: list[Refusal]
     ) -> None:
         """`fixed` is who is stepped to its messages, if that takes steps of one length only."""
-        owner, jitter = f"connections.{x.name}", nanoseconds(x.delay_jitter)
-        self.index, self.delay, self.jacobi = index, nanoseconds(x.delay), x.order == "jacobi"
-        self.longest = self.delay + jitter
+        owner = f"connections.{x.name}"
+        self.index, self.jacobi = index, x.order == "jacobi"
+        self.longest = nanoseconds(highest(x.delay)) + nanoseconds(highest(x.delay_jitter))
         self._name, self._fixed, self._refused = owner, fixed, refused
-        self._late = lateness(jitter, x.jitter_distribution, partial(streams.of, owner, DELAY_JITTER))
+        self._delay = times(x.delay, partial(streams.of, owner, DELAY))
+        self._late = lateness(x.delay_jitter, x.jitter_distribution, partial(streams.of, owner, DELAY_JITTER))
         self._lost = losses(x.loss, x.burst_length, partial(streams.of, owner, LOSS))
         self._last = 0
 
     def messages(self, sent: Integers) -> Integers:
         """Arrivals of the next messages, sent at these times; -1 for one that is lost."""
-        lost, own = self._lost(len(sent)), sent + self.delay + self._late(len(sent))
+        lost, own = self._lost(len(sent)), sent + self._delay(len(sent)) + self._late(len(sent))
         arrivals = self._in_order(np.where(lost, 0, own), "an arrival")
         result: Integers = np.where(lost, -1, arrivals)
         return result
 
     def measurements(self, samples: Integers) -> tuple[Integers, Integers]:
         """When the next messages are measured, for samples at these times, and their arrivals as in `messages`."""
-        lost, own = self._lost(len(samples)), samples - self.delay - self._late(len(samples))
+        lost, own = self._lost(len(samples)), samples - self._delay(len(samples)) - self._late(len(samples))
         return self._in_order(own, "a measurement"), np.where(lost, -1, samples)
 
     def _in_order(self, times: Integers, what: str) -> Integers:
@@ -75,8 +78,8 @@ class SampledComponent:
         self.outgoing = [links[i] for i in plan.commanded if connections[i].sender == name]
         self._ahead = max((link.longest for link in self.incoming), default=0)
         self._grid = Grid(exact_nanoseconds(sampling.offset) / ratio, exact_nanoseconds(sampling.period) / ratio)
-        jitter, owner = nanoseconds(sampling.jitter), f"components.{name}"
-        self._late = lateness(jitter, sampling.jitter_distribution, partial(streams.of, owner, JITTER))
+        owner = f"components.{name}"
+        self._late = lateness(sampling.jitter, sampling.jitter_distribution, partial(streams.of, owner, JITTER))
         self._name, self._refused, self._stop = owner, refused, nanoseconds(plan.system.stop_time)
         self._fixed = [fixed[x] for x in sorted({connections[link.index].sender for link in self.incoming} & {*fixed})]
         self._k, self._next = 0, self._times(0, 1, -1)

@@ -7,6 +7,7 @@ from orchestration.schedule.cursor import INSTANTS
 from orchestration.schedule.schedule import Schedule
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
+from orchestration.system.distribution import content
 from orchestration.system.model import System
 
 MOST = 2**17
@@ -16,13 +17,16 @@ _KEPT = 8
 
 def timing(system: System) -> Hashable:
     """What the schedule of a system follows from."""
-    chance = any(c.sampling is not None and c.sampling.jitter for c in system.components.values()) or any(
-        x.delay_jitter or x.loss for x in system.connections
-    )
+    samplings = [c.sampling for c in system.components.values() if c.sampling is not None]
+    chance = any(each.is_random for each in samplings) or any(x.is_random for x in system.connections)
     return (
         system.stop_time,
         tuple((name, c.step, c.sampling) for name, c in system.components.items()),
-        tuple((x.delay, x.delay_jitter, x.jitter_distribution, x.loss, x.burst_length) for x in system.connections),
+        tuple(content(each.jitter) for each in samplings),
+        tuple(
+            (content(x.delay), content(x.delay_jitter), x.jitter_distribution, content(x.loss), x.burst_length)
+            for x in system.connections
+        ),
         tuple((source.to, source.period) for source in system.sources.values() if source.period is not None),
         (system.seed, tuple(sorted(system.streams.items()))) if chance else None,
     )

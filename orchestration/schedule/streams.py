@@ -6,7 +6,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-JITTER, DELAY_JITTER, LOSS, NOISE, VALUE = "jitter", "delay_jitter", "loss", "noise", "value"
+JITTER, DELAY, DELAY_JITTER, LOSS, NOISE, VALUE = "jitter", "delay", "delay_jitter", "loss", "noise", "value"
 
 
 class Streams:

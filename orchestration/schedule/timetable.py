@@ -18,7 +18,8 @@ from orchestration.schedule.plan import Plan
 from orchestration.schedule.random_timing import MESSAGES, NEXT, TIME, Link, SampledComponent
 from orchestration.schedule.schedule import Schedule
 from orchestration.schedule.streams import Streams
-from orchestration.system.model import System
+from orchestration.system.distribution import highest
+from orchestration.system.model import Sampling, System
 from orchestration.system.times import NANOSECONDS, Grid, exact_nanoseconds, nanoseconds
 
 LONGEST = 2**60
@@ -260,11 +261,12 @@ def _expect_no_longer(system: System) -> None:
     times |= {f"sources.{name}.period": source.period or 0.0 for name, source in system.sources.items()}
     for name, component in system.components.items():
         if component.sampling is not None:
+            _expect_jitter_within_period(name, component.sampling)
             for key in ("period", "offset"):
                 place = f"components.{name}.sampling.{key}"
                 times[place] = getattr(component.sampling, key) / component.sampling.clock_ratio
     for x in system.connections:
-        times |= {f"connections.{x.name}.delay": x.delay, f"connections.{x.name}.delay_jitter": x.delay_jitter}
+        times |= {f"connections.{x.name}.{key}": highest(getattr(x, key)) for key in ("delay", "delay_jitter")}
     for place, time in times.items():
         if time >= LONGEST / NANOSECONDS:
             raise UsageError(f"{place} = {time:g} s: expected less than {LONGEST / NANOSECONDS:.4g} s")
@@ -272,12 +274,19 @@ def _expect_no_longer(system: System) -> None:
         sampling = system.components[x.receiver].sampling
         if sampling is None or system.components[x.sender].sampling is not None:
             continue
-        period = sampling.period / sampling.clock_ratio
-        if x.delay + x.delay_jitter > MOST_AHEAD * period:
+        period, late = sampling.period / sampling.clock_ratio, highest(x.delay) + highest(x.delay_jitter)
+        if late > MOST_AHEAD * period:
             raise UsageError(
-                f"connections.{x.name}.delay: is measured {x.delay + x.delay_jitter:g} s before a sample of "
+                f"connections.{x.name}.delay: is measured {late:g} s before a sample of "
                 f"{x.receiver}, every {period:g} s: expected at most {MOST_AHEAD} samples"
             )
+
+
+def _expect_jitter_within_period(name: str, sampling: Sampling) -> None:
+    try:
+        sampling.expect_jitter_within_period()
+    except UsageError as error:
+        raise UsageError(f"components.{name}.sampling.{error}") from error
 
 
 def _pace(system: System) -> float:

@@ -28,6 +28,7 @@ from orchestration.schedule.timetable import Timetable
 from orchestration.stability.linear_simulator import Linear, Opened
 from orchestration.stability.linearised_component import PULSE, Rest, Tangent
 from orchestration.stability.operating_point import common_period, deterministic, exchanged, expect_rest, latest_offset
+from orchestration.system.distribution import highest
 from orchestration.system.model import Component, Criterion, System, component_of, variable_of
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 
@@ -67,7 +68,7 @@ def at_rest(system: System, instances: Instances, pulse: float = PULSE) -> Itera
     """
     calm = deterministic(system)
     period = _expect_period(calm)
-    delay = max((exact_nanoseconds(x.delay) for x in calm.connections), default=Fraction(0))
+    delay = max((exact_nanoseconds(highest(x.delay)) for x in calm.connections), default=Fraction(0))
     begin = latest_offset(calm) + (math.ceil(delay / period) + HELD) * period
     calm = replace(calm, stop_time=float(begin + (SETTLED + 2) * period) / NANOSECONDS)
     with prepared(calm, load=_watching(instances)) as simulation:

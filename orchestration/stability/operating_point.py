@@ -9,6 +9,7 @@ import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
+from orchestration.system.distribution import lowest
 from orchestration.system.model import Component, Criterion, Sampling, System
 from orchestration.system.paths import changed
 from orchestration.system.times import exact_nanoseconds
@@ -30,7 +31,16 @@ def deterministic(system: System) -> System:
         chosen,
         components={name: _punctual(component) for name, component in chosen.components.items()},
         connections=tuple(
-            replace(x, delay_jitter=0.0, loss=0.0, burst_length=None, noise={}, quantisation={})
+            replace(
+                x,
+                delay=lowest(x.delay),
+                delay_jitter=0.0,
+                jitter_distribution="uniform",
+                loss=0.0,
+                burst_length=None,
+                noise={},
+                quantisation={},
+            )
             for x in chosen.connections
         ),
         sources={

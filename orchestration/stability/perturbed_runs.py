@@ -30,6 +30,7 @@ from orchestration.stability.operating_point import (
     latest_offset,
     longest_period,
 )
+from orchestration.system.distribution import highest
 from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 
@@ -81,7 +82,7 @@ def growth_of(system: System, instances: Instances) -> Growth:
     seconds = float(interval) / NANOSECONDS
     window = difference[begin:end]
     rounding = float(np.finfo(float).eps * (np.abs(calm[begin:end]) / scale).max(initial=0.0))
-    delays = DELAYS + math.ceil(max((x.delay for x in nominal.connections), default=0.0) / seconds)
+    delays = DELAYS + math.ceil(max((highest(x.delay) for x in nominal.connections), default=0.0) / seconds)
     fitted = _rate(window, delays, rounding) if len(window) >= SHORTEST else None
     rate = _between(size, begin, min(end, count - 1)) if fitted is None else fitted
     return Growth(rate=rate / seconds, horizon=nominal.stop_time)

@@ -12,6 +12,7 @@ from orchestration.signals.waypoints import read_waypoints
 from orchestration.studies.store import expect_columns
 from orchestration.studies.study import Study
 from orchestration.system.check import check_parameter
+from orchestration.system.files_read import drawn
 from orchestration.system.following import heard
 from orchestration.system.model import System
 from orchestration.system.request import in_its_own_words
@@ -68,7 +69,9 @@ class _Alike:
 
 
 def expect_tables(system: System) -> None:
-    """Raise `UsageError` for a table of a source that cannot be read, or does not last."""
+    """Raise `UsageError` for a trace or a table of a source that cannot be read, or does not last."""
+    for _, each in drawn(system):
+        _ = each.highest
     for source in system.sources.values():
         if source.file is not None and source.is_motion:
             read_waypoints(source.file, source.parameters)

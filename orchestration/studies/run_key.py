@@ -5,12 +5,14 @@ import hashlib
 import json
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from orchestration.building.inputs import Files, tables_of
 from orchestration.results.own_metrics import OwnMetric
 from orchestration.studies.study import Study
-from orchestration.system.model import Component, Source, System
+from orchestration.system.distribution import Distribution
+from orchestration.system.model import Component, Connection, Source, System
 from orchestration.workers.provenance import machine, versions
 
 
@@ -26,7 +28,7 @@ def run_key(system: System, files: Files, metrics: Sequence[OwnMetric] = ()) -> 
             _text_of(component, partial(_component_of, name, files), name, id(files))
             for name, component in system.components.items()
         ),
-        "connections": _listed(_text_of(x, _values_of) for x in system.connections),
+        "connections": _listed(_text_of(x, partial(_connection_of, files), id(files)) for x in system.connections),
         "sources": _listed(
             _text_of(source, partial(_named_source_of, name, files), name, id(files))
             for name, source in system.sources.items()
@@ -66,8 +68,12 @@ def _component_of(name: str, files: Files, component: Component) -> dict[str, An
         "name": name,
         "fmu": files.hashes[component.fmu],
         "parameters": {key: v for key, v in component.parameters.items() if key not in starts or v != starts[key]},
-        "sampling": None if component.sampling is None else dataclasses.asdict(component.sampling),
+        "sampling": None if component.sampling is None else _content(component.sampling, files),
     }
+
+
+def _connection_of(files: Files, x: Connection) -> dict[str, Any]:
+    return _content(x, files)
 
 
 def _named_source_of(name: str, files: Files, source: Source) -> list[Any]:
@@ -75,11 +81,22 @@ def _named_source_of(name: str, files: Files, source: Source) -> list[Any]:
 
 
 def _source_of(source: Source, files: Files) -> dict[str, Any]:
-    return {**_values_of(source), "file": None if source.file is None else files.hashes[str(source.file)]}
+    return _content(source, files)
 
 
 def _values_of(of: Any) -> dict[str, Any]:
     return {field.name: getattr(of, field.name) for field in dataclasses.fields(of)}
+
+
+def _content(of: Any, files: Files) -> dict[str, Any]:
+    """The values of a part of a system, with what is drawn as its own values, and files as what is in them."""
+    return {name: _told(value, files) for name, value in _values_of(of).items()}
+
+
+def _told(value: Any, files: Files) -> Any:
+    if isinstance(value, Path):
+        return files.hashes[str(value)]
+    return _content(value, files) if isinstance(value, Distribution) else value
 
 
 def study_parts(study: Study) -> dict[str, str]:
@@ -88,14 +105,14 @@ def study_parts(study: Study) -> dict[str, str]:
     tables = Files(fmus={}, tables=tables_of(system))
     parts: dict[str, Any] = {key: getattr(system, key) for key in ("stop_time", "seed")}
     for name, component in system.components.items():
-        parts |= _parts(f"components.{name}", component, without=("fmu",))
+        parts |= _parts(f"components.{name}", component, tables, without=("fmu",))
     for x in system.connections:
-        parts |= _parts(f"connections.{x.name}", x)
+        parts |= _parts(f"connections.{x.name}", x, tables)
     for name, source in system.sources.items():
         parts |= {f"sources.{name}.{key}": value for key, value in _source_of(source, tables).items()}
     parts |= {f"objectives.{name}": text for name, text in system.objectives.items()}
     parts |= {f"metrics.{metric.name}": metric.source for metric in study.metrics}
-    parts |= _parts("criterion", system.criterion)
+    parts |= _parts("criterion", system.criterion, tables)
     said: dict[str, str] = {}
     for path, value in parts.items():
         name = study.base.in_words(path)
@@ -103,17 +120,17 @@ def study_parts(study: Study) -> dict[str, str]:
     return said
 
 
-def _parts(place: str, of: Any, without: Container[str] = ()) -> dict[str, Any]:
+def _parts(place: str, of: Any, files: Files, without: Container[str] = ()) -> dict[str, Any]:
     """Every value of `of`, by path; what is `None` is not there."""
     found: dict[str, Any] = {}
     for field in dataclasses.fields(of):
         value, path = getattr(of, field.name), f"{place}.{field.name}"
         if dataclasses.is_dataclass(value):
-            found |= _parts(path, value)
+            found |= _parts(path, value, files)
         elif field.name == "parameters":
             found |= {f"{path}.{name}": given for name, given in value.items()}
         elif value is not None and field.name not in without:
-            found[path] = value
+            found[path] = _told(value, files)
     return found
 
 

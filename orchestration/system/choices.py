@@ -5,6 +5,7 @@ from typing import Literal
 Order = Literal["gauss-seidel", "jacobi"]
 Hold = Literal["zero", "first"]
 Clock = Literal["master", "fmu"]
-Distribution = Literal["uniform", "normal"]
+Spread = Literal["uniform", "normal"]
+TraceOrder = Literal["drawn", "as recorded"]
 Align = Literal["exact", "next"]
 Interpolation = Literal["linear", "previous", "spline"]

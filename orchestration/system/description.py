@@ -1,9 +1,10 @@
 """A system in words: its components with their rates, its connections with what happens to their messages."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from orchestration.basics.units import in_brackets
+from orchestration.system.distribution import Distribution, Varying
 from orchestration.system.model import Component, Connection, Sampling, Source, System, variable_of
 
 
@@ -48,7 +49,7 @@ def sampled(sampling: Sampling) -> str:
     """When a digital task runs."""
     parts = [f"every {seconds(sampling.period)}"]
     parts += [f"from {seconds(sampling.offset)}"] if sampling.offset else []
-    parts += [f"jitter {seconds(sampling.jitter)} {sampling.jitter_distribution}"] if sampling.jitter else []
+    parts += [f"jitter {_largest(sampling.jitter, sampling.jitter_distribution)}"] if sampling.jitter else []
     parts += [f"clock {sampling.clock_ratio:g} times true time"] if sampling.clock_ratio != 1.0 else []
     parts += ["by its own clock"] if sampling.clock == "fmu" else []
     return ", ".join(parts)
@@ -63,9 +64,11 @@ def signals(x: Connection) -> str:
 
 def timing(x: Connection) -> str:
     """What happens to the messages of a connection; empty if they arrive as they are, at once."""
-    parts = [f"delay {seconds(x.delay)}"] if x.delay else []
-    parts += [f"delay jitter {seconds(x.delay_jitter)} {x.jitter_distribution}"] if x.delay_jitter else []
-    if x.loss:
+    parts = [f"delay {varying(x.delay)}"] if x.delay else []
+    parts += [f"delay jitter {_largest(x.delay_jitter, x.jitter_distribution)}"] if x.delay_jitter else []
+    if isinstance(x.loss, Distribution):
+        parts.append(f"loss {varying(x.loss, '{:g}'.format)}")
+    elif x.loss:
         bursts = f" in bursts of {x.burst_length:g}" if x.burst_length is not None else ""
         parts.append(f"loss {100.0 * x.loss:g} %{bursts}")
     parts += ["hold first"] if x.hold == "first" else []
@@ -89,6 +92,32 @@ def what(source: Source) -> str:
     if source.file is not None:
         return f"{'way-points of' if source.is_motion else 'file'} {source.file.name}"
     return source.signal or f"trajectory of {source.trajectory}"
+
+
+def varying(of: Varying, said: Callable[[float], str] | None = None) -> str:
+    """A time, or how it is distributed; of what is no time each number as it is `said`."""
+    said = said or seconds
+    if not isinstance(of, Distribution):
+        return said(of)
+    if of.uniform is not None:
+        return f"{said(of.uniform[0])} to {said(of.uniform[1])} uniform"
+    if of.normal is not None and of.range is not None:
+        mean, deviation = map(said, of.normal)
+        return f"{mean} ± {deviation} normal, cut to {said(of.range[0])} to {said(of.range[1])}"
+    if of.file is not None:
+        return f"{of.column} of {of.file.name}, {of.order}"
+    values = [said(value) for value in of.values or ()]
+    if of.probabilities is not None:
+        values = [f"{value} ({share:g})" for value, share in zip(values, of.probabilities, strict=True)]
+    return f"one of {', '.join(_few(values))}"
+
+
+def _largest(jitter: Varying, spread: str) -> str:
+    return varying(jitter) if isinstance(jitter, Distribution) else f"{seconds(jitter)} {spread}"
+
+
+def _few(names: list[str], most: int = 6) -> list[str]:
+    return names if len(names) <= most else [*names[: most - 1], f"{len(names) - most + 1} more"]
 
 
 def seconds(value: float) -> str:
@@ -117,7 +146,7 @@ def _shortened(names: Sequence[str], most: int = 6) -> list[str]:
         f"{stem}{parts[0]}" if len(parts) == 1 else f"{stem}.{{{','.join(part[1:] for part in parts)}}}"
         for stem, parts in groups.items()
     ]
-    return named if len(named) <= most else [*named[: most - 1], f"{len(named) - most + 1} more"]
+    return _few(named, most)
 
 
 def _table(rows: Sequence[Sequence[str]]) -> list[str]:

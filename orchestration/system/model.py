@@ -10,7 +10,18 @@ from orchestration.basics.errors import UsageError
 from orchestration.basics.records import Scalar, record
 from orchestration.expressions.syntax import is_number, parse
 from orchestration.signals import WINDS
-from orchestration.system.choices import Align, Clock, Distribution, Hold, Interpolation, Order
+from orchestration.system.choices import Align, Clock, Hold, Interpolation, Order, Spread
+from orchestration.system.distribution import (
+    Distribution,
+    Varying,
+    highest,
+    is_random,
+    reads_file,
+    require_losses,
+    require_spread,
+    require_varying,
+    spreads,
+)
 from orchestration.system.requirements import (
     is_finite,
     require,
@@ -34,10 +45,12 @@ class Sampling:
     """The period T of the task [s], in its own time: instant k is offset + kT."""
     offset: float = 0.0
     """The time of the first instant [s], in its own time."""
-    jitter: float = 0.0
-    """The largest lateness J of an instant [s], drawn for each; it is less than the period."""
-    jitter_distribution: Distribution = "uniform"
-    """How it is drawn over [0, J]; normal is centred at J/2 with standard deviation J/6, cut to the range."""
+    jitter: Varying = 0.0
+    """The largest lateness J of an instant [s], drawn for each, or how the lateness itself is distributed; it is less
+    than the period."""
+    jitter_distribution: Spread = "uniform"
+    """How a lateness of which the largest is given is drawn over [0, J]; normal is centred at J/2 with standard
+    deviation J/6, cut to the range."""
     clock_ratio: float = 1.0
     """The seconds r that the component believes pass per true second."""
     clock: Clock = "master"
@@ -45,12 +58,24 @@ class Sampling:
 
     def __post_init__(self) -> None:
         require_positive(self, "period", "clock_ratio")
-        require_not_negative(self, "offset", "jitter")
+        require_not_negative(self, "offset")
+        require_varying(self, "jitter")
+        require_spread(self, self.jitter, self.jitter_distribution)
         require(is_at_least(self.period, self.clock_ratio), "period", self.period, "at least a nanosecond")
-        longest = self.period / self.clock_ratio
-        require(self.jitter < longest, "jitter", self.jitter, f"less than the period of {longest:g} s")
+        if not reads_file(self.jitter):
+            self.expect_jitter_within_period()
         if self.clock == "fmu":
             require_own_clock(self)
+
+    @property
+    def is_random(self) -> bool:
+        """Whether seeds make a difference to its instants."""
+        return spreads(self.jitter)
+
+    def expect_jitter_within_period(self) -> None:
+        """Raise `UsageError` for a lateness of a period or more; of a trace that is known when it is read."""
+        longest, most = self.period / self.clock_ratio, highest(self.jitter)
+        require(most < longest, "jitter", most, f"less than the period of {longest:g} s")
 
 
 @record()
@@ -99,14 +124,16 @@ class Connection:
     order: Order = "gauss-seidel"
     """Whether a message can be there at the instant at which it was sent (gauss-seidel), or at the next one of its
     sender (jacobi); in a file without it, what `order` at the top says."""
-    delay: float = 0.0
-    """The time d from sending to arrival [s]; it may exceed a period."""
-    delay_jitter: float = 0.0
-    """The largest random addition J_d to the delay [s]; messages never overtake each other."""
-    jitter_distribution: Distribution = "uniform"
-    """How that is drawn over [0, J_d]; normal is centred at J_d/2, cut to the range."""
-    loss: float = 0.0
-    """The probability that a message is lost."""
+    delay: Varying = 0.0
+    """The time d from sending to arrival [s], or how it is distributed; it may exceed a period, and messages never
+    overtake each other."""
+    delay_jitter: Varying = 0.0
+    """The largest random addition J_d to the delay [s], or how the addition itself is distributed."""
+    jitter_distribution: Spread = "uniform"
+    """How an addition of which the largest is given is drawn over [0, J_d]; normal is centred at J_d/2, cut to the
+    range."""
+    loss: Varying = 0.0
+    """The probability that a message is lost, or values of 0 and 1, as of a trace: 1 for one that is lost."""
     burst_length: float | None = None
     """The mean number of losses in a row (Gilbert-Elliott); without it, losses are independent."""
     hold: Hold = "zero"
@@ -129,9 +156,19 @@ class Connection:
         """Whether scale and offset change a value."""
         return self.scale != 1.0 or self.offset != 0.0
 
+    @property
+    def is_random(self) -> bool:
+        """Whether seeds make a difference to when its messages arrive, and which."""
+        return is_random(self.delay) or spreads(self.delay_jitter) or spreads(self.loss)
+
     def __post_init__(self) -> None:
-        require_not_negative(self, "delay", "delay_jitter")
-        require_share(self, "loss")
+        require_varying(self, "delay", "delay_jitter")
+        require_spread(self, self.delay_jitter, self.jitter_distribution)
+        if isinstance(self.loss, Distribution):
+            require_losses(self.loss, self.burst_length)
+        else:
+            require_share(self, "loss")
+            require_bursts(self, self.burst_length, "loss")
         for what, values in (("noise", self.noise), ("quantisation", self.quantisation)):
             for name, value in values.items():
                 require(is_finite(value) and value >= 0.0, f"{what} of {name}", value, "zero or positive")
@@ -146,7 +183,6 @@ class Connection:
         for what, ends in (("from", self.start), ("to", self.end)):
             owners = {component_of(end) for end in ends}
             require(len(owners) == 1, what, ", ".join(ends), "variables of one component")
-        require_bursts(self, self.burst_length, "loss")
 
     def places(self, name: str) -> list[int]:
         """Where in a message a variable of the sender is; those of its components for a vector; none if in no place."""
@@ -432,9 +468,7 @@ class System:
     def _causes(self) -> list[str]:
         """What random numbers are drawn for."""
         tasks = [f"components.{name}.jitter" for name, c in self.components.items() if c.sampling is not None]
-        sent = [
-            f"connections.{x.name}.{cause}" for x in self.connections for cause in ("delay_jitter", "loss", "noise")
-        ]
+        sent = [f"connections.{x.name}.{cause}" for x in self.connections for cause in _CAUSES]
         return [*tasks, *sent, *(f"sources.{name}.value" for name, x in self.sources.items() if x.is_random)]
 
     def _feeds(self) -> list[tuple[str, str | None, str]]:
@@ -442,6 +476,10 @@ class System:
             (f"connections.{x.name}", start, end) for x in self.connections for start, end in zip(x.start, x.end)
         ]
         return feeds + [(f"sources.{name}", None, end) for name, source in self.sources.items() for end in source.to]
+
+
+_CAUSES = ("delay", "delay_jitter", "loss", "noise")
+"""Of a connection"""
 
 
 def _few(names: list[str], most: int = 6) -> list[str]:

@@ -8,15 +8,18 @@ from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError
 from orchestration.basics.typed_tables import fields_of, parsed, table_of
 from orchestration.system.choices import Order
+from orchestration.system.distribution import Distribution
 from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
 from orchestration.system.parameters import flattened, parameters_in
 from orchestration.system.paths import changed, for_each
 from orchestration.system.requirements import require
 
-SamplingTable = table_of(Sampling)
+DistributionTable = table_of(Distribution, file=(str | None, None))
+SamplingTable = table_of(Sampling, within=[DistributionTable])
 ComponentTable = table_of(Component, within=[SamplingTable], parameters=(dict[str, Any], {}))
 ConnectionTable = table_of(
     Connection,
+    within=[DistributionTable],
     called={"start": "from", "end": "to"},
     without=["stated"],
     name=(str | None, None),
@@ -70,7 +73,9 @@ def system_from_tables(tables: Mapping[str, Any], folder: Path) -> System:
         **given
         | {
             "components": {name: _component(name, value, folder) for name, value in table.components.items()},
-            "connections": tuple(_connection(i, value, table.order) for i, value in enumerate(table.connections)),
+            "connections": tuple(
+                _connection(i, value, table.order, folder) for i, value in enumerate(table.connections)
+            ),
             "sources": {name: _source(name, value, folder) for name, value in table.sources.items()},
             "criterion": _made("criterion", Criterion, table.criterion.model_dump()),
             "operating_point": dict(flattened(table.operating_point)),
@@ -92,13 +97,14 @@ def _component(name: str, table: Any, folder: Path) -> Component:
     keys["fmu"] = str(folder / table.fmu) if table.fmu.endswith(".fmu") else table.fmu
     keys["parameters"] = parameters_in(table.parameters, f"{place}.parameters")
     if table.sampling is not None:
-        keys["sampling"] = _made(f"{place}.sampling", Sampling, table.sampling.model_dump())
+        sampling = _with_distributions(f"{place}.sampling", table.sampling, folder)
+        keys["sampling"] = _made(f"{place}.sampling", Sampling, sampling)
     return _made(place, Component, keys)
 
 
-def _connection(index: int, table: Any, order: Order) -> Connection:
-    keys = table.model_dump()
-    keys["name"] = table.name if table.name is not None else str(index)
+def _connection(index: int, table: Any, order: Order, folder: Path) -> Connection:
+    name = table.name if table.name is not None else str(index)
+    keys = _with_distributions(f"connections.{name}", table, folder) | {"name": name}
     keys["order"] = table.order or order
     keys["stated"] = bool({"scale", "offset"} & table.model_fields_set)
     for what in ("noise", "quantisation"):
@@ -107,6 +113,17 @@ def _connection(index: int, table: Any, order: Order) -> Connection:
             if isinstance(value, bool) or not isinstance(value, (int, float)):
                 raise UsageError(f"connections.{keys['name']}.{what}.{variable} = {value!r}: expected a number")
     return _made(f"connections.{keys['name']}", Connection, keys)
+
+
+def _with_distributions(place: str, table: Any, folder: Path) -> dict[str, Any]:
+    """The keys of a table, those that are drawn as what they are drawn from."""
+    keys: dict[str, Any] = table.model_dump()
+    for key in keys:
+        drawn = getattr(table, key)
+        if isinstance(drawn, DistributionTable):
+            file = None if drawn.file is None else folder / drawn.file
+            keys[key] = _made(f"{place}.{key}", Distribution, {**keys[key], "file": file})
+    return keys
 
 
 def _source(name: str, table: Any, folder: Path) -> Source:

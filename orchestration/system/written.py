@@ -17,9 +17,6 @@ def tables_of(system: Any) -> dict[str, Any]:
             table["fmu"] = str(Path(table["fmu"]).absolute())
     tables["connections"] = [_connection_table(x) for x in system.connections]
     tables["sources"] = {name: _without_defaults(source) for name, source in system.sources.items()}
-    for table in tables["sources"].values():
-        if "file" in table:
-            table["file"] = str(Path(table["file"]).absolute())
     for key in ("objectives", "streams", "operating_point"):
         tables[key] = dict(getattr(system, key))
     tables["criterion"] = _without_defaults(system.criterion)
@@ -43,6 +40,8 @@ def _without_defaults(of: Any, keep: tuple[str, ...] = ()) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
+    if isinstance(value, Path):
+        return str(value.absolute())
     if isinstance(value, tuple):
         return list(value)
     return dict(value) if isinstance(value, Mapping) else value

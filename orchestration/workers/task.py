@@ -16,6 +16,7 @@ from orchestration.fmi.reuse import Instances
 from orchestration.results.own_metrics import OwnMetric
 from orchestration.runs.result import Result
 from orchestration.runs.simulation import prepared
+from orchestration.system.files_read import files_read
 from orchestration.system.model import System
 from orchestration.workers.row import Row
 
@@ -158,9 +159,8 @@ class Runner:
 
 def _expect_files(system: System) -> None:
     """Raise `WorkerEnvironmentError` if a file is not there, or is not the FMU that the coordinator has read."""
-    tables = [source.file for source in system.sources.values() if source.file is not None]
     fmus = [Path(component.fmu) for component in system.components.values()]
-    for file in (*fmus, *tables):
+    for file in (*fmus, *files_read(system).values()):
         if not file.is_file():
             raise WorkerEnvironmentError(f"{file}: is no longer there")
     try:

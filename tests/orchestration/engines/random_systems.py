@@ -2,10 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from hypothesis import strategies as st
 
+from orchestration.system.choices import TraceOrder
+from orchestration.system.distribution import Distribution
 from orchestration.system.model import Component, Connection, Sampling, System
 
 OUTPUTS = ("y", "z")
@@ -17,6 +20,31 @@ def some(*values: Any) -> st.SearchStrategy[float]:
     return st.just(0.0) | st.sampled_from(values or TIMES) | st.floats(0.001, 0.1)
 
 
+ORDERS: tuple[TraceOrder, ...] = ("drawn", "as recorded")
+TRACE = Path(__file__).parents[2] / "data" / "trace.csv"
+
+
+@st.composite
+def distributions(draw: st.DrawFn, most: float = 0.1) -> Distribution:
+    """Of every kind, up to a largest value."""
+    low, high = sorted((draw(st.floats(0.0, most)), draw(st.floats(0.0, most))))
+    kind = draw(st.sampled_from(("uniform", "normal", "values", "probabilities", *(("file",) if most >= 0.1 else ()))))
+    if kind == "uniform":
+        return Distribution(uniform=(low, high))
+    if kind == "normal":
+        return Distribution(normal=(draw(st.floats(-0.01, most)), 0.1 * most + high), range=(0.0, high + 1e-4 * most))
+    if kind == "file":
+        return Distribution(file=TRACE, column="delay", order=draw(st.sampled_from(ORDERS)))
+    values = (low, high, 0.5 * high)
+    shares = draw(st.sampled_from(((0.25, 0.75, 0.0), (0.1, 0.2, 0.7)))) if kind == "probabilities" else None
+    return Distribution(values=values, probabilities=shares)
+
+
+def losses() -> st.SearchStrategy[Distribution]:
+    """That are no probability."""
+    return st.builds(Distribution, file=st.just(TRACE), column=st.just("lost"), order=st.sampled_from(ORDERS))
+
+
 @st.composite
 def samplings(draw: st.DrawFn) -> Sampling:
     """Of a task."""
@@ -25,9 +53,24 @@ def samplings(draw: st.DrawFn) -> Sampling:
         return Sampling(period=period, offset=draw(st.sampled_from((0.0, 0.01))), clock="fmu")
     return Sampling(
         period=period, clock_ratio=ratio, offset=draw(some()),
-        jitter=draw(st.just(0.0) | st.floats(0.0, 0.99)) * period / ratio,
-        jitter_distribution=draw(st.sampled_from(("uniform", "normal"))),
+        **draw(jitters("jitter", st.floats(0.0, 0.99).map(lambda share: share * period / ratio), 0.7 * period / ratio)),
     )  # fmt: skip
+
+
+@st.composite
+def jitters(draw: st.DrawFn, key: str, largest: st.SearchStrategy[float], most: float) -> dict[str, Any]:
+    """A jitter by its largest value, or as it is distributed up to `most`."""
+    if draw(st.integers(0, 3)) == 0:
+        return {key: draw(distributions(most))}
+    return {key: draw(st.just(0.0) | largest), "jitter_distribution": draw(st.sampled_from(("uniform", "normal")))}
+
+
+@st.composite
+def lost(draw: st.DrawFn) -> dict[str, Any]:
+    """What is lost, by a probability or by a trace."""
+    if draw(st.integers(0, 3)) == 0:
+        return {"loss": draw(losses())}
+    return {"loss": draw(some(0.3, 0.5)), "burst_length": draw(st.none() | st.floats(1.0, 5.0))}
 
 
 @st.composite
@@ -46,9 +89,8 @@ def connections(draw: st.DrawFn, index: int, names: Sequence[str]) -> Connection
     by_name = st.dictionaries(st.sampled_from(outputs), st.just(0.0) | st.floats(0.01, 1.0))
     is_dull = draw(st.booleans())
     disturbed: dict[str, Any] = {} if is_dull else {
-        "delay": draw(some(*TIMES, 0.2)), "delay_jitter": draw(some()), "loss": draw(some(0.3, 0.5)),
-        "jitter_distribution": draw(st.sampled_from(("uniform", "normal"))),
-        "burst_length": draw(st.none() | st.floats(1.0, 5.0)), "noise": draw(by_name),
+        "delay": draw(some(*TIMES, 0.2) | distributions()), **draw(jitters("delay_jitter", some(), 0.1)),
+        **draw(lost()), "noise": draw(by_name),
     }  # fmt: skip
     return Connection(
         name=f"c{index}",

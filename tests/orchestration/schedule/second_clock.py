@@ -87,18 +87,62 @@ def uniform(numbers: np.random.Generator) -> float:
     return (int(numbers.bit_generator.random_raw()) >> 11) * 2.0**-53
 
 
-def lateness(numbers: np.random.Generator, largest: float, distribution: str) -> int:
+def drawn(numbers: np.random.Generator, given: Any, k: int) -> float | Fraction:
+    """The k-th number of what a distribution says; a span is of whole nanoseconds, all else as it stands there."""
+    if isinstance(given, (int, float)):
+        return given
+    if given["file"] is not None:
+        header, *rows = [line.split(",") for line in given["file"].read_text().split()]
+        table = [float(row[header.index(given["column"])]) for row in rows]
+        if given["order"] == "as recorded":
+            return table[k % len(table)]
+    elif given["values"] is not None:
+        table = list(given["values"])
+    u = uniform(numbers)
+    if given["uniform"] is not None:
+        a, b = (round(exactly(end)) for end in given["uniform"])
+        return Fraction(a + math.floor(u * (b - a)), 10**9)
+    if given["normal"] is not None:
+        (m, s), (a, b) = given["normal"], given["range"]
+        p, q = (math.erfc((m - end) / (s * math.sqrt(2.0))) / 2.0 for end in (a, b))
+        x = math.floor((m + s * NormalDist().inv_cdf(p + u * (q - p))) * 1e9)
+        return Fraction(min(max(x, round(exactly(a))), round(exactly(b))), 10**9)
+    if given["probabilities"] is None:
+        return table[math.floor(u * len(table))]
+    sums = list(itertools.accumulate(given["probabilities"]))
+    return table[next(i for i, total in enumerate(sums) if u < total)]
+
+
+def longest(given: Any) -> Fraction:
+    """The most that it can be, in nanoseconds."""
+    if isinstance(given, (int, float)):
+        return exactly(given)
+    if given["file"] is not None:
+        return max(longest(drawn(np.random.default_rng(), given | {"order": "as recorded"}, k)) for k in range(99))
+    return exactly(max(given["values"] or given["uniform"] or given["range"]))
+
+
+def whole(seconds: float | Fraction) -> int:
     """In nanoseconds."""
+    return round(seconds * 10**9 if isinstance(seconds, Fraction) else exactly(seconds))
+
+
+def lateness(numbers: np.random.Generator, largest: Any, distribution: str, k: int) -> int:
+    """Of sample or message k, in nanoseconds."""
     if largest == 0:
         return 0
+    if isinstance(largest, dict):
+        return whole(drawn(numbers, largest, k))
     u = uniform(numbers)
     if distribution == "normal":
         u = min(max(NormalDist(0.5, 1 / 6).inv_cdf(C0 + u * (C1 - C0)), 0.0), 1.0)
     return math.floor(u * round(exactly(largest)))
 
 
-def losses(numbers: np.random.Generator, p: float, n: float | None, count: int) -> list[bool]:
+def losses(numbers: np.random.Generator, p: Any, n: float | None, count: int) -> list[bool]:
     """Of the first `count` messages."""
+    if isinstance(p, dict):
+        return [drawn(numbers, p, k) == 1 for k in range(count)]
     if p == 0:
         return [False] * count
     lost: list[bool] = []
@@ -159,7 +203,7 @@ def samples(system: System, name: str, until: int, grids: Iterable[float]) -> li
     offset, period = exactly(sampling["offset"]) / r, exactly(sampling["period"]) / r
     times: list[int] = []
     while len(times) < 2 or times[-2] <= until:
-        late = lateness(numbers, sampling["jitter"], sampling["jitter_distribution"])
+        late = lateness(numbers, sampling["jitter"], sampling["jitter_distribution"], len(times))
         t = round(offset + len(times) * period) + late
         while t < until and any(t not in points(step, t) for step in grids):
             t = max(points(step, t)[-1] for step in grids)
@@ -183,13 +227,14 @@ def messages(
 ) -> list[Message]:
     """All of a connection; `grids` are the steps of components that move what happens to them to their next point."""
     given = wire.given
-    numbers = {kind: stream(system, f"connections.{wire.name}.{kind}") for kind in ("loss", "delay_jitter", "noise")}
+    causes = ("loss", "delay", "delay_jitter", "noise")
+    numbers = {kind: stream(system, f"connections.{wire.name}.{kind}") for kind in causes}
     lost = losses(numbers["loss"], given["loss"], given["burst_length"], len(instants))
     moved = grids.get(wire.sender if wire.is_read else wire.receiver)
     made, last = [], 0
     for k, t in enumerate(instants):
-        late = round(exactly(given["delay"]))
-        late += lateness(numbers["delay_jitter"], given["delay_jitter"], given["jitter_distribution"])
+        late = whole(drawn(numbers["delay"], given["delay"], k))
+        late += lateness(numbers["delay_jitter"], given["delay_jitter"], given["jitter_distribution"], k)
         then = max(last, t - late if wire.is_read else t + late)
         then = then if moved is None else points(moved, then)[-1]
         last = last if lost[k] and not wire.is_read else then
@@ -237,7 +282,7 @@ class Run:
         self.times: dict[str, list[int]] = {}
         for name in (name for name, c in self.components.items() if c["sampling"] is not None):
             read = [wire for wire in self.wires if wire.is_read and wire.receiver == name]
-            latest = max((exactly(w.given["delay"]) + exactly(w.given["delay_jitter"]) for w in read), default=0)
+            latest = max((longest(w.given["delay"]) + longest(w.given["delay_jitter"]) for w in read), default=0)
             waits = [grids[wire.sender] for wire in read if wire.sender in grids]
             self.times[name] = samples(system, name, self.stop + math.ceil(latest), waits)
         self.sent = {

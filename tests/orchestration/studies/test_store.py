@@ -23,13 +23,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestration.building import fmus
-from orchestration.building.inputs import Files
+from orchestration.building.inputs import Files, files_of
 from orchestration.quadrotor.scenario import FmuChoice
 from orchestration.quadrotor.signals import ReferenceChoice
 from orchestration.quadrotor.wiring import DEFAULT_PLANT
 from orchestration.studies import store as stores
 from orchestration.studies.run_key import run_key
 from orchestration.studies.store import TEXTS, DesignPoint, open_for_reading, open_for_writing
+from orchestration.system.distribution import Distribution
+from orchestration.system.paths import changed as with_changes
 from orchestration.workers import provenance
 from orchestration.workers.provenance import Sources, flight_sources, imported, sources_hash, versions
 from orchestration.workers.row import Row
@@ -472,6 +474,22 @@ def test_the_key_differs_with_everything_that_determines_a_run(tmp_path: Path) -
     found = list(different_keys(tmp_path))
     assert len(found) == 30
     assert len(set(found)) == len(found)
+
+
+def test_the_key_differs_with_a_distribution_and_with_what_is_in_a_trace_but_not_with_where_it_lies(
+    tmp_path: Path,
+) -> None:
+    def key(delay: Distribution) -> str:
+        system = with_changes(BASE.as_system(), {"connections.command.delay": delay})
+        return run_key(system, files_of(system))
+
+    found = [key(Distribution(uniform=(0.0, most))) for most in (0.001, 0.002)]
+    for name, content in (("one", "0.001"), ("two", "0.002"), ("three", "0.002")):
+        (tmp_path / name).write_text(f"delay\n0.0\n{content}\n")
+        found.append(key(Distribution(file=tmp_path / name, column="delay")))
+    found.append(key(Distribution(file=tmp_path / "two", column="delay", order="as recorded")))
+    assert found[3] == found[4]
+    assert len(set(found)) == len(found) - 1
 
 
 def test_the_key_differs_with_the_versions_of_the_software(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from orchestration.system.distribution import highest
 from orchestration.system.model import System
 from orchestration.system.system_file import load_system
 from tests.orchestration.engines.batch.lanes import assert_the_same_signals, in_lanes, located, shape_of
@@ -37,7 +38,9 @@ def crowds(draw: st.DrawFn) -> list[System]:
                 parts[name] = replace(part, step=draw(st.sampled_from((part.step, *TIMES))))
             elif part.sampling.clock == "master" and draw(st.booleans()):
                 period = draw(st.sampled_from(TIMES))
-                jitter = min(part.sampling.jitter, 0.9 * period / part.sampling.clock_ratio)
+                jitter, most = part.sampling.jitter, 0.9 * period / part.sampling.clock_ratio
+                if highest(jitter) > most:
+                    jitter = most
                 parts[name] = replace(part, sampling=replace(part.sampling, period=period, jitter=jitter))
         wires = tuple(
             replace(x, delay=draw(st.sampled_from((x.delay, *TIMES)))) if x.delay else x for x in first.connections

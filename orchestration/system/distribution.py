@@ -1,0 +1,232 @@
+"""A time that is not the same each time: how it is distributed, or the trace that it is taken from."""
+
+import math
+from collections.abc import Hashable, Iterator, Mapping
+from dataclasses import fields, is_dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+
+from orchestration.basics.records import record
+from orchestration.system.choices import TraceOrder
+from orchestration.system.requirements import is_finite, require
+
+if TYPE_CHECKING:
+    from orchestration.basics.simulator import Floats
+
+LEAST_INSIDE = 1e-6
+"""What of a normal distribution has to be within its range: from less its digits are lost"""
+
+
+@record()
+class Distribution:
+    """A number that is not the same each time: drawn from a distribution or from a measured trace, or a trace as it is.
+
+    Exactly one of `uniform`, `normal`, `values` and `file` is given. No value is below 0; times are in seconds.
+    """
+
+    uniform: tuple[float, float] | None = None
+    """The least and the largest value, between which all are equally likely."""
+    normal: tuple[float, float] | None = None
+    """The mean and the standard deviation of a normal distribution, which is cut to `range`."""
+    range: tuple[float, float] | None = None
+    """The least and the largest value of the normal distribution."""
+    values: tuple[float, ...] | None = None
+    """The values that there are."""
+    probabilities: tuple[float, ...] | None = None
+    """The probability of each of the values; without them, all are equally likely."""
+    file: Path | None = None
+    """The path of a CSV file with a trace; in a file, relative to its folder."""
+    column: str | None = None
+    """The column of the file that holds the values."""
+    order: TraceOrder = "drawn"
+    """Whether a row is drawn each time, all equally likely (drawn), or the rows come one after the other and begin anew
+    after the last (as recorded)."""
+
+    @property
+    def lowest(self) -> float:
+        """The least value; raises `UsageError` for a file that cannot be read."""
+        span = self.uniform or self.range
+        return span[0] if span is not None else float(self.table().min())
+
+    @property
+    def highest(self) -> float:
+        """The largest value, likewise."""
+        span = self.uniform or self.range
+        return span[1] if span is not None else float(self.table().max())
+
+    @property
+    def is_random(self) -> bool:
+        """Whether seeds make a difference, likewise."""
+        return self.order == "drawn" and self.lowest < self.highest
+
+    def table(self) -> "Floats":
+        """The values that there are, one by one, of a distribution that is no formula.
+
+        Raises `UsageError` for a file that cannot be read, or holds a value below 0.
+        """
+        if self.file is not None and self.column is not None:
+            return _column(self.file, self.column, _state(self.file))
+        import numpy as np  # what only reads a system does without
+
+        return np.array(self.values, dtype=np.float64)
+
+    def share(self, value: float) -> float:
+        """How much of the normal distribution is below a value."""
+        assert self.normal is not None
+        mean, deviation = self.normal
+        return math.erfc((mean - value) / (deviation * math.sqrt(2.0))) / 2.0
+
+    def __post_init__(self) -> None:
+        given = [kind for kind in KINDS if getattr(self, kind) is not None]
+        require(len(given) == 1, "distribution", " and ".join(given) or "nothing", f"one of {', '.join(KINDS)}")
+        for belonging, kind in (("range", "normal"), ("probabilities", "values"), ("column", "file")):
+            if kind not in given:
+                value = getattr(self, belonging)
+                require(value is None, belonging, value, f"none without {kind}")
+        require(self.order == "drawn" or self.file is not None, "order", self.order, "none without file")
+        if self.uniform is not None:
+            _require_span("uniform", self.uniform)
+        if self.normal is not None:
+            self._expect_normal()
+        if self.values is not None:
+            self._expect_values()
+        require(self.file is None or self.column is not None, "column", "none", "the name of a column of the file")
+
+    def _expect_normal(self) -> None:
+        assert self.normal is not None
+        mean, deviation = self.normal
+        require(is_finite(mean), "normal", list(self.normal), "a mean and a deviation")
+        require(is_finite(deviation) and deviation > 0.0, "normal", list(self.normal), "a positive deviation")
+        require(self.range is not None, "range", "none", "the least and the largest value of a normal distribution")
+        assert self.range is not None
+        _require_span("range", self.range)
+        inside = self.share(self.range[1]) - self.share(self.range[0])
+        require(
+            inside >= LEAST_INSIDE, "range", list(self.range), f"one that has {LEAST_INSIDE:g} of it or more inside"
+        )
+
+    def _expect_values(self) -> None:
+        assert self.values is not None
+        require(len(self.values) > 0, "values", "none", "at least one")
+        for value in self.values:
+            require(is_finite(value) and value >= 0.0, "values", value, "zero or positive numbers")
+        if self.probabilities is None:
+            return
+        count = len(self.values)
+        require(len(self.probabilities) == count, "probabilities", len(self.probabilities), f"{count}, one a value")
+        for share in self.probabilities:
+            require(is_finite(share) and 0.0 <= share <= 1.0, "probabilities", share, "probabilities in [0, 1]")
+        total = math.fsum(self.probabilities)
+        require(abs(total - 1.0) <= 1e-9, "probabilities", total, "a sum of 1")
+
+
+KINDS = ("uniform", "normal", "values", "file")
+
+Varying: TypeAlias = float | Distribution
+"""A number, or what it is drawn from"""
+
+
+def lowest(of: Varying) -> float:
+    """The least that it can be."""
+    return of.lowest if isinstance(of, Distribution) else of
+
+
+def highest(of: Varying) -> float:
+    """The most that it can be."""
+    return of.highest if isinstance(of, Distribution) else of
+
+
+def is_random(of: Varying) -> bool:
+    """Whether seeds make a difference to it."""
+    return isinstance(of, Distribution) and of.is_random
+
+
+def spreads(of: Varying) -> bool:
+    """The same of what, given as a number, is the largest value or a probability."""
+    return of.is_random if isinstance(of, Distribution) else of > 0.0
+
+
+def content(of: Varying) -> Hashable:
+    """What it is told by from any other, a file that has been written anew included."""
+    return (of, None if of.file is None else _state(of.file)) if isinstance(of, Distribution) else of
+
+
+def require_varying(of: object, *names: str) -> None:
+    """The fields `names` are numbers that are finite and not below 0, or are drawn."""
+    for name in names:
+        value = getattr(of, name)
+        fits = isinstance(value, Distribution) or (is_finite(value) and value >= 0.0)
+        require(fits, name, value, "zero or a positive number")
+
+
+def reads_file(of: Varying) -> bool:
+    """Whether it is known only when a file is read."""
+    return isinstance(of, Distribution) and of.file is not None
+
+
+def require_spread(of: object, jitter: Varying, spread: str) -> None:
+    """How a lateness is drawn is said once: by its distribution, or by words beside its largest value."""
+    fits = spread == "uniform" or not isinstance(jitter, Distribution)
+    require(fits, "jitter_distribution", spread, "none beside a jitter that says its distribution itself")
+
+
+def require_losses(losses: Distribution, burst_length: float | None) -> None:
+    """Losses that are no probability are values of 0 and 1, one by one."""
+    is_table = losses.values is not None or losses.file is not None
+    require(is_table, "loss", "a formula", "a probability, or values or a file of 0 and 1")
+    require(burst_length is None, "burst_length", burst_length, "none beside a loss that is no probability")
+    for value in losses.values or ():
+        require(value in (0.0, 1.0), "loss.values", value, "0 or 1")
+
+
+Of = TypeVar("Of")
+
+
+def distributions(of: Any) -> Iterator[tuple[str, Distribution]]:
+    """What is drawn in a part of a system, by the path from there."""
+    for field in fields(of):
+        value = getattr(of, field.name)
+        if isinstance(value, Distribution):
+            yield field.name, value
+        elif is_dataclass(value):
+            yield from ((f"{field.name}.{path}", each) for path, each in distributions(value))
+
+
+def with_traces_at(of: Of, paths: Mapping[str, Path]) -> Of:
+    """A part of a system with the files of what is drawn in it at other paths, by what it calls them."""
+    changes: dict[str, Any] = {}
+    for field in fields(of):  # type: ignore[arg-type]
+        value = getattr(of, field.name)
+        if isinstance(value, Distribution):
+            if value.file is not None:
+                changes[field.name] = replace(value, file=paths[str(value.file)])
+        elif is_dataclass(value):
+            changes[field.name] = with_traces_at(value, paths)
+    return replace(of, **changes) if changes else of  # type: ignore[type-var]
+
+
+def _require_span(name: str, span: tuple[float, float]) -> None:
+    first, last = span
+    fits = is_finite(first) and is_finite(last) and 0.0 <= first <= last
+    require(fits, name, list(span), "two numbers from 0 on, the least and the largest")
+
+
+def _state(path: Path) -> tuple[int, int] | None:
+    """By what a file is told from one that was written there later."""
+    try:
+        found = path.stat()
+    except (OSError, ValueError):
+        return None  # to be read, for the reason to be said
+    return found.st_mtime_ns, found.st_size
+
+
+@lru_cache(maxsize=64)
+def _column(path: Path, column: str, state: tuple[int, int] | None) -> "Floats":
+    from orchestration.signals.table_file import read_rows
+
+    rows = read_rows(path, (column,))
+    values = rows.columns[column]
+    if (values < 0.0).any():
+        raise rows.refused(int((values < 0.0).argmax()), column, "zero or positive numbers")
+    return values

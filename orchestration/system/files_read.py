@@ -1,0 +1,21 @@
+"""The files that a system reads beside its FMUs: tables of sources, traces of what is drawn."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from orchestration.system.distribution import Distribution, distributions
+from orchestration.system.model import System
+
+
+def files_read(system: System) -> dict[str, Path]:
+    """The files, each by whose it is: the name of a source, or the place of what is drawn."""
+    found = {name: source.file for name, source in system.sources.items() if source.file is not None}
+    return found | {place: each.file for place, each in drawn(system) if each.file is not None}
+
+
+def drawn(system: System) -> Iterator[tuple[str, Distribution]]:
+    """Everything that is drawn from a distribution or a trace, by its place."""
+    components = ((f"components.{name}", component) for name, component in system.components.items())
+    connections = ((f"connections.{x.name}", x) for x in system.connections)
+    for place, part in (*components, *connections):
+        yield from ((f"{place}.{path}", each) for path, each in distributions(part))
