@@ -1,0 +1,160 @@
+"""What has become of tasks and messages: their jobs and frames, and who had a processor or a network when.
+
+Times are in nanoseconds; NEVER stands where something did not happen before the end.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+from orchestration.basics.simulator import Booleans, Integers
+
+NEVER = -1
+"""Of what did not happen"""
+DONE, UNFINISHED, SKIPPED, ABORTED = range(4)
+"""What becomes of a job: what is under way or waits at the end is unfinished"""
+RUN, SWITCH, CORRUPTED = range(3)
+"""What a processor or a network does: work, the switch before it, or a frame that has to be sent again"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Jobs:
+    """The jobs of one task, a number each in the order of their releases, those included that a skip left out."""
+
+    nominal: Integers
+    """when each should be released; responses and deadlines count from here"""
+    released: Integers
+    """when it was"""
+    started: Integers
+    """when its own first instruction was"""
+    ended: Integers
+    """when it was done"""
+    written: Integers
+    """when its outputs were sent"""
+    deadline: Integers
+    preemptions: Integers
+    """how often another took the processor from it"""
+    outcome: Integers
+    """DONE, UNFINISHED, SKIPPED or ABORTED"""
+    stop: int
+
+    def __len__(self) -> int:
+        return len(self.nominal)
+
+    @property
+    def done(self) -> Booleans:
+        """Which of them are done."""
+        found: Booleans = self.outcome == DONE
+        return found
+
+    @property
+    def responses(self) -> Integers:
+        """Of those that are done, from the nominal release to the end."""
+        found: Integers = (self.ended - self.nominal)[self.done]
+        return found
+
+    @property
+    def due(self) -> Booleans:
+        """Which of them have their deadline within the run."""
+        found: Booleans = self.deadline <= self.stop
+        return found
+
+    @property
+    def missed(self) -> Booleans:
+        """Which of those that are `due` were not done by their deadline, skipped and aborted ones included."""
+        return _missed(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Frames:
+    """The messages of one name, in the order in which they were queued."""
+
+    nominal: Integers
+    """when each should be queued; responses and deadlines count from here"""
+    queued: Integers
+    started: Integers
+    """when its first bit was sent the first time"""
+    ended: Integers
+    """when it was received"""
+    deadline: Integers
+    """the largest number where it has none"""
+    attempts: Integers
+    """how often it was sent, the last time included; over two links twice"""
+    stop: int
+
+    def __len__(self) -> int:
+        return len(self.nominal)
+
+    @property
+    def done(self) -> Booleans:
+        """Which of them are received."""
+        found: Booleans = self.ended != NEVER
+        return found
+
+    @property
+    def responses(self) -> Integers:
+        """Of those that are received, from the nominal instant to the last bit."""
+        found: Integers = (self.ended - self.nominal)[self.done]
+        return found
+
+    @property
+    def due(self) -> Booleans:
+        """Which of them have their deadline within the run."""
+        found: Booleans = self.deadline <= self.stop
+        return found
+
+    @property
+    def missed(self) -> Booleans:
+        """Which of those that are `due` were not received by their deadline."""
+        return _missed(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slices:
+    """Who has one processor, or one link of a network, when: pieces that follow each other."""
+
+    owners: tuple[str, ...]
+    """the names of its tasks, or of the messages over it"""
+    owner: Integers
+    """the index of each piece's among them"""
+    number: Integers
+    """which job or frame of it"""
+    begin: Integers
+    end: Integers
+    kind: Integers
+    """RUN, SWITCH or CORRUPTED"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Happening:
+    """An event of a task or a message."""
+
+    time: int
+    what: str
+    """`released`, `started`, `preempted`, `resumed`, `finished`, `missed`, `skipped`, `aborted`; `queued`,
+    `transmitted`, `retransmitted`"""
+    owner: str
+    """as COMPUTER.TASK or NETWORK.MESSAGE"""
+    number: int
+    """which job or frame"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Timeline:
+    """What has become of all computers and networks of a system, up to a time."""
+
+    stop: int
+    jobs: Mapping[str, Jobs]
+    """by COMPUTER.TASK"""
+    frames: Mapping[str, Frames]
+    """by NETWORK.MESSAGE"""
+    processors: Mapping[str, Slices]
+    """by computer"""
+    links: Mapping[str, Slices]
+    """by network or, where it has several links, as `NETWORK: NODE -> switch`"""
+    happenings: Callable[[], Iterator[Happening]]
+    """what happened, in order"""
+
+
+def _missed(of: Jobs | Frames) -> Booleans:
+    found: Booleans = of.due & ((of.ended == NEVER) | (of.ended > of.deadline))
+    return found

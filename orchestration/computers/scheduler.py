@@ -1,0 +1,528 @@
+"""What happens on processors and networks, instant by instant, in Python: the text that scheduler.c follows.
+
+At an instant, in this order: what ends does so, and writes; deadlines, first those at which jobs are aborted, then
+those at which outputs are written; arrivals and releases. When nothing of that is left processors choose; what they
+start and ends at once makes it all begin again. At last networks choose.
+"""
+
+from collections import deque
+from collections.abc import Collection
+
+import numpy as np
+
+from orchestration.basics.simulator import Integers
+from orchestration.computers.parts import (
+    ABORT,
+    ABORTED,
+    ARRIVES,
+    AT_ONCE,
+    BEGUN,
+    COLUMNS,
+    EARLIEST_DEADLINE,
+    FINISHED,
+    FIXED_PRIORITY,
+    INTERRUPTED,
+    LATER,
+    NONE,
+    NOTED,
+    PASSED,
+    PREEMPTED,
+    QUEUED,
+    RELEASED,
+    RESUMED,
+    SAMPLED,
+    SENT,
+    SKIP,
+    SKIPPED,
+    SPOILT,
+    STARTED,
+    SWITCHING,
+    WRITTEN,
+    Leg,
+    Message,
+    Parts,
+    Stream,
+    Task,
+)
+
+
+class _Numbers:
+    """A stream, number by number."""
+
+    __slots__ = ("_draw", "_drawn")
+
+    def __init__(self, draw: Stream) -> None:
+        self._draw = draw
+        self._drawn: list[int] = []
+
+    def next(self) -> int:
+        if not self._drawn:
+            self._drawn = self._draw(AT_ONCE).tolist()
+            self._drawn.reverse()
+        return self._drawn.pop()
+
+
+class _Job:
+    """A job that is released and not over."""
+
+    __slots__ = ("deadline", "left", "nominal", "number", "released", "sample", "started")
+
+    def __init__(self, number: int, nominal: int, released: int, deadline: int, left: int) -> None:
+        self.number, self.nominal, self.released, self.deadline, self.left = number, nominal, released, deadline, left
+        self.started, self.sample = False, NONE
+
+
+class _TaskState:
+    """A task at work: its jobs that are not over, the oldest first, and what is still to be written."""
+
+    __slots__ = ("carriers", "jobs", "next_late", "next_nominal", "number", "part", "sampled_at", "samples",
+                 "started_at", "unwritten")  # fmt: skip
+
+    def __init__(self, part: Task, carriers: list[int]) -> None:
+        self.part, self.carriers = part, carriers
+        self.jobs: deque[_Job] = deque()
+        self.unwritten: deque[_Job] = deque()
+        self.number = self.samples = self.next_nominal = self.next_late = 0
+        self.started_at = self.sampled_at = NONE
+
+
+class _ProcessorState:
+    """A processor at work."""
+
+    __slots__ = ("at_work", "changed", "ready_at", "running", "tasks")
+
+    def __init__(self, tasks: list[int]) -> None:
+        self.tasks = tasks
+        self.running = NONE
+        """the task whose job has it"""
+        self.at_work = False
+        """whether that has come to its own instructions"""
+        self.ready_at = 0
+        """when it does, or did, since it was given the processor"""
+        self.changed = False
+
+
+class _Frame:
+    """A frame on its way."""
+
+    __slots__ = ("late", "lost", "nominal", "number", "queued", "sample")
+
+    def __init__(self, number: int, nominal: int, sample: int, late: int, lost: int) -> None:
+        self.number, self.nominal, self.sample, self.late, self.lost = number, nominal, sample, late, lost
+        self.queued = 0
+
+
+class _LegState:
+    """Frames of one message that wait for one link, and those that are still on their way to that queue."""
+
+    __slots__ = ("coming", "frames", "is_last", "message", "part", "place", "rank")
+
+    def __init__(self, message: int, place: int, of: Message) -> None:
+        self.message, self.place, self.rank = message, place, of.rank
+        self.part: Leg = of.legs[place]
+        self.is_last = place == len(of.legs) - 1
+        self.frames: deque[_Frame] = deque()
+        self.coming: deque[tuple[int, _Frame]] = deque()
+
+
+class _LinkState:
+    """A link at work."""
+
+    __slots__ = ("changed", "legs", "sending", "slot", "slots", "spoilt")
+
+    def __init__(self, legs: list[int], slots: int) -> None:
+        self.legs, self.slots = legs, slots
+        self.sending = NONE
+        """the leg whose frame it carries"""
+        self.spoilt = False
+        self.slot = NONE
+        """that which begins now"""
+        self.changed = False
+
+
+class Scheduler:
+    """Goes through the instants, and keeps notes of them."""
+
+    def __init__(self, parts: Parts, noted: Collection[int] = NOTED) -> None:
+        """`noted` are the kinds of notes that are kept."""
+        self._parts, self._stop = parts, parts.stop
+        self._noted = [kind in noted for kind in range(len(NOTED))]
+        self._notes: list[int] = []
+        self._numbers = [_Numbers(stream) for stream in parts.streams]
+        carriers = range(len(parts.carriers))
+        self._tasks = [
+            _TaskState(part, [c for c in carriers if parts.carriers[c].sender == i])
+            for i, part in enumerate(parts.tasks)
+        ]
+        self._processors = [
+            _ProcessorState([i for i, task in enumerate(parts.tasks) if task.processor == p])
+            for p in range(len(parts.processors))
+        ]
+        self._legs = [
+            _LegState(m, place, message)
+            for m, message in enumerate(parts.messages)
+            for place in range(len(message.legs))
+        ]
+        self._first_leg = [
+            next(i for i, leg in enumerate(self._legs) if leg.message == m) for m in range(len(parts.messages))
+        ]
+        self._links = [
+            _LinkState([i for i, leg in enumerate(self._legs) if leg.part.link == k], link.slots)
+            for k, link in enumerate(parts.links)
+        ]
+        self._frame_number = [0] * len(parts.messages)
+        self._message_next = [(0, 0)] * len(parts.messages)
+        self._pending: list[deque[int]] = [deque() for _ in carriers]
+        self._last_arrival = [0] * len(parts.carriers)
+
+        # When something is due next, one place for each cause.
+        counts = [
+            len(self._processors), len(self._links), len(self._tasks), len(parts.carriers), len(self._tasks),
+            len(parts.messages), len(self._legs), len(self._links),
+        ]  # fmt: skip
+        begins = [sum(counts[:i]) for i in range(len(counts) + 1)]
+        (self._busy, self._line, self._deadline, self._arrival, self._release, self._instant_of, self._hop,
+         self._slot) = begins[:-1]  # fmt: skip
+        self._due = [LATER] * begins[-1]
+        for i, task in enumerate(parts.tasks):
+            if task.nominal != NONE:
+                self._draw_release(i)
+        for m, message in enumerate(parts.messages):
+            if message.nominal != NONE:
+                self._draw_instant(m)
+        for k, link in enumerate(parts.links):
+            if link.slots:
+                self._draw_slot(k)
+        self._slots_past = [0] * len(parts.links)
+
+    @property
+    def reached(self) -> int:
+        """The next instant [ns]; LATER if there is none up to the end."""
+        due = min(self._due, default=LATER)
+        return due if due <= self._stop else LATER
+
+    def run(self, until: int) -> None:
+        """Go through all instants before `until` [ns], up to the end."""
+        due, last = self._due, min(until - 1, self._stop)
+        if not due:
+            return
+        while (now := min(due)) <= last:
+            self._pass(now)
+
+    def taken(self) -> Integers:
+        """The notes since they were taken last, a row each: time, what, whose, which, a number more."""
+        found = np.array(self._notes, dtype=np.int64).reshape(-1, COLUMNS)
+        self._notes.clear()
+        return found
+
+    def _note(self, now: int, kind: int, whose: int, which: int, more: int) -> None:
+        if self._noted[kind]:
+            self._notes += (now, kind, whose, which, more)
+
+    # -- an instant ------------------------------------------------------------------------------------------------
+
+    def _pass(self, now: int) -> None:
+        due = self._due
+        while True:
+            while min(due) == now:
+                self._end(now)
+                self._meet_deadlines(now)
+                self._arrive(now)
+            if now == self._stop:
+                return
+            for p, processor in enumerate(self._processors):
+                if processor.changed:
+                    self._choose(p, processor, now)
+            if min(due) > now:
+                break
+        for k, link in enumerate(self._links):
+            if link.changed:
+                self._choose_frame(k, link, now)
+
+    def _end(self, now: int) -> None:
+        due = self._due
+        for p, processor in enumerate(self._processors):
+            if due[self._busy + p] == now:
+                due[self._busy + p] = LATER
+                processor.changed = True
+                if processor.at_work and processor.ready_at + self._tasks[processor.running].jobs[0].left == now:
+                    self._finish(processor, now)
+        for k, link in enumerate(self._links):
+            if due[self._line + k] == now:
+                due[self._line + k] = LATER
+                link.changed = True
+                self._pass_on(link, now)
+
+    def _meet_deadlines(self, now: int) -> None:
+        due, late = self._due, []
+        for i, task in enumerate(self._tasks):
+            if due[self._deadline + i] == now:
+                late.append(i)
+                if task.part.overrun == ABORT:
+                    while task.jobs and task.jobs[0].deadline <= now:
+                        self._abort(i, task, now)
+        for i in late:
+            task = self._tasks[i]
+            while task.unwritten and task.unwritten[0].deadline <= now:
+                self._write(i, task.unwritten.popleft(), now)
+            self._set_deadline(i, now)
+
+    def _arrive(self, now: int) -> None:
+        due, parts = self._due, self._parts
+        for c, pending in enumerate(self._pending):
+            if due[self._arrival + c] == now:
+                while pending and pending[0] == now:
+                    pending.popleft()
+                    for i in parts.carriers[c].releases:
+                        if now < self._stop:
+                            self._let_go(i, now, now)
+                due[self._arrival + c] = pending[0] if pending else LATER
+        for i, task in enumerate(self._tasks):
+            while due[self._release + i] == now:
+                self._let_go(i, task.next_nominal, now)
+                self._draw_release(i)
+        for m, message in enumerate(parts.messages):
+            while due[self._instant_of + m] == now:
+                self._post(m, message, now)
+                self._draw_instant(m)
+        for j, leg in enumerate(self._legs):
+            if due[self._hop + j] == now:
+                while leg.coming and leg.coming[0][0] == now:
+                    self._queue(j, leg.coming.popleft()[1], now)
+                due[self._hop + j] = leg.coming[0][0] if leg.coming else LATER
+        for k, link in enumerate(self._links):
+            if due[self._slot + k] == now:
+                link.slot, link.changed = self._slots_past[k] % link.slots, True
+                self._slots_past[k] += 1
+                self._draw_slot(k)
+
+    # -- tasks -----------------------------------------------------------------------------------------------------
+
+    def _draw_release(self, i: int) -> None:
+        task = self._tasks[i]
+        task.next_nominal = self._numbers[task.part.nominal].next()
+        time = task.next_nominal + self._numbers[task.part.late].next()
+        self._due[self._release + i] = time if time < self._stop else LATER
+
+    def _let_go(self, i: int, nominal: int, now: int) -> None:
+        """Release a job."""
+        task = self._tasks[i]
+        execution = self._numbers[task.part.execution].next()
+        number = task.number
+        task.number += 1
+        if task.part.overrun == SKIP and task.jobs:
+            self._note(now, SKIPPED, i, number, nominal)
+            return
+        job = _Job(number, nominal, now, nominal + task.part.deadline, execution)
+        task.jobs.append(job)
+        self._note(now, RELEASED, i, number, nominal)
+        if task.part.reads_at_release and task.part.overrun != ABORT:
+            self._sample(i, task, job, now)
+        if task.part.overrun == ABORT:
+            self._set_deadline(i, now)
+        self._processors[task.part.processor].changed = True
+
+    def _sample(self, i: int, task: _TaskState, job: _Job, now: int) -> None:
+        """What a job computes with is that of its release or of now, but a nanosecond after the sample before it."""
+        time = job.released if task.part.reads_at_release else now
+        job.sample, task.samples = task.samples, task.samples + 1
+        task.sampled_at = max(time, task.sampled_at + 1)
+        self._note(now, SAMPLED, i, job.number, task.sampled_at)
+
+    def _set_deadline(self, i: int, now: int) -> None:
+        task, due = self._tasks[i], LATER
+        if task.part.overrun == ABORT and task.jobs:
+            due = task.jobs[0].deadline
+        if task.unwritten:
+            due = min(due, task.unwritten[0].deadline)
+        self._due[self._deadline + i] = max(due, now)
+
+    def _finish(self, processor: _ProcessorState, now: int) -> None:
+        i = processor.running
+        task = self._tasks[i]
+        job = task.jobs.popleft()
+        processor.running, processor.at_work = NONE, False
+        self._note(now, FINISHED, i, job.number, 0)
+        if task.part.writes_at_deadline and now <= job.deadline:
+            task.unwritten.append(job)
+        else:
+            self._write(i, job, now)
+        if task.part.writes_at_deadline or task.part.overrun == ABORT:
+            self._set_deadline(i, now)
+
+    def _abort(self, i: int, task: _TaskState, now: int) -> None:
+        job, processor = task.jobs.popleft(), self._processors[task.part.processor]
+        if processor.running == i:
+            self._note(now, INTERRUPTED, i, job.number, 0)
+            processor.running, processor.at_work = NONE, False
+            self._due[self._busy + task.part.processor] = LATER
+        self._note(now, ABORTED, i, job.number, 0)
+        processor.changed = True
+        if job.sample != NONE:
+            for c in task.carriers:
+                carrier = self._parts.carriers[c]
+                self._numbers[carrier.late].next()
+                self._numbers[carrier.lost].next()
+                self._note(now, SENT, c, job.sample, 2)
+
+    def _write(self, i: int, job: _Job, now: int) -> None:
+        self._note(now, WRITTEN, i, job.number, job.sample)
+        for c in self._tasks[i].carriers:
+            self._send(c, job.sample, now, now)
+
+    # -- processors ------------------------------------------------------------------------------------------------
+
+    def _choose(self, p: int, processor: _ProcessorState, now: int) -> None:
+        """Give the processor to the job that comes first, and have it go on when its switch is over."""
+        processor.changed = False
+        part, waits = self._parts.processors[p], False
+        chosen, least = processor.running, None
+        if chosen != NONE:
+            least = self._order(part.policy, chosen)
+        if chosen == NONE or part.preemptive:
+            for i in processor.tasks:
+                task = self._tasks[i]
+                if i == processor.running or not task.jobs:
+                    continue
+                if task.started_at == now and not (part.switch or task.jobs[0].started):
+                    waits = True  # jobs of one task begin a nanosecond apart
+                    continue
+                order = self._order(part.policy, i)
+                if least is None or order < least:
+                    chosen, least = i, order
+        if chosen != processor.running:
+            self._take_away(processor, now)
+            processor.running, processor.ready_at = chosen, now + part.switch
+            if part.switch:
+                self._note(now, SWITCHING, chosen, self._tasks[chosen].jobs[0].number, 0)
+        then = LATER
+        if processor.running != NONE:
+            if not processor.at_work and processor.ready_at <= now:
+                self._go_on(processor, now)
+            left = self._tasks[processor.running].jobs[0].left if processor.at_work else 0
+            then = processor.ready_at + left
+        self._due[self._busy + p] = min(then, now + 1) if waits else then
+
+    def _order(self, policy: int, i: int) -> tuple[int, ...]:
+        task = self._tasks[i]
+        job, priority = task.jobs[0], task.part.priority
+        if policy == FIXED_PRIORITY:
+            return priority, job.released, i
+        if policy == EARLIEST_DEADLINE:
+            return job.deadline, priority, job.released, i
+        return job.released, priority, i
+
+    def _take_away(self, processor: _ProcessorState, now: int) -> None:
+        """The job that has the processor has it no more, if there is one."""
+        i = processor.running
+        if i == NONE:
+            return
+        job = self._tasks[i].jobs[0]
+        if processor.at_work:
+            job.left -= now - processor.ready_at
+            self._note(now, PREEMPTED, i, job.number, 0)
+        else:
+            self._note(now, INTERRUPTED, i, job.number, 0)
+        processor.running, processor.at_work = NONE, False
+
+    def _go_on(self, processor: _ProcessorState, now: int) -> None:
+        """The switch is over."""
+        i = processor.running
+        task = self._tasks[i]
+        job = task.jobs[0]
+        processor.at_work, processor.ready_at = True, now
+        self._note(now, RESUMED if job.started else STARTED, i, job.number, 0)
+        if not job.started:
+            job.started, task.started_at = True, now
+            if job.sample == NONE:
+                self._sample(i, task, job, now)
+
+    # -- messages --------------------------------------------------------------------------------------------------
+
+    def _draw_instant(self, m: int) -> None:
+        message = self._parts.messages[m]
+        nominal = self._numbers[message.nominal].next()
+        time = nominal + self._numbers[message.late].next()
+        self._message_next[m] = nominal, time
+        self._due[self._instant_of + m] = time if time < self._stop else LATER
+
+    def _draw_slot(self, k: int) -> None:
+        time = self._numbers[self._parts.links[k].begins].next()
+        self._due[self._slot + k] = time if time < self._stop else LATER
+
+    def _post(self, m: int, message: Message, now: int) -> None:
+        """A message has its instant."""
+        nominal, _ = self._message_next[m]
+        if message.carrier == NONE:
+            self._enqueue(m, _Frame(self._frame_number[m], nominal, NONE, 0, 0), now)
+        else:
+            self._send(message.carrier, self._frame_number[m], nominal, now)
+
+    def _send(self, c: int, sample: int, nominal: int, now: int) -> None:
+        """A message of a connection leaves."""
+        carrier = self._parts.carriers[c]
+        late, lost = self._numbers[carrier.late].next(), self._numbers[carrier.lost].next()
+        self._note(now, SENT, c, sample, lost)
+        if carrier.message == NONE:
+            self._receive(c, sample, late, lost, now)
+        else:
+            m = carrier.message
+            self._enqueue(m, _Frame(self._frame_number[m], nominal, sample, late, lost), now)
+
+    def _receive(self, c: int, sample: int, late: int, lost: int, now: int) -> None:
+        """A message has come so far; its connection's own delay counts from here. Messages never overtake."""
+        if lost:
+            return
+        arrival = self._last_arrival[c] = max(self._last_arrival[c], now + late)
+        self._note(now, ARRIVES, c, sample, arrival)
+        if self._parts.carriers[c].releases:
+            self._pending[c].append(arrival)
+            self._due[self._arrival + c] = self._pending[c][0]
+
+    def _enqueue(self, m: int, frame: _Frame, now: int) -> None:
+        self._frame_number[m] += 1
+        self._note(now, QUEUED, m, frame.number, frame.nominal)
+        self._queue(self._first_leg[m], frame, now)
+
+    def _queue(self, j: int, frame: _Frame, now: int) -> None:
+        leg = self._legs[j]
+        frame.queued = now
+        leg.frames.append(frame)
+        self._links[leg.part.link].changed = True
+
+    def _choose_frame(self, k: int, link: _LinkState, now: int) -> None:
+        """A link that is free takes the frame that comes first; with slots, of those in the slot that begins."""
+        link.changed = False
+        chosen, least = NONE, None
+        if link.sending == NONE and (link.slot != NONE or not link.slots):
+            for j in link.legs:
+                leg = self._legs[j]
+                if not leg.frames or (link.slots and leg.part.slot != link.slot):
+                    continue
+                order = (leg.rank, leg.frames[0].queued, leg.message)
+                if least is None or order < least:
+                    chosen, least = j, order
+        link.slot = NONE
+        if chosen == NONE:
+            return
+        leg, message = self._legs[chosen], self._parts.messages[self._legs[chosen].message]
+        link.sending, link.spoilt = chosen, bool(self._numbers[message.corrupted].next())
+        length = leg.part.corrupted_length if link.spoilt else leg.part.length
+        self._due[self._line + k] = now + length
+        self._note(now, BEGUN, leg.message, leg.frames[0].number, leg.place)
+
+    def _pass_on(self, link: _LinkState, now: int) -> None:
+        """The last bit of what a link carries is over."""
+        j, link.sending = link.sending, NONE
+        leg = self._legs[j]
+        message = self._parts.messages[leg.message]
+        if link.spoilt:
+            self._note(now, SPOILT, leg.message, leg.frames[0].number, leg.place)
+            return
+        frame = leg.frames.popleft()
+        self._note(now, PASSED, leg.message, frame.number, leg.place)
+        if not leg.is_last:
+            self._legs[j + 1].coming.append((now + message.pause, frame))
+            self._due[self._hop + j + 1] = self._legs[j + 1].coming[0][0]
+        elif message.carrier != NONE:
+            self._receive(message.carrier, frame.sample, frame.late, frame.lost, now)

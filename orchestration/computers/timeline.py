@@ -1,0 +1,190 @@
+"""From what the scheduler has noted to what has become of each task and message."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from orchestration.basics.simulator import Integers
+from orchestration.computers.parts import (
+    ABORTED,
+    BEGUN,
+    FINISHED,
+    INTERRUPTED,
+    LATER,
+    NONE,
+    PASSED,
+    PREEMPTED,
+    QUEUED,
+    RELEASED,
+    RESUMED,
+    SKIPPED,
+    SPOILT,
+    STARTED,
+    SWITCHING,
+    WRITTEN,
+    Parts,
+)
+from orchestration.computers.results import ABORTED as WAS_ABORTED
+from orchestration.computers.results import (
+    CORRUPTED,
+    DONE,
+    NEVER,
+    RUN,
+    SWITCH,
+    UNFINISHED,
+    Frames,
+    Happening,
+    Jobs,
+    Slices,
+    Timeline,
+)
+from orchestration.computers.results import SKIPPED as WAS_SKIPPED
+
+_OF_TASKS = (RELEASED, STARTED, PREEMPTED, RESUMED, FINISHED, ABORTED, SKIPPED, SWITCHING, INTERRUPTED, WRITTEN)
+_OF_MESSAGES = (QUEUED, BEGUN, SPOILT, PASSED)
+_ON_A_PROCESSOR = (SWITCHING, STARTED, RESUMED, PREEMPTED, FINISHED, INTERRUPTED)
+NEEDED = frozenset((*_OF_TASKS, *_OF_MESSAGES))
+"""The kinds of notes that a timeline is made of"""
+_SAID = {
+    RELEASED: "released", STARTED: "started", PREEMPTED: "preempted", RESUMED: "resumed", FINISHED: "finished",
+    ABORTED: "aborted", SKIPPED: "skipped", QUEUED: "queued",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Names:
+    """What the parts are called."""
+
+    processors: Sequence[str]
+    tasks: Sequence[str]
+    """as COMPUTER.TASK"""
+    messages: Sequence[str]
+    """as NETWORK.MESSAGE"""
+    links: Sequence[str]
+
+
+def timeline(parts: Parts, names: Names, deadlines: Sequence[int], notes: Integers, until: int) -> Timeline:
+    """What the notes up to `until` [ns] come to; `deadlines` are those of the messages, LATER for none."""
+    notes = notes[notes[:, 0] <= until]
+    what = notes[:, 1]
+    of_tasks, of_messages = notes[np.isin(what, _OF_TASKS)], notes[np.isin(what, _OF_MESSAGES)]
+    jobs = [_jobs(of_tasks[of_tasks[:, 2] == i], task.deadline, until) for i, task in enumerate(parts.tasks)]
+    frames = [
+        _frames(of_messages[of_messages[:, 2] == m], deadlines[m], len(message.legs), until)
+        for m, message in enumerate(parts.messages)
+    ]
+    return Timeline(
+        stop=until,
+        jobs=dict(zip(names.tasks, jobs)),
+        frames=dict(zip(names.messages, frames)),
+        processors={
+            name: _slices_of_processor(of_tasks, parts, p, names.tasks, until)
+            for p, name in enumerate(names.processors)
+        },
+        links={
+            name: _slices_of_link(of_messages, parts, k, names.messages, until) for k, name in enumerate(names.links)
+        },
+        happenings=partial(_happenings, notes, parts, names, jobs),
+    )
+
+
+def _jobs(notes: Integers, deadline: int, stop: int) -> Jobs:
+    what = notes[:, 1]
+    first = notes[(what == RELEASED) | (what == SKIPPED)]
+    count = len(first)
+
+    def times(kind: int) -> Integers:
+        found = np.full(count, NEVER, dtype=np.int64)
+        some = notes[what == kind]
+        found[some[:, 3]] = some[:, 0]
+        return found
+
+    ended = times(FINISHED)
+    outcome = np.where(ended == NEVER, UNFINISHED, DONE)
+    outcome[notes[what == ABORTED, 3]] = WAS_ABORTED
+    outcome[notes[what == SKIPPED, 3]] = WAS_SKIPPED
+    return Jobs(
+        nominal=first[:, 4],
+        released=first[:, 0],
+        started=times(STARTED),
+        ended=ended,
+        written=times(WRITTEN),
+        deadline=first[:, 4] + deadline,
+        preemptions=np.bincount(notes[what == PREEMPTED, 3], minlength=count),
+        outcome=outcome,
+        stop=stop,
+    )
+
+
+def _frames(notes: Integers, deadline: int, legs: int, stop: int) -> Frames:
+    what = notes[:, 1]
+    first = notes[what == QUEUED]
+    started, ended = np.full((2, len(first)), NEVER, dtype=np.int64)
+    begun, last = notes[(what == BEGUN) & (notes[:, 4] == 0)], notes[(what == PASSED) & (notes[:, 4] == legs - 1)]
+    started[begun[::-1, 3]] = begun[::-1, 0]  # of several attempts the first
+    ended[last[:, 3]] = last[:, 0]
+    return Frames(
+        nominal=first[:, 4],
+        queued=first[:, 0],
+        started=started,
+        ended=ended,
+        deadline=np.minimum(first[:, 4], LATER - deadline) + deadline,
+        attempts=np.bincount(notes[what == BEGUN, 3], minlength=len(first)),
+        stop=stop,
+    )
+
+
+def _slices_of_processor(notes: Integers, parts: Parts, processor: int, names: Sequence[str], stop: int) -> Slices:
+    """Each note of who has the processor ends the piece that the one before it has begun."""
+    owners = [i for i, task in enumerate(parts.tasks) if task.processor == processor]
+    kept = notes[np.isin(notes[:, 1], _ON_A_PROCESSOR) & np.isin(notes[:, 2], owners)]
+    kinds = np.where(kept[:, 1] == SWITCHING, SWITCH, RUN)
+    return _slices(kept, kinds, (SWITCHING, STARTED, RESUMED), owners, names, stop)
+
+
+def _slices_of_link(notes: Integers, parts: Parts, link: int, names: Sequence[str], stop: int) -> Slices:
+    legs = max((len(message.legs) for message in parts.messages), default=1)
+    where = np.full((len(parts.messages), legs), NONE)
+    for m, message in enumerate(parts.messages):
+        for place, leg in enumerate(message.legs):
+            where[m, place] = leg.link
+    notes = notes[notes[:, 1] != QUEUED]
+    kept = notes[where[notes[:, 2], notes[:, 4]] == link]
+    is_spoilt = np.append(kept[1:, 1] == SPOILT, [False])[: len(kept)]
+    owners = np.flatnonzero((where == link).any(axis=1)).tolist()
+    return _slices(kept, np.where(is_spoilt, CORRUPTED, RUN), (BEGUN,), owners, names, stop)
+
+
+def _slices(
+    notes: Integers, kinds: Integers, beginning: Sequence[int], owners: Sequence[int], names: Sequence[str], stop: int
+) -> Slices:
+    begins = np.isin(notes[:, 1], beginning)
+    ends = np.append(notes[1:, 0], stop)[: len(notes)]
+    return Slices(
+        owners=tuple(names[i] for i in owners),
+        owner=np.searchsorted(np.array(owners, dtype=np.int64), notes[begins, 2]),
+        number=notes[begins, 3],
+        begin=notes[begins, 0],
+        end=ends[begins],
+        kind=kinds[begins],
+    )
+
+
+def _happenings(notes: Integers, parts: Parts, names: Names, jobs: Sequence[Jobs]) -> Iterator[Happening]:
+    """What happened, in order; what is missed after all else that happens at the deadline."""
+    rows: list[tuple[int, int, int, str, str, int]] = []
+    for place, (time, what, whose, which, more) in enumerate(notes.tolist()):
+        if what in _SAID:
+            owner = (names.messages if what == QUEUED else names.tasks)[whose]
+            rows.append((time, 0, place, _SAID[what], owner, which))
+        elif what == SPOILT:
+            rows.append((time, 0, place, "retransmitted", names.messages[whose], which))
+        elif what == PASSED and more == len(parts.messages[whose].legs) - 1:
+            rows.append((time, 0, place, "transmitted", names.messages[whose], which))
+    for name, of in zip(names.tasks, jobs):
+        missed = of.missed.nonzero()[0].tolist()
+        rows += [(int(of.deadline[j]), 1, j, "missed", name, j) for j in missed]
+    for time, _, _, said, owner, which in sorted(rows):
+        yield Happening(time=time, what=said, owner=owner, number=which)
