@@ -1,0 +1,257 @@
+"""What happens to the state of a loop: time goes by, messages are made and arrive, tasks sample.
+
+Its first numbers are, one after another: the states of components in continuous time; of each connection what was
+received last, and of a first-order hold its slope and what arrived last; of tasks their states and outputs. Held noise
+and outputs that are read as of the last step follow where a loop is taken as it is simulated.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats
+from orchestration.engines.channel import of_each
+from orchestration.exact.clockwork import ATTOSECONDS
+from orchestration.exact.flows import Flows
+from orchestration.exact.linear import Components, Continuous, Sampled
+from orchestration.exact.pieces import Piece
+from orchestration.schedule.plan import Plan
+from orchestration.system.model import Connection, System, component_of, variable_of
+
+
+class Places:
+    """Which numbers of a state are what."""
+
+    def __init__(self) -> None:
+        self.size = 0
+        self._known: dict[tuple[str, str], slice] = {}
+
+    def add(self, kind: str, name: str, count: int) -> None:
+        """So many numbers more."""
+        self._known[kind, name] = slice(self.size, self.size + count)
+        self.size += count
+
+    def __call__(self, kind: str, name: str) -> slice:
+        """Where the numbers of a kind of a component or connection are."""
+        return self._known[kind, name]
+
+    def has(self, kind: str, name: str) -> bool:
+        """Whether there are any."""
+        return (kind, name) in self._known
+
+
+class LoopEffects(ABC):
+    """The effects that both readings of a loop have in common."""
+
+    def __init__(self, system: System, components: Components, tasks: Sequence[str]) -> None:
+        self.system, self.parts, self.tasks = system, components, list(tasks)
+        self.places = places = Places()
+        self.wires = {system.connections[i].name for i in Plan(system).wires}
+        self.fed = {end: (x, j) for x in system.connections for j, end in enumerate(x.end)}
+        self.continuous = {n: c for n, c in components.items() if isinstance(c, Continuous)}
+        self.sampled_parts = {n: c for n, c in components.items() if isinstance(c, Sampled)}
+        for name, part in self.continuous.items():
+            places.add("state", name, len(part.A))
+        for x in system.connections:
+            if x.name not in self.wires or self.holds_wires:
+                places.add("received", x.name, len(x.start))
+            if x.hold == "first":
+                places.add("slope", x.name, len(x.start))
+                places.add("last", x.name, len(x.start))
+        for name, task in self.sampled_parts.items():
+            places.add("state", name, len(task.A))
+            places.add("output", name, len(task.outputs))
+        self.size = places.size
+        self.costs = 0
+        self._noise = {x.name: _noise_of(x) for x in system.connections}
+
+    holds_wires = False
+
+    # -- rows over the state -------------------------------------------------------------------------------------
+
+    def one(self, kind: str, name: str, j: int) -> Floats:
+        """The row that takes one number."""
+        row: Floats = np.zeros(self.size)
+        row[self.places(kind, name).start + j] = 1.0
+        return row
+
+    def signal(self, name: str) -> Floats:
+        """The row that makes a signal, COMPONENT.VARIABLE, or what a source says; zero for what stays.
+
+        Raises `UsageError` for one that is not known.
+        """
+        owner, variable = component_of(name), variable_of(name)
+        if owner in self.system.sources:
+            return self._of_source(name)
+        part = self.parts.get(owner)
+        if part is None:
+            raise UsageError(f"{name} is not known of the linear loop")
+        if variable in part.outputs:
+            return self.output(owner, part.outputs.index(variable))
+        return self.input(name)
+
+    def input(self, end: str) -> Floats:
+        """The row of what an input gets."""
+        if end in self.fed:
+            x, j = self.fed[end]
+            if self.places.has("received", x.name):
+                return self.one("received", x.name, j)
+            sender = self.continuous[x.sender]
+            return x.scale * self.output(x.sender, sender.outputs.index(variable_of(x.start[j])))
+        return np.zeros(self.size)
+
+    def output(self, name: str, j: int) -> Floats:
+        """The row of an output of a component."""
+        if name in self.sampled_parts:
+            return self.one("output", name, j)
+        return self._output_of_continuous(name, j)
+
+    @abstractmethod
+    def _output_of_continuous(self, name: str, j: int) -> Floats:
+        """Of a component in continuous time."""
+
+    def _of_source(self, name: str) -> Floats:
+        return np.zeros(self.size)
+
+    # -- what happens --------------------------------------------------------------------------------------------
+
+    def taken(self, piece: Piece, link: int) -> Piece:
+        """As `Effects`."""
+        x = self.system.connections[link]
+        rows = np.array([x.scale * self._sent(start) for start in x.start]).reshape(len(x.start), self.size)
+        size = len(piece.Z)
+        change = np.vstack([np.eye(size), np.hstack([rows, np.zeros((len(rows), size - self.size))])])
+        covariance = np.zeros((len(change), len(change)))
+        covariance[size:, size:] = np.diag(self._noise[x.name])
+        return piece.mapped(change, covariance)
+
+    def _sent(self, start: str) -> Floats:
+        """The row of an output as a message has it."""
+        outputs = self.parts[component_of(start)].outputs
+        variable = variable_of(start)
+        return self.output(component_of(start), outputs.index(variable)) if variable in outputs else np.zeros(self.size)
+
+    def arrived(self, piece: Piece, link: int, at: int, since: int, gap: int | None) -> Piece:
+        """As `Effects`."""
+        x = self.system.connections[link]
+        size, count = len(piece.Z), len(x.start)
+        message = np.eye(size)[at : at + count]
+        change = np.eye(size)
+        change[self.places("received", x.name)] = message
+        if x.hold == "first":
+            slope, last = self.places("slope", x.name), self.places("last", x.name)
+            before = np.eye(size)[last]
+            if since > 0:
+                change[slope] = (message - before) * (ATTOSECONDS / since)
+            elif gap is not None:  # it takes the place of one that arrived at the same instant
+                change[slope] += (message - before) * (ATTOSECONDS / gap)
+            change[last] = message
+        return piece.mapped(np.delete(change, slice(at, at + count), axis=0))
+
+    def sampled(self, piece: Piece, task: int, ages: Sequence[tuple[int, int | None]]) -> Piece:
+        """As `Effects`."""
+        name = self.tasks[task]
+        part = self.sampled_parts[name]
+        size = len(piece.Z)
+        state, output = self.places("state", name), self.places("output", name)
+        inputs = np.array([self.input(f"{name}.{end}") for end in part.inputs]).reshape(len(part.inputs), self.size)
+        before = np.eye(self.size)[state]
+        change = np.eye(size)
+        change[output, : self.size] = part.C @ before + part.D @ inputs
+        change[state, : self.size] = part.A @ before + part.B @ inputs
+        return piece.mapped(change)
+
+    @abstractmethod
+    def passed(self, piece: Piece, duration: int) -> Piece:
+        """As `Effects`."""
+
+    def ticked(self, piece: Piece, tick: int) -> Piece:
+        """As `Effects`."""
+        return piece
+
+
+def _noise_of(x: Connection) -> Floats:
+    """The variance of what a connection adds to each number of a message, as it arrives."""
+    sigma, quantum = of_each(x, x.noise), of_each(x, x.quantisation)
+    found: Floats = x.scale**2 * (sigma**2 + quantum**2 / 12.0)
+    return found
+
+
+class TrueEffects(LoopEffects):
+    """The loop as it is meant: continuous time goes by continuously, noise of sources is white."""
+
+    def __init__(
+        self, system: System, components: Components, tasks: Sequence[str], noise: Mapping[str, float] | None = None
+    ) -> None:
+        """`noise` has the intensities of white noise by input."""
+        super().__init__(system, components, tasks)
+        self._outputs = self._algebra(noise or {})
+
+    def _algebra(self, noise: Mapping[str, float]) -> dict[str, Floats]:
+        """The rows of all outputs in continuous time, through wires and direct feed-through."""
+        rows = {name: np.zeros((len(part.outputs), self.size)) for name, part in self.continuous.items()}
+        loud = {name: np.zeros((len(part.outputs), len(noise))) for name, part in self.continuous.items()}
+        names = list(noise)
+        for _ in range(len(self.continuous) + 1):
+            before = {name: each.copy() for name, each in rows.items()}
+            for name, part in self.continuous.items():
+                held, white = self._inputs_of(name, part, before, loud, names)
+                own = np.eye(self.size)[self.places("state", name)]
+                rows[name], loud[name] = part.C @ own + part.D @ held, part.D @ white
+        if any(not np.array_equal(before[name], rows[name]) for name in rows):
+            raise UsageError("a loop of components in continuous time with direct feed-through: expected a state in it")
+        for name, part in self.continuous.items():
+            for j in np.flatnonzero(loud[name].any(axis=1)):
+                raise UsageError(
+                    f"white noise reaches {name}.{part.outputs[j]} directly, and has no finite variance there; "
+                    "expected --as-simulated"
+                )
+        F, R = np.zeros((self.size, self.size)), np.zeros((self.size, self.size))
+        for name, part in self.continuous.items():
+            place = self.places("state", name)
+            held, white = self._inputs_of(name, part, rows, loud, names)
+            F[place] += part.B @ held
+            F[place, place] += part.A
+            driven = np.zeros((self.size, len(names)))
+            driven[place] = part.B @ white
+            for k, input_ in enumerate(names):
+                R += noise[input_] * np.outer(driven[:, k], driven[:, k])
+        for x in self.system.connections:
+            if x.hold == "first":
+                F[self.places("received", x.name), self.places("slope", x.name)] = np.eye(len(x.start))
+        self.F, self.R = F, R
+        return rows
+
+    def _inputs_of(
+        self, name: str, part: Continuous, rows: Mapping[str, Floats], loud: Mapping[str, Floats], noise: Sequence[str]
+    ) -> tuple[Floats, Floats]:
+        """What the inputs of a component get, by the state and by white noise."""
+        held, white = np.zeros((len(part.inputs), self.size)), np.zeros((len(part.inputs), len(noise)))
+        for j, variable in enumerate(part.inputs):
+            end = f"{name}.{variable}"
+            if end in noise:
+                white[j, noise.index(end)] = 1.0
+            elif end in self.fed:
+                x, i = self.fed[end]
+                if x.name not in self.wires:
+                    held[j] = self.one("received", x.name, i)
+                elif variable_of(x.start[i]) in self.continuous[x.sender].outputs:
+                    k = self.continuous[x.sender].outputs.index(variable_of(x.start[i]))
+                    held[j], white[j] = x.scale * rows[x.sender][k], x.scale * loud[x.sender][k]
+        return held, white
+
+    def _output_of_continuous(self, name: str, j: int) -> Floats:
+        found: Floats = self._outputs[name][j]
+        return found
+
+    def charge(self, Q: Floats) -> None:
+        """The costs are z'Q z, integrated over time; Q of shape (costs, size, size)."""
+        self.costs, self._flows = len(Q), Flows(self.F, self.R, Q)
+
+    def passed(self, piece: Piece, duration: int) -> Piece:
+        """As `Effects`."""
+        return piece.flowed(self._flows.over(duration / ATTOSECONDS))

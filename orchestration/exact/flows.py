@@ -1,0 +1,91 @@
+"""What a linear system becomes in a time, and what that costs: exponentials and their integrals, by doubling.
+
+Van Loan's block exponential has e^(-At) in it, which overflows where a plant is stiff; here a short time is taken by
+the series, and doubled: what decays only decays.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from orchestration.basics.simulator import Floats
+
+SHORT = 0.25
+"""of the norm of F h: for so long the series is taken"""
+TERMS = 18
+"""of the series: the next one is below rounding, for the covariance, whose rate is twice that of the state, too"""
+
+
+@dataclass(frozen=True)
+class Flow:
+    """z' = F z + w over a time, w white of covariance R, and the integrals of z'Q z for some Q."""
+
+    change: Floats
+    """e^(Ft) - I: of what is slow, digits are kept that e^(Ft) has not"""
+    covariance: Floats
+    """of what the noise has added"""
+    costs: Floats
+    """M, shape (costs, n, n): the integral of each z'Q z is z(0)'M z(0) and …"""
+    extra: Floats
+    """… this, shape (costs,), by the noise in between"""
+
+    @functools.cached_property
+    def matrix(self) -> Floats:
+        """e^(Ft)"""
+        found: Floats = np.eye(len(self.change)) + self.change
+        return found
+
+    def doubled(self) -> Flow:
+        """Over twice the time."""
+        change, matrix = self.change, self.matrix
+        return Flow(
+            change=2.0 * change + change @ change,
+            covariance=self.covariance + matrix @ self.covariance @ matrix.T,
+            costs=self.costs + matrix.T @ self.costs @ matrix,
+            extra=2.0 * self.extra + _traces(self.costs, self.covariance),
+        )
+
+
+class Flows:
+    """The flows of one system over any times, each made once."""
+
+    def __init__(self, F: Floats, R: Floats, Q: Floats) -> None:
+        """`F` and `R` of shape (n, n), `Q` of shape (costs, n, n)."""
+        self._F, self._R, self._Q = F, R, Q
+        size = np.abs(F).sum(axis=1).max(initial=0.0)
+        self._rate = min(float(size), float(np.abs(F).sum(axis=0).max(initial=0.0)))
+        self._known: dict[float, Flow] = {}
+
+    def over(self, time: float) -> Flow:
+        """The flow over `time` [s]."""
+        if time not in self._known:
+            doublings = max(0, math.ceil(math.log2(self._rate * time / SHORT))) if self._rate * time > 0.0 else 0
+            flow = self._series(time / 2**doublings)
+            for _ in range(doublings):
+                flow = flow.doubled()
+            self._known[time] = flow
+        return self._known[time]
+
+    def _series(self, h: float) -> Flow:
+        F, Q = self._F * h, self._Q
+        change, term = np.zeros_like(F), np.eye(len(F))
+        covariance, grown = np.zeros_like(F), self._R * h
+        costs, asked = np.zeros_like(Q), Q * h
+        extra = np.zeros(len(Q))
+        for k in range(1, TERMS + 1):
+            term = F @ term / k
+            change = change + term
+            covariance, costs = covariance + grown, costs + asked
+            extra = extra + _traces(Q, grown) * h / (k + 1)
+            grown = (F @ grown + grown @ F.T) / (k + 1)
+            asked = (F.T @ asked + asked @ F) / (k + 1)
+        return Flow(change, covariance, costs, extra)
+
+
+def _traces(costs: Floats, covariance: Floats) -> Floats:
+    found: Floats = np.einsum("kij,ij->k", costs, covariance)
+    return found

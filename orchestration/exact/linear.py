@@ -1,0 +1,42 @@
+"""Components as linear ones about the point where they rest: what a loop is put together from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from orchestration.basics.simulator import Floats
+
+Derivatives = Callable[[float], tuple[Floats, Floats]]
+"""Of the outputs after a step of a length [s] and, below, of the state then: by the state before, and by the inputs"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Continuous:
+    """x' = A x + B u, y = C x + D u."""
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    A: Floats
+    B: Floats
+    C: Floats
+    D: Floats
+    step: Derivatives | None = None
+    """as it is stepped, where that is not what the matrices say"""
+    unfit: str | None = None
+    """why the matrices do not say what it does; None: they do"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sampled:
+    """At each sample y = C x + D u, and then x becomes A x + B u."""
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    A: Floats
+    B: Floats
+    C: Floats
+    D: Floats
+
+
+Components = dict[str, Continuous | Sampled]

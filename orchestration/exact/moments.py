@@ -1,0 +1,253 @@
+"""Second moments of a jump-linear system: what they become in a period, where they stay, and what they cost.
+
+The system has a mode, a Markov chain over modes that may differ from stage to stage of a period, and a state whose size
+may differ from mode to mode. A passage takes it from a mode to one of the next stage, with a probability, by a `Piece`.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Booleans, Floats
+from orchestration.exact.pieces import Piece
+
+LARGEST = 4000
+"""Numbers in the second moments of all modes together"""
+LARGEST_FOURTH = 2000
+"""likewise of fourth moments"""
+ALMOST = 1e-12
+"""of a variance: what is smaller is rounding"""
+
+
+@dataclass(frozen=True)
+class Passage:
+    """From a mode of one stage to one of the next."""
+
+    begin: int
+    end: int
+    probability: float
+    piece: Piece
+
+
+Stage = Sequence[Passage]
+
+
+class JumpLinear:
+    """A jump-linear system over one period of stages; the last one leads to the modes of the first."""
+
+    def __init__(self, stages: Sequence[Stage], sizes: Sequence[Sequence[int]]) -> None:
+        """`sizes` are those of the state, by stage and by mode before the stage."""
+        self._stages, self._sizes = _recurrent(stages, sizes)
+        self._turn_to_fewest()
+        self._stages, self._sizes = _live(self._stages, self._sizes)
+        self.numbers = sum(n * (n + 1) // 2 for n in self._sizes[0])
+        """in the second moments where the period begins"""
+        if self.numbers > LARGEST:
+            raise UsageError(
+                f"{len(self._sizes[0])} modes with {self.numbers} second moments, more than {LARGEST}: "
+                "expected fewer messages on their way, or states"
+            )
+
+    def _turn_to_fewest(self) -> None:
+        """The period begins where there is least to be solved for."""
+        counts = [sum(n * n for n in sizes) for sizes in self._sizes]
+        first = counts.index(min(counts))
+        self._stages = [*self._stages[first:], *self._stages[:first]]
+        self._sizes = [*self._sizes[first:], *self._sizes[:first]]
+
+    @functools.cached_property
+    def shares(self) -> list[Floats]:
+        """The stationary probabilities of the modes, by stage."""
+        count = len(self._sizes[0])
+        chain: Floats = np.eye(count)
+        for i in range(len(self._stages)):
+            chain = self._step_of_chain(i) @ chain
+        system = np.vstack([chain - np.eye(count), np.ones(count)])
+        found: list[Floats] = [np.linalg.lstsq(system, np.append(np.zeros(count), 1.0), rcond=None)[0]]
+        for i in range(len(self._stages) - 1):
+            found.append(self._step_of_chain(i) @ found[-1])
+        return found
+
+    def _step_of_chain(self, i: int) -> Floats:
+        found: Floats = np.zeros((len(self._sizes[(i + 1) % len(self._sizes)]), len(self._sizes[i])))
+        for passage in self._stages[i]:
+            found[passage.end, passage.begin] += passage.probability
+        return found
+
+    @functools.cached_property
+    def _operator(self) -> Floats:
+        """What a period makes of the second moments, but for the noise, as a matrix."""
+        basis = _Symmetric(self._sizes[0])
+        moments = basis.matrices(np.eye(self.numbers))
+        for i, stage in enumerate(self._stages):
+            after = self._none(i + 1, self.numbers)
+            for p in stage:
+                Z = p.piece.Z
+                after[p.end] += p.probability * (Z @ moments[p.begin] @ Z.T)
+            moments = after
+        found: Floats = basis.numbers(moments).T
+        return found
+
+    def _none(self, i: int, count: int) -> list[Floats]:
+        return [np.zeros((count, n, n)) for n in self._sizes[i % len(self._sizes)]]
+
+    @functools.cached_property
+    def radius(self) -> float:
+        """The mean-square radius: by how much second moments grow in a period."""
+        return float(np.abs(np.linalg.eigvals(self._operator)).max(initial=0.0))
+
+    def after(self, moments: Sequence[Floats], shares: Sequence[Floats] | None = None) -> list[Floats]:
+        """Second moments, by mode weighted by its probability, a period later; and what the noise has added."""
+        shares = self.shares if shares is None else shares
+        now = list(moments)
+        for i, stage in enumerate(self._stages):
+            later = [each[0] for each in self._none(i + 1, 1)]
+            for p in stage:
+                Z = p.piece.Z
+                later[p.end] += p.probability * (Z @ now[p.begin] @ Z.T + shares[i][p.begin] * p.piece.W)
+            now = later
+        return now
+
+    def stationary(self) -> list[Floats]:
+        """The second moments that stay, by mode where the period begins; there are such where the radius is below 1."""
+        basis = _Symmetric(self._sizes[0])
+        added = basis.numbers([each[None] for each in self.after([each[0] for each in self._none(0, 1)])])[0]
+        solved = np.linalg.solve(np.eye(self.numbers) - self._operator, added)
+        return [each[0] for each in basis.matrices(solved[None])]
+
+    def costs(self) -> Floats:
+        """The stationary costs of a period, shape (costs,)."""
+        now, total = self.stationary(), 0.0
+        for i, stage in enumerate(self._stages):
+            later = [each[0] for each in self._none(i + 1, 1)]
+            for p in stage:
+                piece, share = p.piece, self.shares[i][p.begin]
+                total = total + p.probability * (np.einsum("kij,ij->k", piece.M, now[p.begin]) + share * piece.c)
+                later[p.end] += p.probability * (piece.Z @ now[p.begin] @ piece.Z.T + share * piece.W)
+            now = later
+        return np.atleast_1d(np.asarray(total, dtype=float))
+
+    @functools.cached_property
+    def fourth_moment_radius(self) -> float | None:
+        """By how much fourth moments grow in a period; None where there are too many of them to be told."""
+        halves = [[n * (n + 1) // 2 for n in sizes] for sizes in self._sizes]
+        numbers = sum(n * (n + 1) // 2 for n in halves[0])
+        if numbers > LARGEST_FOURTH:
+            return None
+        basis = _Symmetric(halves[0])
+        moments = basis.matrices(np.eye(numbers))
+        for i, stage in enumerate(self._stages):
+            after = [np.zeros((numbers, n, n)) for n in halves[(i + 1) % len(halves)]]
+            for p in stage:
+                square = _squared(p.piece.Z)
+                after[p.end] += p.probability * (square @ moments[p.begin] @ square.T)
+            moments = after
+        return float(np.abs(np.linalg.eigvals(basis.numbers(moments).T)).max(initial=0.0))
+
+
+class _Symmetric:
+    """Symmetric matrices of some sizes as one row of numbers: their upper triangles."""
+
+    def __init__(self, sizes: Sequence[int]) -> None:
+        self._triangles = [np.triu_indices(n) for n in sizes]
+        self._sizes = sizes
+        self._cuts = np.cumsum([len(rows) for rows, _ in self._triangles])[:-1]
+
+    def matrices(self, numbers: Floats) -> list[Floats]:
+        """From rows, shape (count, numbers), the matrices of each size, shape (count, n, n)."""
+        found = []
+        for n, (rows, columns), part in zip(self._sizes, self._triangles, np.split(numbers, self._cuts, axis=1)):
+            matrix = np.zeros((len(numbers), n, n))
+            matrix[:, rows, columns] = part
+            matrix[:, columns, rows] = part
+            found.append(matrix)
+        return found
+
+    def numbers(self, matrices: Sequence[Floats]) -> Floats:
+        """And back."""
+        parts = [each[:, rows, columns] for each, (rows, columns) in zip(matrices, self._triangles)]
+        found: Floats = np.concatenate(parts, axis=1)
+        return found
+
+
+def _squared(Z: Floats) -> Floats:
+    """What Z makes of z z', as a matrix over the upper triangle of that: (i, j) by (k, m)."""
+    (i, j), (k, m) = np.triu_indices(Z.shape[0]), np.triu_indices(Z.shape[1])
+    found: Floats = Z[np.ix_(i, k)] * Z[np.ix_(j, m)]
+    apart = k != m
+    found[:, apart] += (Z[np.ix_(i, m)] * Z[np.ix_(j, k)])[:, apart]
+    return found
+
+
+def _recurrent(stages: Sequence[Stage], sizes: Sequence[Sequence[int]]) -> tuple[list[Stage], list[Sequence[int]]]:
+    """Without the modes that only a beginning has."""
+    count = len(sizes[0])
+    reach = np.eye(count, dtype=bool)
+    for i, stage in enumerate(stages):
+        step = np.zeros((len(sizes[(i + 1) % len(sizes)]), len(sizes[i])), dtype=bool)
+        for p in stage:
+            step[p.end, p.begin] |= p.probability > 0.0
+        reach = (step.astype(int) @ reach.astype(int)) > 0
+    closure = reach | np.eye(count, dtype=bool)
+    for _ in range(max(1, math.ceil(math.log2(count + 1)))):
+        closure = (closure.astype(int) @ closure.astype(int)) > 0
+    stays = np.array([all(closure[m, k] for k in np.flatnonzero(closure[:, m])) for m in range(count)])
+    return _only(stages, sizes, [stays])
+
+
+def _only(
+    stages: Sequence[Stage], sizes: Sequence[Sequence[int]], first: list[Booleans]
+) -> tuple[list[Stage], list[Sequence[int]]]:
+    """Only the modes that are kept at first, and those that they lead to."""
+    kept = first
+    for i, stage in enumerate(stages[:-1]):
+        later = np.zeros(len(sizes[i + 1]), dtype=bool)
+        for p in stage:
+            later[p.end] |= bool(kept[i][p.begin]) and p.probability > 0.0
+        kept.append(later)
+    places = [np.cumsum(keep) - 1 for keep in kept]
+    found: list[Stage] = []
+    for i, stage in enumerate(stages):
+        then = places[(i + 1) % len(stages)]
+        found.append(
+            [
+                Passage(int(places[i][p.begin]), int(then[p.end]), p.probability, p.piece)
+                for p in stage
+                if kept[i][p.begin] and p.probability > 0.0
+            ]
+        )
+    return found, [[n for n, keep in zip(stage, keeps) if keep] for stage, keeps in zip(sizes, kept)]
+
+
+def _live(stages: Sequence[Stage], sizes: Sequence[Sequence[int]]) -> tuple[list[Stage], list[Sequence[int]]]:
+    """Without those numbers of a state that nothing later depends on."""
+    live = [[np.zeros(n, dtype=bool) for n in stage] for stage in sizes]
+    changed = True
+    while changed:
+        changed = False
+        for i in reversed(range(len(stages))):
+            then = live[(i + 1) % len(stages)]
+            for p in stages[i]:
+                used = p.piece.Z[then[p.end]].any(axis=0) | p.piece.M.any(axis=(0, 1))
+                if (used & ~live[i][p.begin]).any():
+                    live[i][p.begin] |= used
+                    changed = True
+    found: list[Stage] = []
+    for i, stage in enumerate(stages):
+        then = live[(i + 1) % len(stages)]
+        found.append(
+            [Passage(p.begin, p.end, p.probability, _cut(p.piece, live[i][p.begin], then[p.end])) for p in stage]
+        )
+    return found, [[int(keep.sum()) for keep in stage] for stage in live]
+
+
+def _cut(piece: Piece, before: Booleans, after: Booleans) -> Piece:
+    return Piece(
+        piece.Z[np.ix_(after, before)], piece.W[np.ix_(after, after)], piece.M[:, before][:, :, before], piece.c
+    )

@@ -1,0 +1,81 @@
+"""Loops of which exact costs are known, from matrices."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from orchestration.exact.clockwork import Clockwork
+from orchestration.exact.effects import TrueEffects
+from orchestration.exact.linear import Components, Continuous, Sampled
+from orchestration.exact.moments import JumpLinear
+from orchestration.exact.timing import links_of, tasks_of
+from orchestration.system.model import Component, Connection, Sampling, System
+
+GAIN = 3.0 - math.sqrt(3.0)
+
+
+def integrator(*, nodes: int = 3, sampling: dict[str, Any] | None = None, **command: Any) -> JumpLinear:
+    """x' = u + w under u = -GAIN x every second; its cost is x²."""
+    system = System(
+        stop_time=10.0,
+        components={
+            "plant": Component(fmu="plant.fmu", step=0.1),
+            "law": Component(fmu="law.fmu", sampling=Sampling(**{"period": 1.0, **(sampling or {})})),
+        },
+        connections=(
+            Connection(name="measurement", start=("plant.x",), end=("law.x",)),
+            Connection(name="command", start=("law.u",), end=("plant.u",), **command),
+        ),
+    )
+    empty = np.zeros((0, 0))
+    components: Components = {
+        "plant": Continuous(
+            inputs=("u", "w"), outputs=("x",), A=np.zeros((1, 1)), B=np.ones((1, 2)), C=np.eye(1), D=np.zeros((1, 2))
+        ),
+        "law": Sampled(
+            inputs=("x",), outputs=("u",), A=empty, B=np.zeros((0, 1)), C=np.zeros((1, 0)), D=np.array([[-GAIN]])
+        ),
+    }
+    return loop(system, components, {"plant.w": 1.0}, ("plant.x",), nodes)
+
+
+SERVO_PERIOD = 0.006
+
+
+def servo(*, nodes: int = 3, **command: Any) -> JumpLinear:
+    """1000/(s² + s) (u + w) under a PD controller with the last sample in it; its cost is y² + u²."""
+    system = System(
+        stop_time=1.0,
+        components={
+            "servo": Component(fmu="servo.fmu", step=0.001),
+            "law": Component(fmu="law.fmu", sampling=Sampling(period=SERVO_PERIOD)),
+        },
+        connections=(
+            Connection(name="measurement", start=("servo.y",), end=("law.y",)),
+            Connection(name="command", start=("law.u",), end=("servo.u",), **command),
+        ),
+    )
+    K, derivative = 1.5, 0.035 / SERVO_PERIOD
+    components: Components = {
+        "servo": Continuous(
+            inputs=("u", "w"), outputs=("y",), A=np.array([[0.0, 1.0], [0.0, -1.0]]),
+            B=np.array([[0.0, 0.0], [1000.0, 1000.0]]), C=np.array([[1.0, 0.0]]), D=np.zeros((1, 2)),
+        ),
+        "law": Sampled(
+            inputs=("y",), outputs=("u",), A=np.zeros((1, 1)), B=np.eye(1), C=np.array([[K * derivative]]),
+            D=np.array([[-K * (1.0 + derivative)]]),
+        ),
+    }  # fmt: skip
+    return loop(system, components, {"servo.w": 1.0}, ("servo.y", "servo.u"), nodes)
+
+
+def loop(
+    system: System, components: Components, noise: dict[str, float], signals: tuple[str, ...], nodes: int
+) -> JumpLinear:
+    """Of which the cost is the sum of the squares of some signals."""
+    tasks = tasks_of(system)
+    effects = TrueEffects(system, components, [task.name for task in tasks], noise)
+    rows = [effects.signal(name) for name in signals]
+    effects.charge(np.array([sum(np.outer(row, row) for row in rows)]))
+    return JumpLinear(*Clockwork(tasks, links_of(system), effects, order=nodes).stages())
