@@ -17,6 +17,7 @@ Where to begin:
 - `load_scenario` and `load_system` read files of them, and the constructors refuse what the files refuse, in one line;
 - `fly` takes arrays of initial conditions, or of anything else, and gives arrays: many runs at once, without a store;
 - `limit` finds the largest period, delay, loss or anything else that is still good;
+- `expect` gives the expectation of means of squares exactly, of the loop about its operating point, without a run;
 - `linearise` cuts a loop open about its operating point, sampled, held and late as it is: two systems of matrices;
 - `sweep` flies a `Study` over axes, `compare` controllers against each other, `tune` searches for gains: what is there
   is not flown again, and what they give becomes a table with `to_pandas`;
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from orchestration.comparison.design import Comparison
     from orchestration.comparison.file import load_comparison
     from orchestration.comparison.run import Compared, compare
+    from orchestration.exact.expect import Expected, expect
     from orchestration.fmi.model import Model, read_model
     from orchestration.limits.limit import Limit
     from orchestration.limits.limit import find as limit
@@ -108,6 +110,8 @@ _HOMES = {
     "Flights": "orchestration.runs.in_lanes",
     "limit": "orchestration.limits.limit",
     "Limit": "orchestration.limits.limit",
+    "expect": "orchestration.exact.expect",
+    "Expected": "orchestration.exact.expect",
     "linearise": "orchestration.stability.linearise",
     "Linearised": "orchestration.stability.linearise",
     "StateSpace": "orchestration.stability.state_space",
@@ -143,6 +147,7 @@ __all__ = [
     "Criterion",
     "Distribution",
     "DisturbanceChoice",
+    "Expected",
     "Flights",
     "FmuChoice",
     "Limit",
@@ -170,6 +175,7 @@ __all__ = [
     "Vehicle",
     "changed",
     "compare",
+    "expect",
     "fly",
     "fly_until",
     "limit",

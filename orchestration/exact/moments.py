@@ -226,17 +226,19 @@ def _only(
 
 
 def _live(stages: Sequence[Stage], sizes: Sequence[Sequence[int]]) -> tuple[list[Stage], list[Sequence[int]]]:
-    """Without those numbers of a state that nothing later depends on."""
-    live = [[np.zeros(n, dtype=bool) for n in stage] for stage in sizes]
+    """Without those numbers of a state that nothing later depends on, not even themselves."""
+    live = [[np.ones(n, dtype=bool) for n in stage] for stage in sizes]
     changed = True
     while changed:
         changed = False
         for i in reversed(range(len(stages))):
             then = live[(i + 1) % len(stages)]
+            used = [np.zeros(n, dtype=bool) for n in sizes[i]]
             for p in stages[i]:
-                used = p.piece.Z[then[p.end]].any(axis=0) | p.piece.M.any(axis=(0, 1))
-                if (used & ~live[i][p.begin]).any():
-                    live[i][p.begin] |= used
+                used[p.begin] |= p.piece.Z[then[p.end]].any(axis=0) | p.piece.M.any(axis=(0, 1))
+            for keep, use in zip(live[i], used):
+                if (keep & ~use).any():
+                    keep &= use
                     changed = True
     found: list[Stage] = []
     for i, stage in enumerate(stages):

@@ -49,19 +49,41 @@ RUNGS_OF_TASK = 32
 
 
 @dataclass(frozen=True, kw_only=True)
+class Beside:
+    """What of the components counts beside what connections carry, as COMPONENT.VARIABLE."""
+
+    moved: Sequence[str] = ()
+    """Real inputs"""
+    seen: Sequence[str] = ()
+    """other Reals"""
+
+
+NOTHING = Beside()
+
+
+@dataclass(frozen=True, kw_only=True)
 class AtRest:
     """A system that has come to rest, and its components about it."""
 
     simulation: PreparedRun
     tangents: dict[str, Tangent]
+    beside: Beside
+    begun: Mapping[str, bytes]
+    """the saved states of the components there"""
     begin: Fraction
     """of a period, when the component that begins last samples [ns]"""
     period: Fraction
     """after which all sampled components are due together again [ns]"""
 
+    def retaken(self, pulse: float) -> dict[str, Tangent]:
+        """The tangents by other pulses."""
+        for name, instance in self.simulation.instances.items():
+            instance.restore(self.begun[name])
+        return _tangents(self.simulation, self.period, pulse, self.beside)
+
 
 @contextmanager
-def at_rest(system: System, instances: Instances, pulse: float = PULSE) -> Iterator[AtRest]:
+def at_rest(system: System, instances: Instances, pulse: float = PULSE, beside: Beside = NOTHING) -> Iterator[AtRest]:
     """`system` at its operating point, punctual and without loss, noise and quantisation.
 
     Raises `UsageError` where it does not rest there, or cannot be put into a linear loop, saying why.
@@ -74,8 +96,10 @@ def at_rest(system: System, instances: Instances, pulse: float = PULSE) -> Itera
     with prepared(calm, load=_watching(instances)) as simulation:
         _expect_states(simulation)
         _come_to_rest(simulation, begin, period)
-        tangents = {name: _tangent(simulation, name, period, pulse) for name in calm.components}
-        yield AtRest(simulation=simulation, tangents=tangents, begin=begin, period=period)
+        yield AtRest(
+            simulation=simulation, begun={name: one.save() for name, one in simulation.instances.items()},
+            tangents=_tangents(simulation, period, pulse, beside), beside=beside, begin=begin, period=period,
+        )  # fmt: skip
 
 
 # -- where it is taken -----------------------------------------------------------------------------------------------
@@ -111,11 +135,17 @@ def _come_to_rest(simulation: PreparedRun, begin: Fraction, period: Fraction) ->
     expect_rest(system, np.array(rows))
 
 
-def _tangent(simulation: PreparedRun, name: str, period: Fraction, pulse: float) -> Tangent:
+def _tangents(simulation: PreparedRun, period: Fraction, pulse: float, beside: Beside) -> dict[str, Tangent]:
+    return {name: _tangent(simulation, name, period, pulse, beside) for name in simulation.system.components}
+
+
+def _tangent(simulation: PreparedRun, name: str, period: Fraction, pulse: float, beside: Beside) -> Tangent:
     fmu, system = cast("Watched", simulation.instances[name]), simulation.system
-    given = {variable_of(end): 0.0 for x in system.connections for end in x.end if component_of(end) == name}
+    ends = [*(end for x in system.connections for end in x.end), *beside.moved]
+    starts = [*(start for x in system.connections for start in x.start), *beside.seen]
+    given = dict.fromkeys(variable_of(end) for end in ends if component_of(end) == name)
     inputs = tuple(end for end in given if fmu.model.variables[end].kind == "Real")
-    taken = dict.fromkeys(variable_of(s) for x in system.connections for s in x.start if component_of(s) == name)
+    taken = dict.fromkeys(variable_of(start) for start in starts if component_of(start) == name)
     rest = Rest(
         fmu=fmu.fmu,
         inputs=inputs,

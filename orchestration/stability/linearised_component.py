@@ -19,8 +19,8 @@ from orchestration.system.times import NANOSECONDS
 
 PULSE = 1e-6
 """of an input, both ways: of its value, or absolute where that is smaller than 1"""
-LARGEST = 1e-2
-"""of an output, likewise: what a pulse may make of it; later outputs are not looked at"""
+LARGEST = 1e4
+"""of an output by the pulse: what that may make of it; later outputs are not looked at"""
 NOISE = 100.0 * np.finfo(float).eps
 """of an output, likewise: what rounding may make of it"""
 SEEN = 1e-11
@@ -65,12 +65,13 @@ class Tangent(Linear):
 
     def __init__(self, rest: Rest, ladder: Sequence[float], pulse: float = PULSE, *, unit: float | None = None) -> None:
         super().__init__(rest.inputs, rest.outputs, states=0)  # of which there are more, once they are found
-        self._unit, self._fmu = unit, rest.fmu
+        self.unit, self._fmu = unit, rest.fmu
         self._held, self._given = rest.held, rest.held.copy()
         self._write = rest.fmu.writer(rest.inputs, self._given)
         self._found: Floats = np.zeros(len(rest.outputs))
         self._read = rest.fmu.reader(rest.outputs, self._found)
         self._pulse = pulse * np.maximum(1.0, np.abs(rest.held))
+        self._largest = LARGEST * pulse
         self._time = rest.time
         self._rest = _State(rest.fmu.save(), rest.time)
         self._read()
@@ -180,7 +181,7 @@ class Tangent(Linear):
         later = []
         for pair in pairs:
             (up, after_up), (down, after_down) = (self._stepped(state, self._held, h) for state in pair)
-            if np.abs((up - down) / self._weight).max(initial=0.0) > LARGEST:
+            if np.abs((up - down) / self._weight).max(initial=0.0) > self._largest:
                 return None
             later.append((after_up, after_down))
         return later
@@ -207,7 +208,7 @@ class Tangent(Linear):
         self._write()
         found: Floats = np.zeros((len(steps), len(self.outputs)))
         for k, h in enumerate(steps):
-            count = 1 if self._unit is None else round(h / self._unit)
+            count = 1 if self.unit is None else round(h / self.unit)
             for _ in range(count):
                 self._fmu.step(self._time, h / count)
                 self._time += h / count

@@ -1,0 +1,51 @@
+"""The command that answers without a run."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from orchestration.command import registry as registering
+from orchestration.command.answer import Answer
+from orchestration.command.flags import FlightFlags, Timing, flies, request_from
+
+if TYPE_CHECKING:
+    from orchestration.exact.expect import Expected
+
+
+@flies
+def expect(
+    scenario: Annotated[
+        Path | None,
+        typer.Argument(help="System or scenario file, or SSP; without one, the paper's flight.", show_default=False),
+    ] = None,
+    timing: Timing = None,
+    *,
+    flags: FlightFlags,
+) -> Answer:
+    """Expect the objectives that are means of squares exactly, of the loop about its operating point, without a run."""
+    from orchestration.exact.expect import expect as expected
+
+    found = expected(request_from(scenario, flags, timing))
+    return Answer(document=found, lines=_lines(found))
+
+
+def _lines(found: "Expected") -> list[str]:
+    fourth = found.fourth_moment_radius
+    told = {
+        **{name: "-" if value is None else f"{value:.12g}" for name, value in found.objectives.items()},
+        "mean_square_radius": f"{found.mean_square_radius:.12g} in {found.period:g} s",
+        "fourth_moment_radius": "-" if fourth is None else f"{fourth:.12g}",
+        "accuracy": f"{found.accuracy:.1g} of each",
+        "method": found.method,
+    }
+    width = max(map(len, told))
+    lines = [f"{name:<{width}}  {value}" for name, value in told.items()]
+    if fourth is not None and found.mean_square_radius < 1.0 <= fourth:
+        lines.append("fourth moments have no end: an interval of a mean square over runs means nothing here")
+    return [*lines, *(f"no {name}: {why}" for name, why in found.reasons.items())]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the command line."""
+    registering.add(app, registering.STUDY, expect)

@@ -1,0 +1,85 @@
+"""`expect` of systems with FMUs: known answers, and what is refused by name."""
+
+import dataclasses
+import json
+import math
+from typing import Any
+
+import pytest
+
+from orchestration.exact.expect import Expected, expect
+from orchestration.system.model import Source
+from quadcosim import UsageError
+from tests.commands import Main
+from tests.examples.common import EXAMPLES, example
+
+
+def expected(name: str, **changes: Any) -> Expected:
+    return expect(example(name, {key.replace("__", "."): value for key, value in changes.items()}))
+
+
+def test_minimum_variance_control_costs_what_theory_says_through_its_fmus() -> None:
+    found = expected("minimum_variance")
+    assert found.objectives["variance"] == pytest.approx((3.0 + math.sqrt(3.0)) / 6.0, abs=1e-9)
+    assert found.objectives["effort"] == pytest.approx(math.sqrt(3.0), abs=1e-9)
+    assert found.accuracy < 1e-9
+    assert not found.reasons
+
+
+def test_with_a_uniform_delay_through_its_fmus_too() -> None:
+    found = expected("minimum_variance", connections__command__delay_jitter=0.5)
+    assert found.objectives["variance"] == pytest.approx(1.2186963044, abs=1e-9)
+
+
+def test_a_mean_that_has_no_finite_expectation_is_none_and_says_why() -> None:
+    found = expected("minimum_variance", connections__command__loss=0.3)
+    assert found.objectives == {"variance": None, "effort": None}
+    assert found.mean_square_radius > 1.0
+    assert found.reasons["variance"].startswith("the mean-square radius is 1.16999")
+
+
+def test_objectives_that_are_no_means_of_squares_are_refused_by_name_and_the_radius_is_there() -> None:
+    found = expected("dc_servo", connections__command__loss=0.0, connections__command__delay_jitter=0.0)
+    assert found.objectives == {"middle": None, "late": None, "cost": None}
+    assert "integral(servo.angle ** 2): expected mean(…) or rms(…)" in found.reasons["cost"]
+    assert found.mean_square_radius == pytest.approx(0.9324**2, abs=1e-4)
+
+
+def test_objectives_may_be_made_of_means_and_of_signals_that_no_connection_carries() -> None:
+    servo = example("dc_servo", {"connections.command.loss": 0.0})
+    noisy = dataclasses.replace(
+        servo, sources={"torque": Source(noise=1e-4, period=0.001, to=("controller.reference",))}, objectives={}
+    )
+    with pytest.raises(UsageError, match=r"sources\.torque: white noise into controller\.reference, which samples it"):
+        expect(noisy)
+    measured = dataclasses.replace(
+        servo,
+        connections=(dataclasses.replace(servo.connections[0], noise={"angle": 0.01}), servo.connections[1]),
+        objectives={
+            "speed": "rms(servo.speed)",
+            "both": "mean(servo.angle ** 2 + 0.1 * servo.speed * servo.angle) + 2 * speed",
+            "inner": "mean(controller.integral ** 2)",
+            "third": "mean(servo.angle ** 3)",
+            "late": "mean(time * servo.angle)",
+        },
+    )
+    found = expect(measured)
+    speed, both = found.objectives["speed"], found.objectives["both"]
+    assert speed is not None
+    assert both is not None
+    assert both > 2.0 * speed > 0.0
+    assert found.objectives["inner"] is not None
+    assert found.reasons == {
+        "third": "third: servo.angle ** 3: expected a polynomial of signals of degree two at most",
+        "late": "late: depends on time: expected signals alone, whose mean stays",
+    }
+
+
+def test_the_command_prints_what_it_found(main: Main) -> None:
+    path = EXAMPLES / "minimum_variance/system.toml"
+    document = json.loads(main("expect", path, "--set", "connections.command.loss=0.2", "--json").stdout)
+    assert document["objectives"]["variance"] == pytest.approx(5.8867513459, abs=1e-9)
+    assert document["mean_square_radius"] < 1.0 < document["fourth_moment_radius"]
+    lines = main("expect", path, "--set", "connections.command.loss=0.2").stdout
+    assert "variance              5.8867513459" in lines
+    assert "an interval of a mean square over runs means nothing here" in lines
