@@ -20,13 +20,16 @@ def expect(
         typer.Argument(help="System or scenario file, or SSP; without one, the paper's flight.", show_default=False),
     ] = None,
     timing: Timing = None,
+    as_simulated: Annotated[
+        bool, typer.Option("--as-simulated", help="What runs print on average: noise held, means over their rows.")
+    ] = False,
     *,
     flags: FlightFlags,
 ) -> Answer:
     """Expect the objectives that are means of squares exactly, of the loop about its operating point, without a run."""
     from orchestration.exact.expect import expect as expected
 
-    found = expected(request_from(scenario, flags, timing))
+    found = expected(request_from(scenario, flags, timing), as_simulated=as_simulated)
     return Answer(document=found, lines=_lines(found))
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from fractions import Fraction
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from orchestration.engines.channel import of_each
 from orchestration.exact.clockwork import ATTOSECONDS
 from orchestration.exact.flows import Flows
 from orchestration.exact.linear import Components, Continuous, Sampled
+from orchestration.exact.objectives import Mean
 from orchestration.exact.pieces import Piece
 from orchestration.schedule.plan import Plan
 from orchestration.system.model import Connection, System, component_of, variable_of
@@ -65,11 +67,26 @@ class LoopEffects(ABC):
         for name, task in self.sampled_parts.items():
             places.add("state", name, len(task.A))
             places.add("output", name, len(task.outputs))
+        self._add_places(places)
         self.size = places.size
         self.costs = 0
         self._noise = {x.name: _noise_of(x) for x in system.connections}
 
     holds_wires = False
+    """whether what a wire passes on is held from step to step"""
+
+    @abstractmethod
+    def _add_places(self, places: Places) -> None:
+        """For what else there is."""
+
+    @property
+    def grids(self) -> Sequence[Fraction]:
+        """Periods [s] of points at which it ticks."""
+        return ()
+
+    @abstractmethod
+    def charge(self, means: Sequence[Mean]) -> None:
+        """The costs are these means, over time."""
 
     # -- rows over the state -------------------------------------------------------------------------------------
 
@@ -248,9 +265,17 @@ class TrueEffects(LoopEffects):
         found: Floats = self._outputs[name][j]
         return found
 
-    def charge(self, Q: Floats) -> None:
-        """The costs are z'Q z, integrated over time; Q of shape (costs, size, size)."""
-        self.costs, self._flows = len(Q), Flows(self.F, self.R, Q)
+    def _add_places(self, places: Places) -> None:
+        """There is nothing else."""
+
+    def charge(self, means: Sequence[Mean]) -> None:
+        """As `LoopEffects`, by integrals."""
+        self.costs = len(means)
+        Q = np.zeros((self.costs, self.size, self.size))
+        for k, mean in enumerate(means):
+            rows = np.array([self.signal(name) for name in mean.signals])
+            Q[k] = rows.T @ mean.Q @ rows
+        self._flows = Flows(self.F, self.R, Q)
 
     def passed(self, piece: Piece, duration: int) -> Piece:
         """As `Effects`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
 from orchestration.building.inputs import files_of
+from orchestration.exact.as_simulated import SimulatedEffects, expect_rows
 from orchestration.exact.clockwork import Clockwork
 from orchestration.exact.components import components_of
 from orchestration.exact.effects import LoopEffects, TrueEffects
@@ -62,11 +63,12 @@ class Expected:
         return f"<Expected: {listed or 'no objectives'}; mean-square radius {self.mean_square_radius:.6g}>"
 
 
-def expect(asked: Asked) -> Expected:
+def expect(asked: Asked, *, as_simulated: bool = False) -> Expected:
     """The stationary expectation of each objective that is made of means of quadratic expressions of signals.
 
     The system is linearised about its operating point, or where it begins. Noise of sources is white; delays, jitter
-    and losses are drawn as a run draws them.
+    and losses are drawn as a run draws them. `as_simulated` it is the expectation of what a run prints when it is long:
+    noise is held for the period of its source, what is in continuous time is stepped, and means are over rows.
 
     Raises `UsageError` for a system that does not rest there, or of which there is no exact answer, naming why.
     """
@@ -75,13 +77,13 @@ def expect(asked: Asked) -> Expected:
     with in_its_own_words(request):
         system = request.as_system() if known is None else known.at_rest(request)
         files = files_of(system)
-        return computed(files.fmus.values(), expected_of, system, files.models_of(system))
+        return computed(files.fmus.values(), expected_of, system, files.models_of(system), as_simulated)
 
 
-def expected_of(system: System, models: Mapping[str, Model]) -> Expected:
+def expected_of(system: System, models: Mapping[str, Model], simulated: bool = False) -> Expected:
     """As `expect`, of a system whose FMUs are loaded in this process."""
     chosen = changed(system, system.operating_point)
-    noise = _white(chosen)
+    noise = _white(chosen, simulated=simulated)
     wanted = Wanted(chosen, models)
     beside = Beside(moved=tuple(noise), seen=wanted.seen)
     instances = Instances()
@@ -92,22 +94,22 @@ def expected_of(system: System, models: Mapping[str, Model]) -> Expected:
     finally:
         instances.close()
     for name, part in parts.items():
-        if isinstance(part, Continuous) and part.unfit is not None:
+        if isinstance(part, Continuous) and part.unfit is not None and not simulated:
             raise UsageError(f"{name} is no linear system in continuous time: {part.unfit}; expected --as-simulated")
-    return _answer(chosen, parts, noise, wanted, how)
+    return _answer(chosen, parts, noise, wanted, how, simulated=simulated)
 
 
-def _white(system: System) -> dict[str, float]:
+def _white(system: System, *, simulated: bool) -> dict[str, float]:
     """The intensities of white noise by input; raises `UsageError` for what drives a system otherwise."""
     found = {}
     for name, source in system.sources.items():
         if source.is_random and source.noise is None:
             raise UsageError(f"sources.{name}: gusts by name; expected white noise, of which there is an expectation")
         for end in source.to if source.noise else ():
-            if system.components[component_of(end)].sampling is not None:
+            if not simulated and system.components[component_of(end)].sampling is not None:
                 raise UsageError(
                     f"sources.{name}: white noise into {end}, which samples it: its variance has no limit; "
-                    "expected noise of a connection"
+                    "expected noise of a connection, or --as-simulated"
                 )
             found[end] = float(source.noise or 0.0)
     return found
@@ -182,20 +184,31 @@ def _signals_of(name: str, models: Mapping[str, Model]) -> list[str]:
 
 
 def _answer(
-    system: System, parts: Components, noise: Mapping[str, float], wanted: Wanted, how: Mapping[str, str]
+    system: System,
+    parts: Components,
+    noise: Mapping[str, float],
+    wanted: Wanted,
+    how: Mapping[str, str],
+    *,
+    simulated: bool,
 ) -> Expected:
     """By finer and finer rules, until they agree."""
     tasks = tasks_of(system)
-    effects = TrueEffects(system, parts, [task.name for task in tasks], noise)
+    links, names_of_tasks = links_of(system), [task.name for task in tasks]
+    effects: LoopEffects
+    if simulated:
+        expect_rows(system, tasks, links)
+        effects = SimulatedEffects(system, parts, names_of_tasks)
+    else:
+        effects = TrueEffects(system, parts, names_of_tasks, noise)
     used = [call for call, mean in wanted.means.items() if np.any(mean.Q)]
-    effects.charge(_charges(effects, [wanted.means[call] for call in used]))
-    links = links_of(system)
+    effects.charge([wanted.means[call] for call in used])
     densities = any(x.late.is_density for x in links) or any(task.jitter.is_density for task in tasks)
     found: list[tuple[JumpLinear, Floats]] = []
     apart, order = 0.0, ORDERS[0]
     for order in ORDERS if densities else ORDERS[:1]:
         try:
-            clock = Clockwork(tasks, links, effects, order=order)
+            clock = Clockwork(tasks, links, effects, order=order, grids=effects.grids)
             loop = JumpLinear(*clock.stages())
         except UsageError:
             if len(found) < 2:
@@ -222,17 +235,8 @@ def _answer(
     return Expected(
         objectives=values, reasons={name: reasons[name] for name in system.objectives if name in reasons},
         mean_square_radius=loop.radius, fourth_moment_radius=loop.fourth_moment_radius, accuracy=apart + known,
-        method=_method(how, order if densities else None, system), period=period,
+        method=_method(how, order if densities else None, system, simulated=simulated), period=period,
     )  # fmt: skip
-
-
-def _charges(effects: LoopEffects, means: Sequence[Mean]) -> Floats:
-    """The costs of means, over the state of a loop."""
-    found: Floats = np.zeros((len(means), effects.size, effects.size))
-    for k, mean in enumerate(means):
-        rows = np.array([effects.signal(name) for name in mean.signals])
-        found[k] = rows.T @ mean.Q @ rows
-    return found
 
 
 def _apart(one: tuple[JumpLinear, Floats], other: tuple[JumpLinear, Floats]) -> float:
@@ -243,12 +247,14 @@ def _apart(one: tuple[JumpLinear, Floats], other: tuple[JumpLinear, Floats]) -> 
     return max(radii, float((np.abs(one[1] - other[1]) / np.maximum(np.abs(other[1]), 1e-300)).max(initial=0.0)))
 
 
-def _method(how: Mapping[str, str], order: int | None, system: System) -> str:
+def _method(how: Mapping[str, str], order: int | None, system: System, *, simulated: bool) -> str:
     known: dict[str, list[str]] = {}
     for name, by in how.items():
         known.setdefault(by, []).append(name)
     said = ["second moments of the loop about its operating point"]
     said += [f"{', '.join(listed)} known by {by}" for by, listed in known.items()]
+    if simulated:
+        said.append("noise held, steps and means over rows as in a run")
     if order is not None:
         said.append(f"random times by Gauss's rule with {order} nodes between any two instants")
     rounded = [x.name for x in system.connections if any(x.quantisation.values())]

@@ -9,6 +9,7 @@ from orchestration.exact.clockwork import Clockwork
 from orchestration.exact.effects import TrueEffects
 from orchestration.exact.linear import Components, Continuous, Sampled
 from orchestration.exact.moments import JumpLinear
+from orchestration.exact.objectives import Mean
 from orchestration.exact.timing import links_of, tasks_of
 from orchestration.system.model import Component, Connection, Sampling, System
 
@@ -76,6 +77,6 @@ def loop(
     """Of which the cost is the sum of the squares of some signals."""
     tasks = tasks_of(system)
     effects = TrueEffects(system, components, [task.name for task in tasks], noise)
-    rows = [effects.signal(name) for name in signals]
-    effects.charge(np.array([sum(np.outer(row, row) for row in rows)]))
+    count = len(signals)
+    effects.charge([Mean(signals=signals, c=0.0, g=np.zeros(count), Q=np.eye(count))])
     return JumpLinear(*Clockwork(tasks, links_of(system), effects, order=nodes).stages())

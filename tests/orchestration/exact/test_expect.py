@@ -83,3 +83,29 @@ def test_the_command_prints_what_it_found(main: Main) -> None:
     lines = main("expect", path, "--set", "connections.command.loss=0.2").stdout
     assert "variance              5.8867513459" in lines
     assert "an interval of a mean square over runs means nothing here" in lines
+
+
+def as_simulated(**changes: Any) -> float:
+    given = {key.replace("__", "."): value for key, value in changes.items()}
+    found = expect(example("minimum_variance", given), as_simulated=True).objectives["variance"]
+    assert found is not None
+    return found
+
+
+def test_as_simulated_noise_is_held_and_the_mean_is_over_rows() -> None:
+    assert as_simulated() == pytest.approx(0.791562, abs=5e-7)
+
+
+def test_with_finer_rows_the_mean_as_simulated_becomes_that_over_time_of_noise_that_is_held() -> None:
+    coarse, fine = (as_simulated(components__plant__step=step) for step in (0.01, 0.005))
+    assert (4.0 * fine - coarse) / 3.0 == pytest.approx(0.772008, abs=5e-7)
+
+
+def test_with_finer_noise_and_rows_it_becomes_that_of_white_noise() -> None:
+    coarse, fine = (as_simulated(components__plant__step=step, sources__noise__period=step) for step in (0.01, 0.005))
+    assert (4.0 * fine - coarse) / 3.0 == pytest.approx((3.0 + math.sqrt(3.0)) / 6.0, abs=1e-6)
+
+
+def test_as_simulated_refuses_rows_at_which_the_plant_is_not_stepped() -> None:
+    with pytest.raises(UsageError, match=r"connections\.measurement is measured between the steps of plant"):
+        as_simulated(connections__measurement__delay=0.05)

@@ -1,0 +1,213 @@
+"""The effects of a loop as a run simulates it: noise held, steps of components, means over the rows of the run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats
+from orchestration.exact.clockwork import ATTOSECONDS, Link, Task
+from orchestration.exact.effects import LoopEffects, Places
+from orchestration.exact.flows import Flows
+from orchestration.exact.linear import Components, Continuous
+from orchestration.exact.objectives import Mean
+from orchestration.exact.pieces import Piece
+from orchestration.schedule.plan import Plan
+from orchestration.system.model import System, component_of
+from orchestration.system.times import NANOSECONDS, exact_nanoseconds
+
+
+class SimulatedEffects(LoopEffects):
+    """The loop as it is simulated: all components in continuous time are stepped to each instant."""
+
+    holds_wires = True
+
+    def __init__(self, system: System, components: Components, tasks: Sequence[str]) -> None:
+        """Of noise, each value is held for the period of its source."""
+        self.noise = [name for name, source in system.sources.items() if source.noise]
+        super().__init__(system, components, tasks)
+        self._plan = Plan(system)
+        self._flows = {
+            name: Flows(*_held(part)) for name, part in self.continuous.items() if part.unfit is None
+        }  # fmt: skip
+        self._means: Sequence[Mean] = ()
+        self._maps: dict[int, tuple[Floats, Floats]] = {}
+
+    def _add_places(self, places: Places) -> None:
+        for name, part in self.continuous.items():
+            places.add("output", name, len(part.outputs))
+        for name in self.noise:
+            places.add("noise", name, len(self.system.sources[name].to))
+
+    @property
+    def grids(self) -> list[Fraction]:
+        """The periods [s] of the points that a run has by itself: first those of noise, in their order, then steps."""
+        periods = [_seconds(self.system.sources[name].period or 0.0) for name in self.noise]
+        return periods + sorted({_seconds(self.system.components[name].step or 0.0) for name in self.continuous})
+
+    def charge(self, means: Sequence[Mean]) -> None:
+        """As `LoopEffects`: by the trapezoid from row to row, exactly where all signals are held."""
+        self._means, self.costs = means, len(means)
+
+    # -- rows over the state -------------------------------------------------------------------------------------
+
+    def _output_of_continuous(self, name: str, j: int) -> Floats:
+        return self.one("output", name, j)
+
+    def _of_source(self, name: str) -> Floats:
+        source = component_of(name)
+        if source in self.noise:
+            return self.one("noise", source, self.system.sources[source].signals(source).index(name))
+        return np.zeros(self.size)
+
+    def input(self, end: str) -> Floats:
+        """As `LoopEffects`, with noise."""
+        for name in self.noise:
+            if end in self.system.sources[name].to:
+                return self.one("noise", name, self.system.sources[name].to.index(end))
+        return super().input(end)
+
+    def _is_held(self, signal: str) -> bool:
+        """Whether a run knows that a signal is constant, or on a line, from row to row."""
+        owner = component_of(signal)
+        return owner in self.sampled_parts or signal in self.fed or owner in self.system.sources
+
+    # -- what happens --------------------------------------------------------------------------------------------
+
+    def passed(self, piece: Piece, duration: int) -> Piece:
+        """As `Effects`."""
+        if duration not in self._maps:
+            self._maps[duration] = self._step(duration / ATTOSECONDS)
+        change, costs = self._maps[duration]
+        whole = np.eye(len(piece.Z))
+        whole[: self.size, : self.size] = change
+        return piece.charged(costs, 1.0).mapped(whole)
+
+    def ticked(self, piece: Piece, tick: int) -> Piece:
+        """As `Effects`: noise has new values at its points."""
+        if tick >= len(self.noise):
+            return piece
+        source, place = self.system.sources[self.noise[tick]], self.places("noise", self.noise[tick])
+        change, covariance = np.eye(len(piece.Z)), np.zeros_like(piece.W)
+        change[place] = 0.0
+        variance = float(source.noise or 0.0) / float(source.period or 1.0)
+        covariance[place, place] = variance * np.eye(len(source.to))
+        return piece.mapped(change, covariance)
+
+    def _step(self, h: float) -> tuple[Floats, Floats]:
+        """The state after a step of all, and the costs of it."""
+        now = np.eye(self.size)
+        for name in self._plan.continuous:
+            part = self.continuous[name]
+            for wire in self._wires_into(name, ahead=True):
+                now = self._carried(now, wire)
+            inputs = np.array([self.input(f"{name}.{end}") for end in part.inputs]).reshape(-1, self.size) @ now
+            by_state, by_input = self._derivatives(name, part, h)
+            moved = by_state @ now[self.places("state", name)] + by_input @ inputs
+            now = now.copy()
+            now[self.places("output", name)] = moved[: len(part.outputs)]
+            now[self.places("state", name)] = moved[len(part.outputs) :]
+        for x in self.system.connections:
+            if x.hold == "first":
+                now[self.places("received", x.name)] += h * now[self.places("slope", x.name)]
+        costs = self._trapezoid(now, h)
+        for name in self._plan.continuous:
+            for wire in self._wires_into(name, ahead=False):
+                now = self._carried(now, wire)
+        return now, costs
+
+    def _derivatives(self, name: str, part: Continuous, h: float) -> tuple[Floats, Floats]:
+        """Of the outputs after a step and of the state then, by the state before and by the inputs."""
+        if part.unfit is not None:
+            assert part.step is not None
+            return part.step(h)
+        flow, n = self._flows[name].over(h).matrix, len(part.A)
+        after, moved = flow[:n, :n], flow[:n, n:]
+        return np.vstack([part.C @ after, after]), np.vstack([part.C @ moved + part.D, moved])
+
+    def _wires_into(self, name: str, *, ahead: bool) -> list[int]:
+        """Those that pass on what their senders are stepped to, or what they were before."""
+        order, found = self._plan.continuous, []
+        for i in self._plan.wires:
+            x = self.system.connections[i]
+            new = x.order == "gauss-seidel" and order.index(x.sender) < order.index(x.receiver)
+            if x.receiver == name and new == ahead:
+                found.append(i)
+        return found
+
+    def _carried(self, now: Floats, wire: int) -> Floats:
+        x = self.system.connections[wire]
+        now = now.copy()
+        now[self.places("received", x.name)] = np.array([x.scale * self._sent(start) for start in x.start]) @ now
+        return now
+
+    def _trapezoid(self, after: Floats, h: float) -> Floats:
+        found: Floats = np.zeros((self.costs, self.size, self.size))
+        for k, mean in enumerate(self._means):
+            starts = np.array([self.signal(name) for name in mean.signals])
+            ends = np.array(
+                [
+                    start if name in self.fed and self._is_wired(name) else start @ after
+                    for name, start in zip(mean.signals, starts)
+                ]
+            )
+            if all(map(self._is_held, mean.signals)):
+                middles = 0.5 * (starts + ends)
+                points = ((starts, 1.0 / 6.0), (middles, 4.0 / 6.0), (ends, 1.0 / 6.0))
+            else:
+                points = ((starts, 0.5), (ends, 0.5))  # type: ignore[assignment]
+            found[k] = sum(h * weight * rows.T @ mean.Q @ rows for rows, weight in points)
+        return found
+
+    def _is_wired(self, end: str) -> bool:
+        return self.fed[end][0].name in self.wires
+
+
+def _held(part: Continuous) -> tuple[Floats, Floats, Floats]:
+    """A component with its inputs held, as one system."""
+    n, m = part.B.shape
+    F: Floats = np.zeros((n + m, n + m))
+    F[:n, :n], F[:n, n:] = part.A, part.B
+    return F, np.zeros_like(F), np.zeros((0, n + m, n + m))
+
+
+def _seconds(seconds: float) -> Fraction:
+    return exact_nanoseconds(seconds) / NANOSECONDS
+
+
+def expect_rows(system: System, tasks: Sequence[Task], links: Sequence[Link]) -> None:
+    """Raise `UsageError` for what happens at rows at which some component in continuous time is not stepped."""
+    continuous = [name for name, one in system.components.items() if one.sampling is None]
+    steps = {_seconds(system.components[name].step or 0.0) for name in continuous}
+    if len(steps) > 1:
+        raise UsageError(
+            f"--as-simulated: {', '.join(continuous)} have different steps: expected one, at whose points all have rows"
+        )
+    if not steps:
+        return
+    (step,) = steps
+    single = len(continuous) == 1
+    plan = Plan(system)
+    for i, task in enumerate(tasks):
+        on_grid = task.jitter.is_certain and task.offset % step == 0 and task.period % step == 0
+        measures = any(x.receiver == i and x.is_measured and not x.is_read_ahead for x in links)
+        if not on_grid and not (single and measures):
+            raise UsageError(
+                f"--as-simulated: {task.name} samples between the steps of {', '.join(continuous)}, which are not all "
+                "measured then"
+            )
+        if not task.jitter.is_certain and (task.offset % step or task.period % step):
+            raise UsageError(f"--as-simulated: {task.name} has jitter, and is due between the steps of {continuous[0]}")
+    for i, link in enumerate(links):
+        if i in plan.wires:
+            continue
+        sender = tasks[link.sender] if link.sender is not None else None
+        punctual = sender is None or (sender.jitter.is_certain and sender.offset % step == sender.period % step == 0)
+        on_grid = punctual and link.late.is_certain and Fraction(link.delay, ATTOSECONDS) % step == 0
+        if not on_grid and (not single or (link.sender is not None and link.receiver is not None)):
+            raise UsageError(f"--as-simulated: {link.name} arrives between the steps of {', '.join(continuous)}")
+        if link.is_read_ahead and Fraction(link.longest, ATTOSECONDS) % step:
+            raise UsageError(f"--as-simulated: {link.name} is measured between the steps of {', '.join(continuous)}")
