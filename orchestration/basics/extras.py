@@ -13,6 +13,7 @@ EXTRAS = {
     "report": ("plotly",),
     "gym": ("gymnasium",),
     "control": ("control",),
+    "certificates": ("clarabel", "flint", "python-flint"),
 }
 """By the extra that brings them."""
 

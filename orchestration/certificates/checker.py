@@ -1,0 +1,221 @@
+"""Verifies a certificate by itself, in ball arithmetic: every number below is an interval that holds the true one.
+
+Proven is: V(mode, word, z) = zᵀ P(mode, word) z, where the word are the labels of the values to come, falls from one
+period to the next, whatever letter comes next and whatever its parameters are:
+
+    M(τ)ᵀ P(next mode, next word) M(τ) < P(mode, word)    for all τ in the cells of the word's first label.
+
+M(τ) over a cell lies between its values at the corners of the cell, but for r²/2 · sup |∂²M/∂τ²| along each parameter,
+r half of the cell's width; and MᵀPM is convex in M, so the corners suffice. The forms may be given in any coordinates
+X of the state: what is looked at is congruent to the above. Nothing here knows how the forms were found.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from flint import arb, arb_mat, ctx
+
+from orchestration.basics.errors import QuadcosimError
+from orchestration.basics.simulator import Floats
+from orchestration.certificates.certificate import Certificate, Node, words
+from orchestration.certificates.family import Letter
+
+BITS = 106
+"""of the arithmetic"""
+OF_THE_LARGEST = 1e-3
+"""of the radius: what the largest entry of a row adds to the others"""
+
+
+class NotProven(QuadcosimError):
+    """The numbers of a certificate do not prove anything."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Proven:
+    """What a certificate was found to prove, made of its numbers."""
+
+    ranges: dict[str, tuple[tuple[float, float], ...]]
+    """by letter: of each of its parameters"""
+    runs: dict[str, int | None]
+    """by letter: how often it may come in a row; None: for ever"""
+    states: int
+    radius: float
+
+
+def proven(certificate: Certificate) -> Proven:
+    """What `certificate` proves; raises `NotProven` where it proves nothing."""
+    before, ctx.prec = ctx.prec, BITS
+    try:
+        forms = _forms(certificate)
+        enclosures = _Enclosures(certificate)
+        for edge in edges_of(certificate):
+            _expect_fall(edge, forms, enclosures)
+    finally:
+        ctx.prec = before
+    letters = certificate.family.letters
+    return Proven(
+        ranges={letter.name: letter.ranges for letter in letters},
+        runs={letter.name: _longest_run(letter) for letter in letters},
+        states=len(certificate.family.kept),
+        radius=certificate.radius,
+    )
+
+
+def _forms(certificate: Certificate) -> dict[Node, arb_mat]:
+    """The forms of all that may come, each symmetric to the bit and positive definite."""
+    modes = {mode for letter in certificate.family.letters for move in letter.moves for mode in move}
+    nodes = {(mode, word) for mode in modes for _, word in words(certificate, mode, certificate.memory)}
+    found = {}
+    for node in nodes:
+        form = certificate.forms.get(node)
+        if form is None:
+            raise NotProven(f"no form for mode {node[0]} and word {list(node[1])}")
+        if not (form == form.T).all():
+            raise NotProven(f"the form of mode {node[0]} and word {list(node[1])} is not symmetric")
+        found[node] = arb_mat(form.tolist())
+        if not _is_positive(found[node]):
+            raise NotProven(f"the form of mode {node[0]} and word {list(node[1])} is not positive definite")
+    return found
+
+
+def edges_of(certificate: Certificate) -> Iterator[tuple[Node, Node, int]]:
+    """Every node, what may come after it, and the label in between."""
+    modes = {mode for letter in certificate.family.letters for move in letter.moves for mode in move}
+    for mode in sorted(modes):
+        for after, longer in words(certificate, mode, certificate.memory + 1):
+            yield (mode, longer[:-1]), (after, longer[1:]), longer[0]
+
+
+def _expect_fall(edge: tuple[Node, Node, int], forms: dict[Node, arb_mat], enclosures: _Enclosures) -> None:
+    start, end, label = edge
+    for box, corners in enclosures.of(label):
+        for M in corners:
+            if not _is_positive(forms[start] - M.transpose() * forms[end] * M):
+                raise NotProven(f"the form does not fall for {_said(enclosures.letter_of(label), box)}")
+
+
+class _Enclosures:
+    """Of the maps over cells."""
+
+    def __init__(self, certificate: Certificate) -> None:
+        self._certificate, family = certificate, certificate.family
+        self._matrices = {name: _measured(m, certificate.radius) for name, m in family.matrices.items()}
+        size, coordinates = len(next(iter(family.matrices.values()))), arb_mat(certificate.coordinates.tolist())
+        chosen = arb_mat([[int(i == j) for j in range(size)] for i in family.kept])
+        try:
+            self._first = chosen.transpose() * coordinates.inv()
+        except ZeroDivisionError:
+            raise NotProven("the coordinates of the forms are not independent") from None
+        self._last = coordinates * chosen
+        self._known: dict[int, list[tuple[tuple[tuple[float, float], ...], list[arb_mat]]]] = {}
+
+    def letter_of(self, label: int) -> Letter:
+        pairs = zip(self._certificate.family.letters, self._certificate.cells)
+        return next(letter for letter, cells in pairs if label in cells.labels)
+
+    def of(self, label: int) -> list[tuple[tuple[tuple[float, float], ...], list[arb_mat]]]:
+        """The cells of a label, and of each the maps at its corners, as wide as the map between them may be."""
+        if label not in self._known:
+            letter = self.letter_of(label)
+            cells = self._certificate.cells[self._certificate.family.letters.index(letter)]
+            boxes = [box for other, box in cells.boxes() if other == label]
+            self._known[label] = [(box, self._corners(letter, box)) for box in boxes]
+        return self._known[label]
+
+    def _corners(self, letter: Letter, box: tuple[tuple[float, float], ...]) -> list[arb_mat]:
+        over = [arb(low).union(arb(high)) for low, high in box]
+        beyond = None
+        for i, (low, high) in enumerate(box):
+            bent = self._jet(letter, over, i)[2] * ((arb(high) - arb(low)) ** 2 / 8)
+            beyond = bent if beyond is None else _sum_of_sizes(beyond, bent)
+        found = []
+        for corner in itertools.product(*box):
+            M = self._jet(letter, [arb(x) for x in corner], None)[0]
+            found.append(M if beyond is None else _widened(M, beyond))
+        return found
+
+    def _jet(self, letter: Letter, point: Sequence[arb], along: int | None) -> tuple[arb_mat, arb_mat, arb_mat]:
+        """The map at a point, and its first two derivatives along a parameter."""
+        zero = arb_mat(self._first.nrows(), self._first.ncols())
+        M, d, dd = self._first, zero, zero
+        for factor in letter.product:
+            X = self._matrices[factor.matrix]
+            slope = arb(0)
+            if factor.times is not None:
+                lasts = arb(factor.times[0])
+                for c, x in zip(factor.times[1:], point):
+                    lasts += arb(c) * x
+                slope = arb(0 if along is None else factor.times[along + 1])
+                F = (X * lasts).exp()
+            else:
+                F = X
+            if along is not None:
+                G = X * slope
+                dd, d = F * dd, F * d
+                M = F * M
+                if slope != 0:
+                    GM = G * M
+                    dd, d = dd + G * d * 2 + G * GM, d + GM
+            else:
+                M = F * M
+        return self._last * M, self._last * d, self._last * dd
+
+
+def _measured(matrix: Floats, radius: float) -> arb_mat:
+    """With what measuring may leave: of every entry, and a thousandth of that of the largest one of its row.
+
+    Zeros are exact, and so are rows of a single one, which hold or move a value.
+    """
+    return arb_mat([_measured_row(row.tolist(), radius) for row in matrix])
+
+
+def _measured_row(row: list[float], radius: float) -> list[arb]:
+    if [x for x in row if x != 0.0] == [1.0]:
+        return [arb(x) for x in row]
+    of_all = OF_THE_LARGEST * max(map(abs, row))
+    return [arb(x, radius * (abs(x) + of_all)) if x != 0.0 else arb(0) for x in row]
+
+
+def _sum_of_sizes(a: arb_mat, b: arb_mat) -> arb_mat:
+    return arb_mat([[abs(x) + abs(y) for x, y in zip(p, q)] for p, q in zip(a.tolist(), b.tolist())])
+
+
+def _widened(M: arb_mat, by: arb_mat) -> arb_mat:
+    """Every entry and all that is as near as an entry of `by` is large."""
+    rows = zip(M.tolist(), by.tolist())
+    return arb_mat([[x + arb(0, y.abs_upper()) for x, y in zip(p, q)] for p, q in rows])
+
+
+def _is_positive(Q: arb_mat) -> bool:
+    """Whether every symmetric matrix in `Q` is positive definite: its Cholesky factor exists, in intervals."""
+    rows, lower = Q.tolist(), list[list[arb]]()
+    for i, row in enumerate(rows):
+        new: list[arb] = []
+        for j in range(i):
+            other = lower[j]
+            x = row[j]
+            for k in range(j):
+                x -= new[k] * other[k]
+            new.append(x / other[j])
+        rest = row[i]
+        for x in new:
+            rest -= x * x
+        if not rest > 0:
+            return False
+        lower.append([*new, rest.sqrt()])
+    return True
+
+
+def _longest_run(letter: Letter) -> int | None:
+    """How many moves of a letter may follow one another."""
+    reached, count = {start for start, _ in letter.moves}, 0
+    while reached and count <= len(letter.moves):
+        reached, count = {end for start, end in letter.moves if start in reached}, count + 1
+    return None if count > len(letter.moves) and reached else count - 1
+
+
+def _said(letter: Letter, box: tuple[tuple[float, float], ...]) -> str:
+    return " and ".join([letter.name, *(f"{low:.6g} to {high:.6g}" for low, high in box)])
