@@ -1,0 +1,183 @@
+"""The matrices of a system's components about its operating point, and what a place in their common state is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+import numpy as np
+
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats
+from orchestration.schedule.plan import Plan
+from orchestration.stability.linear_loop import AtRest
+from orchestration.stability.matrices import Matrices, in_continuous_time, minds_its_step, of_samples
+from orchestration.stability.operating_point import true_period
+from orchestration.system.model import Connection, System, variable_of
+from orchestration.system.times import NANOSECONDS, exact_nanoseconds
+
+Place = tuple[str, ...]
+"""Of the state: what it is, of whom, and which"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loop:
+    """A system about its operating point, as matrices; times are exact, in nanoseconds."""
+
+    system: System
+    components: Mapping[str, Matrices]
+    period: Fraction
+    """after which all is as it was"""
+    order: Sequence[str]
+    """of sampled components at one instant"""
+    minds: frozenset[str] = frozenset()
+    """sampled components that do something else where their next sample comes at another time"""
+
+    def samples_of(self, name: str) -> list[Fraction]:
+        """The instants of a component within a period of the loop."""
+        sampling = self.system.components[name].sampling
+        assert sampling is not None
+        step = true_period(sampling)
+        first = exact_nanoseconds(sampling.offset) / Fraction(repr(float(sampling.clock_ratio)))
+        return [(first + k * step) % self.period for k in range(round(self.period / step))]
+
+    def connection(self, name: str) -> Connection:
+        """By its name."""
+        return next(x for x in self.system.connections if x.name == name)
+
+    def is_sampled(self, name: str) -> bool:
+        """Whether a component is a digital task."""
+        return self.system.components[name].sampling is not None
+
+
+def loop_of(rest: AtRest) -> Loop:
+    """The loop of a system at rest; raises `UsageError` for what this is not for."""
+    system = rest.simulation.system
+    for x in system.connections:
+        if x.hold != "zero":
+            raise UsageError(f"connections.{x.name}.hold: expected zero")
+        if system.components[x.sender].sampling is None and system.components[x.receiver].sampling is None:
+            raise UsageError(f"connections.{x.name}: expected a sampled component at one of its ends")
+    period = float(rest.period) / NANOSECONDS
+    components, minds = {}, set()
+    for name, component in system.components.items():
+        tangent = rest.tangents[name]
+        if component.sampling is not None:
+            components[name] = of_samples(tangent, component.sampling.period)
+            if minds_its_step(tangent, component.sampling.period):
+                minds.add(name)
+        else:
+            assert component.step is not None
+            components[name] = in_continuous_time(tangent, name, min(component.step, period), period)
+    for x in system.connections:
+        for start, end in zip(x.start, x.end):
+            known = (components[x.sender].outputs, components[x.receiver].inputs)
+            if variable_of(start) not in known[0] or variable_of(end) not in known[1]:
+                raise UsageError(f"connections.{x.name}: carries {start}, which is no Real")
+    return Loop(
+        system=system, components=components, period=rest.period, order=Plan(system).sampled, minds=frozenset(minds)
+    )
+
+
+@dataclass(kw_only=True)
+class Layout:
+    """Where what goes through time is: states, what is held, messages on their way."""
+
+    loop: Loop
+    kept: frozenset[str] = frozenset()
+    """connections of which the last message is remembered where it is not read, as others may be lost"""
+    places: dict[Place, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name, matrices in self.loop.components.items():
+            for i in range(len(matrices.A)):
+                self.place(("state", name, str(i)))
+            for end in matrices.inputs:
+                if not self.loop.is_sampled(name) or not self._is_fresh(name, end):
+                    self.place(("input", name, end))
+
+    def _is_fresh(self, name: str, end: str) -> bool:
+        """Whether an input of a sampled component is measured anew for each of its samples."""
+        x = next(x for x in self.loop.system.connections if f"{name}.{end}" in x.end)
+        return not self.loop.is_sampled(x.sender) and x.name not in self.kept
+
+    def place(self, of: Place) -> int:
+        """Where it is; at the end, if it is new."""
+        return self.places.setdefault(of, len(self.places))
+
+    def flow(self) -> Floats:
+        """The generator of what happens between instants."""
+        found: Floats = np.zeros((len(self.places), len(self.places)))
+        for name, matrices in self.loop.components.items():
+            if self.loop.is_sampled(name):
+                continue
+            states = [self.places["state", name, str(i)] for i in range(len(matrices.A))]
+            inputs = [self.places["input", name, end] for end in matrices.inputs]
+            found[np.ix_(states, states)], found[np.ix_(states, inputs)] = matrices.A, matrices.B
+        return found
+
+
+class Assigned:
+    """The linear map of an instant, from assignments one after the other: a row for every place."""
+
+    def __init__(self, layout: Layout, size: int) -> None:
+        self.layout = layout
+        self.rows: Floats = np.eye(size)
+        self._read: dict[tuple[str, str], Floats] = {}
+
+    def measure(self, x: Connection) -> list[Floats]:
+        """What a connection takes from a component in continuous time."""
+        of, layout = self.layout.loop.components[x.sender], self.layout
+        states = self.rows[[layout.places["state", x.sender, str(i)] for i in range(len(of.A))]]
+        inputs = self.rows[[layout.places["input", x.sender, end] for end in of.inputs]]
+        outputs = of.C @ states + of.D @ inputs
+        return [x.scale * outputs[of.outputs.index(variable_of(start))] for start in x.start]
+
+    def hear(self, x: Connection, values: Sequence[Floats]) -> None:
+        """A message arrives."""
+        for end, value in zip(x.end, values):
+            key = ("input", x.receiver, variable_of(end))
+            if key in self.layout.places:
+                self.rows[self.layout.places[key]] = value
+            self._read[x.receiver, variable_of(end)] = value
+
+    def push(self, x: Connection, values: Sequence[Floats], count: int) -> None:
+        """A message is sent, `count` of them being on their way already."""
+        for i, value in enumerate(values):
+            self.rows[self.layout.place(("message", x.name, str(count), str(i)))] = value
+
+    def pop(self, x: Connection, count: int) -> list[Floats]:
+        """The oldest of the messages on their way, which the others follow."""
+        at = [
+            [self.layout.place(("message", x.name, str(k), str(i))) for i in range(len(x.start))] for k in range(count)
+        ]
+        values = list(self.rows[at[0]])
+        for k in range(count - 1):
+            self.rows[at[k]] = self.rows[at[k + 1]]
+        self.rows[at[-1]] = 0.0
+        return values
+
+    def last(self, x: Connection, values: Sequence[Floats] | None) -> list[Floats]:
+        """What was sent last, after `values` are if they are not lost."""
+        at = [self.layout.place(("last", x.name, str(i))) for i in range(len(x.start))]
+        if values is not None:
+            self.rows[at] = values
+        return list(self.rows[at])
+
+    def sample(self, name: str) -> dict[str, Floats]:
+        """A sampled component steps; what it says then."""
+        of, layout = self.layout.loop.components[name], self.layout
+        at = [layout.places["state", name, str(i)] for i in range(len(of.A))]
+        size = len(self.rows)
+        states = self.rows[at].reshape(len(at), size)
+        heard = [
+            self.rows[layout.places["input", name, end]]
+            if ("input", name, end) in layout.places
+            else self._read[name, end]
+            for end in of.inputs
+        ]
+        inputs = np.array(heard).reshape(len(heard), size)
+        outputs = of.C @ states + of.D @ inputs
+        self.rows[at] = of.A @ states + of.B @ inputs
+        return dict(zip(of.outputs, outputs))

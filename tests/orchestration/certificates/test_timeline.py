@@ -1,0 +1,165 @@
+"""The maps of a period against the master's own, wherever the messages and samples fall in it."""
+
+import dataclasses
+import functools
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orchestration.basics.errors import UsageError
+from orchestration.certificates.family import Family
+from orchestration.certificates.parts import Loop, loop_of
+from orchestration.certificates.timeline import DELAY, JITTER, LOSS, Timeline, Varying
+from orchestration.fmi.reuse import Instances
+from orchestration.stability.linear_loop import at_rest
+from orchestration.stability.monodromy import growth_of_loop
+from orchestration.system.model import System
+from orchestration.system.paths import changed
+from tests.examples.common import example
+
+PERIOD = 0.5
+COMMAND = Varying(kind=DELAY, name="command", path="connections.command.delay_jitter")
+MEASUREMENT = Varying(kind=DELAY, name="measurement", path="connections.measurement.delay_jitter")
+SAMPLE = Varying(kind=JITTER, name="controller", path="components.controller.sampling.jitter")
+LOST = Varying(kind=LOSS, name="command", path="connections.command.loss")
+UNHEARD = Varying(kind=LOSS, name="measurement", path="connections.measurement.loss")
+
+
+@pytest.fixture(scope="module")
+def instances() -> Iterator[Instances]:
+    made = Instances()
+    yield made
+    made.close()
+
+
+@pytest.fixture(scope="module")
+def system() -> System:
+    slow = {"components.controller.sampling.period": PERIOD}
+    return changed(dataclasses.replace(example("double_integrator"), stop_time=20.0), slow)
+
+
+def loop(system: System, instances: Instances) -> Loop:
+    with at_rest(system, instances) as rest:
+        return loop_of(rest)
+
+
+def radius_of(family: Family, value: float) -> float:
+    """Of the same draw again and again."""
+    maps = [
+        family.at(letter, [value])
+        for letter in family.letters
+        if letter.ranges[0][0] <= value <= letter.ranges[0][1]
+    ]  # fmt: skip
+    return float(np.abs(np.linalg.eigvals(functools.reduce(lambda a, b: b @ a, maps))).max())
+
+
+@pytest.mark.parametrize(
+    ("varying", "path", "changes"),
+    [
+        (COMMAND, "connections.command.delay", {"connections.command.delay": 0.3}),
+        (COMMAND, "connections.command.delay", {"connections.command.delay": 1.2}),
+        (COMMAND, "connections.command.delay", {"connections.command.order": "jacobi"}),
+        (COMMAND, "connections.command.delay", {"connections.measurement.delay": 0.13}),
+        (
+            COMMAND,
+            "connections.command.delay",
+            {
+                "components.controller.sampling.offset": 0.2,
+                "components.controller.sampling.clock_ratio": 1.25,
+                "connections.command.scale": 0.7,
+                "connections.command.delay": 0.45,
+            },
+        ),
+        (MEASUREMENT, "connections.measurement.delay", {"connections.measurement.delay": 0.9}),
+        (MEASUREMENT, "connections.measurement.delay", {"connections.command.delay": 0.2}),
+    ],
+)
+def test_a_delay_that_stays_is_the_masters(
+    system: System, instances: Instances, varying: Varying, path: str, changes: dict[str, Any]
+) -> None:
+    as_it_is = changed(system, changes)
+    nominal, jitter = loop(as_it_is, instances), 0.35
+    family = Timeline(nominal, [varying]).family([jitter])
+    seconds = float(nominal.period) / 1e9
+    delay = changes.get(path, 0.0)
+    for value in (0.11, jitter):
+        expected = math.exp(seconds * growth_of_loop(changed(as_it_is, {path: delay + value}), instances))
+        assert radius_of(family, value) == pytest.approx(expected, abs=1e-9)
+
+
+def test_where_the_order_depends_on_the_draw_there_is_a_letter_for_each(system: System, instances: Instances) -> None:
+    nominal = loop(changed(system, {"connections.command.delay": 0.3}), instances)
+    family = Timeline(nominal, [COMMAND]).family([0.35])
+    assert [letter.ranges for letter in family.letters] == [((0.0, 0.2),), ((0.2, 0.35),)]
+    at_once, just_after = (family.at(letter, [0.2]) for letter in family.letters)
+    assert at_once == pytest.approx(
+        just_after, abs=1e-12
+    )  # a command that arrives at a sample comes after it or before
+
+
+def test_samples_that_are_all_late_by_the_same_are_not_late(system: System, instances: Instances) -> None:
+    family = Timeline(loop(changed(system, {"connections.command.delay": 0.1}), instances), [SAMPLE]).family([0.3])
+    expected = radius_of(family, 0.0)
+    assert radius_of(family, 0.3) == pytest.approx(expected, abs=1e-10)
+
+
+def test_a_late_sample_with_a_late_command_is_the_sum_of_both(system: System, instances: Instances) -> None:
+    """Of the sample, and of its command: x after it is as by hand, for a double integrator under u = -x - v."""
+    family = Timeline(loop(system, instances), [SAMPLE, COMMAND]).family([0.1, 0.3])
+    late, wait = 0.07, 0.21
+    flow = [
+        np.array([[1.0, t, 0.5 * t * t], [0.0, 1.0, t], [0.0, 0.0, 1.0]]) for t in (late, wait, PERIOD - late - wait)
+    ]
+    command = np.array([[-1.0, -1.0, 0.0]]) @ flow[0]
+    after = flow[1] @ flow[0]
+    after[2] = command
+    whole = flow[2] @ after
+    assert len(family.kept) == 3
+    eigenvalues = np.sort_complex(np.linalg.eigvals(family.at(family.letters[0], [late, wait])))
+    assert eigenvalues == pytest.approx(np.sort_complex(np.linalg.eigvals(whole)), abs=1e-9)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.2])
+def test_what_is_lost_leaves_the_command_as_it_was(system: System, instances: Instances, delay: float) -> None:
+    """Every second message lost is a sample every second period, the delay as it is."""
+    nominal = changed(system, {"connections.command.delay": delay})
+    family = Timeline(loop(nominal, instances), [LOST]).family(run=1)
+    arrives, lost = (family.at(letter) for letter in family.letters)
+    radius = np.abs(np.linalg.eigvals(lost @ arrives)).max()
+    slower = changed(nominal, {"components.controller.sampling.period": 2.0 * PERIOD})
+    assert radius == pytest.approx(math.exp(2.0 * PERIOD * growth_of_loop(slower, instances)), abs=1e-9)
+    assert [letter.moves for letter in family.letters] == [((0, 0), (1, 0)), ((0, 1),)]
+
+
+def test_a_law_without_memory_says_the_same_where_its_measurement_is_lost(system: System, instances: Instances) -> None:
+    """So to lose every second measurement is to lose every second command."""
+    of = loop(system, instances)
+    radii = []
+    for what in (LOST, UNHEARD):
+        family = Timeline(of, [what]).family(run=1)
+        arrives, lost = (family.at(letter) for letter in family.letters)
+        radii.append(np.abs(np.linalg.eigvals(lost @ arrives)).max())
+    assert radii[0] == pytest.approx(radii[1], abs=1e-12)
+
+
+def test_draws_that_would_be_open_at_once_are_refused(system: System, instances: Instances) -> None:
+    of = loop(changed(system, {"connections.command.delay": 0.1}), instances)
+    assert Timeline(of, [SAMPLE]).largest() == pytest.approx(0.4)
+    assert Timeline(of, [COMMAND]).largest() == pytest.approx(0.5)
+    with pytest.raises(UsageError, match=r"connections\.command\.delay_jitter: expected less"):
+        Timeline(of, [COMMAND]).family([0.51])
+
+
+def test_what_is_not_for_this_is_refused(system: System, instances: Instances) -> None:
+    with pytest.raises(UsageError, match=r"connections\.command\.hold: expected zero"):
+        loop(changed(system, {"connections.command.hold": "first"}), instances)
+
+
+def test_a_law_that_integrates_over_its_step_is_refused_with_late_samples(system: System, instances: Instances) -> None:
+    of = loop(system, instances)
+    assert not of.minds
+    with pytest.raises(UsageError, match="controller does something else where its next sample comes later"):
+        Timeline(dataclasses.replace(of, minds=frozenset(["controller"])), [SAMPLE])
