@@ -6,6 +6,7 @@ there.
 """
 
 import argparse
+import statistics
 import subprocess
 import tempfile
 from dataclasses import replace
@@ -64,16 +65,20 @@ def with_values_fixed(folder: Path) -> str:
     return table(["fixed", "precision", "text [B]", "without words [B]", "stack [B]"], rows)
 
 
-def flown(sources: list[Path], folder: Path, board: str, *flags: str) -> list[int]:
-    """Bytes of the instance, and instructions a step: mean and most."""
+def flown(sources: list[Path], folder: Path, machine: tuple[str, ...], *flags: str) -> tuple[int, list[int]]:
+    """Bytes of the instance, and the instructions of each step of a flight against the plant.
+
+    `sources` are of the controller and of the plant; raises `subprocess.CalledProcessError` where a step fails.
+    """
     board_files = [str(BOARD_FILES / "cortex_m.c"), "-T", str(BOARD_FILES / "cortex_m.ld"), "--specs=rdimon.specs"]
     places = [f"-I{source.parent}" for source in sources]
     program = [str(HERE / "embedded.c"), *map(str, sources), "-lm", "-o", str(folder / "flown")]
-    subprocess.run([ARM, *OPTIONS, *flags, *places, *board_files, *program], check=True)
-    qemu = [QEMU, "-M", board, "-display", "none", "-icount", "shift=6"]
+    subprocess.run([ARM, *OPTIONS, *machine, *flags, *places, *board_files, *program], check=True)
+    qemu = [QEMU, "-M", BOARDS[machine], "-display", "none", "-icount", "shift=6"]
     given = ["-semihosting-config", "enable=on,target=native", "-kernel", str(folder / "flown")]
     done = subprocess.run([*qemu, *given], check=True, stdout=subprocess.PIPE, text=True, timeout=300)
-    return [int(word) for word in done.stdout.split()]
+    size, *counts = (int(word) for word in done.stdout.split())
+    return size, counts
 
 
 def differences(double: Path, single: Path, plant: Path) -> str:
@@ -104,10 +109,10 @@ def main() -> None:
             source = write(controller, folder / precision, single=precision == "single")
             for machine, flags in MACHINES.items():
                 for optimised in ("-O2", "-Os"):
-                    size, mean, most = flown([source, plant_source], folder, BOARDS[flags], *flags, optimised)
+                    size, counts = flown([source, plant_source], folder, flags, optimised)
                     text, depth = compiled(source, folder, *flags, optimised)
                     bare, _ = compiled(source, folder, *flags, optimised, WITHOUT_TEXTS)
-                    numbers = (text, bare, size, depth, mean, most)
+                    numbers = (text, bare, size, depth, round(statistics.mean(counts)), max(counts))
                     rows.append([precision, machine, f"`{optimised}`", *(f"{n:,}" for n in numbers)])
         double, single = (folder / precision / "UnifiedController.c" for precision in ("double", "single"))
         far = differences(double, single, plant_source)

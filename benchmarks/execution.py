@@ -1,0 +1,89 @@
+"""How long a controller computes on a flight controller's processor: `python -m benchmarks.execution [--out FOLDER]`.
+
+For each law and each redesign the instructions of every step of a flight of 10 s at 100 Hz are counted under QEMU, in
+the C that `export-c` writes, at -O2: the same numbers each time. They are written as traces for `execution` of a task,
+a CSV file each: `instructions`, and `seconds`, at CYCLES cycles an instruction and the processor's clock. That model
+knows no caches, no wait states of the flash and no interrupts.
+"""
+
+import argparse
+import statistics
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.embedded import flown
+from benchmarks.mathematics import table
+from fmu_kit.bundle import Target
+from fmu_kit.compiler.pack.embedded import write
+from orchestration.building.models import MODELS
+from tests.fmu_kit.compiler.embedded import M4F, M7
+
+FOLDER = Path(__file__).parents[1] / "examples" / "autopilot" / "execution"
+CYCLES = 1.0
+"""An instruction; the M7 does up to two in one, and waits for its memory"""
+
+
+@dataclass(frozen=True)
+class Processor:
+    """One that flight controllers have."""
+
+    flags: tuple[str, ...]
+    clock: float
+    """[Hz]"""
+    single: bool
+    """whether the law is computed in single precision"""
+
+
+PROCESSORS = {
+    "m7": Processor(M7, 216e6, single=False),  # STM32F765, of the Pixhawk 4
+    "m4f": Processor(M4F, 168e6, single=True),  # STM32F427, of the Pixhawk 1
+}
+REDESIGNS = ("explicit", "semi_implicit", "midpoint", "mean", "match")
+LAWS = {
+    **{f"unified_{name}": ("UnifiedController", k) for k, name in enumerate(REDESIGNS, 1)},
+    "geometric": ("GeometricController", 1),
+    "cascaded": ("CascadedController", 0),
+}
+"""By the name of the trace: the controller, and its discretisation, if it has any"""
+
+
+def counted(model: str, discretisation: int, processor: Processor, folder: Path) -> list[int] | None:
+    """Instructions of each step; None where the law fails in this precision."""
+    sources = [
+        write(Target.parse(MODELS[name]), folder / name, single=processor.single and name == model)
+        for name in (model, "QuadrotorPlant")
+    ]
+    prepared = f"c.par.discretisation = {discretisation};" if discretisation else ""
+    given = (f"-DCONTROLLER={model}", f"-DPREPARED={prepared}", "-O2")
+    try:
+        return flown(sources, folder, processor.flags, *given)[1]
+    except subprocess.CalledProcessError:
+        return None
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=FOLDER)
+    folder: Path = parser.parse_args().out
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = []
+    for name, (model, discretisation) in LAWS.items():
+        for machine, processor in PROCESSORS.items():
+            with tempfile.TemporaryDirectory() as temporary:
+                counts = counted(model, discretisation, processor, Path(temporary))
+            if counts is None:
+                rows.append([name, machine, "fails", "", ""])
+                continue
+            seconds = [count * CYCLES / processor.clock for count in counts]
+            lines = [f"{count},{time:.9f}" for count, time in zip(counts, seconds)]
+            path = folder / f"{name}_{machine}.csv"
+            path.write_text("\n".join(["instructions,seconds", *lines]) + "\n", encoding="utf-8")
+            numbers = (f"{round(statistics.median(counts)):,}", f"{max(counts):,}", f"{max(seconds) * 1e6:.1f}")
+            rows.append([name, machine, *numbers])
+    print(table(["law", "processor", "instructions a step", "most", "longest [us]"], rows))
+
+
+if __name__ == "__main__":
+    main()
