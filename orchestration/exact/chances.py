@@ -64,23 +64,22 @@ class Chance:
         if not self.is_density:
             return list(zip(self.values, self.probabilities))
         low, high = self.lowest, self.highest
-        edges = [low, *(at - base for at in kinks(base + low, base + high)), high]
+        edges = [base + low, *kinks(base + low, base + high), base + high]
         found: list[Draw] = []
         for a, b in itertools.pairwise(edges):
-            nodes, weights = self._rule((a - low) / (high - low), (b - low) / (high - low), order)
-            found += [(low + round((high - low) * node), weight) for node, weight in zip(nodes, weights)]
+            nodes, weights = self._rule((a - base - low) / (high - low), (b - base - low) / (high - low), order)
+            found += [(a - base + round((b - a) * node), weight) for node, weight in zip(nodes, weights)]
         total = sum(weight for _, weight in found)
         return [(value, weight / total) for value, weight in found]
 
     def _rule(self, a: float, b: float, order: int) -> tuple[Sequence[float], Sequence[float]]:
-        """Nodes and weights over a part of [0, 1], the whole range."""
+        """Nodes, as shares of a part of [0, 1], the whole range, and their weights there."""
         if self.deviation is None:
             nodes, weights = _legendre(order)
-            return (a + (b - a) * nodes).tolist(), ((b - a) * weights).tolist()
+            return nodes.tolist(), ((b - a) * weights).tolist()
         nodes, weights = _legendre(FINE)
-        fine = a + (b - a) * nodes
-        apart = (fine - 0.5) * (self.highest - self.lowest) / self.deviation
-        return gauss_of(fine, (b - a) * weights * np.exp(-0.5 * apart**2), order)
+        apart = (a + (b - a) * nodes - 0.5) * (self.highest - self.lowest) / self.deviation
+        return gauss_of(nodes, (b - a) * weights * np.exp(-0.5 * apart**2), order)
 
 
 FINE = 120

@@ -23,7 +23,7 @@ from orchestration.exact.pieces import Piece
 
 ATTOSECONDS = 10**18
 MOST_MODES = 2000
-MOST_PASSAGES = 40_000
+MOST_PASSAGES = 12_000
 NEGLIGIBLE = 1e-13
 """A probability: runs of losses that are less likely are taken for the longest that is told apart"""
 LONGEST_AGE = 100

@@ -30,7 +30,7 @@ from orchestration.system.model import System, component_of, variable_of
 from orchestration.system.paths import changed
 from orchestration.system.request import in_its_own_words
 
-ORDERS = (3, 6, 12, 24)
+ORDERS = (1, 2, 4, 8, 16, 32)
 """of Gauss's rule, tried in turn until the next one changes nothing"""
 AGREE = 1e-10
 """of a figure: what may differ from order to order"""

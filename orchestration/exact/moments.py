@@ -15,14 +15,15 @@ import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Booleans, Floats
+from orchestration.exact.krylov import Map, largest, solved
 from orchestration.exact.pieces import Piece
 
-LARGEST = 4000
+LARGEST = 100_000
 """Numbers in the second moments of all modes together"""
-LARGEST_FOURTH = 2000
-"""likewise of fourth moments"""
-ALMOST = 1e-12
-"""of a variance: what is smaller is rounding"""
+LARGEST_FOURTH = 1e8
+"""Products in what a period makes of fourth moments"""
+DENSE = 400
+"""Numbers of which an operator is made a matrix"""
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,8 @@ class JumpLinear:
         self._stages, self._sizes = _recurrent(stages, sizes)
         self._turn_to_fewest()
         self._stages, self._sizes = _live(self._stages, self._sizes)
-        self.numbers = sum(n * (n + 1) // 2 for n in self._sizes[0])
+        self._basis = _Symmetric(self._sizes[0])
+        self.numbers = self._basis.count
         """in the second moments where the period begins"""
         if self.numbers > LARGEST:
             raise UsageError(
@@ -80,75 +82,108 @@ class JumpLinear:
             found[passage.end, passage.begin] += passage.probability
         return found
 
-    @functools.cached_property
-    def _operator(self) -> Floats:
-        """What a period makes of the second moments, but for the noise, as a matrix."""
-        basis = _Symmetric(self._sizes[0])
-        moments = basis.matrices(np.eye(self.numbers))
-        for i, stage in enumerate(self._stages):
-            after = self._none(i + 1, self.numbers)
-            for p in stage:
-                Z = p.piece.Z
-                after[p.end] += p.probability * (Z @ moments[p.begin] @ Z.T)
-            moments = after
-        found: Floats = basis.numbers(moments).T
-        return found
+    def _none(self, i: int) -> list[Floats]:
+        return [np.zeros((n, n)) for n in self._sizes[i % len(self._sizes)]]
 
-    def _none(self, i: int, count: int) -> list[Floats]:
-        return [np.zeros((count, n, n)) for n in self._sizes[i % len(self._sizes)]]
+    @functools.cached_property
+    def _batches(self) -> list[_Batches]:
+        return [
+            _Batches(
+                [(p.begin, p.end, p.probability, p.piece.Z) for p in stage], self._sizes[(i + 1) % len(self._sizes)]
+            )
+            for i, stage in enumerate(self._stages)
+        ]
+
+    def _turned(self, numbers: Floats) -> Floats:
+        """What a period makes of second moments, but for the noise."""
+        now = self._basis.matrices(numbers)
+        for batches in self._batches:
+            now = batches.of(now)
+        return self._basis.numbers(now)
 
     @functools.cached_property
     def radius(self) -> float:
         """The mean-square radius: by how much second moments grow in a period."""
-        return float(np.abs(np.linalg.eigvals(self._operator)).max(initial=0.0))
-
-    def after(self, moments: Sequence[Floats], shares: Sequence[Floats] | None = None) -> list[Floats]:
-        """Second moments, by mode weighted by its probability, a period later; and what the noise has added."""
-        shares = self.shares if shares is None else shares
-        now = list(moments)
-        for i, stage in enumerate(self._stages):
-            later = [each[0] for each in self._none(i + 1, 1)]
-            for p in stage:
-                Z = p.piece.Z
-                later[p.end] += p.probability * (Z @ now[p.begin] @ Z.T + shares[i][p.begin] * p.piece.W)
-            now = later
-        return now
+        return _radius(self._turned, self._basis)
 
     def stationary(self) -> list[Floats]:
         """The second moments that stay, by mode where the period begins; there are such where the radius is below 1."""
-        basis = _Symmetric(self._sizes[0])
-        added = basis.numbers([each[None] for each in self.after([each[0] for each in self._none(0, 1)])])[0]
-        solved = np.linalg.solve(np.eye(self.numbers) - self._operator, added)
-        return [each[0] for each in basis.matrices(solved[None])]
+        added = self._basis.numbers(self._flown(self._none(0))[0])
+        if self.numbers > DENSE:
+            return self._basis.matrices(solved(self._turned, added))
+        operator = np.array([self._turned(unit) for unit in np.eye(self.numbers)]).T
+        return self._basis.matrices(np.linalg.solve(np.eye(self.numbers) - operator, added))
 
     def costs(self) -> Floats:
         """The stationary costs of a period, shape (costs,)."""
-        now, total = self.stationary(), 0.0
+        return self._flown(self.stationary())[1]
+
+    def _flown(self, moments: Sequence[Floats]) -> tuple[list[Floats], Floats]:
+        """Second moments, by mode weighted by its probability, a period later, and the costs of that."""
+        now, costs = list(moments), np.zeros(len(self._stages[0][0].piece.c))
         for i, stage in enumerate(self._stages):
-            later = [each[0] for each in self._none(i + 1, 1)]
+            later = self._none(i + 1)
             for p in stage:
                 piece, share = p.piece, self.shares[i][p.begin]
-                total = total + p.probability * (np.einsum("kij,ij->k", piece.M, now[p.begin]) + share * piece.c)
+                costs += p.probability * (np.einsum("kij,ij->k", piece.M, now[p.begin]) + share * piece.c)
                 later[p.end] += p.probability * (piece.Z @ now[p.begin] @ piece.Z.T + share * piece.W)
             now = later
-        return np.atleast_1d(np.asarray(total, dtype=float))
+        return now, costs
 
     @functools.cached_property
     def fourth_moment_radius(self) -> float | None:
         """By how much fourth moments grow in a period; None where there are too many of them to be told."""
         halves = [[n * (n + 1) // 2 for n in sizes] for sizes in self._sizes]
-        numbers = sum(n * (n + 1) // 2 for n in halves[0])
-        if numbers > LARGEST_FOURTH:
+        work = sum(halves[i][p.begin] ** 3 for i, stage in enumerate(self._stages) for p in stage)
+        if work > LARGEST_FOURTH:
             return None
+        stages = [
+            _Batches(
+                [(p.begin, p.end, p.probability, _squared(p.piece.Z)) for p in stage], halves[(i + 1) % len(halves)]
+            )
+            for i, stage in enumerate(self._stages)
+        ]
         basis = _Symmetric(halves[0])
-        moments = basis.matrices(np.eye(numbers))
-        for i, stage in enumerate(self._stages):
-            after = [np.zeros((numbers, n, n)) for n in halves[(i + 1) % len(halves)]]
-            for p in stage:
-                square = _squared(p.piece.Z)
-                after[p.end] += p.probability * (square @ moments[p.begin] @ square.T)
-            moments = after
-        return float(np.abs(np.linalg.eigvals(basis.numbers(moments).T)).max(initial=0.0))
+
+        def turned(numbers: Floats) -> Floats:
+            now = basis.matrices(numbers)
+            for batches in stages:
+                now = batches.of(now)
+            return basis.numbers(now)
+
+        return _radius(turned, basis)
+
+
+def _radius(turned: Map, basis: _Symmetric) -> float:
+    if basis.count > DENSE:
+        return largest(turned, basis.numbers([np.eye(n) for n in basis.sizes]))
+    operator = np.array([turned(unit) for unit in np.eye(basis.count)]).reshape(basis.count, basis.count)
+    return float(np.abs(np.linalg.eigvals(operator)).max(initial=0.0))
+
+
+class _Batches:
+    """The passages of a stage, those at once whose matrices have one shape."""
+
+    def __init__(self, passages: Sequence[tuple[int, int, float, Floats]], sizes: Sequence[int]) -> None:
+        self._sizes = sizes
+        shapes: dict[tuple[int, ...], list[tuple[int, int, float, Floats]]] = {}
+        for passage in sorted(passages, key=lambda one: one[1]):
+            shapes.setdefault(passage[3].shape, []).append(passage)
+        self._parts = []
+        for listed in shapes.values():
+            begins = [begin for begin, _, _, _ in listed]
+            ends, first = np.unique([end for _, end, _, _ in listed], return_index=True)
+            weighted = np.array([p * Z for _, _, p, Z in listed])
+            self._parts.append((begins, weighted, np.array([Z.T for _, _, _, Z in listed]), ends.tolist(), first))
+
+    def of(self, moments: Sequence[Floats]) -> list[Floats]:
+        """The moments after it."""
+        found: list[Floats] = [np.zeros((n, n)) for n in self._sizes]
+        for begins, weighted, turned, ends, first in self._parts:
+            each = weighted @ np.array([moments[begin] for begin in begins]) @ turned
+            for end, summed in zip(ends, np.add.reduceat(each, first, axis=0)):
+                found[end] += summed
+        return found
 
 
 class _Symmetric:
@@ -156,24 +191,23 @@ class _Symmetric:
 
     def __init__(self, sizes: Sequence[int]) -> None:
         self._triangles = [np.triu_indices(n) for n in sizes]
-        self._sizes = sizes
-        self._cuts = np.cumsum([len(rows) for rows, _ in self._triangles])[:-1]
+        self.sizes = sizes
+        self._cuts = np.cumsum([len(rows) for rows, _ in self._triangles]).tolist()
+        self.count = self._cuts[-1]
 
     def matrices(self, numbers: Floats) -> list[Floats]:
-        """From rows, shape (count, numbers), the matrices of each size, shape (count, n, n)."""
+        """The matrices of a row."""
         found = []
-        for n, (rows, columns), part in zip(self._sizes, self._triangles, np.split(numbers, self._cuts, axis=1)):
-            matrix = np.zeros((len(numbers), n, n))
-            matrix[:, rows, columns] = part
-            matrix[:, columns, rows] = part
+        for n, (rows, columns), part in zip(self.sizes, self._triangles, np.split(numbers, self._cuts)):
+            matrix = np.zeros((n, n))
+            matrix[rows, columns] = part
+            matrix[columns, rows] = part
             found.append(matrix)
         return found
 
     def numbers(self, matrices: Sequence[Floats]) -> Floats:
         """And back."""
-        parts = [each[:, rows, columns] for each, (rows, columns) in zip(matrices, self._triangles)]
-        found: Floats = np.concatenate(parts, axis=1)
-        return found
+        return np.concatenate([each[rows, columns] for each, (rows, columns) in zip(matrices, self._triangles)])
 
 
 def _squared(Z: Floats) -> Floats:
