@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestration.basics.errors import UsageError
 from orchestration.building import fmus
 from orchestration.exact.expect import Expected, expect
 from orchestration.runs.in_lanes import fly
@@ -138,7 +139,11 @@ def main() -> None:
     while done < given.count:
         system = random_loop(number)
         number += 1
-        found = expect(system, as_simulated=True)
+        try:
+            found = expect(system, as_simulated=True)
+        except UsageError as error:
+            print(f"{number - 1:4} {error}", flush=True)
+            continue
         if found.fourth_moment_radius is None or found.fourth_moment_radius >= LARGEST_FOURTH:
             continue
         done += 1

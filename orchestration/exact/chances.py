@@ -30,23 +30,26 @@ class Chance:
     """all that there are, or the two ends of a density"""
     probabilities: tuple[float, ...] = (1.0,)
     """of the values; empty for a density"""
-    deviation: float | None = None
-    """of a density that is normal about its middle, cut to its ends; None: uniform"""
+    normal: tuple[float, float] | None = None
+    """mean and deviation of a density that is normal, cut to its ends; None: uniform"""
+    more: Chance | None = None
+    """another amount, independent, that comes on top"""
 
     @property
-    def is_density(self) -> bool:
-        """Whether there are more values than can be listed."""
-        return not self.probabilities
+    def is_by_rule(self) -> bool:
+        """Whether there are more values than are gone through one by one."""
+        by_rule = not self.probabilities or len(self.values) > FEW
+        return by_rule or (self.more is not None and self.more.is_by_rule)
 
     @property
     def lowest(self) -> int:
         """The least value."""
-        return min(self.values)
+        return min(self.values) + (0 if self.more is None else self.more.lowest)
 
     @property
     def highest(self) -> int:
         """The largest one."""
-        return max(self.values)
+        return max(self.values) + (0 if self.more is None else self.more.highest)
 
     @property
     def is_certain(self) -> bool:
@@ -56,32 +59,51 @@ class Chance:
     def draws(self, base: int, kinks: Kinks, order: int) -> list[Draw]:
         """The values, with probabilities.
 
-        Of a density as many as the order has in each part between the `kinks` of `base` plus the value: by these,
-        integrals of what is smooth there are exact but for what falls off faster than any power of the order.
+        Of a density, and of a long table, as many as the order has in each part between the `kinks` of `base` plus the
+        value: by these, integrals of what is smooth there are exact but for what falls faster than any power of it.
         """
-        if self.is_certain:
-            return [(self.lowest, 1.0)]
-        if not self.is_density:
+        if self.more is None:
+            return self._own(base, kinks, order)
+        found: dict[int, float] = {}
+        for value, p in self._own(base, no_kinks, order):
+            for further, q in self.more.draws(base + value, kinks, order):
+                found[value + further] = found.get(value + further, 0.0) + p * q
+        return sorted(found.items())
+
+    def _own(self, base: int, kinks: Kinks, order: int) -> list[Draw]:
+        low, high = min(self.values), max(self.values)
+        if low == high:
+            return [(low, 1.0)]
+        if self.probabilities and len(self.values) <= FEW:
             return list(zip(self.values, self.probabilities))
-        low, high = self.lowest, self.highest
         edges = [base + low, *kinks(base + low, base + high), base + high]
         found: list[Draw] = []
         for a, b in itertools.pairwise(edges):
-            nodes, weights = self._rule((a - base - low) / (high - low), (b - base - low) / (high - low), order)
+            nodes, weights = self._rule(a - base, b - base, order)
             found += [(a - base + round((b - a) * node), weight) for node, weight in zip(nodes, weights)]
         total = sum(weight for _, weight in found)
         return [(value, weight / total) for value, weight in found]
 
-    def _rule(self, a: float, b: float, order: int) -> tuple[Sequence[float], Sequence[float]]:
-        """Nodes, as shares of a part of [0, 1], the whole range, and their weights there."""
-        if self.deviation is None:
+    def _rule(self, a: int, b: int, order: int) -> tuple[Sequence[float], Sequence[float]]:
+        """Nodes, as shares of the part from a to b, and their weights there."""
+        if self.probabilities:
+            last = b == max(self.values)
+            inside = [(v, p) for v, p in zip(self.values, self.probabilities) if a <= v < b or (last and v == b)]
+            if not inside:
+                return [], []
+            shares = np.array([(v - a) / (b - a) for v, _ in inside])
+            return gauss_of(shares, np.array([p for _, p in inside]), order)
+        if self.normal is None:
             nodes, weights = _legendre(order)
             return nodes.tolist(), ((b - a) * weights).tolist()
         nodes, weights = _legendre(FINE)
-        apart = (a + (b - a) * nodes - 0.5) * (self.highest - self.lowest) / self.deviation
+        mean, deviation = self.normal
+        apart = (a + (b - a) * nodes - mean) / deviation
         return gauss_of(nodes, (b - a) * weights * np.exp(-0.5 * apart**2), order)
 
 
+FEW = 40
+"""values of a table that are gone through one by one"""
 FINE = 120
 """nodes by which a density is known from which those of its own rule are made"""
 
@@ -129,6 +151,16 @@ def uniform(low: int, high: int) -> Chance:
     return Chance((low, high), ()) if high > low else Chance((low,))
 
 
-def cut_normal(low: int, high: int, deviation: float) -> Chance:
-    """Normal about the middle, cut to the two."""
-    return Chance((low, high), (), deviation) if high > low else Chance((low,))
+def normal(mean: float, deviation: float, low: int, high: int) -> Chance:
+    """Normal, cut to the range."""
+    return Chance((low, high), (), (mean, deviation)) if high > low else Chance((low,))
+
+
+def table(values: Sequence[int], probabilities: Sequence[float]) -> Chance:
+    """These values."""
+    found: dict[int, float] = {}
+    for value, p in zip(values, probabilities):
+        if p > 0.0:
+            found[value] = found.get(value, 0.0) + p
+    listed = sorted(found)
+    return Chance(tuple(listed), tuple(found[value] for value in listed))

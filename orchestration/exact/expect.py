@@ -203,7 +203,7 @@ def _answer(
         effects = TrueEffects(system, parts, names_of_tasks, noise)
     used = [call for call, mean in wanted.means.items() if np.any(mean.Q)]
     effects.charge([wanted.means[call] for call in used])
-    densities = any(x.late.is_density for x in links) or any(task.jitter.is_density for task in tasks)
+    densities = any(x.late.is_by_rule for x in links) or any(task.jitter.is_by_rule for task in tasks)
     found: list[tuple[JumpLinear, Floats]] = []
     apart, order = 0.0, ORDERS[0]
     for order in ORDERS if densities else ORDERS[:1]:

@@ -6,6 +6,8 @@ from typing import Any
 import pytest
 
 from orchestration.basics.bisection import bisected
+from orchestration.exact import chances
+from orchestration.system.distribution import Distribution
 from tests.orchestration.exact.common import GAIN, SERVO_PERIOD, integrator, servo
 
 
@@ -22,6 +24,34 @@ def test_with_a_uniform_delay_it_is_that_of_three_nodes_of_gauss(nodes: int) -> 
 def test_the_servo_costs_what_jitterbug_says(delay: float, expected: float) -> None:
     """Of its table, where each of two delays is half of it."""
     assert servo(delay=delay).costs()[0] / SERVO_PERIOD == pytest.approx(expected, rel=1e-11)
+
+
+@pytest.mark.parametrize(("longest", "expected"), [(10, 74.720524553), (20, 86.5141979439)])
+def test_with_two_delays_out_of_eleven_or_more_values_the_servo_costs_what_jitterbug_says(
+    longest: int, expected: float
+) -> None:
+    """Two independent delays of 0, 0.15, … ms: the controller is static, so their sum may be one delay."""
+    count = longest + 1
+    ways = [min(k, 2 * longest - k) + 1 for k in range(2 * longest + 1)]
+    delay = Distribution(
+        values=tuple(0.00015 * k for k in range(2 * longest + 1)), probabilities=tuple(n / count**2 for n in ways)
+    )
+    assert servo(delay=delay).costs()[0] / SERVO_PERIOD == pytest.approx(expected, rel=1e-10)
+
+
+def test_a_delay_and_a_jitter_on_top_that_are_both_drawn_make_their_sum() -> None:
+    each = Distribution(values=tuple(0.00015 * k for k in range(11)))
+    assert servo(delay=each, delay_jitter=each).costs()[0] / SERVO_PERIOD == pytest.approx(74.720524553, rel=1e-10)
+
+
+def test_a_long_table_costs_what_its_values_do_one_by_one() -> None:
+    """By Gauss's rule of the table, which is exact for powers of the delay up to the nineteenth."""
+    values = tuple(0.0005 + 0.003 * (k / 60.0) ** 2 for k in range(61))
+    by_rule = servo(nodes=10, delay=Distribution(values=values)).costs()[0]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(chances, "FEW", len(values))
+        one_by_one = servo(delay=Distribution(values=values)).costs()[0]
+    assert by_rule == pytest.approx(one_by_one, rel=1e-11)
 
 
 def test_with_a_fifth_of_the_commands_lost_the_cost_is_the_exact_one_and_fourth_moments_have_no_end() -> None:
