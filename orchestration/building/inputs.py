@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 from orchestration.basics.errors import QuadcosimError
 from orchestration.building import fmus
 from orchestration.fmi.model import Model, read_model
+from orchestration.system.computers import Computer, Network
 from orchestration.system.distribution import with_traces_at
 from orchestration.system.files_read import files_read
 from orchestration.system.model import Component, Connection, Source, System
@@ -89,12 +90,14 @@ def all_with_files(systems: Iterable[System], paths: Mapping[str, Path]) -> list
             components={name: _at(each, paths, made) for name, each in system.components.items()},
             connections=tuple(_at(each, paths, made) for each in system.connections),
             sources={name: _at(each, paths, made) for name, each in system.sources.items()},
+            computers={name: _at(each, paths, made) for name, each in system.computers.items()},
+            networks={name: _at(each, paths, made) for name, each in system.networks.items()},
         )
         for system in systems
     ]
 
 
-Part = TypeVar("Part", Component, Connection, Source)
+Part = TypeVar("Part", Component, Connection, Source, Computer, Network)
 
 
 def _at(part: Part, paths: Mapping[str, Path], made: dict[int, Any]) -> Part:

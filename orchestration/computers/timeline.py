@@ -1,6 +1,6 @@
 """From what the scheduler has noted to what has become of each task and message."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -65,10 +65,14 @@ class Names:
     links: Sequence[str]
 
 
-def timeline(parts: Parts, names: Names, deadlines: Sequence[int], notes: Integers, until: int) -> Timeline:
-    """What the notes up to `until` [ns] come to; `deadlines` are those of the messages, LATER for none."""
-    notes = notes[notes[:, 0] <= until]
-    what = notes[:, 1]
+def timeline(
+    parts: Parts, names: Names, deadlines: Sequence[int], notes: Integers, without: Collection[str] = ()
+) -> Timeline:
+    """What all notes of a run come to; `deadlines` are those of the messages, LATER for none.
+
+    Processors and tasks of names `without` are left out.
+    """
+    until, what = parts.stop, notes[:, 1]
     of_tasks, of_messages = notes[np.isin(what, _OF_TASKS)], notes[np.isin(what, _OF_MESSAGES)]
     jobs = [_jobs(of_tasks[of_tasks[:, 2] == i], task.deadline, until) for i, task in enumerate(parts.tasks)]
     frames = [
@@ -77,7 +81,7 @@ def timeline(parts: Parts, names: Names, deadlines: Sequence[int], notes: Intege
     ]
     return Timeline(
         stop=until,
-        jobs=dict(zip(names.tasks, jobs)),
+        jobs={name: each for name, each in zip(names.tasks, jobs) if name not in without},
         frames=dict(zip(names.messages, frames)),
         processors={
             name: _slices_of_processor(of_tasks, parts, p, names.tasks, until)
@@ -86,7 +90,7 @@ def timeline(parts: Parts, names: Names, deadlines: Sequence[int], notes: Intege
         links={
             name: _slices_of_link(of_messages, parts, k, names.messages, until) for k, name in enumerate(names.links)
         },
-        happenings=partial(_happenings, notes, parts, names, jobs),
+        happenings=partial(_happenings, notes, parts, names, jobs, without),
     )
 
 
@@ -172,18 +176,23 @@ def _slices(
     )
 
 
-def _happenings(notes: Integers, parts: Parts, names: Names, jobs: Sequence[Jobs]) -> Iterator[Happening]:
+def _happenings(
+    notes: Integers, parts: Parts, names: Names, jobs: Sequence[Jobs], without: Collection[str]
+) -> Iterator[Happening]:
     """What happened, in order; what is missed after all else that happens at the deadline."""
     rows: list[tuple[int, int, int, str, str, int]] = []
     for place, (time, what, whose, which, more) in enumerate(notes.tolist()):
         if what in _SAID:
             owner = (names.messages if what == QUEUED else names.tasks)[whose]
-            rows.append((time, 0, place, _SAID[what], owner, which))
+            if owner not in without:
+                rows.append((time, 0, place, _SAID[what], owner, which))
         elif what == SPOILT:
             rows.append((time, 0, place, "retransmitted", names.messages[whose], which))
         elif what == PASSED and more == len(parts.messages[whose].legs) - 1:
             rows.append((time, 0, place, "transmitted", names.messages[whose], which))
     for name, of in zip(names.tasks, jobs):
+        if name in without:
+            continue
         missed = of.missed.nonzero()[0].tolist()
         rows += [(int(of.deadline[j]), 1, j, "missed", name, j) for j in missed]
     for time, _, _, said, owner, which in sorted(rows):

@@ -9,6 +9,7 @@ from orchestration.basics.bisection import Range
 from orchestration.basics.statistics import refutes, wilson
 from orchestration.requests.ranges import Varied
 from orchestration.results.criterion import judged, unmet
+from orchestration.system import placement
 from orchestration.system.model import System
 from orchestration.workers.executors import RunEvaluator
 
@@ -27,6 +28,7 @@ def is_random(system: System) -> bool:
         any(one.sampling is not None and one.sampling.is_random for one in system.components.values())
         or any(x.is_random or any(x.noise.values()) for x in system.connections)
         or any(source.is_random and source.noise != 0.0 for source in system.sources.values())
+        or placement.is_random(system)
     )
 
 

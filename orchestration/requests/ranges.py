@@ -10,7 +10,7 @@ from orchestration.basics.units import after
 from orchestration.fmi.model import Model
 from orchestration.results.quantities import is_in_seconds
 from orchestration.system.distribution import Distribution
-from orchestration.system.model import System
+from orchestration.system.model import System, TaskSampling
 from orchestration.system.paths import TOP, changed, value_at
 from orchestration.system.request import Request, in_its_own_words, system_meant
 
@@ -97,8 +97,10 @@ def usual_quantity(request: Request) -> str:
     """
     if request.range_of(PERIOD) is not None:
         return PERIOD
-    sampled = [name for name, each in system_meant(request).components.items() if each.sampling is not None]
-    paths = [f"components.{name}.sampling.{PERIOD}" for name in sampled]
+    components = system_meant(request).components.items()
+    sampled = [(name, each.sampling) for name, each in components if each.sampling is not None]
+    owners = [one.task if isinstance(one, TaskSampling) else f"components.{name}.sampling" for name, one in sampled]
+    paths = [f"{owner}.{PERIOD}" for owner in owners]
     if len(paths) != 1:
         listed = f", one of {', '.join(paths)}" if paths else ""
         raise UsageError(f"--of: expected a path, as connections.NAME.delay{listed}")
@@ -107,7 +109,8 @@ def usual_quantity(request: Request) -> str:
 
 def _range_of_period(varied: Varied) -> Range | None:
     """From half of the period of a sampled component to fifty times of it, as that of the quadrotor is scanned."""
-    if not varied.of.endswith(f".sampling.{PERIOD}"):
+    is_task = varied.of.startswith("computers.") and varied.of.endswith(f".{PERIOD}")
+    if not (is_task or varied.of.endswith(f".sampling.{PERIOD}")):
         return None
     period = float(value_at(varied.system, varied.of))
     return Range(first=period / 2.0, step=period / 2.0, last=50.0 * period, tolerance=period / 20.0)

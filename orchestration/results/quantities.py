@@ -64,4 +64,7 @@ def is_in_seconds(path: str) -> bool:
     return not is_parameter and not is_of_values and path.rpartition(".")[2] in _SECONDS
 
 
-_SECONDS = ("period", "offset", "step", "plant_interval", "jitter", "delay", "delay_jitter", "stop_time")
+_SECONDS = (
+    *("period", "offset", "step", "plant_interval", "jitter", "delay", "delay_jitter", "stop_time"),
+    *("execution", "deadline", "switch", "latency"),
+)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from orchestration.basics.errors import QuadcosimError
+from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.basics.interrupt import Interrupted
 from orchestration.building import fmus
 from orchestration.engines.sources import Values
@@ -97,6 +97,8 @@ def held_to_fmus(asked: Request, announce: Announce | None = None) -> Meant:
     """The system that somebody asked for, its FMUs built if need be; raises `UsageError` for what they do not have."""
     with in_its_own_words(asked):
         system = asked.as_system()
+        if not system.components:
+            raise UsageError("components = none: expected at least one to run; computers and networks alone have none")
         paths = fmus.of_components(system.fmus, announce)
         models = {name: read_model(path) for name, path in paths.items()}
         found = checked(system, models)

@@ -5,6 +5,7 @@ from functools import cached_property
 
 from orchestration.schedule.order import ranked
 from orchestration.system.model import Connection, System
+from orchestration.system.placement import carried
 
 
 @dataclass(frozen=True)
@@ -16,12 +17,29 @@ class Plan:
     @cached_property
     def wires(self) -> tuple[int, ...]:
         """Between components in continuous time, nothing late, lost or noisy: read whenever the receiver is stepped."""
-        return tuple(i for i, x in enumerate(self._connections) if self._between_continuous(x) and is_plain(x))
+        return tuple(
+            i
+            for i, x in enumerate(self._connections)
+            if self._between_continuous(x) and is_plain(x) and i not in self.over_networks
+        )
 
     @cached_property
     def posted(self) -> tuple[int, ...]:
-        """Between components in continuous time otherwise: a message at each point of the sender."""
-        return tuple(i for i, x in enumerate(self._connections) if self._between_continuous(x) and not is_plain(x))
+        """Between components in continuous time otherwise, a message at each point of the sender; over networks,
+        from these to anyone at the instants of the message.
+        """
+        return tuple(
+            i
+            for i, x in enumerate(self._connections)
+            if (self._between_continuous(x) and not is_plain(x))
+            or (self._continuous(x.sender) and i in self.over_networks)
+        )
+
+    @cached_property
+    def over_networks(self) -> frozenset[int]:
+        """Connections that go over networks."""
+        names = carried(self.system)
+        return frozenset(i for i, x in enumerate(self._connections) if x.name in names)
 
     @cached_property
     def measured(self) -> tuple[int, ...]:
@@ -29,7 +47,7 @@ class Plan:
         return tuple(
             i
             for i, x in enumerate(self._connections)
-            if self._continuous(x.sender) and not self._continuous(x.receiver)
+            if self._continuous(x.sender) and not self._continuous(x.receiver) and i not in self.over_networks
         )
 
     @cached_property
@@ -53,7 +71,9 @@ class Plan:
         """Sampled components, in the order in which those that are due at one instant are processed."""
         members = [name for name in self.system.components if not self._continuous(name)]
         at_once = (
-            i for i in self.commanded if not self._connections[i].delay and not self._connections[i].delay_jitter
+            i
+            for i in self.commanded
+            if not (self._connections[i].delay or self._connections[i].delay_jitter or i in self.over_networks)
         )
         return ranked(members, (self._pair(i) for i in at_once if self._follows(i)))
 

@@ -9,6 +9,7 @@ import numpy as np
 from orchestration.basics.simulator import Integers
 from orchestration.schedule.drawing import times
 from orchestration.schedule.fixed_step import FixedStep, Refusal, seconds
+from orchestration.schedule.foreseen import NEVER, Foreseen
 from orchestration.schedule.message_times import lateness, losses
 from orchestration.schedule.plan import Plan
 from orchestration.schedule.streams import DELAY, DELAY_JITTER, JITTER, LOSS, Streams
@@ -36,8 +37,11 @@ class Link:
     def messages(self, sent: Integers) -> Integers:
         """Arrivals of the next messages, sent at these times; -1 for one that is lost."""
         lost, own = self._lost(len(sent)), sent + self._delay(len(sent)) + self._late(len(sent))
-        arrivals = self._in_order(np.where(lost, 0, own), "an arrival")
-        result: Integers = np.where(lost, -1, arrivals)
+        return self.arrivals(np.where(lost, -1, own))
+
+    def arrivals(self, own: Integers) -> Integers:
+        """When the next messages arrive that would by themselves at these times, -1 for one that is lost."""
+        result: Integers = np.where(own < 0, -1, self._in_order(np.maximum(own, 0), "an arrival"))
         return result
 
     def measurements(self, samples: Integers) -> tuple[Integers, Integers]:
@@ -54,41 +58,48 @@ class Link:
         return times
 
 
-class SampledComponent:
+class TimedComponent:
     """A sampled component: its samples that are drawn and not past, a row each.
 
     Columns: k, time, time of the next, then for each incoming link when it is measured and arrives, and for each
     outgoing one when it is sent and arrives.
     """
 
+    first: int
+    """[ns], its first sample"""
+
     def __init__(
         self,
         name: str,
         plan: Plan,
         links: Sequence[Link],
-        streams: Streams,
         fixed: Mapping[str, FixedStep],
         refused: list[Refusal],
     ) -> None:
-        connections, sampling = plan.system.connections, plan.system.components[name].sampling
-        assert sampling is not None
-        ratio = Fraction(repr(float(sampling.clock_ratio)))
+        connections = plan.system.connections
         self.index, self.rank = list(plan.system.components).index(name), plan.sampled.index(name)
         self.incoming = [links[i] for i in plan.measured if connections[i].receiver == name]
         self.outgoing = [links[i] for i in plan.commanded if connections[i].sender == name]
         self._ahead = max((link.longest for link in self.incoming), default=0)
-        self._grid = Grid(exact_nanoseconds(sampling.offset) / ratio, exact_nanoseconds(sampling.period) / ratio)
-        owner = f"components.{name}"
-        self._late = lateness(sampling.jitter, sampling.jitter_distribution, partial(streams.of, owner, JITTER))
-        self._name, self._refused, self._stop = owner, refused, nanoseconds(plan.system.stop_time)
+        self._name, self._refused, self._stop = f"components.{name}", refused, nanoseconds(plan.system.stop_time)
         self._fixed = [fixed[x] for x in sorted({connections[link.index].sender for link in self.incoming} & {*fixed})]
-        self._k, self._next = 0, self._times(0, 1, -1)
-        self.first = int(self._next[0])
         self.rows: Integers = np.zeros((0, 3 + 2 * (len(self.incoming) + len(self.outgoing))), dtype=np.int64)
 
-    def _times(self, first: int, end: int, before: int) -> Integers:
-        """Of samples `first` up to `end`, without that one; `before` is that of the one before them [ns]."""
-        times = self._grid.between(first, end) + self._late(end - first)
+    def drawn_to(self, end: int) -> None:
+        """Draw until no sample that is still to be drawn has anything to do with what is before `end` [ns]."""
+        raise NotImplementedError
+
+    def messages(self, rows: Integers) -> Integers:
+        """Of these samples, in the order in which they are exchanged, shape (n, number, 4)."""
+        links = [*self.incoming, *self.outgoing]
+        result = np.empty((len(rows), len(links), 4), dtype=np.int64)
+        for i, link in enumerate(links):
+            result[:, i, 0], result[:, i, 1] = link.index, rows[:, 0]
+            result[:, i, 2:] = rows[:, MESSAGES + 2 * i : MESSAGES + 2 * i + 2]
+        return result
+
+    def _moved(self, times: Integers, first: int, before: int) -> Integers:
+        """Samples from number `first` on, on points of who is read; `before` is the one before them [ns]."""
         if not self._fixed:
             return times
         found = []
@@ -112,6 +123,33 @@ class SampledComponent:
                 time = int(fixed.aligned(np.array([time]), f"a sample of {self._name}", self._refused)[0])
         return time
 
+
+class SampledComponent(TimedComponent):
+    """One that samples by its own clock."""
+
+    def __init__(
+        self,
+        name: str,
+        plan: Plan,
+        links: Sequence[Link],
+        streams: Streams,
+        fixed: Mapping[str, FixedStep],
+        refused: list[Refusal],
+    ) -> None:
+        super().__init__(name, plan, links, fixed, refused)
+        sampling = plan.system.components[name].sampling
+        assert sampling is not None
+        ratio = Fraction(repr(float(sampling.clock_ratio)))
+        self._grid = Grid(exact_nanoseconds(sampling.offset) / ratio, exact_nanoseconds(sampling.period) / ratio)
+        generator = partial(streams.of, self._name, JITTER)
+        self._late = lateness(sampling.jitter, sampling.jitter_distribution, generator)
+        self._k, self._next = 0, self._times(0, 1, -1)
+        self.first = int(self._next[0])
+
+    def _times(self, first: int, end: int, before: int) -> Integers:
+        """Of samples `first` up to `end`, without that one; `before` is that of the one before them [ns]."""
+        return self._moved(self._grid.between(first, end) + self._late(end - first), first, before)
+
     def drawn_to(self, end: int) -> None:
         """Draw until no sample that is still to be drawn has anything to do with what is before `end` [ns]."""
         while self._next[0] - self._ahead < end:
@@ -127,14 +165,58 @@ class SampledComponent:
             self.rows = np.vstack([self.rows, np.column_stack(columns)])
             self._k, self._next = last, times[-1:]
 
-    def messages(self, rows: Integers) -> Integers:
-        """Of these samples, in the order in which they are exchanged, shape (n, number, 4)."""
-        links = [*self.incoming, *self.outgoing]
-        result = np.empty((len(rows), len(links), 4), dtype=np.int64)
-        for i, link in enumerate(links):
-            result[:, i, 0], result[:, i, 1] = link.index, rows[:, 0]
-            result[:, i, 2:] = rows[:, MESSAGES + 2 * i : MESSAGES + 2 * i + 2]
-        return result
+
+class ScheduledComponent(TimedComponent):
+    """One whose samples and messages the scheduler finds: a task, or what messages release."""
+
+    def __init__(
+        self,
+        name: str,
+        plan: Plan,
+        links: Sequence[Link],
+        foreseen: Foreseen,
+        fixed: Mapping[str, FixedStep],
+        refused: list[Refusal],
+    ) -> None:
+        super().__init__(name, plan, links, fixed, refused)
+        self._foreseen, self._samples = foreseen, foreseen.samples[name]
+        names = [x.name for x in plan.system.connections]
+        self._sent = [foreseen.messages.get(names[link.index]) for link in self.outgoing]
+        self._k, self._before = 0, -1
+        while not (len(self._samples.times) or foreseen.over):
+            foreseen.further()
+        first = self._moved(self._samples.times[:1], 0, -1)
+        self.first = int(first[0]) if len(first) else NEVER
+
+    def drawn_to(self, end: int) -> None:
+        """As in any other."""
+        foreseen, samples = self._foreseen, self._samples
+        foreseen.to(end + self._ahead)
+        while True:
+            self._take(samples.known(foreseen.over))
+            if foreseen.over or (len(samples.times) and samples.times[0] >= end + self._ahead):
+                return
+            foreseen.further()
+
+    def _take(self, count: int) -> None:
+        """So many more are drawn."""
+        if not count:
+            return
+        times, then = self._samples.take(count)
+        now = self._moved(times, self._k, self._before)
+        columns: list[Integers] = [np.arange(self._k, self._k + count), now, self._moved(then, self._k + 1, -1)]
+        for link in self.incoming:
+            columns += link.measurements(now)
+        for link, messages in zip(self.outgoing, self._sent):
+            if messages is None:
+                sent = columns[2] if link.jacobi else now
+                columns += [sent, link.messages(sent)]
+            else:
+                sent, own = messages.take(count)
+                sent, own = np.maximum(sent, now), np.where(own < 0, -1, np.maximum(own, now))
+                columns += [sent, link.arrivals(own)]
+        self.rows = np.vstack([self.rows, np.column_stack(columns)])
+        self._k, self._before = self._k + count, int(now[-1])
 
 
 TIME, NEXT, MESSAGES = 1, 2, 3

@@ -7,6 +7,7 @@ from orchestration.schedule.cursor import INSTANTS
 from orchestration.schedule.schedule import Schedule
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
+from orchestration.system import placement
 from orchestration.system.distribution import content
 from orchestration.system.model import System
 
@@ -19,6 +20,7 @@ def timing(system: System) -> Hashable:
     """What the schedule of a system follows from."""
     samplings = [c.sampling for c in system.components.values() if c.sampling is not None]
     chance = any(each.is_random for each in samplings) or any(x.is_random for x in system.connections)
+    chance = chance or placement.is_random(system)
     return (
         system.stop_time,
         tuple((name, c.step, c.sampling) for name, c in system.components.items()),
@@ -27,6 +29,7 @@ def timing(system: System) -> Hashable:
             (content(x.delay), content(x.delay_jitter), x.jitter_distribution, content(x.loss), x.burst_length)
             for x in system.connections
         ),
+        placement.content_of(system),
         tuple((source.to, source.period) for source in system.sources.values() if source.period is not None),
         (system.seed, tuple(sorted(system.streams.items()))) if chance else None,
     )

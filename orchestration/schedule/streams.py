@@ -7,6 +7,7 @@ from statistics import NormalDist
 import numpy as np
 
 JITTER, DELAY, DELAY_JITTER, LOSS, NOISE, VALUE = "jitter", "delay", "delay_jitter", "loss", "noise", "value"
+EXECUTION, ARRIVALS, ERROR = "execution", "arrivals", "error"
 
 
 class Streams:

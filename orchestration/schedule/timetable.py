@@ -13,13 +13,25 @@ import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Booleans, Integers
-from orchestration.schedule.fixed_step import FixedStep, Refusal
+from orchestration.schedule.fixed_step import FixedStep, Refusal, seconds
+from orchestration.schedule.foreseen import Foreseen
 from orchestration.schedule.plan import Plan
-from orchestration.schedule.random_timing import MESSAGES, NEXT, TIME, Link, SampledComponent
+from orchestration.schedule.random_timing import (
+    MESSAGES,
+    NEXT,
+    TIME,
+    Link,
+    SampledComponent,
+    ScheduledComponent,
+    TimedComponent,
+)
 from orchestration.schedule.schedule import Schedule
 from orchestration.schedule.streams import Streams
+from orchestration.system.computers import require_less
 from orchestration.system.distribution import highest
-from orchestration.system.model import Sampling, System
+from orchestration.system.frames import ERROR_BITS, frame_nanoseconds
+from orchestration.system.model import Sampling, System, is_foreseen
+from orchestration.system.placement import carried, placed_messages, placed_tasks, tasks_of
 from orchestration.system.times import NANOSECONDS, Grid, exact_nanoseconds, nanoseconds
 
 LONGEST = 2**60
@@ -102,14 +114,21 @@ class Timetable:
             i: Grid(Fraction(0), exact_nanoseconds(system.components[names[i]].step or 0.0))
             for i in sorted(self._continuous.tolist())
         }
-        self._tasks = [SampledComponent(name, plan, links, streams, fixed, self._refused) for name in plan.sampled]
+        _expect_moves(system, fixed)
+        self._fixed = fixed
+        self._foreseen = Foreseen(system, streams, max((links[i].longest for i in plan.measured), default=0))
+        self._tasks = [self._timed(name, links, streams, fixed) for name in plan.sampled]
         self.first_samples = {
             name: task.first for name, task in zip(plan.sampled, self._tasks) if task.first < self.stop
         }
         """[ns], by sampled component that samples at all"""
+        self._connections = system.connections
         self._sender = np.array([names.index(x.sender) for x in system.connections], dtype=np.int64)
         self._receiver = np.array([names.index(x.receiver) for x in system.connections], dtype=np.int64)
-        self._posted = {i: [links[j] for j in plan.posted if self._sender[j] == i] for i in self._points}
+        own = [j for j in plan.posted if j not in plan.over_networks]
+        self._posted = {i: [links[j] for j in own if self._sender[j] == i] for i in self._points}
+        self._over_networks = [links[j] for j in plan.posted if j in plan.over_networks]
+        self._posted_before = dict.fromkeys((link.index for link in self._over_networks), 0)
         self._changes = [
             (Grid(Fraction(0), exact_nanoseconds(source.period)), [names.index(end.split(".")[0]) for end in source.to])
             for source in system.sources.values()
@@ -118,6 +137,13 @@ class Timetable:
         self._on_their_way: Integers = np.zeros((0, _ORDER + 4), dtype=np.int64)
         self._pace = _pace(system)
         self._ahead: Schedule | None = None
+
+    def _timed(
+        self, name: str, links: Sequence[Link], streams: Streams, fixed: Mapping[str, FixedStep]
+    ) -> TimedComponent:
+        if name in self._foreseen.samples:
+            return ScheduledComponent(name, self._plan, links, self._foreseen, fixed, self._refused)
+        return SampledComponent(name, self._plan, links, streams, fixed, self._refused)
 
     def following(self, most: int) -> Schedule | None:
         """The next instants, about `most` of them; None at the end.
@@ -202,8 +228,30 @@ class Timetable:
                 sent = _Sent(link, np.arange(first, last), points, link.messages(points), points, 0, component, place)
                 tables.append(sent.table())
                 later.append(self._under_way(sent, found))
+        for link in self._over_networks:
+            component = int(self._sender[link.index])
+            k, points, arrivals = self._networked(link, end)
+            found.add(points, self._place[component])
+            sent = _Sent(link, k, points, arrivals, points, 0, component, link.index)
+            tables.append(sent.table())
+            later.append(self._under_way(sent, found))
         table = np.concatenate(tables)
         return table[np.lexsort((table[:, 7], table[:, 6], table[:, 4]))], np.concatenate(later)
+
+    def _networked(self, link: Link, end: int) -> tuple[Integers, Integers, Integers]:
+        """Messages of a component in continuous time over a network before `end` [ns]: k, when they go and arrive."""
+        foreseen = self._foreseen
+        messages, end = foreseen.messages[self._connections[link.index].name], min(end, self.stop)
+        foreseen.to(end)
+        while (count := int(np.searchsorted(messages.instants(), end))) > messages.known(foreseen.over):
+            foreseen.further()
+        first = self._posted_before[link.index]
+        self._posted_before[link.index] += count
+        sent, own = messages.take(count)
+        stepped = self._fixed.get(self._connections[link.index].sender)
+        if stepped is not None:
+            sent = stepped.aligned(sent, "a message", self._refused)
+        return np.arange(first, first + count), sent, link.arrivals(np.where(own < 0, -1, np.maximum(own, sent)))
 
     def _measure(self, begin: int, end: int, found: _Collected) -> Integers:
         """What is measured for samples to come."""
@@ -267,14 +315,30 @@ def _expect_no_longer(system: System) -> None:
                 times[place] = getattr(component.sampling, key) / component.sampling.clock_ratio
     for x in system.connections:
         times |= {f"connections.{x.name}.{key}": highest(getattr(x, key)) for key in ("delay", "delay_jitter")}
+    for task in placed_tasks(system.computers):
+        ratio = task.computer.clock_ratio
+        if task.task.period is not None:
+            require_less(f"{task.place}.jitter", task.task.jitter, task.task.period / ratio)
+        times |= {f"{task.place}.{key}": (getattr(task.task, key) or 0.0) / ratio for key in ("period", "offset")}
+        times |= {f"{task.place}.execution": highest(task.task.execution), f"{task.place}.deadline": task.task.due}
+        times[f"computers.{task.computer_name}.switch"] = task.computer.switch
+    for of in placed_messages(system.networks):
+        if of.message.period is not None:
+            require_less(f"{of.place}.jitter", of.message.jitter, of.message.period)
+        times |= {f"{of.place}.{key}": getattr(of.message, key) or 0.0 for key in ("period", "offset", "deadline")}
+        times[f"{of.place}.bytes"] = frame_nanoseconds(of.network, of.message, ERROR_BITS) / NANOSECONDS
+        times[f"networks.{of.network_name}.latency"] = of.network.latency
     for place, time in times.items():
         if time >= LONGEST / NANOSECONDS:
             raise UsageError(f"{place} = {time:g} s: expected less than {LONGEST / NANOSECONDS:.4g} s")
+    over = carried(system)
     for x in system.connections:
         sampling = system.components[x.receiver].sampling
         if sampling is None or system.components[x.sender].sampling is not None:
             continue
         period, late = sampling.period / sampling.clock_ratio, highest(x.delay) + highest(x.delay_jitter)
+        if x.name in over:
+            continue
         if late > MOST_AHEAD * period:
             raise UsageError(
                 f"connections.{x.name}.delay: is measured {late:g} s before a sample of "
@@ -289,6 +353,19 @@ def _expect_jitter_within_period(name: str, sampling: Sampling) -> None:
         raise UsageError(f"components.{name}.sampling.{error}") from error
 
 
+def _expect_moves(system: System, fixed: Mapping[str, FixedStep]) -> None:
+    """Raise `UsageError` for a component of fixed steps that a task or a network meets between two of its points."""
+    tasks, over = tasks_of(system), carried(system)
+    for x in system.connections:
+        places = [of.place for of in (tasks.get(x.sender), tasks.get(x.receiver), over.get(x.name)) if of is not None]
+        for name in (x.sender, x.receiver):
+            if places and name in fixed and not fixed[name].moves:
+                raise UsageError(
+                    f"{places[0]}: components.{name} takes steps of {seconds(fixed[name].grid[1])} s only: expected "
+                    'align = "next" there'
+                )
+
+
 def _pace(system: System) -> float:
     """From one instant to the next [ns], about."""
     periods = [component.step for component in system.components.values()]
@@ -296,7 +373,14 @@ def _pace(system: System) -> float:
     rates = [1.0 / float(exact_nanoseconds(period)) for period in periods if period is not None]
     for component in system.components.values():
         if component.sampling is not None:
-            rates.append(component.sampling.clock_ratio / float(exact_nanoseconds(component.sampling.period)))
+            instants = 2.0 if is_foreseen(component.sampling) else 1.0  # it samples, and it writes
+            period = float(exact_nanoseconds(component.sampling.period))
+            rates.append(instants * component.sampling.clock_ratio / period)
+    by_connection = carried(system)
+    periods = [by_connection[x.name].message.period for x in system.connections if x.name in by_connection]
+    rates += [1.0 / float(exact_nanoseconds(period)) for period in periods if period is not None]
+    if not rates:
+        return float(nanoseconds(system.stop_time))
     return 1.0 / sum(rates)
 
 

@@ -30,6 +30,7 @@ from orchestration.stability.linearised_component import PULSE, Rest, Tangent
 from orchestration.stability.operating_point import common_period, deterministic, exchanged, expect_rest, latest_offset
 from orchestration.system.distribution import highest
 from orchestration.system.model import Component, Criterion, System, component_of, variable_of
+from orchestration.system.placement import expect_none
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 
 SETTLED = 6
@@ -106,6 +107,7 @@ def at_rest(system: System, instances: Instances, pulse: float = PULSE, beside: 
 
 
 def _expect_period(system: System) -> Fraction:
+    expect_none(system, "has no fixed period, which a loop that is made linear needs")
     for name, component in system.components.items():
         if component.sampling is not None and component.sampling.clock == "fmu":
             raise UsageError(f"{name} has a clock of its own")

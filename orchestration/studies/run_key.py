@@ -11,7 +11,6 @@ from typing import Any
 from orchestration.building.inputs import Files, tables_of
 from orchestration.results.own_metrics import OwnMetric
 from orchestration.studies.study import Study
-from orchestration.system.distribution import Distribution
 from orchestration.system.model import Component, Connection, Source, System
 from orchestration.workers.provenance import machine, versions
 
@@ -33,6 +32,11 @@ def run_key(system: System, files: Files, metrics: Sequence[OwnMetric] = ()) -> 
             _text_of(source, partial(_named_source_of, name, files), name, id(files))
             for name, source in system.sources.items()
         ),
+        **{
+            key: _text_of(getattr(system, key), partial(_shared_of, key, files), id(files))
+            for key in ("computers", "networks")
+            if getattr(system, key)
+        },
         "criterion": _text_of(system.criterion, dataclasses.asdict),
         "versions": _text_of(versions(), dict),
     }
@@ -76,6 +80,15 @@ def _connection_of(files: Files, x: Connection) -> dict[str, Any]:
     return _content(x, files)
 
 
+def _shared_of(key: str, files: Files, shared: Mapping[str, Any]) -> list[Any]:
+    """Computers or networks, which are what they are in their order: it decides ties."""
+    part = "tasks" if key == "computers" else "messages"
+    return [
+        [name, _content(one, files) | {part: [[each, _content(of, files)] for each, of in getattr(one, part).items()]}]
+        for name, one in shared.items()
+    ]
+
+
 def _named_source_of(name: str, files: Files, source: Source) -> list[Any]:
     return [name, _source_of(source, files)]
 
@@ -96,7 +109,7 @@ def _content(of: Any, files: Files) -> dict[str, Any]:
 def _told(value: Any, files: Files) -> Any:
     if isinstance(value, Path):
         return files.hashes[str(value)]
-    return _content(value, files) if isinstance(value, Distribution) else value
+    return _content(value, files) if dataclasses.is_dataclass(value) else value
 
 
 def study_parts(study: Study) -> dict[str, str]:
@@ -110,6 +123,11 @@ def study_parts(study: Study) -> dict[str, str]:
         parts |= _parts(f"connections.{x.name}", x, tables)
     for name, source in system.sources.items():
         parts |= {f"sources.{name}.{key}": value for key, value in _source_of(source, tables).items()}
+    for table, part in (("computers", "tasks"), ("networks", "messages")):
+        for name, shared in getattr(system, table).items():
+            parts |= _parts(f"{table}.{name}", shared, tables, without=(part,))
+            for inner, one in getattr(shared, part).items():
+                parts |= _parts(f"{table}.{name}.{part}.{inner}", one, tables)
     parts |= {f"objectives.{name}": text for name, text in system.objectives.items()}
     parts |= {f"metrics.{metric.name}": metric.source for metric in study.metrics}
     parts |= _parts("criterion", system.criterion, tables)

@@ -6,6 +6,7 @@ from typing import Any
 
 from orchestration.basics.records import record
 from orchestration.system.choices import NetworkKind, Overrun, Read, Scheduling, Stuffing, Write
+from orchestration.system.distribution import Varying, highest, is_random, reads_file, require_varying, spreads
 from orchestration.system.requirements import (
     is_finite,
     require,
@@ -45,16 +46,16 @@ class Task:
     """The time T from one release to the next [s], in the computer's own time: release k is at offset + kT."""
     offset: float = 0.0
     """The time of the first release [s], in the computer's own time."""
-    jitter: float = 0.0
-    """The largest lateness of a release [s], drawn for each; it is less than the period."""
+    jitter: Varying = 0.0
+    """The largest lateness of a release [s], drawn for each, or how it is distributed; it is less than the period."""
     arrivals: Arrivals | None = None
     """How releases come by chance, in place of a period."""
     on: str | None = None
     """The connection whose arriving messages release it, in place of a period."""
     priority: int = 1
     """The priority: 1 is more urgent than 2; equal ones by release, then by their order in the file."""
-    execution: float = 0.0
-    """The processor time that a job takes [s]."""
+    execution: Varying = 0.0
+    """The processor time that a job takes [s], or how it is distributed."""
     deadline: float | None = None
     """The time from the nominal release to when a job should be done [s]; without it, the period, or the mean time
     between arrivals."""
@@ -71,9 +72,14 @@ class Task:
         """The deadline that it has [s]."""
         return _due(self)
 
+    @property
+    def is_random(self) -> bool:
+        """Whether seeds make a difference to its jobs."""
+        return spreads(self.jitter) or self.arrivals is not None or is_random(self.execution)
+
     def __post_init__(self) -> None:
         _expect_releases(self, "period, arrivals or on")
-        require_not_negative(self, "execution")
+        require_varying(self, "execution")
         require(self.on is None or self.deadline is not None, "deadline", "none", "one, for a task that has no period")
         if self.deadline is not None:
             require_positive(self, "deadline")
@@ -100,12 +106,12 @@ class Computer:
         require_not_negative(self, "switch")
         require_positive(self, "clock_ratio")
         for name, task in self.tasks.items():
-            place = f"tasks.{name}."
             if task.period is None:
                 continue
+            place = f"tasks.{name}."
             require(is_at_least(task.period, self.clock_ratio), f"{place}period", task.period, "at least a nanosecond")
-            longest = task.period / self.clock_ratio
-            require(task.jitter < longest, f"{place}jitter", task.jitter, f"less than the period of {longest:g} s")
+            if not reads_file(task.jitter):
+                require_less(f"{place}jitter", task.jitter, task.period / self.clock_ratio)
 
 
 @record()
@@ -132,13 +138,18 @@ class Message:
     """The time from one message to the next [s]: of load, and of a connection from a component in continuous time."""
     offset: float = 0.0
     """The time of the first one [s]."""
-    jitter: float = 0.0
-    """The largest lateness of one [s], drawn for each; it is less than the period."""
+    jitter: Varying = 0.0
+    """The largest lateness of one [s], drawn for each, or how it is distributed; it is less than the period."""
     arrivals: Arrivals | None = None
     """How they come by chance, in place of a period."""
     deadline: float | None = None
     """The time in which one should be received [s]; without it, the period or the mean time between arrivals, if it has
     one."""
+
+    @property
+    def is_random(self) -> bool:
+        """Whether seeds make a difference to when it is queued."""
+        return spreads(self.jitter) or self.arrivals is not None
 
     @property
     def due(self) -> float | None:
@@ -153,7 +164,8 @@ class Message:
             _expect_releases(self, "a period")
         if self.period is not None:
             require(is_at_least(self.period, 1.0), "period", self.period, "at least a nanosecond")
-            require(self.jitter < self.period, "jitter", self.jitter, f"less than the period of {self.period:g} s")
+            if not reads_file(self.jitter):
+                require_less("jitter", self.jitter, self.period)
         if self.deadline is not None:
             require_positive(self, "deadline")
 
@@ -233,13 +245,19 @@ class Network:
 def _expect_releases(of: Any, ways: str) -> None:
     given = [key for key in ("period", "arrivals", "on") if getattr(of, key, None) is not None]
     require(len(given) == 1, "period", " and ".join(given) or "none", f"one of {ways}")
-    require_not_negative(of, "offset", "jitter")
+    require_not_negative(of, "offset")
+    require_varying(of, "jitter")
     if of.period is not None:
         require_positive(of, "period")
     else:
         require(of.jitter == 0.0, "jitter", of.jitter, "0 without a period")
     if getattr(of, "on", None) is not None:
         require(of.offset == 0.0, "offset", of.offset, "0 for a task that messages release")
+
+
+def require_less(place: str, jitter: Varying, period: float) -> None:
+    """A lateness is less than a period [s]; of a trace that is known when it is read."""
+    require(highest(jitter) < period, place, highest(jitter), f"less than the period of {period:g} s")
 
 
 def _due(of: Any) -> float:

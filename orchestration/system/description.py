@@ -4,8 +4,19 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from orchestration.basics.units import in_brackets
+from orchestration.system.computers import Message, Task
 from orchestration.system.distribution import Distribution, Varying
-from orchestration.system.model import Component, Connection, Sampling, Source, System, variable_of
+from orchestration.system.model import (
+    Component,
+    Connection,
+    Sampling,
+    SamplingOnArrival,
+    Source,
+    System,
+    TaskSampling,
+    variable_of,
+)
+from orchestration.system.placement import PlacedMessage, PlacedTask, placed_messages, placed_tasks
 
 
 def as_text(system: System, units: Mapping[str, str] = {}, follows: str = "") -> str:
@@ -25,6 +36,8 @@ def as_text(system: System, units: Mapping[str, str] = {}, follows: str = "") ->
         ("components", components),
         ("connections", connections),
         ("sources", sources),
+        ("computers", [_task(each) for each in placed_tasks(system.computers)]),
+        ("networks", [_message(each) for each in placed_messages(system.networks)]),
         ("follows", [(follows,)] if follows else []),
         (
             "objectives",
@@ -42,7 +55,41 @@ def rate(component: Component) -> str:
         return f"continuous, step {seconds(component.step or 0.0)}" + (
             ", moved to its own grid" if component.align == "next" else ""
         )
+    if isinstance(component.sampling, TaskSampling):
+        return component.sampling.task
+    if isinstance(component.sampling, SamplingOnArrival):
+        return f"on {component.sampling.on}"
     return sampled(component.sampling)
+
+
+def _task(of: PlacedTask) -> tuple[str, ...]:
+    task, computer = of.task, of.computer
+    how = [computer.scheduling.replace("-", " "), *([] if computer.preemptive else ["not preemptive"])]
+    how += [f"priority {task.priority}", f"{varying(task.execution)} by {seconds(task.due)}"]
+    how += [f"reads at {task.read}"] if task.read != "start" else []
+    how += [f"writes at {task.write}"] if task.write != "end" else []
+    how += [f"overruns {task.overrun}"] if task.overrun != "queue" else []
+    released = f"on {task.on}" if task.on is not None else _released(task)
+    return f"{of.computer_name}.{of.name}", task.component or "load", released, ", ".join(how)
+
+
+def _message(of: PlacedMessage) -> tuple[str, ...]:
+    message, network = of.message, of.network
+    keys = ("identifier", "slot") if network.kind != "ethernet" else ("priority",)
+    how = [f"{network.kind}, {network.bit_rate:g} bit/s", f"{message.bytes} bytes"]
+    how += [f"{key} {getattr(message, key)}" for key in keys if getattr(message, key) is not None]
+    how += [f"corrupted {100.0 * network.error:g} %"] if network.error else []
+    released = _released(message) if message.period or message.arrivals else "when written"
+    return f"{of.network_name}.{of.name}", message.connection or "load", released, ", ".join(how)
+
+
+def _released(of: Task | Message) -> str:
+    if of.arrivals is not None:
+        return f"{of.arrivals.poisson:g} a second by chance"
+    parts = [f"every {seconds(of.period or 0.0)}"]
+    parts += [f"from {seconds(of.offset)}"] if of.offset else []
+    parts += [f"jitter {varying(of.jitter)}"] if of.jitter else []
+    return ", ".join(parts)
 
 
 def sampled(sampling: Sampling) -> str:

@@ -189,8 +189,8 @@ def distributions(of: Any) -> Iterator[tuple[str, Distribution]]:
         value = getattr(of, field.name)
         if isinstance(value, Distribution):
             yield field.name, value
-        elif is_dataclass(value):
-            yield from ((f"{field.name}.{path}", each) for path, each in distributions(value))
+        for name, part in _parts(field.name, value):
+            yield from ((f"{name}.{path}", each) for path, each in distributions(part))
 
 
 def with_traces_at(of: Of, paths: Mapping[str, Path]) -> Of:
@@ -203,7 +203,17 @@ def with_traces_at(of: Of, paths: Mapping[str, Path]) -> Of:
                 changes[field.name] = replace(value, file=paths[str(value.file)])
         elif is_dataclass(value):
             changes[field.name] = with_traces_at(value, paths)
+        elif isinstance(value, Mapping) and any(map(is_dataclass, value.values())):
+            changes[field.name] = {name: with_traces_at(part, paths) for name, part in value.items()}
     return replace(of, **changes) if changes else of  # type: ignore[type-var]
+
+
+def _parts(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """What a value is made of that may say something drawn, by the path of each."""
+    if isinstance(value, Mapping):
+        yield from ((f"{name}.{key}", part) for key, part in value.items() if is_dataclass(part))
+    elif is_dataclass(value) and not isinstance(value, Distribution):
+        yield name, value
 
 
 def _require_span(name: str, span: tuple[float, float]) -> None:

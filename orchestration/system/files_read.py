@@ -5,6 +5,7 @@ from pathlib import Path
 
 from orchestration.system.distribution import Distribution, distributions
 from orchestration.system.model import System
+from orchestration.system.placement import SHARED
 
 
 def files_read(system: System) -> dict[str, Path]:
@@ -17,5 +18,6 @@ def drawn(system: System) -> Iterator[tuple[str, Distribution]]:
     """Everything that is drawn from a distribution or a trace, by its place."""
     components = ((f"components.{name}", component) for name, component in system.components.items())
     connections = ((f"connections.{x.name}", x) for x in system.connections)
-    for place, part in (*components, *connections):
+    shared = ((f"{table}.{name}", one) for table in SHARED for name, one in getattr(system, table).items())
+    for place, part in (*components, *connections, *shared):
         yield from ((f"{place}.{path}", each) for path, each in distributions(part))

@@ -11,6 +11,7 @@ from orchestration.basics.records import Scalar, record
 from orchestration.expressions.syntax import is_number, parse
 from orchestration.signals import WINDS
 from orchestration.system.choices import Align, Clock, Hold, Interpolation, Order, Spread
+from orchestration.system.computers import Computer, Network
 from orchestration.system.distribution import (
     Distribution,
     Varying,
@@ -21,6 +22,12 @@ from orchestration.system.distribution import (
     require_spread,
     require_varying,
     spreads,
+)
+from orchestration.system.placement import (
+    expect_placement,
+    placed_messages,
+    placed_tasks,
+    with_tasks,
 )
 from orchestration.system.requirements import (
     is_finite,
@@ -79,6 +86,38 @@ class Sampling:
 
 
 @record()
+class TaskSampling(Sampling):
+    """What is known beforehand of the instants of a task: its period, or that of what releases it, about.
+
+    A system makes it of what it says of the task; when the task runs is found by the scheduler.
+    """
+
+    task: str
+    """The path of the task."""
+
+
+@record()
+class SamplingOnArrival(Sampling):
+    """When a digital task runs that is released by messages: whenever one arrives."""
+
+    on: str
+    """The connection whose arriving messages it runs on, in place of a period."""
+    period: float = 0.0
+    """About; a system knows it."""
+
+    def __post_init__(self) -> None:
+        require_positive(self, "clock_ratio")
+        for key in ("offset", "jitter"):
+            require(getattr(self, key) == 0.0, key, getattr(self, key), "0 beside on: messages say when it runs")
+        require(self.clock == "master", "clock", self.clock, "master beside on: messages say when it runs")
+
+
+def is_foreseen(sampling: Sampling) -> bool:
+    """Whether the scheduler finds its instants."""
+    return isinstance(sampling, (TaskSampling, SamplingOnArrival))
+
+
+@record()
 class Component:
     """An FMU, its parameters, and how it is stepped: at sampling instants if it has `sampling`, else continuously."""
 
@@ -90,7 +129,8 @@ class Component:
     """The distance of the communication points [s] of a component in continuous time; a component has either this or
     `sampling`."""
     sampling: Sampling | None = None
-    """When a digital task runs; a component has either this or `step`."""
+    """When a digital task runs; a component has either this or `step`, and none of them if it is the task of a
+    computer."""
     tolerance: float | None = None
     """The relative tolerance of the FMU's own solver; without it, that of the experiment that the FMU declares,
     if any."""
@@ -103,11 +143,10 @@ class Component:
     def __post_init__(self) -> None:
         if self.tolerance is not None:
             require_positive(self, "tolerance")
-        if self.sampling is None:
-            require(self.step is not None, "step", "none", "step (continuous time) or sampling (a digital task)")
+        if self.step is not None:
             require_positive(self, "step")
-            require(is_at_least(self.step or 0.0, 1.0), "step", self.step, "at least a nanosecond")
-        else:
+            require(is_at_least(self.step, 1.0), "step", self.step, "at least a nanosecond")
+        if self.sampling is not None:
             require(self.step is None, "step", self.step, "none beside sampling, whose period it follows")
 
 
@@ -353,12 +392,16 @@ class System:
     """The end of a run [s]."""
     seed: int = 0
     """The seed of all random numbers of a run."""
-    components: Mapping[str, Component]
+    components: Mapping[str, Component] = field(default_factory=dict)
     """The FMUs by name; their order decides ties."""
     connections: tuple[Connection, ...] = ()
     """The messages from component to component."""
     sources: Mapping[str, Source] = field(default_factory=dict)
     """What drives inputs from outside, by name."""
+    computers: Mapping[str, Computer] = field(default_factory=dict)
+    """The processors whose tasks components are, by name."""
+    networks: Mapping[str, Network] = field(default_factory=dict)
+    """The buses and switches over which connections go, by name."""
     objectives: Mapping[str, str] = field(default_factory=dict)
     """What a run comes to: expressions by name."""
     optional: tuple[str, ...] = ()
@@ -377,6 +420,8 @@ class System:
             "components": self.components,
             "connections": [x.name for x in self.connections],
             "sources": self.sources,
+            "computers": self.computers,
+            "networks": self.networks,
             "objectives": self.objectives,
         }
         listed = [f"{what}: {', '.join(_few([*names]))}" for what, names in named.items() if names]
@@ -440,9 +485,17 @@ class System:
         require(whole and 0 <= self.seed < 2**63, "seed", self.seed, "a whole number from 0 to 2^63 - 1")
         if "rows" in self.components:
             raise UsageError("components.rows: expected another name; this one is taken")
-        require(len(self.components) > 0, "components", "none", "at least one")
+        require(bool(self.components or self.computers or self.networks), "components", "none", "at least one")
         _require_names("components", self.components, without=".")
         _require_names("sources", self.sources, without=".")
+        for table in ("computers", "networks"):
+            _require_names(table, getattr(self, table), without=".")
+        for place, owner in self.computers.items():
+            _require_names(f"computers.{place}.tasks", owner.tasks, without=".")
+        for place, network in self.networks.items():
+            _require_names(f"networks.{place}.messages", network.messages, without=".")
+        components = with_tasks(self.components, self.connections, self.computers, self.networks)
+        object.__setattr__(self, "components", components)
         _require_names("connections", (x.name for x in self.connections))
         _require_names("objectives", self.objectives)
         for place, number in self.streams.items():
@@ -463,12 +516,16 @@ class System:
         names = [x.name for x in self.connections]
         for name in names:
             require(names.count(name) == 1, "connections", name, "a name of its own for each")
+        expect_placement(self)
         _require_expressions(tuple(expressions(self)))
 
     def _causes(self) -> list[str]:
         """What random numbers are drawn for."""
         tasks = [f"components.{name}.jitter" for name, c in self.components.items() if c.sampling is not None]
         sent = [f"connections.{x.name}.{cause}" for x in self.connections for cause in _CAUSES]
+        on_computers = [f"{each.place}.{cause}" for each in placed_tasks(self.computers) for cause in TASK_CAUSES]
+        over_networks = [f"{each.place}.{cause}" for each in placed_messages(self.networks) for cause in MESSAGE_CAUSES]
+        sent += [*on_computers, *over_networks]
         return [*tasks, *sent, *(f"sources.{name}.value" for name, x in self.sources.items() if x.is_random)]
 
     def _feeds(self) -> list[tuple[str, str | None, str]]:
@@ -480,6 +537,8 @@ class System:
 
 _CAUSES = ("delay", "delay_jitter", "loss", "noise")
 """Of a connection"""
+TASK_CAUSES, MESSAGE_CAUSES = ("execution", "jitter", "arrivals"), ("jitter", "arrivals", "error")
+"""What random numbers are drawn for of a task, and of a message"""
 
 
 def _few(names: list[str], most: int = 6) -> list[str]:

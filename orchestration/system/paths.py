@@ -6,7 +6,17 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.basics.errors import UsageError, did_you_mean
-from orchestration.system.model import Component, Connection, Sampling, Source, System
+from orchestration.system.computers import Arrivals, Computer, Network
+from orchestration.system.model import (
+    Component,
+    Connection,
+    Sampling,
+    SamplingOnArrival,
+    Source,
+    System,
+    TaskSampling,
+)
+from orchestration.system.placement import SHARED
 
 TOP = ("stop_time", "seed")
 
@@ -15,7 +25,8 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
     """A system with other values, by path.
 
     Paths are such as `components.tank.step`, `components.controller.sampling.period`, `connections.valve.delay`,
-    `components.controller.parameters.maxlevel`, `sources.wind.noise`, `stop_time`. 1.0 is the seed 1.
+    `components.controller.parameters.maxlevel`, `sources.wind.noise`, `computers.autopilot.tasks.telemetry.execution`,
+    `networks.bus.messages.status.period`, `stop_time`. Where only a whole number can be, 1.0 is 1.
 
     Raises `UsageError` for a path that does not exist, naming what does, or a value that cannot be.
     """
@@ -30,6 +41,7 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
         name, key = _split(system, path, table, rest)
         grouped.setdefault((table, name), {})[key] = value
     components, sources = dict(system.components), dict(system.sources)
+    shared: dict[str, dict[str, Any]] = {table: dict(getattr(system, table)) for table in SHARED}
     connections = {x.name: x for x in system.connections}
     for (table, name), keys in grouped.items():
         place = f"{table}.{name}"
@@ -37,12 +49,16 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
             components[name] = _component(place, components[name], keys)
         elif table == "connections":
             connections[name] = _replaced(place, connections[name], _by_variable(connections[name], keys))
+        elif table in SHARED:
+            shared[table][name] = _with_parts(place, shared[table][name], keys)
         else:
             sources[name] = _replaced(
                 place, sources[name], _in_place(sources[name], _by_parameter(sources[name], keys))
             )
     result: System = _replaced(
-        "", system, {**top, "components": components, "connections": tuple(connections.values()), "sources": sources}
+        "",
+        system,
+        {**top, "components": components, "connections": tuple(connections.values()), "sources": sources, **shared},
     )
     return result
 
@@ -54,7 +70,8 @@ def names_table(path: str) -> bool:
 
 def _meant(path: str, value: Any) -> Any:
     """A value as the system keeps it: ranges and the command line know neither whole numbers nor paths of files."""
-    if path == "seed" and isinstance(value, float) and value.is_integer():
+    is_whole = path == "seed" or (path.startswith(tuple(f"{table}." for table in SHARED)) and path.endswith(_WHOLE))
+    if is_whole and isinstance(value, float) and value.is_integer():
         return int(value)
     return Path(value) if names_table(path) and isinstance(value, str) else value
 
@@ -71,6 +88,8 @@ def value_at(system: System, path: str) -> Any:
         if kind == "parameters":
             return component.parameters.get(inner)
         return getattr(component.sampling, inner) if kind == "sampling" else getattr(component, kind)
+    if table in SHARED:
+        return _value_of_part(getattr(system, table)[name], key)
     owner: Any = system.sources[name] if table == "sources" else _connection(system, name)
     kind, _, inner = key.partition(".")
     found = getattr(owner, kind)
@@ -87,6 +106,7 @@ def _split(system: System, path: str, table: str, rest: str) -> tuple[str, str]:
         "components": system.components,
         "connections": [x.name for x in system.connections],
         "sources": system.sources,
+        **{shared: getattr(system, shared) for shared in SHARED},
     }
     if table not in tables:
         listed = f"{', '.join(TOP)} or one that begins with {', '.join(tables)}"
@@ -104,8 +124,7 @@ def _split(system: System, path: str, table: str, rest: str) -> tuple[str, str]:
 def _expect_key(path: str, table: str, system: System, name: str, key: str) -> None:
     keys: list[str]
     if table == "components":
-        digital = system.components[name].sampling is not None
-        keys = [f"sampling.{f.name}" for f in dataclasses.fields(Sampling)] if digital else ["step"]
+        keys = _keys_of_stepping(system.components[name])
         keys += ["align", "fmu", "record", "tolerance", "parameters.NAME"]
         known = key in keys or (key.startswith("parameters.") and key != "parameters.")
     elif table == "connections":
@@ -113,12 +132,68 @@ def _expect_key(path: str, table: str, system: System, name: str, key: str) -> N
         keys = [f.name for f in dataclasses.fields(Connection) if f.name not in fixed]
         keys += ["noise", "quantisation", "noise.VARIABLE", "quantisation.VARIABLE"]
         known = key in keys or key.partition(".")[0] in ("noise", "quantisation")
+    elif table in SHARED:
+        keys, known = _keys_of_parts(getattr(system, table)[name], key)
     else:
         keys = [f.name for f in dataclasses.fields(Source)] + ["parameters.NAME"]
         known = key in keys[:-1] or (key.startswith("parameters.") and key != "parameters.")
     if not known:
         listed = f"{table}.{name}. and one of {', '.join(keys)}"
         raise UsageError(f"{path}: no such key; expected {listed}{did_you_mean(key, keys)}")
+
+
+def _keys_of_stepping(component: Component) -> list[str]:
+    """Of a component, what says when it is stepped; a task has none of these, but its computer has."""
+    if isinstance(component.sampling, TaskSampling):
+        return []
+    if isinstance(component.sampling, SamplingOnArrival):
+        return ["sampling.on", "sampling.clock_ratio"]
+    return ["step"] if component.sampling is None else [f"sampling.{f.name}" for f in dataclasses.fields(Sampling)]
+
+
+_WHOLE = (".priority", ".bytes", ".identifier", ".slot")
+_ARRIVALS = "arrivals.poisson"
+
+
+def _keys_of_parts(of: Computer | Network, key: str) -> tuple[list[str], bool]:
+    """What can be changed of what is shared, and whether a key is one of these."""
+    parts, kind = SHARED["computers" if isinstance(of, Computer) else "networks"]
+    own = [f.name for f in dataclasses.fields(of) if f.name != parts]
+    each = [_IN_FILES.get(f.name, f.name) for f in dataclasses.fields(kind) if f.name != "arrivals"] + [_ARRIVALS]
+    valid = {f"{parts}.{name}.{field}" for name in getattr(of, parts) for field in each}
+    return [*own, *(f"{parts}.NAME.{field}" for field in each)], key in own or key in valid
+
+
+_IN_FILES = {"start": "from", "end": "to"}
+_FIELDS = {"from": "start", "to": "end"}
+
+
+def _value_of_part(of: Computer | Network, key: str) -> Any:
+    kind, _, inner = key.partition(".")
+    if not inner:
+        return getattr(of, kind)
+    name, _, field = inner.partition(".")
+    part = getattr(of, kind)[name]
+    if field == _ARRIVALS:
+        return None if part.arrivals is None else part.arrivals.poisson
+    return getattr(part, _FIELDS.get(field, field))
+
+
+def _with_parts(place: str, of: Computer | Network, keys: Mapping[str, Any]) -> Any:
+    """A computer with other tasks, or a network with other messages."""
+    own = {key: value for key, value in keys.items() if "." not in key}
+    inner: dict[str, dict[str, Any]] = {}
+    for key, value in keys.items():
+        if "." in key:
+            _, name, field = key.split(".", 2)
+            inner.setdefault(name, {})[_FIELDS.get(field, field)] = value
+    parts, key = {}, SHARED[place.partition(".")[0]][0]
+    for name, part in getattr(of, key).items():
+        changes = inner.get(name, {})
+        if _ARRIVALS in changes:
+            changes["arrivals"] = Arrivals(poisson=changes.pop(_ARRIVALS))
+        parts[name] = _replaced(f"{place}.{key}.{name}", part, changes) if changes else part
+    return _replaced(place, of, {**own, key: parts})
 
 
 def _component(place: str, component: Component, keys: Mapping[str, Any]) -> Component:

@@ -8,14 +8,33 @@ from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError
 from orchestration.basics.typed_tables import fields_of, parsed, table_of
 from orchestration.system.choices import Order
+from orchestration.system.computers import Arrivals, Computer, Message, Network, Task
 from orchestration.system.distribution import Distribution
-from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
+from orchestration.system.model import (
+    Component,
+    Connection,
+    Criterion,
+    Sampling,
+    SamplingOnArrival,
+    Source,
+    System,
+)
 from orchestration.system.parameters import flattened, parameters_in
 from orchestration.system.paths import changed, for_each
 from orchestration.system.requirements import require
 
+Made = TypeVar("Made")
+
 DistributionTable = table_of(Distribution, file=(str | None, None))
-SamplingTable = table_of(Sampling, within=[DistributionTable])
+
+
+class SamplingTable(table_of(Sampling, within=[DistributionTable], period=(float | None, None))):  # type: ignore[misc]
+    """When a digital task runs: every period, or whenever a message arrives."""
+
+    on: str | None = None
+    """The connection whose arriving messages it runs on, in place of a period."""
+
+
 ComponentTable = table_of(Component, within=[SamplingTable], parameters=(dict[str, Any], {}))
 ConnectionTable = table_of(
     Connection,
@@ -29,9 +48,17 @@ ConnectionTable = table_of(
 )
 SourceTable = table_of(Source, file=(str | None, None))
 CriterionTable = table_of(Criterion)
+ArrivalsTable = table_of(Arrivals)
+TaskTable = table_of(Task, within=[ArrivalsTable, DistributionTable])
+ComputerTable = table_of(Computer, within=[TaskTable])
+MessageTable = table_of(Message, within=[ArrivalsTable, DistributionTable], called={"start": "from", "end": "to"})
+NetworkTable = table_of(Network, within=[MessageTable])
 
 
-class SystemTable(table_of(System, within=[ComponentTable, ConnectionTable, SourceTable, CriterionTable])):  # type: ignore[misc]
+_PARTS = [ComponentTable, ConnectionTable, SourceTable, ComputerTable, NetworkTable, CriterionTable]
+
+
+class SystemTable(table_of(System, within=_PARTS)):  # type: ignore[misc]
     """Components and what connects and drives them, what a run comes to and when it is good."""
 
     order: Order = "gauss-seidel"
@@ -62,7 +89,7 @@ def load_system(path: str | Path) -> System:
 
 def is_system(tables: Mapping[str, Any]) -> bool:
     """Whether a TOML document is a system file rather than a scenario of the quadrotor."""
-    return "components" in tables
+    return not {"components", "computers", "networks"}.isdisjoint(tables)
 
 
 def system_from_tables(tables: Mapping[str, Any], folder: Path) -> System:
@@ -77,6 +104,8 @@ def system_from_tables(tables: Mapping[str, Any], folder: Path) -> System:
                 _connection(i, value, table.order, folder) for i, value in enumerate(table.connections)
             ),
             "sources": {name: _source(name, value, folder) for name, value in table.sources.items()},
+            "computers": {name: _computer(name, value, folder) for name, value in table.computers.items()},
+            "networks": {name: _network(name, value, folder) for name, value in table.networks.items()},
             "criterion": _made("criterion", Criterion, table.criterion.model_dump()),
             "operating_point": dict(flattened(table.operating_point)),
         }
@@ -97,9 +126,33 @@ def _component(name: str, table: Any, folder: Path) -> Component:
     keys["fmu"] = str(folder / table.fmu) if table.fmu.endswith(".fmu") else table.fmu
     keys["parameters"] = parameters_in(table.parameters, f"{place}.parameters")
     if table.sampling is not None:
-        sampling = _with_distributions(f"{place}.sampling", table.sampling, folder)
-        keys["sampling"] = _made(f"{place}.sampling", Sampling, sampling)
+        keys["sampling"] = _sampling(f"{place}.sampling", table.sampling, folder)
     return _made(place, Component, keys)
+
+
+def _sampling(place: str, table: Any, folder: Path) -> Sampling:
+    keys = {key: value for key, value in _with_distributions(place, table, folder).items() if value is not None}
+    if table.on is None:
+        return _made(place, Sampling, keys)
+    require(table.period is None, f"{place}.period", table.period, "none beside on: messages say when it runs")
+    return _made(place, SamplingOnArrival, keys)
+
+
+def _computer(name: str, table: Any, folder: Path) -> Computer:
+    place = f"computers.{name}"
+    tasks = {key: _with_arrivals(f"{place}.tasks.{key}", Task, task, folder) for key, task in table.tasks.items()}
+    return _made(place, Computer, table.model_dump(exclude={"tasks"}) | {"tasks": tasks})
+
+
+def _network(name: str, table: Any, folder: Path) -> Network:
+    place, of = f"networks.{name}", table.messages.items()
+    messages = {key: _with_arrivals(f"{place}.messages.{key}", Message, one, folder) for key, one in of}
+    return _made(place, Network, table.model_dump(exclude={"messages"}) | {"messages": messages})
+
+
+def _with_arrivals(place: str, kind: type[Made], table: Any, folder: Path) -> Made:
+    arrivals = table.arrivals and _made(f"{place}.arrivals", Arrivals, table.arrivals.model_dump())
+    return _made(place, kind, _with_distributions(place, table, folder) | {"arrivals": arrivals})
 
 
 def _connection(index: int, table: Any, order: Order, folder: Path) -> Connection:
@@ -129,9 +182,6 @@ def _with_distributions(place: str, table: Any, folder: Path) -> dict[str, Any]:
 def _source(name: str, table: Any, folder: Path) -> Source:
     file = None if table.file is None else folder / table.file
     return _made(f"sources.{name}", Source, {**table.model_dump(), "file": file})
-
-
-Made = TypeVar("Made")
 
 
 def _made(place: str, kind: type[Made], keys: Mapping[str, Any]) -> Made:

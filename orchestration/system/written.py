@@ -12,11 +12,17 @@ def tables_of(system: Any) -> dict[str, Any]:
     tables["components"] = {
         name: _without_defaults(component, keep=("fmu",)) for name, component in system.components.items()
     }
-    for table in tables["components"].values():
+    for component, table in zip(system.components.values(), tables["components"].values()):
+        if hasattr(component.sampling, "task"):
+            del table["sampling"]  # which the task says
+        if hasattr(component.sampling, "on"):
+            del table["sampling"]["period"]
         if table["fmu"].endswith(".fmu"):
             table["fmu"] = str(Path(table["fmu"]).absolute())
     tables["connections"] = [_connection_table(x) for x in system.connections]
     tables["sources"] = {name: _without_defaults(source) for name, source in system.sources.items()}
+    tables["computers"] = {name: _with_parts(each, "tasks") for name, each in system.computers.items()}
+    tables["networks"] = {name: _with_parts(each, "messages") for name, each in system.networks.items()}
     for key in ("objectives", "streams", "operating_point"):
         tables[key] = dict(getattr(system, key))
     tables["criterion"] = _without_defaults(system.criterion)
@@ -27,6 +33,14 @@ def _connection_table(x: Any) -> dict[str, Any]:
     keys = _without_defaults(x, keep=("name", "scale") if x.stated else ("name",))
     keys.pop("stated", None)
     return {"name": keys.pop("name"), "from": keys.pop("start"), "to": keys.pop("end"), **keys}
+
+
+def _with_parts(of: Any, key: str) -> dict[str, Any]:
+    """A computer with its tasks, or a network with its messages."""
+    parts = {name: _without_defaults(part) for name, part in getattr(of, key).items()}
+    for part in parts.values():
+        part.update({key: part.pop(name) for name, key in (("start", "from"), ("end", "to")) if name in part})
+    return _without_defaults(of) | {key: parts}
 
 
 def _without_defaults(of: Any, keep: tuple[str, ...] = ()) -> dict[str, Any]:

@@ -68,7 +68,7 @@ TWO = 'stop_time = 1.0\n[components]\na = { fmu = "a.fmu", step = 0.1 }\nb = { f
 WIRE = '[[connections]]\nname = "wire"\nfrom = ["a.y"]\nto = ["b.u"]\n'
 SYSTEMS: list[tuple[str, Made]] = [
     (f"stop_time = 1.0\n{TANK}step = -0.1", lambda: Component(fmu="tank.fmu", step=-0.1)),
-    (f"stop_time = 1.0\n{TANK}", lambda: Component(fmu="tank.fmu")),
+    (f"stop_time = 1.0\n{TANK}", lambda: _system(component=Component(fmu="tank.fmu"))),
     (f"stop_time = 0.0\n{TANK}step = 0.1", lambda: _system(stop_time=0.0)),
     (f"stop_time = 1.0\n{TANK}sampling = {{ period = 0.0 }}", lambda: Sampling(period=0.0)),
     (f"stop_time = 1.0\n{TANK}step = 0.1\nrecord = [1]", lambda: Component(fmu="t", step=0.1, record=(1,))),  # type: ignore[arg-type]
@@ -100,8 +100,8 @@ def _wire(**keys: object) -> Connection:
     return Connection(name="wire", start=("a.y",), end=("b.u",), **keys)  # type: ignore[arg-type]
 
 
-def _system(**keys: object) -> System:
-    return System(components={"tank": Component(fmu="tank.fmu", step=0.1)}, **keys)  # type: ignore[arg-type]
+def _system(*, component: Component | None = None, stop_time: float = 1.0) -> System:
+    return System(components={"tank": component or Component(fmu="tank.fmu", step=0.1)}, stop_time=stop_time)
 
 
 def _two(**keys: object) -> System:

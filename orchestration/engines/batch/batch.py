@@ -24,7 +24,7 @@ from orchestration.schedule.schedule import Schedule
 from orchestration.schedule.schedule_cache import ScheduleCache
 from orchestration.schedule.streams import NOISE, Streams
 from orchestration.schedule.timetable import Timetable
-from orchestration.system.model import System, component_of, variable_of
+from orchestration.system.model import System, component_of, is_foreseen, variable_of
 from orchestration.system.times import NANOSECONDS, nanoseconds
 
 MOST_ROWS = 2**20
@@ -352,7 +352,7 @@ class Batch:
         """When the own time of each component begins, as `Master` has it: 0 unless it begins with a later sample."""
         waits = {name for name, model in self._shape.models.items() if model.waits}
         samplings = [component.sampling for name, component in system.components.items() if name not in waits]
-        is_late = any(sampling is not None and (sampling.offset or sampling.jitter) for sampling in samplings)
+        is_late = any(each is not None and (each.offset or each.jitter or is_foreseen(each)) for each in samplings)
         first = Timetable(system, Streams(system.seed, system.streams)).first_samples if is_late else {}
         for index, name in enumerate(self._shape.names):
             ratio, sample = clock_of(system, name, first)

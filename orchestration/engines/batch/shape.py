@@ -25,6 +25,7 @@ from orchestration.results.objectives import GOOD
 from orchestration.schedule.plan import is_plain
 from orchestration.system.check import recorded
 from orchestration.system.model import Connection, Source, System, component_of, variable_of
+from orchestration.system.placement import carried
 
 Places = npt.NDArray[np.int64]
 c = structures(1)
@@ -36,7 +37,7 @@ def outline(system: System) -> Hashable:
     """What two systems must have in common to be flown in lanes of one batch."""
     return (
         tuple((name, c.fmu, c.record, c.sampling and c.sampling.clock) for name, c in system.components.items()),
-        tuple(map(_outline_of, system.connections)),
+        tuple(map(_outline_of, system.connections)), frozenset(carried(system)),
         tuple((name, source.to, _kind(source), source.trajectory) for name, source in system.sources.items()),
         tuple(system.objectives.items()), system.optional, system.criterion,
     )  # fmt: skip

@@ -108,6 +108,9 @@ def _unsaid(system: System) -> Iterator[str]:
     for name, component in system.components.items():
         if component.sampling is not None:
             yield from _not_plain(f"components.{name}.sampling", component.sampling, ("jitter", "clock_ratio"))
+    for table in ("computers", "networks"):
+        for name in getattr(system, table):
+            yield f"{table}.{name}: an SSP cannot say that; expected none"
     for x in system.connections:
         yield from _not_plain(f"connections.{x.name}", x, FAULTS)
     for name, source in system.sources.items():

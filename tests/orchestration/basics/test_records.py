@@ -40,7 +40,7 @@ def test_what_stands_below_a_field_is_read_without_importing_it() -> None:
 
 
 def test_a_table_has_the_keys_of_its_record_and_says_of_them_what_the_record_does() -> None:
-    assert [*fields_of(SamplingTable)] == [*attribute_docs("orchestration.system.model", "Sampling")]
+    assert [*fields_of(SamplingTable)] == [*attribute_docs("orchestration.system.model", "Sampling"), "on"]
     assert {"from", "to", "name"} <= fields_of(ConnectionTable).keys()
     assert not {"start", "end", "stated"} & fields_of(ConnectionTable).keys()
     assert docs_of_keys(DesignTable)["seed"] == "The seed of the sampling."

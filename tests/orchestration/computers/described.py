@@ -115,4 +115,4 @@ class Described:
         parts = self.parts()
         scheduler = Scheduler(parts)
         scheduler.run(LATER)
-        return timeline(parts, self.names(), [LATER] * len(self.messages), scheduler.taken(), self.stop)
+        return timeline(parts, self.names(), [LATER] * len(self.messages), scheduler.taken())

@@ -34,7 +34,7 @@ def theirs(tasks, policy):
     made.scheduler_info.clas = NAMES[policy]
     model = simso.Model(made)
     model.run_model()
-    found = {int(task.name): [] for task in model.task_list}
+    found: dict[int, list[int]] = {}
     for task in model.results.tasks.values():
         found[int(task.name)] = [job.end_date - job.activation_date for job in task.jobs if job.end_date is not None]
     return found

@@ -32,7 +32,8 @@ def distributions(draw: st.DrawFn, most: float = 0.1) -> Distribution:
     if kind == "uniform":
         return Distribution(uniform=(low, high))
     if kind == "normal":
-        return Distribution(normal=(draw(st.floats(-0.01, most)), 0.1 * most + high), range=(0.0, high + 1e-4 * most))
+        mean = draw(st.floats(-0.1 * most, high))
+        return Distribution(normal=(mean, 0.1 * most + high), range=(0.0, high + 1e-4 * most))
     if kind == "file":
         return Distribution(file=TRACE, column="delay", order=draw(st.sampled_from(ORDERS)))
     values = (low, high, 0.5 * high)

@@ -1,0 +1,133 @@
+"""What the scheduler has found so far of the components and connections of a system, ahead of its timetable."""
+
+from collections.abc import Collection
+
+import numpy as np
+
+from orchestration.basics.simulator import Integers
+from orchestration.computers.parts import ARRIVES, LATER, SAMPLED, SENT
+from orchestration.computers.scheduler import Scheduler
+from orchestration.schedule.resources import Resources
+from orchestration.schedule.streams import Streams
+from orchestration.system.computers import Task
+from orchestration.system.model import System
+from orchestration.system.placement import placed_tasks
+from orchestration.system.times import nanoseconds
+
+NEVER = 2**60
+"""[ns] of what does not come before the end"""
+_UNKNOWN = -2
+_SENT, _LOST, _NOTHING = range(3)
+"""What becomes of a message of a connection, as SENT notes it"""
+_FURTHER = 1_000_000
+"""[ns] that the scheduler goes on at least where something is not known yet"""
+
+
+class Messages:
+    """Messages of one connection in the order of sending, from when they are sent until they are taken."""
+
+    def __init__(self) -> None:
+        self._rows: Integers = np.zeros((0, 3), dtype=np.int64)
+        self._first = 0
+
+    def hear(self, sent: Integers, arriving: Integers) -> None:
+        """Notes of when some were sent and what became of them, and of when some arrive."""
+        rows = np.column_stack([sent[:, 0], sent[:, 4], np.full(len(sent), _UNKNOWN)])
+        self._rows = np.concatenate([self._rows, rows])
+        self._rows[arriving[:, 3] - self._first, 2] = arriving[:, 4]
+
+    def known(self, over: bool) -> int:
+        """How many there are, up to the first of which it is open when it arrives; at the end nothing is open."""
+        is_open = (self._rows[:, 1] == _SENT) & (self._rows[:, 2] == _UNKNOWN)
+        return int(is_open.argmax()) if is_open.any() and not over else len(self._rows)
+
+    def instants(self) -> Integers:
+        """When those are sent that are known and not taken."""
+        return self._rows[:, 0]
+
+    def take(self, count: int) -> tuple[Integers, Integers]:
+        """Of the next so many, when they are sent and when they arrive, -1 for never.
+
+        What was under way at the end arrives after it; of what was not sent by then nothing is told at all.
+        """
+        rows = self._rows[:count]
+        sent, arrives = np.full((2, count), NEVER, dtype=np.int64)
+        arrives[len(rows) :] = -1
+        of_any = rows[:, 1] != _NOTHING
+        sent[: len(rows)][of_any] = rows[of_any, 0]
+        arrives[: len(rows)] = np.where(rows[:, 1] != _SENT, -1, np.where(rows[:, 2] == _UNKNOWN, NEVER, rows[:, 2]))
+        self._rows, self._first = self._rows[count:], self._first + len(rows)
+        return sent, arrives
+
+
+class Samples:
+    """When a component samples, from when that is known until it is taken, and what it sends."""
+
+    def __init__(self, messages: Collection[Messages]) -> None:
+        """`messages` are those of its connections that the scheduler knows."""
+        self.times: Integers = np.zeros(0, dtype=np.int64)
+        self._messages = messages
+
+    def hear(self, times: Integers) -> None:
+        """Some more."""
+        self.times = np.concatenate([self.times, times])
+
+    def known(self, over: bool) -> int:
+        """Of how many all is known, the time of the next one too."""
+        count = len(self.times) if over else max(len(self.times) - 1, 0)
+        return count if over else min([count, *(each.known(over) for each in self._messages)])
+
+    def take(self, count: int) -> tuple[Integers, Integers]:
+        """The times of the next so many, and of those after each, NEVER if that does not come before the end."""
+        times, then = self.times[:count], np.append(self.times[1 : count + 1], NEVER)[:count]
+        self.times = self.times[count:]
+        return times, then
+
+
+def _decides_late(task: Task) -> bool:
+    """Whether it is open up to the deadline if what was read at a release will be computed with."""
+    return task.read == "release" and task.overrun == "abort"
+
+
+class Foreseen:
+    """The scheduler of a system at work."""
+
+    def __init__(self, system: System, streams: Streams, ahead: int) -> None:
+        """What is measured is measured up to so many nanoseconds `ahead` of its sample, which may be after the end."""
+        open_for = [nanoseconds(each.task.due) for each in placed_tasks(system.computers) if _decides_late(each.task)]
+        resources = Resources(system, streams, nanoseconds(system.stop_time) + ahead + max(open_for, default=0))
+        self._scheduler = Scheduler(resources.parts, (SAMPLED, SENT, ARRIVES))
+        self._tasks, self._stop = resources.tasks, resources.parts.stop
+        self._reached = 0
+        self.messages = {name: Messages() for name in resources.carriers}
+        """by connection"""
+        self.samples = {
+            name: Samples(
+                [self.messages[x.name] for x in system.connections if x.sender == name and x.name in self.messages]
+            )
+            for name in self._tasks
+        }
+        """by component"""
+
+    @property
+    def over(self) -> bool:
+        """Whether all is known up to the end."""
+        return self._reached > self._stop
+
+    def to(self, time: int) -> None:
+        """Find out what happens before `time` [ns]."""
+        if time <= self._reached:
+            return
+        self._reached = LATER if self._scheduler.reached == LATER else time
+        self._scheduler.run(time)
+        notes = self._scheduler.taken()
+        kinds = {kind: notes[notes[:, 1] == kind] for kind in (SAMPLED, SENT, ARRIVES)}
+        for name, task in self._tasks.items():
+            found = kinds[SAMPLED]
+            self.samples[name].hear(found[found[:, 2] == task, 4])
+        for i, messages in enumerate(self.messages.values()):
+            messages.hear(*(kinds[kind][kinds[kind][:, 2] == i] for kind in (SENT, ARRIVES)))
+
+    def further(self) -> None:
+        """Find out more, as something before the time that was asked for is not known yet."""
+        self.to(min(self._reached + max(self._reached // 4, _FURTHER), self._stop + 1))

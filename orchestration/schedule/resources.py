@@ -1,0 +1,288 @@
+"""The computers and networks of a system, as the scheduler takes them: whole numbers, and streams of them."""
+
+import math
+from collections.abc import Callable
+from fractions import Fraction
+from functools import partial
+
+import numpy as np
+
+from orchestration.basics.simulator import Integers
+from orchestration.computers.parts import (
+    ABORT,
+    EARLIEST_DEADLINE,
+    FIRST_COME,
+    FIXED_PRIORITY,
+    LATER,
+    NONE,
+    QUEUE,
+    SKIP,
+    Carrier,
+    Leg,
+    Link,
+    Message,
+    Parts,
+    Processor,
+    Stream,
+    Task,
+    constant,
+)
+from orchestration.computers.results import Timeline
+from orchestration.computers.scheduler import Scheduler
+from orchestration.computers.timeline import NEEDED, Names, timeline
+from orchestration.schedule.drawing import times
+from orchestration.schedule.message_times import lateness, losses
+from orchestration.schedule.streams import ARRIVALS, DELAY, DELAY_JITTER, ERROR, EXECUTION, JITTER, LOSS, Streams
+from orchestration.system.computers import Arrivals
+from orchestration.system.frames import ERROR_BITS, frame_nanoseconds
+from orchestration.system.model import SamplingOnArrival, System, TaskSampling
+from orchestration.system.placement import (
+    PlacedMessage,
+    PlacedTask,
+    carried,
+    nodes_of,
+    placed_messages,
+    placed_tasks,
+    released_by,
+)
+from orchestration.system.times import Grid, exact_nanoseconds, nanoseconds
+
+_POLICIES = {
+    "fixed-priority": FIXED_PRIORITY,
+    "earliest-deadline-first": EARLIEST_DEADLINE,
+    "first-come-first-served": FIRST_COME,
+}
+_OVERRUNS = {"queue": QUEUE, "skip": SKIP, "abort": ABORT}
+_NO_DEADLINE = LATER // 2
+
+
+class Resources:
+    """Parts, with their names and with what they are of the system."""
+
+    def __init__(self, system: System, streams: Streams, stop: int) -> None:
+        """Up to `stop` [ns]."""
+        self._system, self._streams_of, self._stop = system, streams, stop
+        self._streams: list[Stream] = []
+        self._links: list[Link] = []
+        self._link_names: list[str] = []
+        self._zero = self._stream(constant(0))
+        placed, self._over = [*placed_tasks(system.computers)], [*placed_messages(system.networks)]
+        released = released_by(system)
+        self.tasks = {each.task.component: i for i, each in enumerate(placed) if each.task.component is not None}
+        """by component, that whose jobs are its steps"""
+        by_network = carried(system)
+        sending = {x.sender for x in system.connections if x.name in by_network or x.name in released}
+        for name, component in system.components.items():
+            sampling = component.sampling
+            on_its_own = isinstance(sampling, SamplingOnArrival) or (sampling is not None and name in sending)
+            if on_its_own and not isinstance(sampling, TaskSampling):
+                self.tasks[name] = len(placed) + len([x for x in self.tasks.values() if x >= len(placed)])
+        self._alone = [name for name, i in self.tasks.items() if i >= len(placed)]
+        messages = {x.message.connection: m for m, x in enumerate(self._over)}
+        self.carriers = {
+            x.name: i
+            for i, x in enumerate(
+                x
+                for x in system.connections
+                if x.name in by_network or (x.sender in self.tasks and x.order == "gauss-seidel")
+            )
+        }
+        """by connection"""
+        processors = [
+            Processor(_POLICIES[each.scheduling], each.preemptive, nanoseconds(each.switch))
+            for each in system.computers.values()
+        ]
+        self.parts = Parts(
+            stop=self._stop,
+            processors=[*processors, *(Processor(FIRST_COME, False, 0) for _ in self._alone)],
+            tasks=[
+                *map(self._task, placed),
+                *(self._task_alone(name, len(processors) + i) for i, name in enumerate(self._alone)),
+            ],
+            carriers=[
+                self._carrier(name, messages.get(name, NONE), self._indices(released.get(name, ())))
+                for name in self.carriers
+            ],
+            messages=[self._message(each) for each in self._over],
+            links=self._links,
+            streams=self._streams,
+        )
+        self._names = Names(
+            processors=[*system.computers, *self._alone],
+            tasks=[*(f"{each.computer_name}.{each.name}" for each in placed), *self._alone],
+            messages=[f"{each.network_name}.{each.name}" for each in self._over],
+            links=self._link_names,
+        )
+
+    def timeline(self) -> Timeline:
+        """What becomes of all computers and networks up to the end."""
+        scheduler = Scheduler(self.parts, NEEDED)
+        scheduler.run(LATER)
+        dues = [each.message.due for each in self._over]
+        deadlines = [LATER if due is None else nanoseconds(due) for due in dues]
+        alone = frozenset(self._alone)
+        return timeline(self.parts, self._names, deadlines, scheduler.taken(), without=alone)
+
+    # -- tasks -----------------------------------------------------------------------------------------------------
+
+    def _task(self, of: PlacedTask) -> Task:
+        task, ratio = of.task, Fraction(repr(float(of.computer.clock_ratio)))
+        nominal = NONE
+        if task.on is None:
+            nominal = self._instants(of.place, task.offset, task.period, task.arrivals, ratio)
+        late = self._stream(lateness(task.jitter, "uniform", self._generator(of.place, JITTER)))
+        return Task(
+            processor=list(self._system.computers).index(of.computer_name),
+            priority=task.priority,
+            deadline=nanoseconds(task.due),
+            overrun=_OVERRUNS[task.overrun],
+            reads_at_release=task.read == "release",
+            writes_at_deadline=task.write == "deadline",
+            nominal=nominal,
+            late=late,
+            execution=self._stream(times(task.execution, self._generator(of.place, EXECUTION))),
+        )
+
+    def _task_alone(self, name: str, processor: int) -> Task:
+        """A sampled component on no computer, which takes no time."""
+        sampling = self._system.components[name].sampling
+        assert sampling is not None
+        ratio, nominal, late = Fraction(repr(float(sampling.clock_ratio))), NONE, self._zero
+        if not isinstance(sampling, SamplingOnArrival):
+            place = f"components.{name}"
+            nominal = self._instants(place, sampling.offset, sampling.period, None, ratio)
+            generator = self._generator(place, JITTER)
+            late = self._stream(lateness(sampling.jitter, sampling.jitter_distribution, generator))
+        return Task(
+            processor=processor,
+            priority=1,
+            deadline=_NO_DEADLINE,
+            overrun=QUEUE,
+            reads_at_release=False,
+            writes_at_deadline=False,
+            nominal=nominal,
+            late=late,
+            execution=self._zero,
+        )
+
+    def _indices(self, released: tuple[str, ...]) -> tuple[int, ...]:
+        """Tasks by their paths, or components that messages release."""
+        paths = {each.place: i for i, each in enumerate(placed_tasks(self._system.computers))}
+        return tuple(paths[one] if one in paths else self.tasks[one] for one in released)
+
+    # -- messages --------------------------------------------------------------------------------------------------
+
+    def _carrier(self, name: str, message: int, releases: tuple[int, ...]) -> Carrier:
+        x = next(x for x in self._system.connections if x.name == name)
+        owner = f"connections.{name}"
+        delay = times(x.delay, self._generator(owner, DELAY))
+        late = lateness(x.delay_jitter, x.jitter_distribution, self._generator(owner, DELAY_JITTER))
+        lost = losses(x.loss, x.burst_length, self._generator(owner, LOSS))
+        return Carrier(
+            sender=self.tasks.get(x.sender, NONE),
+            message=message,
+            late=self._stream(lambda count: delay(count) + late(count)),
+            lost=self._stream(lambda count: lost(count).astype(np.int64)),
+            releases=releases,
+        )
+
+    def _message(self, of: PlacedMessage) -> Message:
+        message, network = of.message, of.network
+        nominal = NONE
+        if message.period is not None or message.arrivals is not None:
+            nominal = self._instants(of.place, message.offset, message.period, message.arrivals, Fraction(1))
+        corrupted = losses(network.error, None, self._generator(of.place, ERROR))
+        is_can = network.kind in ("can", "can-fd")
+        ranked = {"ethernet": message.priority}
+        return Message(
+            rank=(message.identifier or 0) if is_can else ranked.get(network.kind, 0),
+            legs=self._legs(of),
+            pause=nanoseconds(network.latency),
+            nominal=nominal,
+            late=self._stream(lateness(message.jitter, "uniform", self._generator(of.place, JITTER))),
+            corrupted=self._stream(lambda count: corrupted(count).astype(np.int64)),
+            carrier=self.carriers.get(message.connection or "", NONE),
+        )
+
+    def _legs(self, of: PlacedMessage) -> tuple[Leg, ...]:
+        network, name = of.network, of.network_name
+        length = frame_nanoseconds(network, of.message)
+        spoilt = frame_nanoseconds(network, of.message, ERROR_BITS) if network.kind != "tdma" else length
+        slot = of.message.slot if network.kind == "tdma" and of.message.slot is not None else NONE
+        ways = [name]
+        if network.kind == "ethernet":
+            start, end = nodes_of(self._system, of)
+            ways = [f"{name}: {start} -> switch", f"{name}: switch -> {end}"]
+        return tuple(
+            Leg(link=self._link(way, network.slots), slot=slot, length=length, corrupted_length=spoilt) for way in ways
+        )
+
+    def _link(self, name: str, slots: tuple[float, ...]) -> int:
+        if name not in self._link_names:
+            begins = NONE
+            if slots:
+                lengths = [exact_nanoseconds(each) for each in slots]
+                grids = [Grid(sum(lengths[:i], Fraction(0)), sum(lengths, Fraction(0))) for i in range(len(lengths))]
+                begins = self._stream(_one_after_the_other(grids, self._stop))
+            self._link_names.append(name)
+            self._links.append(Link(slots=len(slots), begins=begins))
+        return self._link_names.index(name)
+
+    # -- numbers ---------------------------------------------------------------------------------------------------
+
+    def _stream(self, stream: Stream) -> int:
+        self._streams.append(stream)
+        return len(self._streams) - 1
+
+    def _generator(self, owner: str, cause: str) -> Callable[[], np.random.Generator]:
+        return partial(self._streams_of.of, owner, cause)
+
+    def _instants(
+        self, place: str, offset: float, period: float | None, arrivals: Arrivals | None, ratio: Fraction
+    ) -> int:
+        start = exact_nanoseconds(offset) / ratio
+        if arrivals is not None:
+            return self._stream(_by_chance(round(start), arrivals.poisson, self._streams_of.of(place, ARRIVALS)))
+        assert period is not None
+        return self._stream(_one_after_the_other([Grid(start, exact_nanoseconds(period) / ratio)], self._stop))
+
+
+def _one_after_the_other(grids: list[Grid], stop: int) -> Stream:
+    """The first instant of each grid, the second of each, and so on; LATER in place of those past the end."""
+    first, many = 0, len(grids)
+    lasts = [grid.index_from(stop) for grid in grids]
+
+    def drawn(count: int) -> Integers:
+        nonlocal first
+        numbers = np.arange(first, first + count)
+        first += count
+        found = np.full(count, LATER, dtype=np.int64)
+        for i, grid in enumerate(grids):
+            which = np.flatnonzero((numbers % many == i) & (numbers // many <= lasts[i]))
+            if len(which):
+                k = numbers[which] // many
+                found[which] = grid.between(int(k[0]), int(k[-1]) + 1)
+        return found
+
+    return drawn
+
+
+def _by_chance(start: int, rate: float, generator: np.random.Generator) -> Stream:
+    """Instants of a Poisson process; numpy's logarithm of many numbers at once would give other bits."""
+    last = start
+
+    def drawn(count: int) -> Integers:
+        nonlocal last
+        found = []
+        for u in generator.random(count).tolist():
+            gap = -math.log(1.0 - u) * 1e9 / rate
+            last = min(last + max(1, math.floor(gap)), LATER)
+            found.append(last)
+        return np.array(found, dtype=np.int64)
+
+    return drawn
+
+
+def timeline_of(system: System) -> Timeline:
+    """What becomes of the tasks and messages of a system up to its end."""
+    return Resources(system, Streams(system.seed, system.streams), nanoseconds(system.stop_time)).timeline()

@@ -1,0 +1,252 @@
+"""Which component runs on which computer, and which connection goes over which network."""
+
+from collections.abc import Hashable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
+
+from orchestration.basics.errors import UsageError
+from orchestration.system.computers import Computer, Message, Network, Task
+from orchestration.system.distribution import content
+from orchestration.system.requirements import require
+
+if TYPE_CHECKING:
+    from orchestration.system.model import Component, Connection, System
+
+
+SHARED: Mapping[str, tuple[str, type]] = {"computers": ("tasks", Task), "networks": ("messages", Message)}
+"""The tables of what is shared, with the key of what shares it, and what that is"""
+
+
+@dataclass(frozen=True)
+class PlacedTask:
+    """A task, and where it is."""
+
+    computer_name: str
+    name: str
+    computer: Computer
+    task: Task
+
+    @property
+    def place(self) -> str:
+        """Its path."""
+        return f"computers.{self.computer_name}.tasks.{self.name}"
+
+
+@dataclass(frozen=True)
+class PlacedMessage:
+    """A message, and where it is."""
+
+    network_name: str
+    name: str
+    network: Network
+    message: Message
+
+    @property
+    def place(self) -> str:
+        """Its path."""
+        return f"networks.{self.network_name}.messages.{self.name}"
+
+
+def placed_tasks(computers: Mapping[str, Computer]) -> Iterator[PlacedTask]:
+    """All of them, in the order of the file."""
+    for computer_name, computer in computers.items():
+        for name, task in computer.tasks.items():
+            yield PlacedTask(computer_name, name, computer, task)
+
+
+def placed_messages(networks: Mapping[str, Network]) -> Iterator[PlacedMessage]:
+    """All of them, in the order of the file."""
+    for network_name, network in networks.items():
+        for name, message in network.messages.items():
+            yield PlacedMessage(network_name, name, network, message)
+
+
+def tasks_of(system: "System") -> dict[str, PlacedTask]:
+    """Tasks by the component whose steps are their jobs."""
+    return {each.task.component: each for each in placed_tasks(system.computers) if each.task.component is not None}
+
+
+def carried(system: "System") -> dict[str, PlacedMessage]:
+    """Messages by the connection that they are of."""
+    found = placed_messages(system.networks)
+    return {each.message.connection: each for each in found if each.message.connection is not None}
+
+
+def released_by(system: "System") -> dict[str, tuple[str, ...]]:
+    """What each connection releases whose arrivals release something: paths of tasks, and names of components."""
+    found: dict[str, tuple[str, ...]] = {}
+    for each in placed_tasks(system.computers):
+        if each.task.on is not None:
+            found[each.task.on] = (*found.get(each.task.on, ()), each.place)
+    for name, connection in _by_arrivals(system).items():
+        found[connection] = (*found.get(connection, ()), name)
+    return found
+
+
+def expect_none(system: "System", why: str) -> None:
+    """Raise `UsageError`, saying `why`, for a system of which something happens when the scheduler says."""
+    placed = [task.place for task in tasks_of(system).values()]
+    placed += [message.place for message in carried(system).values()]
+    placed += [f"components.{name}.sampling.on" for name in _by_arrivals(system)]
+    if placed:
+        raise UsageError(f"{placed[0]}: {why}")
+
+
+def _by_arrivals(system: "System") -> dict[str, str]:
+    """Components that are sampled whenever a message arrives, with its connection."""
+    from orchestration.system.model import SamplingOnArrival
+
+    samplings = {name: one.sampling for name, one in system.components.items()}
+    return {name: each.on for name, each in samplings.items() if isinstance(each, SamplingOnArrival)}
+
+
+def is_random(system: "System") -> bool:
+    """Whether seeds make a difference to when its tasks run and its frames are sent."""
+    tasks, messages = placed_tasks(system.computers), [*placed_messages(system.networks)]
+    by_chance = any(each.task.is_random for each in tasks) or any(each.message.is_random for each in messages)
+    return by_chance or any(each.network.error > 0.0 for each in messages)
+
+
+def content_of(system: "System") -> Hashable:
+    """What its computers and networks are told by from any others."""
+    shared = [(each.place, *_values(each.computer), *_values(each.task)) for each in placed_tasks(system.computers)]
+    shared += [
+        (each.place, *_values(each.network), *_values(each.message)) for each in placed_messages(system.networks)
+    ]
+    return tuple(shared)
+
+
+def _values(of: Any) -> tuple[Hashable, ...]:
+    found = (getattr(of, field.name) for field in fields(of))
+    return tuple(content(value) for value in found if not isinstance(value, Mapping))
+
+
+def with_tasks(
+    components: Mapping[str, "Component"], connections: tuple["Connection", ...], computers: Mapping[str, Computer],
+    networks: Mapping[str, Network],
+) -> dict[str, "Component"]:  # fmt: skip
+    """The components, those of tasks with a sampling that says what is known of their instants beforehand."""
+    tasks: dict[str, PlacedTask] = {}
+    for each in placed_tasks(computers):
+        name = each.task.component
+        if name is None:
+            continue
+        known = ", ".join(components) or "(there is none)"
+        require(name in components, f"{each.place}.component", name, f"one of the components {known}")
+        taken = tasks.get(name)
+        require(taken is None, f"{each.place}.component", name, f"another one than {taken and taken.place} has")
+        tasks[name] = each
+    periods = _Periods(components, connections, tasks, networks)
+    return {name: _with_task(name, one, tasks.get(name), periods) for name, one in components.items()}
+
+
+def _with_task(name: str, component: "Component", of: PlacedTask | None, periods: "_Periods") -> "Component":
+    from orchestration.system.model import Sampling, SamplingOnArrival, TaskSampling
+
+    given = component.sampling
+    if of is not None:
+        for key, value in (("sampling", given), ("step", component.step)):
+            own = value is not None and not isinstance(value, TaskSampling)
+            require(not own, f"components.{name}.{key}", "given", f"none beside {of.place}, which says when it runs")
+        ratio, task = of.computer.clock_ratio, of.task
+        period = periods.of(name) * ratio if task.period is None else task.period
+        sampling: Sampling = TaskSampling(period=period, offset=task.offset, clock_ratio=ratio, task=of.place)
+    elif isinstance(given, SamplingOnArrival):
+        sampling = replace(given, period=periods.of(name))
+    else:
+        stated = component.step is not None or (given is not None and not isinstance(given, TaskSampling))
+        require(stated, f"components.{name}.step", "none", "step (continuous time) or sampling (a digital task)")
+        return component
+    return component if sampling == given else replace(component, sampling=sampling)
+
+
+class _Periods:
+    """From one sample of a component to the next [s] of true time, about: of what arrivals release, that of these."""
+
+    def __init__(
+        self, components: Mapping[str, "Component"], connections: tuple["Connection", ...],
+        tasks: Mapping[str, PlacedTask], networks: Mapping[str, Network],
+    ) -> None:  # fmt: skip
+        self._components, self._tasks = components, tasks
+        self._connections = {x.name: x for x in connections}
+        self._messages = {each.message.connection: each.message for each in placed_messages(networks)}
+
+    def of(self, name: str, after: tuple[str, ...] = ()) -> float:
+        """Of a component."""
+        from orchestration.system.model import SamplingOnArrival
+
+        task, sampling = self._tasks.get(name), self._components[name].sampling
+        if task is not None and task.task.on is None:
+            return self._of_task(task)
+        if task is not None and task.task.on is not None:
+            return self.of_connection(f"{task.place}.on", task.task.on, (*after, name))
+        if isinstance(sampling, SamplingOnArrival):
+            return self.of_connection(f"components.{name}.sampling.on", sampling.on, (*after, name))
+        return sampling.period / sampling.clock_ratio if sampling is not None else 0.0
+
+    def of_connection(self, place: str, connection: str, after: tuple[str, ...]) -> float:
+        """Of the messages over a connection; raises `UsageError`, naming the `place`, where there are none."""
+        x, message = self._connections.get(connection), self._messages.get(connection)
+        known = ", ".join(self._connections) or "(there is none)"
+        require(x is not None, place, connection, f"one of the connections {known}")
+        assert x is not None
+        if message is not None and message.period is not None:
+            return message.period
+        sender = self._components[x.sender]
+        if x.sender in after:
+            raise UsageError(f"{place} = {connection}: expected something that begins: each waits for the other")
+        expected = "one from a sampled component, or over a network: no other has messages of its own"
+        require(sender.step is None, place, connection, expected)
+        return self.of(x.sender, after)
+
+    def _of_task(self, of: PlacedTask) -> float:
+        if of.task.arrivals is not None:
+            return of.task.arrivals.gap
+        return (of.task.period or 0.0) / of.computer.clock_ratio
+
+
+def expect_placement(system: "System") -> None:
+    """Raise `UsageError` for what cannot be whatever the FMUs are."""
+    tasks, messages, released = tasks_of(system), carried(system), released_by(system)
+    connections = {x.name: x for x in system.connections}
+    periods = _Periods(system.components, system.connections, tasks, system.networks)
+    for each in placed_tasks(system.computers):
+        if each.task.on is not None:
+            periods.of_connection(f"{each.place}.on", each.task.on, ())
+    for x in system.connections:
+        fits = x.order == "gauss-seidel" or x.name not in released
+        require(fits, f"connections.{x.name}.order", x.order, "gauss-seidel: its arrivals release a task")
+        of = [each.place for each in (tasks.get(x.sender), tasks.get(x.receiver), messages.get(x.name)) if each]
+        fits = x.order == "gauss-seidel" or not of
+        require(fits, f"connections.{x.name}.order", x.order, f"gauss-seidel beside {', '.join(of)}")
+    seen: dict[str, str] = {}
+    for one in placed_messages(system.networks):
+        message, name = one.message, one.message.connection
+        if name is None:
+            continue
+        known = ", ".join(connections) or "(there is none)"
+        require(name in connections, f"{one.place}.connection", name, f"one of the connections {known}")
+        require(name not in seen, f"{one.place}.connection", name, f"another one than {seen.get(name)} has")
+        seen[name] = one.place
+        sampled = system.components[connections[name].sender].sampling is not None
+        stated = message.period is not None
+        require(message.arrivals is None, f"{one.place}.arrivals", "given", "none: it is the message of a connection")
+        sender = connections[name].sender
+        expected = f"none: it is sent when {sender} writes" if sampled else f"when {sender} sends, which does not say"
+        require(stated != sampled, f"{one.place}.period", message.period if stated else "none", expected)
+        expect_nodes(system, one)
+
+
+def expect_nodes(system: "System", of: PlacedMessage) -> None:
+    """Raise `UsageError` for a frame of Ethernet that goes nowhere."""
+    if of.network.kind == "ethernet":
+        start, end = nodes_of(system, of)
+        require(start != end, f"{of.place}.to", end, "another node than it comes from")
+
+
+def nodes_of(system: "System", of: PlacedMessage) -> tuple[str, str]:
+    """The nodes between which a message goes: as it says, else the computers of the ends of its connection, or they."""
+    tasks, x = tasks_of(system), next((x for x in system.connections if x.name == of.message.connection), None)
+    ends = ("", "") if x is None else (x.sender, x.receiver)
+    start, end = (tasks[name].computer_name if name in tasks else name for name in ends)
+    return of.message.start or start, of.message.end or end
