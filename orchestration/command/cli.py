@@ -230,6 +230,7 @@ def run(
         return Answer(document={"paused_in": out}, lines=[])
     for warning in result.warnings:
         warn(warning)
+    exact.say_if_endless(result.asked)
     if follows := result.provenance["follows"]:
         say(f"follows {follows}")
     if out is not None:

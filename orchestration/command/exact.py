@@ -5,12 +5,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from orchestration.basics.terminal import warn
 from orchestration.command import registry as registering
 from orchestration.command.answer import Answer
 from orchestration.command.flags import FlightFlags, Timing, flies, request_from
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from orchestration.building.inputs import Files
     from orchestration.exact.expect import Expected
+    from orchestration.system.model import System
+    from orchestration.system.request import Request
 
 
 @flies
@@ -31,6 +37,18 @@ def expect(
 
     found = expected(request_from(scenario, flags, timing), as_simulated=as_simulated)
     return Answer(document=found, lines=_lines(found))
+
+
+def say_if_endless(request: "Request", systems: "Sequence[System] | None" = None, files: "Files | None" = None) -> None:
+    """Warn where averages over such runs mean nothing."""
+    from orchestration.building.inputs import files_of
+    from orchestration.exact.endless import endless
+    from orchestration.system.request import system_meant
+
+    systems = [system_meant(request)] if systems is None else systems
+    text = endless(request, systems, files_of(systems[0]) if files is None else files)
+    if text is not None:
+        warn(text)
 
 
 def _lines(found: "Expected") -> list[str]:

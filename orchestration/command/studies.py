@@ -8,7 +8,7 @@ import typer
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.terminal import progress_bar, say
-from orchestration.command import completion
+from orchestration.command import completion, exact
 from orchestration.command import registry as registering
 from orchestration.command.answer import Answer, of_files
 from orchestration.command.build_flag import builds
@@ -19,6 +19,9 @@ from orchestration.command.shared_flags import takes
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file.", metavar="STUDY.toml", show_default=False)]
 Out = Annotated[Path | None, typer.Option("--out", help="Folder of the store; default: results/NAME.", metavar="DIR")]
+
+FIRST = 1000
+"""Runs of a study of which is looked at whether their averages mean anything"""
 
 StudyEngineFlag = Annotated[
     str,
@@ -48,8 +51,9 @@ def sweep(
     from orchestration.studies.sweep import sweep as fly
     from orchestration.workers.choice import choice_named
 
+    chosen = load_study(study)
     summary = fly(
-        load_study(study), folder=out, workers=workers, dask=dask, retry_failed=retry_failed,
+        chosen, folder=out, workers=workers, dask=dask, retry_failed=retry_failed,
         engine=choice_named(engine), time_limit=time_limit,
     )  # fmt: skip
     failed = f", {summary.failed} failed (quadcosim export shows why; --retry-failed)" if summary.failed else ""
@@ -58,6 +62,9 @@ def sweep(
         lines.append(f"engine batch: {summary.agreement}")
     for each in summary.follows:
         say(f"follows {each}")
+    files = chosen.files()
+    first = range(min(len(chosen.points), FIRST))
+    exact.say_if_endless(chosen.base, [chosen.system(i, files.starts_of(chosen.origin)) for i in first], files)
     told = ("total", "flown", "failed", "path", "engine", "agreement", "follows")
     document = {name: getattr(summary, name) for name in told}
     return Answer(document=document, lines=lines, good=not summary.failed)

@@ -9,8 +9,6 @@ from orchestration.basics.bisection import Range
 from orchestration.basics.statistics import refutes, wilson
 from orchestration.requests.ranges import Varied
 from orchestration.results.criterion import judged, unmet
-from orchestration.system import placement
-from orchestration.system.model import System
 from orchestration.workers.executors import RunEvaluator
 
 RELIABILITY = 0.9
@@ -20,16 +18,6 @@ RELIABILITY = 0.9
 def is_good(metrics: dict[str, Any]) -> bool:
     """Whether a run meets the criterion of its system; of the quadrotor, whether it flies."""
     return bool(metrics["good"])
-
-
-def is_random(system: System) -> bool:
-    """Whether seeds make a difference."""
-    return (
-        any(one.sampling is not None and one.sampling.is_random for one in system.components.values())
-        or any(x.is_random or any(x.noise.values()) for x in system.connections)
-        or any(source.is_random and source.noise != 0.0 for source in system.sources.values())
-        or placement.is_random(system)
-    )
 
 
 @dataclass(frozen=True, kw_only=True)

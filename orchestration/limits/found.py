@@ -40,6 +40,9 @@ class Found:
     local_limit_outside: float | None
     """Of the quadrotor likewise, with the gain that the law has just outside its boundary layer; None also without such
     a layer."""
+    mean_square_limit: float | None = None
+    """With something random where means of squares first have no finite expectation, of the loop about its operating
+    point, in the quantity's unit; None: nothing is random, or there is none in the range, or it cannot be had."""
     large_signal_limit: float | None
     """The last value that is good from the scenario's own initial state, in the quantity's unit; None: nothing in the
     range failed, or the first value did."""

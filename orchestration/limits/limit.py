@@ -13,8 +13,9 @@ from orchestration.basics.terminal import say
 from orchestration.building.inputs import Files, files_of
 from orchestration.engines.engine import Engine
 from orchestration.engines.wiring import checked
+from orchestration.exact.mean_square import MeanSquareLimit, mean_square_limit
 from orchestration.fmi.foreign import LostError, computed
-from orchestration.limits.evaluation import RELIABILITY, Evaluator, is_random, said
+from orchestration.limits.evaluation import RELIABILITY, Evaluator, said
 from orchestration.limits.found import Continuous, Found
 from orchestration.requests.ranges import Varied, range_asked_for, usual_quantity
 from orchestration.requests.request import Asked, asked_for
@@ -22,6 +23,7 @@ from orchestration.results import html
 from orchestration.results.criterion import edge, judged
 from orchestration.stability.known_loops import Local
 from orchestration.stability.local_limit import local_limits
+from orchestration.system.chance import is_random
 from orchestration.system.request import Request, in_its_own_words, system_meant
 from orchestration.workers.choice import alone
 from orchestration.workers.executors import RunEvaluator
@@ -53,6 +55,7 @@ class Limit(Found):
         found = {
             "last value that is good": self.large_signal_limit,
             "local limit, of small errors at rest": self.local_limit,
+            "mean-square limit": self.mean_square_limit,
             "refuted from": self.refuted_limit,
         }
         rows = [(name, html.number(value), "" if value is None else self.unit or "") for name, value in found.items()]
@@ -122,6 +125,7 @@ def find(
     random = is_random(varied.at(span.last))
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
     local = _local(varied, span, files)
+    mean_square = _mean_square(varied, span, files) if random else MeanSquareLimit()
     with of_share(progress, "longest search") as hear, RunEvaluator(files, workers, how.engine) as pool:
         tell = announce or (lambda line: None)
         if engine == "auto":
@@ -140,18 +144,20 @@ def find(
                 trials.fails(value)
         ideal = _flown(near, pool) if near is not None else None
         hear(1.0)
+    note = [*_note(span, bracket, trials, refuted, local), *_note_of(mean_square, span)]
     tried = tuple(trials.tried[value] for value in sorted(trials.tried))
     return Limit(
         of=of, unit=span.unit.strip() or None, judged=metric, judged_unit=units.get(metric or ""),
         judged_bound=None if metric is None else edge(varied.system, metric),
         local_limit=local.limit, local_limit_outside=local.outside, local_method=local.method,
-        local_accuracy=local.accuracy, large_signal_limit=None if bracket is None else bracket.good,
+        local_accuracy=local.accuracy, mean_square_limit=mean_square.limit,
+        large_signal_limit=None if bracket is None else bracket.good,
         refuted_limit=refuted, follows=fitting[0].follows, horizon=varied.system.stop_time, tolerance=span.tolerance,
         scan=span.step, confidence=confidence if random else None, seeds=seeds,
         flies_above=tuple(
             one.value for one in tried if bracket is not None and one.value > bracket.bad and one.flew == seeds
         ),
-        continuous=ideal, tried=tried, note="; ".join(_note(span, bracket, trials, refuted, local)),
+        continuous=ideal, tried=tried, note="; ".join(note),
     )  # fmt: skip
 
 
@@ -171,6 +177,13 @@ def _local(varied: Varied, span: Range, files: Files) -> Local:
         return Local(reason=f"no local limit: {error}")
 
 
+def _mean_square(varied: Varied, span: Range, files: Files) -> MeanSquareLimit:
+    try:
+        return computed(files.fmus.values(), mean_square_limit, varied, span, files.models_of(varied.system))
+    except LostError as error:
+        return MeanSquareLimit(reason=f"no mean-square limit: {error}")
+
+
 _ALWAYS = ("local_limit", "large_signal_limit")
 """What is asked for: told also where there is none"""
 
@@ -187,6 +200,13 @@ def as_text(found: Limit) -> dict[str, str]:
     known = [f"{one.value:.6g}: {said(one)}" for one in found.tried if one.share is not None]
     shown["tried"] = "; ".join(known) or f"{len(found.tried)} values"
     return shown
+
+
+def _note_of(found: MeanSquareLimit, span: Range) -> list[str]:
+    """What a mean over runs means: it has no finite expectation from the mean-square limit on."""
+    if found.limit is not None:
+        return [f"from {found.limit:.6g}{span.unit} on means of squares have no finite expectation"]
+    return [found.reason] if found.reason else []
 
 
 def _refuted(trials: Evaluator, bracket: Bracket | None, above: list[float]) -> float | None:

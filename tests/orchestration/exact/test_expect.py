@@ -3,13 +3,14 @@
 import dataclasses
 import json
 import math
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from orchestration.exact.expect import Expected, expect
 from orchestration.system.model import Source
-from quadcosim import UsageError
+from quadcosim import UsageError, limit
 from tests.commands import Main
 from tests.examples.common import EXAMPLES, example
 
@@ -109,3 +110,49 @@ def test_with_finer_noise_and_rows_it_becomes_that_of_white_noise() -> None:
 def test_as_simulated_refuses_rows_at_which_the_plant_is_not_stepped() -> None:
     with pytest.raises(UsageError, match=r"connections\.measurement is measured between the steps of plant"):
         as_simulated(connections__measurement__delay=0.05)
+
+
+@pytest.mark.parametrize(("burst", "expected"), [(None, 0.2240092377), (2.0, 0.1443375673)])
+def test_the_limit_of_losses_has_the_mean_square_limit_of_theory(burst: float | None, expected: float) -> None:
+    system = example("minimum_variance", {"stop_time": 5.0, "connections.command.burst_length": burst})
+    found = limit(
+        system, "connections.command.loss", first=0.1, last=0.3, scan=0.1, tolerance=1e-4, progress=None, announce=None
+    )
+    assert found.mean_square_limit == pytest.approx(expected, abs=1e-6)
+    assert "means of squares have no finite expectation" in found.note
+
+
+def test_a_limit_of_a_loop_without_chance_has_no_mean_square_limit() -> None:
+    system = example("minimum_variance", {"stop_time": 5.0, "sources.noise.noise": 0.0})
+    found = limit(system, "connections.command.delay", first=0.1, last=0.2, progress=None, announce=None)
+    assert found.mean_square_limit is None
+    assert "square" not in found.note
+
+
+NO_END = "variance, effort: without a finite expectation"
+
+
+def test_a_run_says_that_its_averages_mean_nothing(main: Main) -> None:
+    path, loss = EXAMPLES / "minimum_variance/system.toml", "connections.command.loss"
+    lossy = main("run", path, "--set", "stop_time=20", "--set", f"{loss}=0.3")
+    assert f"{NO_END}, so an average over runs means nothing; the mean-square radius is 1.16999" in lossy.stderr
+    assert NO_END not in main("run", path, "--set", "stop_time=20", "--set", f"{loss}=0.2").stderr
+
+
+def test_a_sweep_says_at_how_many_points(main: Main, tmp_path: Path) -> None:
+    study = tmp_path / "study.toml"
+    study.write_text(
+        f"""
+name = "losses"
+scenario = "{EXAMPLES / "minimum_variance/system.toml"}"
+[[axes]]
+name = "loss"
+sets = ["connections.command.loss"]
+values = [0.1, 0.2, 0.3]
+[[axes]]
+name = "length"
+sets = ["stop_time"]
+values = [5.0]
+"""
+    )
+    assert f"{NO_END} at 1 of 3 points" in main("sweep", study, "--out", tmp_path / "store").stderr

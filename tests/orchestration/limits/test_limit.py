@@ -662,8 +662,8 @@ def test_find_flies_the_scenario_and_its_result_is_json() -> None:
     fields = json.loads(json.dumps(dataclasses.asdict(found)))
     assert fields.keys() == {
         "of", "unit", "judged", "judged_unit", "judged_bound", "local_limit", "local_method", "local_accuracy",
-        "local_limit_outside", "large_signal_limit", "refuted_limit", "follows", "horizon", "tolerance",
-        "scan", "confidence", "seeds", "flies_above", "continuous", "tried", "note",
+        "local_limit_outside", "mean_square_limit", "large_signal_limit", "refuted_limit", "follows", "horizon",
+        "tolerance", "scan", "confidence", "seeds", "flies_above", "continuous", "tried", "note",
     }  # fmt: skip
     limit = found.large_signal_limit
     assert limit is not None

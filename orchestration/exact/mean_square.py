@@ -1,0 +1,50 @@
+"""Where a random quantity becomes so large that means of squares have no end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from orchestration.basics.bisection import Range, first_failure
+from orchestration.basics.errors import SimulatorError, UsageError
+from orchestration.exact.loops import Loops
+from orchestration.fmi.model import Model
+from orchestration.requests.ranges import Varied
+from orchestration.stability.known_loops import LOOPS
+from orchestration.system.model import System
+from orchestration.system.paths import changed
+
+FINER = 0.01
+"""of the tolerance of a measured limit"""
+AGREE = 1e-6
+"""of a radius, from order to order"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeanSquareLimit:
+    """The limit, None where there is none, and why."""
+
+    limit: float | None = None
+    reason: str = ""
+
+
+def mean_square_limit(varied: Varied, span: Range, models: Mapping[str, Model]) -> MeanSquareLimit:
+    """The first value of a quantity, from below, at which the mean-square radius of the loop is 1."""
+    known = LOOPS.of(varied.request.kind)
+    try:
+        system = varied.system if known is None else known.at_rest(varied.request)
+        return _first(system, varied.paths, span, Loops(models))
+    except (UsageError, SimulatorError) as error:
+        return MeanSquareLimit(reason=f"no mean-square limit: {error}")
+
+
+def _first(system: System, paths: Sequence[str], span: Range, loops: Loops) -> MeanSquareLimit:
+    def fails(value: float) -> bool:
+        return loops.solved(changed(system, dict.fromkeys(paths, value)), agree=AGREE).loop.radius >= 1.0
+
+    bracket = first_failure(fails, span.values(), FINER * span.tolerance)
+    if bracket is None:
+        return MeanSquareLimit(reason="second moments are bounded throughout the range")
+    if bracket.good is None:
+        return MeanSquareLimit(reason="second moments have no end throughout the range")
+    return MeanSquareLimit(limit=0.5 * (bracket.good + bracket.bad))

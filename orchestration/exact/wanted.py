@@ -1,0 +1,80 @@
+"""The objectives of a system of which there may be an expectation, and the signals that they are of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from orchestration.basics.errors import UsageError
+from orchestration.exact.objectives import Mean, means_of, quadratic, squared, value, whole
+from orchestration.expressions.syntax import Call, names
+from orchestration.fmi.model import Model
+from orchestration.stability.linear_loop import AtRest
+from orchestration.system.model import System, component_of, variable_of
+
+
+class Wanted:
+    """The objectives of a system, as far as there can be an expectation of them, and why not."""
+
+    def __init__(self, system: System, models: Mapping[str, Model]) -> None:
+        self._system = system
+        self._nodes = whole(system.objectives)
+        self.calls: dict[str, list[Call]] = {}
+        self.reasons: dict[str, str] = {}
+        self.means: dict[Call, Mean] = {}
+        self._numbers: Mapping[str, float] = {}
+        for name, node in self._nodes.items():
+            try:
+                self.calls[name] = means_of(node, name)
+            except UsageError as error:
+                self.reasons[name] = str(error)
+        used = {part for calls in self.calls.values() for call in calls for part in names(call)}
+        self._signals = dict.fromkeys(signal for part in sorted(used) for signal in _signals_of(part, models))
+        self.seen = tuple(
+            signal for signal in self._signals
+            if models[component_of(signal)].variables[variable_of(signal)].causality != "input"
+        )  # fmt: skip
+
+    def about(self, loop: AtRest) -> None:
+        """The means as polynomials about the point where the loop rests."""
+        for name, state in loop.begun.items():
+            loop.simulation.instances[name].restore(state)
+        rest = {
+            signal: float(loop.simulation.instances[component_of(signal)].get(variable_of(signal)))
+            for signal in self._signals
+        }
+        for name, source in self._system.sources.items():
+            rest |= dict.fromkeys(source.signals(name), source.constant or 0.0) if source.is_held else {}
+        self._numbers = loop.simulation.parameters
+        for name, calls in [*self.calls.items()]:
+            try:
+                for call in calls:
+                    if call not in self.means:
+                        self.means[call] = quadratic(squared(call), rest, self._numbers, name)
+            except UsageError as error:
+                self.reasons[name] = str(error)
+                del self.calls[name]
+
+    def values(self, means: Mapping[Call, float]) -> dict[str, float | None]:
+        """All objectives in the order of the system, by their means."""
+        found: dict[str, float | None] = dict.fromkeys(self._nodes)
+        for name in self.calls:
+            try:
+                found[name] = value(self._nodes[name], means, self._numbers)
+            except UsageError as error:
+                self.reasons[name] = f"{name}: {error}"
+        return found
+
+
+def _signals_of(name: str, models: Mapping[str, Model]) -> list[str]:
+    """The Real signals that a name in an expression stands for; none for a parameter, time, or a source's."""
+    owner = component_of(name)
+    if owner not in models:
+        return []
+    known = models[owner].variables
+    parts = [name] if variable_of(name) in known else [f"{name}.{axis}" for axis in "xyzw"]
+    return [
+        part for part in parts
+        if variable_of(part) in known
+        and known[variable_of(part)].kind == "Real"
+        and known[variable_of(part)].causality in ("input", "output", "local")
+    ]  # fmt: skip

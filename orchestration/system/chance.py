@@ -1,0 +1,14 @@
+"""Whether a system leaves anything to chance."""
+
+from orchestration.system import placement
+from orchestration.system.model import System
+
+
+def is_random(system: System) -> bool:
+    """Whether seeds make a difference to its runs."""
+    return (
+        any(one.sampling is not None and one.sampling.is_random for one in system.components.values())
+        or any(x.is_random or any(x.noise.values()) for x in system.connections)
+        or any(source.is_random and source.noise != 0.0 for source in system.sources.values())
+        or placement.is_random(system)
+    )
