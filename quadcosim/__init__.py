@@ -18,6 +18,7 @@ Where to begin:
 - `fly` takes arrays of initial conditions, or of anything else, and gives arrays: many runs at once, without a store;
 - `limit` finds the largest period, delay, loss or anything else that is still good;
 - `expect` gives the expectation of means of squares exactly, of the loop about its operating point, without a run;
+- `margin` certifies how far a delay, a jitter or a run of losses may vary without making the linear loop unstable;
 - `linearise` cuts a loop open about its operating point, sampled, held and late as it is: two systems of matrices;
 - `sweep` flies a `Study` over axes, `compare` controllers against each other, `tune` searches for gains: what is there
   is not flown again, and what they give becomes a table with `to_pandas`;
@@ -38,6 +39,11 @@ tell_in(in_python)
 
 if TYPE_CHECKING:
     from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageError
+    from orchestration.certificates.check import Checked
+    from orchestration.certificates.check import check as check_certificate
+    from orchestration.certificates.margin import Certified, margin
+    from orchestration.certificates.region import Region
+    from orchestration.certificates.region import region as margin_region
     from orchestration.comparison.design import Comparison
     from orchestration.comparison.file import load_comparison
     from orchestration.comparison.run import Compared, compare
@@ -115,6 +121,12 @@ _HOMES = {
     "linearise": "orchestration.stability.linearise",
     "Linearised": "orchestration.stability.linearise",
     "StateSpace": "orchestration.stability.state_space",
+    "margin": "orchestration.certificates.margin",
+    "Certified": "orchestration.certificates.margin",
+    "margin_region": "orchestration.certificates.region",
+    "Region": "orchestration.certificates.region",
+    "check_certificate": "orchestration.certificates.check",
+    "Checked": "orchestration.certificates.check",
     "sweep": "orchestration.studies.sweep",
     "Study": "orchestration.studies.study",
     "Axis": "orchestration.studies.axes",
@@ -135,11 +147,13 @@ _HOMES = {
     "RunInterrupted": "orchestration.runs.meant",
     "RunLost": "orchestration.runs.meant",
 }
-_OTHERWISE = {"limit": "find"}
+_OTHERWISE = {"limit": "find", "check_certificate": "check", "margin_region": "region"}
 """Names that go by another one at home"""
 
 __all__ = [
     "Axis",
+    "Certified",
+    "Checked",
     "Compared",
     "Comparison",
     "Component",
@@ -156,6 +170,7 @@ __all__ = [
     "QuadcosimError",
     "Record",
     "ReferenceChoice",
+    "Region",
     "Result",
     "RunInterrupted",
     "RunLost",
@@ -174,6 +189,7 @@ __all__ = [
     "UsageError",
     "Vehicle",
     "changed",
+    "check_certificate",
     "compare",
     "expect",
     "fly",
@@ -187,6 +203,8 @@ __all__ = [
     "load_system",
     "load_tuning",
     "load_vehicle",
+    "margin",
+    "margin_region",
     "read_model",
     "report",
     "resume",

@@ -73,15 +73,15 @@ def _cycles(family: Family, maps: dict[Draw, Floats], longest: int) -> Iterator[
         yield from extended(start, start, (), np.eye(size))
 
 
-def least_breaking(family_up_to: Callable[[float], Family], limit: float) -> Broken | None:
+def least_breaking(family_up_to: Callable[[float], Family], limit: float, longest: int = LONGEST) -> Broken | None:
     """The least value up to `limit` at which a sequence is unstable, as far as the scan sees."""
-    found = functools.cache(lambda value: unstable_sequence(family_up_to(value)))
+    found = functools.cache(lambda value: unstable_sequence(family_up_to(value), longest))
     rising = [limit * i / SCAN for i in range(SCAN + 1)]
     first = next((i for i in range(1, SCAN + 1) if found(rising[i])), None)
     if first is None:
         return None
     value = bisected(lambda v: found(v) is not None, rising[first - 1], rising[first], FINE * limit).bad
-    return broken_at(family_up_to(value), value)
+    return broken_at(family_up_to(value), value, longest)
 
 
 def broken_at(family: Family, value: float, longest: int = LONGEST) -> Broken | None:

@@ -19,6 +19,8 @@ from orchestration.certificates.family import Factor, Family, Letter
 
 FORMAT = "quadcosim certificate 1"
 
+Box = tuple[tuple[float, float], ...]
+"""The ends of a cell along each parameter"""
 Word = tuple[int, ...]
 Node = tuple[int, Word]
 """A mode, and the labels of the values to come"""
@@ -33,7 +35,7 @@ class Cells:
     labels: tuple[int, ...]
     """of each cell, those of the last parameter next to each other"""
 
-    def boxes(self) -> Iterator[tuple[int, tuple[tuple[float, float], ...]]]:
+    def boxes(self) -> Iterator[tuple[int, Box]]:
         """The label of each cell, and its ends along each parameter."""
         sides = [list(itertools.pairwise(edges)) for edges in self.edges]
         yield from zip(self.labels, itertools.product(*sides), strict=True)

@@ -12,12 +12,14 @@ from orchestration.basics.simulator import Floats
 from orchestration.certificates.certificate import Cells, Certificate
 from orchestration.certificates.checker import NotProven, proven
 from orchestration.certificates.family import Family
-from orchestration.certificates.search import forms_for
+from orchestration.certificates.search import forms_for, inequalities_of
 
 RADIUS = 1e-6
 """relative, of what is measured"""
 LADDER = ((1, 0), (2, 1), (2, 2), (2, 3), (2, 4), (3, 3))
 """labels of each letter with a parameter, and how many of those to come a form depends on: tried in turn"""
+LARGEST = 1000
+"""inequalities of a search: steps of the ladder that ask for more are left out"""
 SEARCHED = 12
 """cells in which forms are looked for; of two parameters the square root of that along each"""
 FINER = (2, 4, 8)
@@ -46,6 +48,8 @@ def certified(family: Family, of: Sequence[str], first: int = 0, radius: float =
             of=tuple(of), radius=radius, family=family, cells=tuple(_divided(family, labels, 1)),
             coordinates=_coordinates(family, parts), memory=memory, forms={},
         )  # fmt: skip
+        if inequalities_of(certificate) > LARGEST:
+            continue
         found = _proved(certificate, parts, labels)
         if found is not None:
             return Found(certificate=found, step=step)

@@ -13,15 +13,15 @@ X of the state: what is looked at is congruent to the above. Nothing here knows 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from flint import arb, arb_mat, ctx
 
 from orchestration.basics.errors import QuadcosimError
 from orchestration.basics.simulator import Floats
-from orchestration.certificates.certificate import Certificate, Node, words
-from orchestration.certificates.family import Letter
+from orchestration.certificates.certificate import Box, Certificate, Node, words
+from orchestration.certificates.family import Factor, Letter
 
 BITS = 106
 """of the arithmetic"""
@@ -110,13 +110,14 @@ class _Enclosures:
         except ZeroDivisionError:
             raise NotProven("the coordinates of the forms are not independent") from None
         self._last = coordinates * chosen
-        self._known: dict[int, list[tuple[tuple[tuple[float, float], ...], list[arb_mat]]]] = {}
+        self._factors: dict[tuple[Factor, Box], arb_mat] = {}
+        self._known: dict[int, list[tuple[Box, list[arb_mat]]]] = {}
 
     def letter_of(self, label: int) -> Letter:
         pairs = zip(self._certificate.family.letters, self._certificate.cells)
         return next(letter for letter, cells in pairs if label in cells.labels)
 
-    def of(self, label: int) -> list[tuple[tuple[tuple[float, float], ...], list[arb_mat]]]:
+    def of(self, label: int) -> list[tuple[Box, list[arb_mat]]]:
         """The cells of a label, and of each the maps at its corners, as wide as the map between them may be."""
         if label not in self._known:
             letter = self.letter_of(label)
@@ -125,43 +126,43 @@ class _Enclosures:
             self._known[label] = [(box, self._corners(letter, box)) for box in boxes]
         return self._known[label]
 
-    def _corners(self, letter: Letter, box: tuple[tuple[float, float], ...]) -> list[arb_mat]:
-        over = [arb(low).union(arb(high)) for low, high in box]
+    def _corners(self, letter: Letter, box: Box) -> list[arb_mat]:
         beyond = None
         for i, (low, high) in enumerate(box):
-            bent = self._jet(letter, over, i)[2] * ((arb(high) - arb(low)) ** 2 / 8)
+            bent = self._jet(letter, box, i)[2] * ((arb(high) - arb(low)) ** 2 / 8)
             beyond = bent if beyond is None else _sum_of_sizes(beyond, bent)
-        found = []
-        for corner in itertools.product(*box):
-            M = self._jet(letter, [arb(x) for x in corner], None)[0]
-            found.append(M if beyond is None else _widened(M, beyond))
-        return found
+        corners = [self._map(letter, corner) for corner in itertools.product(*box)]
+        return corners if beyond is None else [_widened(M, beyond) for M in corners]
 
-    def _jet(self, letter: Letter, point: Sequence[arb], along: int | None) -> tuple[arb_mat, arb_mat, arb_mat]:
-        """The map at a point, and its first two derivatives along a parameter."""
-        zero = arb_mat(self._first.nrows(), self._first.ncols())
-        M, d, dd = self._first, zero, zero
+    def _map(self, letter: Letter, point: tuple[float, ...]) -> arb_mat:
+        M = self._first
         for factor in letter.product:
-            X = self._matrices[factor.matrix]
-            slope = arb(0)
-            if factor.times is not None:
-                lasts = arb(factor.times[0])
-                for c, x in zip(factor.times[1:], point):
-                    lasts += arb(c) * x
-                slope = arb(0 if along is None else factor.times[along + 1])
-                F = (X * lasts).exp()
-            else:
-                F = X
-            if along is not None:
-                G = X * slope
-                dd, d = F * dd, F * d
-                M = F * M
-                if slope != 0:
-                    GM = G * M
-                    dd, d = dd + G * d * 2 + G * GM, d + GM
-            else:
-                M = F * M
+            M = self._factor(factor, tuple((x, x) for x in point)) * M
+        return self._last * M
+
+    def _jet(self, letter: Letter, box: Box, along: int) -> tuple[arb_mat, arb_mat, arb_mat]:
+        """The map over a box, and its first two derivatives along a parameter."""
+        M = self._first
+        d = dd = arb_mat(M.nrows(), M.ncols())
+        for factor in letter.product:
+            F = self._factor(factor, box)
+            M, d, dd = F * M, F * d, F * dd
+            slope = arb(0 if factor.times is None else factor.times[along + 1])
+            if slope != 0:
+                G = self._matrices[factor.matrix] * slope
+                dd, d = dd + G * d * 2 + G * (G * M), d + G * M
         return self._last * M, self._last * d, self._last * dd
+
+    def _factor(self, factor: Factor, box: Box) -> arb_mat:
+        X = self._matrices[factor.matrix]
+        if factor.times is None:
+            return X
+        if (factor, box) not in self._factors:
+            lasts = arb(factor.times[0])
+            for c, (low, high) in zip(factor.times[1:], box):
+                lasts += arb(c) * arb(low).union(arb(high))
+            self._factors[factor, box] = (X * lasts).exp()
+        return self._factors[factor, box]
 
 
 def _measured(matrix: Floats, radius: float) -> arb_mat:
@@ -217,5 +218,5 @@ def _longest_run(letter: Letter) -> int | None:
     return None if count > len(letter.moves) and reached else count - 1
 
 
-def _said(letter: Letter, box: tuple[tuple[float, float], ...]) -> str:
+def _said(letter: Letter, box: Box) -> str:
     return " and ".join([letter.name, *(f"{low:.6g} to {high:.6g}" for low, high in box)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -34,6 +35,14 @@ def forms_for(certificate: Certificate, parts: Sequence[Sequence[int]]) -> Mappi
         for node, form in found.items():
             whole[node][inside] = form
     return whole
+
+
+def inequalities_of(certificate: Certificate) -> int:
+    """How many matrix inequalities a search would have to satisfy, or enough to be too many."""
+    labels = sum(len(set(cells.labels)) for cells in certificate.cells)
+    corners = sum(math.prod(map(len, cells.edges)) for cells in certificate.cells)
+    modes = max(len(letter.moves) for letter in certificate.family.letters)
+    return int(modes * corners * labels**certificate.memory)
 
 
 def _maps(certificate: Certificate) -> dict[int, list[Floats]]:

@@ -87,6 +87,7 @@ class Timeline:
         Raises `UsageError` where draws would be open at once.
         """
         limits = [exact_nanoseconds(J) for J in most]
+        run = run if self._lossy else 0
         begins = sorted((_first(group, limits), i) for i, group in enumerate(self._groups))
         ends = [time for time, _ in begins[1:]] + [begins[0][0] + self.loop.period]
         for (_, i), end in zip(begins, ends):

@@ -14,7 +14,7 @@ from orchestration.basics.extras import extra_of
 from orchestration.basics.terminal import complain, progress_bar, say, warn
 from orchestration.basics.units import after
 from orchestration.building import consent
-from orchestration.command import completion, exact, interop, plotting, studies
+from orchestration.command import completion, exact, interop, margin, plotting, studies
 from orchestration.command import new as beginning
 from orchestration.command import registry as registering
 from orchestration.command import report as reports
@@ -337,6 +337,7 @@ beginning.register(app)
 system_commands.register(app)
 studies.register(app)
 exact.register(app)
+margin.register(app)
 registering.add(app, FMUS, build, validate, doctor)
 registering.add(app, TOOLS, export_c, ssp)
 interop.register(app)

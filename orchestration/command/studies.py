@@ -293,32 +293,6 @@ def limit(
     return Answer(document=found, lines=[f"{name:<19}  {value}" for name, value in limits.as_text(found).items()])
 
 
-@flies
-def margin(
-    scenario: Annotated[
-        Path | None, typer.Argument(help="Scenario file; without one, the paper's flight.", show_default=False)
-    ] = None,
-    *,
-    flags: FlightFlags,
-) -> Answer:
-    """Delays that the loop about hover tolerates: constant ones exactly, varying ones by bounds from theory."""
-    from orchestration.building.inputs import files_of
-    from orchestration.flight.margin import margin_of
-    from orchestration.fmi.foreign import computed
-    from orchestration.quadrotor.scenario import Scenario
-    from orchestration.system.request import system_meant
-
-    chosen = request_from(scenario, flags)
-    if not isinstance(chosen, Scenario):
-        raise UsageError("margin: expected a scenario of the quadrotor")
-    found = dataclasses.asdict(computed(files_of(system_meant(chosen)).fmus.values(), margin_of, chosen))
-    lines = []
-    for name, value in found.items():
-        shown = " ".join(f"{share:g}" for share in value) if isinstance(value, tuple) else value
-        lines.append(f"{name:<17}  {f'{value:.6g} s' if isinstance(value, float) else '-' if value is None else shown}")
-    return Answer(document=found, lines=lines)
-
-
 def _current_store(study: Path, out: Path | None) -> Path:
     """The store of a study file that has not changed since it was flown."""
     from orchestration.studies.store import open_for_reading, store_path
@@ -334,4 +308,4 @@ def _current_store(study: Path, out: Path | None) -> Path:
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the command line."""
-    registering.add(app, registering.STUDY, limit, margin, sweep, status, draw, export, compare, tune)
+    registering.add(app, registering.STUDY, limit, sweep, status, draw, export, compare, tune)

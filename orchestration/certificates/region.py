@@ -1,0 +1,122 @@
+"""Two quantities that vary at once: which pairs of values are certified together, and which break the loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from orchestration.basics.errors import UsageError
+from orchestration.basics.extras import needs
+from orchestration.basics.progress import ShareHeard, of_share
+from orchestration.certificates.breaking import Broken, least_breaking, unstable_sequence
+from orchestration.certificates.family import Family
+from orchestration.certificates.margin import down_to_nanoseconds, largest_certified, measured, varying_of
+from orchestration.certificates.timeline import LOSS, Timeline
+from orchestration.figures.palette import BLUE, RED
+from orchestration.figures.style import SCREEN, Style, save
+from orchestration.requests.request import Asked, asked_for
+
+COLUMNS = 6
+"""values of the first quantity, from 0 to what breaks the loop by itself"""
+LONGEST = 4
+"""draws after which the sequences that are tried repeat"""
+
+Pair = tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Region:
+    """Pairs of values [s]: at each draw both quantities are anywhere from 0 to theirs."""
+
+    of: tuple[str, str]
+    """The paths of what varies."""
+    certified: tuple[Pair, ...]
+    """For which a proof was found: so it is for all pairs that are smaller in both."""
+    breaking: tuple[Pair, ...]
+    """At which a periodic sequence was found that makes the loop unstable, the second value being the least."""
+    searched: str
+    """Which sequences were tried for `breaking`."""
+    states: int
+    """Numbers that go from one period to the next."""
+    certificates: tuple[str, ...]
+    """The proofs, one for each certified pair, as the texts of files that `check` verifies."""
+
+    def save(self, folder: str | Path, style: Style = SCREEN) -> list[Path]:
+        """Write the certificates, `1.json` and so on, and the figure, into a folder; the paths."""
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        written = [folder / f"{i}.json" for i in range(1, len(self.certificates) + 1)]
+        for path, text in zip(written, self.certificates):
+            path.write_text(text, encoding="utf-8")
+        with style.applied():
+            figure = self.figure(style)
+        return [*written, *save({"region": figure}, folder, style)]
+
+    def figure(self, style: Style = SCREEN) -> Figure:
+        """The pairs that are certified, and those that break the loop."""
+        figure = style.figure(70.0)
+        axes = figure.add_subplot()
+        steps = [(1e3 * a, 1e3 * b) for a, b in self.certified]
+        for i, (a, b) in enumerate(steps):
+            axes.fill_between([0.0, a], [b, b], color=BLUE, alpha=0.25, linewidth=0.0, label=None if i else "certified")
+        axes.plot(*zip(*steps), ".", color=BLUE)
+        if self.breaking:
+            axes.plot(
+                *zip(*[(1e3 * a, 1e3 * b) for a, b in self.breaking]), "x-", color=RED, label="a sequence breaks it"
+            )
+        axes.set(xlabel=f"{self.of[0]} [ms]", ylabel=f"{self.of[1]} [ms]", xlim=(0.0, None), ylim=(0.0, None))
+        figure.legend(loc="outside lower center", ncols=2)
+        return figure
+
+
+@needs("flint", "clarabel")
+def region(asked: Asked, of: str, and_of: str, *, columns: int = COLUMNS, progress: ShareHeard = None) -> Region:
+    """How far two quantities of a system may vary at once: see `margin`, of which both are paths of times.
+
+    Raises `UsageError` as `margin` does, for two quantities of different sampled components, and for a loop that is
+    unstable without either.
+    """
+    request = asked_for(asked)
+    pair = [varying_of(request, each) for each in (of, and_of)]
+    if any(each.kind == LOSS for each in pair) or pair[0] == pair[1]:
+        raise UsageError(f"--of {of} --and {and_of}: expected two different jitters or delay jitters")
+    timeline = Timeline(measured(request), pair)
+    if unstable_sequence(timeline.family([0.0, 0.0])) is not None:
+        raise UsageError("the loop is unstable where nothing varies, so nothing can be certified")
+    paths = (pair[0].path, pair[1].path)
+    with of_share(progress, "certifying") as heard:
+        widest = _broken(timeline, 0.0, first=True)
+        most = down_to_nanoseconds(timeline.largest()) if widest is None else widest.value
+        certified, breaking, texts = list[Pair](), list[Pair](), list[str]()
+        for i in range(columns):
+            heard(i / columns)
+            a = down_to_nanoseconds(most * i / columns)
+            broken = _broken(timeline, a)
+            top = down_to_nanoseconds(timeline.largest() - a) if broken is None else broken.value
+            if broken is not None:
+                breaking.append((a, broken.value))
+            b, text = largest_certified(_beside(timeline, a), paths, top, lambda share: None)
+            if b is not None and text is not None:
+                certified.append((a, b))
+                texts.append(text)
+    return Region(
+        of=paths, certified=tuple(certified), breaking=tuple(breaking), certificates=tuple(texts),
+        states=len(timeline.family([0.0, 0.0]).kept),
+        searched=f"draws at either end of both ranges, sequences that repeat after at most {LONGEST}",
+    )  # fmt: skip
+
+
+def _beside(timeline: Timeline, a: float) -> Callable[[float], Family]:
+    return lambda b: timeline.family([a, b])
+
+
+def _broken(timeline: Timeline, other: float, *, first: bool = False) -> Broken | None:
+    """What breaks the loop in one quantity, the other one being anywhere up to its value."""
+
+    def up_to(value: float) -> Family:
+        return timeline.family([value, other] if first else [other, value])
+
+    return least_breaking(up_to, down_to_nanoseconds(timeline.largest() - other), LONGEST)

@@ -1,0 +1,144 @@
+"""The command about what linear theory promises: how late, and how unevenly late, a loop may be."""
+
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from orchestration.basics.errors import UsageError
+from orchestration.basics.terminal import say
+from orchestration.command import registry as registering
+from orchestration.command.answer import Answer
+from orchestration.command.flags import FlightFlags, Timing, flies, request_from
+
+if TYPE_CHECKING:
+    from orchestration.system.request import Request
+
+
+@flies
+def margin(
+    scenario: Annotated[
+        Path | None,
+        typer.Argument(
+            help="System or scenario file, or SSP; without one, the paper's flight, or with --check none.",
+            show_default=False,
+        ),
+    ] = None,
+    timing: Timing = None,
+    of: Annotated[
+        str | None,
+        typer.Option(
+            "--of",
+            help="What varies from draw to draw: the path of a delay_jitter, of a sampling.jitter, or of a loss, which "
+            "stands for the longest run of losses. Default: the delays of the quadrotor's command, by bounds.",
+            metavar="PATH",
+            show_default=False,
+        ),
+    ] = None,
+    and_of: Annotated[
+        str | None,
+        typer.Option("--and", help="With --of: what varies beside it; a region is drawn.", metavar="PATH"),
+    ] = None,
+    check: Annotated[
+        Path | None,
+        typer.Option("--check", help="Verify a certificate, and with a file that it is of that loop.", metavar="FILE"),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="Where the certificate is written; with --and the folder.", metavar="CERTIFICATE"),
+    ] = None,
+    *,
+    flags: FlightFlags,
+) -> Answer:
+    """How late, and how unevenly, messages and samples may be before the linear loop can become unstable; proofs."""
+    if of is None and (and_of is not None or (check is None and out is not None)):
+        raise UsageError(f"{'--out' if and_of is None else '--and'}: expected --of PATH beside it")
+    if check is not None:
+        if of is not None or out is not None:
+            raise UsageError("--check: expected neither --of nor --out; what varies is in the certificate")
+        given = scenario is not None or flags != FlightFlags()
+        return _checked(check, request_from(scenario, flags, timing) if given else None)
+    request = request_from(scenario, flags, timing)
+    if of is None:
+        return _of_hover(request)
+    return _certified(request, of, out) if and_of is None else _region(request, of, and_of, out)
+
+
+def _certified(request: "Request", of: str, out: Path | None) -> Answer:
+    from orchestration.certificates.margin import margin as certify
+
+    found = certify(request, of, progress="bar")
+    written = None if out is None or found.certificate is None else found.save(out)
+    document = dataclasses.asdict(found) | {"certificate": written}
+    unit = "" if of.endswith("loss") else " s"
+    sequence = "; ".join(" ".join([name, *(f"{x:.6g} s" for x in at)]) for name, at in found.breaking_sequence)
+    shown = {
+        "of": found.of,
+        "certified": _number(found.certified, unit),
+        "breaking": _number(found.breaking, unit),
+        "breaking_sequence": sequence or "-",
+        "searched": found.searched,
+        "small_gain": _number(found.small_gain, unit),
+        "states": found.states,
+        "certificate": written or "-",
+    }
+    return Answer(document=document, lines=[f"{name:<17}  {value}" for name, value in shown.items()])
+
+
+def _region(request: "Request", of: str, and_of: str, out: Path | None) -> Answer:
+    from orchestration.certificates.region import region
+
+    found = region(request, of, and_of, progress="bar")
+    written = [] if out is None else found.save(out)
+    for path in written:
+        say(str(path))
+    document = dataclasses.asdict(found) | {"certificates": written}
+    lines = [f"{of} and {and_of}", f"searched           {found.searched}"]
+    lines += [f"certified          {a:.6g} s and {b:.6g} s" for a, b in found.certified]
+    lines += [f"breaking           {a:.6g} s and {b:.6g} s" for a, b in found.breaking]
+    return Answer(document=document, lines=lines)
+
+
+def _checked(path: Path, request: "Request | None") -> Answer:
+    from orchestration.certificates.check import check
+
+    found = check(path, request)
+    lines = []
+    for name, ranges in found.ranges.items():
+        run = found.runs[name]
+        values = " and ".join(f"{low:.9g} to {high:.9g} s" for low, high in ranges)
+        often = "any number of times in a row" if run is None else f"at most {run} times in a row"
+        lines.append(f"{name:<17}  {', '.join(filter(None, [values, often]))}")
+    lines.append(f"{'proved':<17}  no sequence of these makes the {found.states} numbers of the loop grow")
+    lines.append(f"{'radius':<17}  {found.radius:g} of what was measured")
+    of = " and ".join(found.of)
+    lines.append(f"{'loop':<17}  {of + ' of this system' if of else 'the matrices in the file; no system was given'}")
+    return Answer(document=found, lines=lines)
+
+
+def _of_hover(chosen: "Request") -> Answer:
+    """The delays of the quadrotor about hover: constant ones exactly, varying ones by bounds."""
+    from orchestration.building.inputs import files_of
+    from orchestration.flight.margin import margin_of
+    from orchestration.fmi.foreign import computed
+    from orchestration.quadrotor.scenario import Scenario
+    from orchestration.system.request import system_meant
+
+    if not isinstance(chosen, Scenario):
+        raise UsageError("margin: expected a scenario of the quadrotor, or --of PATH")
+    found = dataclasses.asdict(computed(files_of(system_meant(chosen)).fmus.values(), margin_of, chosen))
+    lines = []
+    for name, value in found.items():
+        shown = " ".join(f"{share:g}" for share in value) if isinstance(value, tuple) else value
+        lines.append(f"{name:<17}  {f'{value:.6g} s' if isinstance(value, float) else '-' if value is None else shown}")
+    return Answer(document=found, lines=lines)
+
+
+def _number(value: float | None, unit: str) -> str:
+    return "-" if value is None else f"{value:.6g}{unit}"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the command line."""
+    registering.add(app, registering.STUDY, margin)
