@@ -6,12 +6,13 @@ from functools import partial
 
 import numpy as np
 
-from orchestration.basics.simulator import Integers
+from orchestration.basics.simulator import Booleans, Integers
 from orchestration.computers.parts import (
     ABORTED,
     BEGUN,
     FINISHED,
     INTERRUPTED,
+    KINDS,
     LATER,
     NONE,
     PASSED,
@@ -73,7 +74,7 @@ def timeline(
     Processors and tasks of names `without` are left out.
     """
     until, what = parts.stop, notes[:, 1]
-    of_tasks, of_messages = notes[np.isin(what, _OF_TASKS)], notes[np.isin(what, _OF_MESSAGES)]
+    of_tasks, of_messages = notes[_are(what, _OF_TASKS)], notes[_are(what, _OF_MESSAGES)]
     jobs = [_jobs(of_tasks[of_tasks[:, 2] == i], task.deadline, until) for i, task in enumerate(parts.tasks)]
     frames = [
         _frames(of_messages[of_messages[:, 2] == m], deadlines[m], len(message.legs), until)
@@ -92,6 +93,14 @@ def timeline(
         },
         happenings=partial(_happenings, notes, parts, names, jobs, without),
     )
+
+
+def _are(what: Integers, kinds: Sequence[int]) -> Booleans:
+    """Which notes are of one of these kinds."""
+    is_one = np.zeros(KINDS, dtype=np.bool_)
+    is_one[[*kinds]] = True
+    found: Booleans = is_one[what]
+    return found
 
 
 def _jobs(notes: Integers, deadline: int, stop: int) -> Jobs:
@@ -143,7 +152,7 @@ def _frames(notes: Integers, deadline: int, legs: int, stop: int) -> Frames:
 def _slices_of_processor(notes: Integers, parts: Parts, processor: int, names: Sequence[str], stop: int) -> Slices:
     """Each note of who has the processor ends the piece that the one before it has begun."""
     owners = [i for i, task in enumerate(parts.tasks) if task.processor == processor]
-    kept = notes[np.isin(notes[:, 1], _ON_A_PROCESSOR) & np.isin(notes[:, 2], owners)]
+    kept = notes[_are(notes[:, 1], _ON_A_PROCESSOR) & np.isin(notes[:, 2], owners)]
     kinds = np.where(kept[:, 1] == SWITCHING, SWITCH, RUN)
     return _slices(kept, kinds, (SWITCHING, STARTED, RESUMED), owners, names, stop)
 
@@ -164,7 +173,7 @@ def _slices_of_link(notes: Integers, parts: Parts, link: int, names: Sequence[st
 def _slices(
     notes: Integers, kinds: Integers, beginning: Sequence[int], owners: Sequence[int], names: Sequence[str], stop: int
 ) -> Slices:
-    begins = np.isin(notes[:, 1], beginning)
+    begins = _are(notes[:, 1], beginning)
     ends = np.append(notes[1:, 0], stop)[: len(notes)]
     return Slices(
         owners=tuple(names[i] for i in owners),

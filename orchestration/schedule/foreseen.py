@@ -5,8 +5,8 @@ from collections.abc import Collection
 import numpy as np
 
 from orchestration.basics.simulator import Integers
+from orchestration.computers.compiled import scheduler
 from orchestration.computers.parts import ARRIVES, LATER, SAMPLED, SENT
-from orchestration.computers.scheduler import Scheduler
 from orchestration.schedule.resources import Resources
 from orchestration.schedule.streams import Streams
 from orchestration.system.computers import Task
@@ -96,7 +96,7 @@ class Foreseen:
         """What is measured is measured up to so many nanoseconds `ahead` of its sample, which may be after the end."""
         open_for = [nanoseconds(each.task.due) for each in placed_tasks(system.computers) if _decides_late(each.task)]
         resources = Resources(system, streams, nanoseconds(system.stop_time) + ahead + max(open_for, default=0))
-        self._scheduler = Scheduler(resources.parts, (SAMPLED, SENT, ARRIVES))
+        self._scheduler = scheduler(resources.parts, (SAMPLED, SENT, ARRIVES))
         self._tasks, self._stop = resources.tasks, resources.parts.stop
         self._reached = 0
         self.messages = {name: Messages() for name in resources.carriers}

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from orchestration.basics.simulator import Integers
+from orchestration.computers.compiled import scheduler
 from orchestration.computers.parts import (
     ABORT,
     EARLIEST_DEADLINE,
@@ -28,7 +29,6 @@ from orchestration.computers.parts import (
     constant,
 )
 from orchestration.computers.results import Timeline
-from orchestration.computers.scheduler import Scheduler
 from orchestration.computers.timeline import NEEDED, Names, timeline
 from orchestration.schedule.drawing import times
 from orchestration.schedule.message_times import lateness, losses
@@ -116,12 +116,12 @@ class Resources:
 
     def timeline(self) -> Timeline:
         """What becomes of all computers and networks up to the end."""
-        scheduler = Scheduler(self.parts, NEEDED)
-        scheduler.run(LATER)
+        at_work = scheduler(self.parts, NEEDED)
+        at_work.run(LATER)
         dues = [each.message.due for each in self._over]
         deadlines = [LATER if due is None else nanoseconds(due) for due in dues]
         alone = frozenset(self._alone)
-        return timeline(self.parts, self._names, deadlines, scheduler.taken(), without=alone)
+        return timeline(self.parts, self._names, deadlines, at_work.taken(), without=alone)
 
     # -- tasks -----------------------------------------------------------------------------------------------------
 

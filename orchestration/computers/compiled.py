@@ -1,0 +1,196 @@
+"""The scheduler in C: the same notes as of the one in Python, to the bit. Compiled once, and kept in the cache."""
+
+import ctypes
+import functools
+import weakref
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
+from orchestration.basics.errors import QuadcosimError
+from orchestration.basics.libraries import kept
+from orchestration.basics.simulator import Integers
+from orchestration.computers import parts as constants
+from orchestration.computers.parts import (
+    AT_ONCE,
+    COLUMNS,
+    LATER,
+    NOTED,
+    Carrier,
+    Leg,
+    Link,
+    Message,
+    Parts,
+    Processor,
+    Task,
+)
+from orchestration.computers.scheduler import Scheduler
+
+SOURCE = Path(__file__).with_name("scheduler.c")
+_ROOM = 4096
+"""Notes that C keeps until Python takes them"""
+_TABLES: dict[str, tuple[str, ...]] = {
+    "PROCESSOR": Processor._fields,
+    "TASK": Task._fields,
+    "CARRIER": (*Carrier._fields, "releases_end"),
+    "MESSAGE": Message._fields,
+    "LEG": ("message", "place", "is_last", *Leg._fields),
+    "LINK": Link._fields,
+}
+"""What a row of each table has; where parts have others in them, C has where these begin"""
+_KINDS = ("PROCESSORS", "TASKS", "CARRIERS", "MESSAGES", "LEGS", "LINKS")
+_DRAW, _TAKE = (ctypes.CFUNCTYPE(None, ctypes.c_int64) for _ in range(2))
+
+
+class _Given(ctypes.Structure):
+    _fields_ = (
+        ("stop", ctypes.c_int64),
+        ("counts", ctypes.c_int64 * len(_KINDS)),
+        *(
+            (name, ctypes.c_void_p)
+            for name in ("processors", "tasks", "carriers", "releases", "messages", "legs", "links")
+        ),
+        ("numbers", ctypes.c_void_p),
+        ("used", ctypes.c_void_p),
+        ("notes", ctypes.c_void_p),
+        ("room", ctypes.c_int64),
+        ("noted", ctypes.c_int64),
+        ("kept", ctypes.c_void_p),
+        ("draw", _DRAW),
+        ("take", _TAKE),
+    )
+
+
+class Schedules(Protocol):
+    """A scheduler, in whatever language."""
+
+    @property
+    def reached(self) -> int:
+        """The next instant [ns]; LATER if there is none up to the end."""
+
+    def run(self, until: int) -> None:
+        """Go through all instants before `until` [ns], up to the end."""
+
+    def taken(self) -> Integers:
+        """The notes since they were taken last, a row each: time, what, whose, which, a number more."""
+
+
+def scheduler(parts: Parts, noted: Collection[int] = NOTED) -> Schedules:
+    """What goes through the instants of `parts`, in C where there is a compiler; notes are kept of kinds `noted`."""
+    try:
+        _library()
+    except QuadcosimError:
+        return Scheduler(parts, noted)
+    return CompiledScheduler(parts, noted)
+
+
+class CompiledScheduler:
+    """The scheduler in C; raises `QuadcosimError` without a compiler."""
+
+    def __init__(self, parts: Parts, noted: Collection[int] = NOTED) -> None:
+        self._library = _library()
+        legs = [(m, place, place == len(of.legs) - 1, *leg) for m, of in enumerate(parts.messages)
+                for place, leg in enumerate(of.legs)]  # fmt: skip
+        ends = np.cumsum([0, *(len(each.releases) for each in parts.carriers)])
+        tables = {
+            "processors": parts.processors,
+            "tasks": parts.tasks,
+            "carriers": [(*each._replace(releases=ends[i]), ends[i + 1]) for i, each in enumerate(parts.carriers)],
+            "releases": [i for each in parts.carriers for i in each.releases],
+            "messages": [each._replace(legs=0) for each in parts.messages],  # type: ignore[arg-type]
+            "legs": legs,
+            "links": parts.links,
+        }
+        self._tables = {name: np.array(rows, dtype=np.int64) for name, rows in tables.items()}
+        self._streams = parts.streams
+        self._numbers = np.zeros((len(parts.streams), AT_ONCE), dtype=np.int64)
+        self._notes = np.zeros((_ROOM, COLUMNS), dtype=np.int64)
+        self._noted: list[Integers] = []
+        self._failure: BaseException | None = None
+        self._kept: list[npt.NDArray[Any]] = [
+            self._numbers.ctypes.data + self._numbers.strides[0] * np.arange(len(parts.streams)),
+            np.full(len(parts.streams), AT_ONCE, dtype=np.int64),
+            np.array([kind in noted for kind in range(len(NOTED))], dtype=np.uint8),
+        ]
+        self._draw, self._take = _DRAW(self._draw_for_c), _TAKE(self._take_for_c)
+        given = _Given(
+            stop=parts.stop,
+            counts=tuple(len(tables[name.lower()]) for name in _KINDS),
+            **{name: table.ctypes.data for name, table in self._tables.items()},
+            **{name: array.ctypes.data for name, array in zip(("numbers", "used", "kept"), self._kept)},
+            notes=self._notes.ctypes.data,
+            room=_ROOM,
+            draw=self._draw,
+            take=self._take,
+        )
+        self._made = self._library.scheduler_made(ctypes.byref(given))
+        self._expect(bool(self._made))
+        weakref.finalize(self, self._library.scheduler_free, self._made)
+
+    @property
+    def reached(self) -> int:
+        """As of the one in Python."""
+        return int(self._library.scheduler_reached(self._made))
+
+    def run(self, until: int) -> None:
+        """As by the one in Python."""
+        noted = int(self._library.scheduler_run(self._made, until))
+        self._expect(noted >= 0)
+        self._take_for_c(noted)
+
+    def taken(self) -> Integers:
+        """As of the one in Python."""
+        found = np.concatenate([self._notes[:0], *self._noted])
+        self._noted.clear()
+        return found
+
+    def _draw_for_c(self, stream: int) -> None:
+        """More numbers of a stream; no exception goes through C."""
+        try:
+            self._numbers[stream] = self._streams[stream](AT_ONCE)
+        except BaseException as error:
+            self._failure = error
+            self._numbers[stream] = LATER // 2  # nothing comes any more
+
+    def _take_for_c(self, noted: int) -> None:
+        self._noted.append(self._notes[:noted].copy())
+
+    def _expect(self, has_memory: bool) -> None:
+        if self._failure is not None:
+            raise self._failure
+        if not has_memory:
+            raise MemoryError("no memory for the jobs and frames that wait")
+
+
+@functools.cache
+def _library() -> Any:
+    """scheduler.c as a library; raises `QuadcosimError` that says what stands in the way."""
+    sources = {"scheduler.c": SOURCE.read_bytes(), "constants.h": _constants().encode()}
+    path = kept("scheduler", sources, OPTIONS, lambda: compiled_here(sources, "scheduler.c"))
+    try:
+        library = ctypes.CDLL(str(path))
+    except OSError as error:
+        raise QuadcosimError(str(error)) from error
+    for name in ("size_of_given", "scheduler_reached", "scheduler_run"):
+        getattr(library, name).restype = ctypes.c_int64
+    library.scheduler_made.restype = ctypes.c_void_p
+    library.scheduler_made.argtypes = (ctypes.c_void_p,)
+    library.scheduler_free.restype, library.scheduler_free.argtypes = None, (ctypes.c_void_p,)
+    library.scheduler_reached.argtypes = (ctypes.c_void_p,)
+    library.scheduler_run.argtypes = (ctypes.c_void_p, ctypes.c_int64)
+    assert library.size_of_given() == ctypes.sizeof(_Given)
+    return library
+
+
+def _constants() -> str:
+    """What parts.py counts and names, for C."""
+    found = {name: value for name, value in vars(constants).items() if name.isupper() and isinstance(value, int)}
+    found |= {name: i for i, name in enumerate(_KINDS)} | {"PART_KINDS": len(_KINDS)}
+    for table, columns in _TABLES.items():
+        found |= {f"{table}_{column.upper()}": i for i, column in enumerate(columns)}
+        found[f"{table}_COLUMNS"] = len(columns)
+    return "".join(f"#define {name} (INT64_C({value}))\n" for name, value in found.items())
