@@ -44,6 +44,7 @@ REDESIGNS = ("explicit", "semi_implicit", "midpoint", "mean", "match")
 LAWS = {
     **{f"unified_{name}": ("UnifiedController", k) for k, name in enumerate(REDESIGNS, 1)},
     "geometric": ("GeometricController", 1),
+    "geometric_mean": ("GeometricController", 4),
     "cascaded": ("CascadedController", 0),
 }
 """By the name of the trace: the controller, and its discretisation, if it has any"""

@@ -17,6 +17,7 @@ import pandas as pd
 
 import quadcosim
 from docs import charts, comparisons, theory
+from docs import processor as processors
 from docs.theory import PAPER
 from orchestration.basics.statistics import first_end, quantile, wilson
 from orchestration.comparison.fates import FATES, SETTLING, survived
@@ -55,6 +56,7 @@ def main() -> None:
     sections = (
         compared, pictures, period, limits, continuous, delay, bounds, gains, bandwidth, finite_time, monte_carlo,
         sensitivity, agreement,
+        processor, stalls,
     )  # fmt: skip
     for section in [one for one in sections if one.__name__ in sys.argv[1:] or not sys.argv[1:]]:
         print(f"\n## {section.__name__}", flush=True)
@@ -256,6 +258,17 @@ def agreement() -> list[str]:
 
 
 # -- flying and drawing -----------------------------------------------------------------------------------
+
+
+def processor() -> list[str]:
+    """What each design takes of a processor beside what it is good for."""
+    _save(processors.figure, "processor")
+    return processors.equal_share()
+
+
+def stalls() -> list[str]:
+    """How long the law may be kept from the processor."""
+    return processors.stalls()
 
 
 def fly(name: str) -> pd.DataFrame:

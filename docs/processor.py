@@ -1,0 +1,161 @@
+"""What a law takes of a processor, and what it is good for: the flights of the comparisons beside counted costs."""
+
+import csv
+import json
+import statistics
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+import quadcosim
+from orchestration.basics.documents import tables_in
+from orchestration.basics.statistics import wilson
+from orchestration.figures.style import DOCS
+
+ROOT = Path(__file__).parent.parent
+AUTOPILOT = ROOT / "examples" / "autopilot"
+PROCESSOR = "m7"
+NINE_IN_TEN = 0.9
+
+
+@dataclass(frozen=True, kw_only=True)
+class Design:
+    """A controller of a comparison, and what a sample of it takes."""
+
+    comparison: str
+    controller: str
+    trace: str
+    cost_of: Callable[[Sequence[float]], float]
+    """of the traces' steps [s]: of a cascade at one rate every step is one with all loops"""
+    color: str
+
+    @property
+    def cost(self) -> float:
+        """A sample of it [s]."""
+        with (AUTOPILOT / "execution" / f"{self.trace}_{PROCESSOR}.csv").open(encoding="utf-8") as file:
+            return self.cost_of([float(row["seconds"]) for row in csv.DictReader(file)])
+
+    def cells(self) -> list[dict[str, Any]]:
+        """Those of the comparison, by period."""
+        kept = json.loads((ROOT / "docs" / "data" / f"{self.comparison}.json").read_text("utf-8"))["cells"]
+        return [cell for cell in kept if cell["controller"] == self.controller]
+
+
+DESIGNS = {
+    "unified, κ = 1": Design(
+        comparison="periods", controller="unified", trace="unified_explicit", cost_of=statistics.mean, color="C0"
+    ),
+    "unified, κ = 0": Design(
+        comparison="periods",
+        controller="unified, no coupling",
+        trace="unified_explicit",
+        cost_of=statistics.mean,
+        color="C1",
+    ),
+    "unified, κ = 1, `mean`": Design(
+        comparison="periods", controller="unified, mean", trace="unified_mean", cost_of=statistics.mean, color="C2"
+    ),
+    "geometric": Design(
+        comparison="periods", controller="geometric", trace="geometric", cost_of=statistics.mean, color="C3"
+    ),
+    "geometric, `mean`": Design(
+        comparison="periods", controller="geometric, mean", trace="geometric_mean", cost_of=statistics.mean, color="C4"
+    ),
+    "cascade, all loops at one rate": Design(
+        comparison="periods", controller="cascade, one rate", trace="cascaded", cost_of=max, color="C5"
+    ),
+    "cascade, fast inner loops": Design(
+        comparison="fast_inner",
+        controller="cascade, fast inner loops",
+        trace="cascaded",
+        cost_of=statistics.mean,
+        color="C6",
+    ),
+}
+
+
+def equal_share() -> list[str]:
+    """The least share of the processor at which nine in ten settle, and survive, design by design."""
+    lines = [
+        "| design | a sample [µs] | settle: period | share | survive: period | share |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name, design in DESIGNS.items():
+        found = [f"{1e6 * design.cost:.1f}"]
+        for fate in ("settles", "survives"):
+            period = _longest(design, fate)
+            found += (
+                ["none", "-"] if period is None else [f"{1e3 * period:g} ms", f"{100 * design.cost / period:.3f} %"]
+            )
+        lines.append(f"| {name} | {' | '.join(found)} |")
+    return lines
+
+
+def _longest(design: Design, fate: str) -> float | None:
+    """The longest period up to which nine in ten do so at each period of the grid."""
+    found = None
+    for cell in design.cells():
+        if cell[fate] < NINE_IN_TEN * cell["count"]:
+            break
+        found = float(cell["value"])
+    return found
+
+
+def figure() -> Figure:
+    """Shares that settle and survive over the share of the processor."""
+    made = DOCS.figure(34.0)
+    panels = made.subplots(1, 2, sharey=True)
+    for panel, (fate, word) in zip(panels, {"settles": "settle", "survives": "survive"}.items(), strict=True):
+        for name, design in DESIGNS.items():
+            cells = design.cells()
+            shares = [100.0 * design.cost / cell["value"] for cell in cells]
+            bands = [wilson(cell[fate], cell["count"]) for cell in cells]
+            panel.fill_between(shares, *zip(*bands), color=design.color, alpha=0.12, linewidth=0.0)
+            panel.plot(
+                shares,
+                [cell[fate] / cell["count"] for cell in cells],
+                ".-",
+                color=design.color,
+                label=name.replace("`", ""),
+            )
+        panel.set(xscale="log", xlabel="share of the processor [%]", title=f"that {word}", xlim=(0.003, 5.0))
+    panels[0].set_ylabel("share of 200 initial conditions [1]")
+    made.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return made
+
+
+STALLED = "computers.autopilot.tasks.storage.execution"
+LAWS: dict[str, tuple[str, dict[str, Any], str]] = {
+    "unified, κ = 1": ("UnifiedController", {}, "unified_explicit"),
+    "unified, κ = 0": ("UnifiedController", {"coupling": 0.0}, "unified_explicit"),
+    "unified, κ = 1, `mean`": ("UnifiedController", {"discretisation": "mean"}, "unified_mean"),
+    "geometric": ("GeometricController", {}, "geometric"),
+    "cascade, all loops at one rate": ("CascadedController", {"velocity_ratio": 1, "attitude_ratio": 1}, "cascaded"),
+}
+"""What flies the example of an autopilot: its FMU, its parameters, and its execution times"""
+
+
+def stalls() -> list[str]:
+    """For how long the memory card may hold the processor, once a second, in the example of an autopilot."""
+    lines = ["| law | largest stall that is good | the least that is not, and why |", "|---|---|---|"]
+    for name, (fmu, parameters, trace) in LAWS.items():
+        found = quadcosim.limit(
+            certain(fmu, parameters, trace), STALLED, first=0.01, last=0.6, scan=0.02, tolerance=0.001, progress=None
+        )
+        lines.append(f"| {name} | {1e3 * (found.large_signal_limit or 0.0):.0f} ms | {found.note} |")
+    return lines
+
+
+def certain(fmu: str, parameters: dict[str, Any], trace: str) -> dict[str, Any]:
+    """The example with a law, and nothing left to chance: the mean in place of what is drawn."""
+    told = tables_in((AUTOPILOT / "flight.toml").read_text("utf-8"))
+    told["components"]["controller"] |= {"fmu": f"native/{fmu}", "parameters": parameters}
+    tasks, network = told["computers"]["autopilot"]["tasks"], told["networks"]["bus"]
+    tasks["radio"] |= {"jitter": 0.0, "execution": 0.001}
+    design = Design(comparison="", controller="", trace=trace, cost_of=statistics.mean, color="")
+    tasks["control"]["execution"] = round(design.cost, 9)
+    network["error"], network["messages"]["airspeed"]["jitter"] = 0.0, 0.0
+    return told
