@@ -121,8 +121,26 @@ def four_components() -> Figure:
     return figure
 
 
+def three_servos() -> Figure:
+    """The angles, with the processor given by rates and by deadlines."""
+    figure = Figure(figsize=SMALL)
+    both = figure.subplots(1, 2, sharey=True)
+    for axes, how in zip(both, ("fixed-priority", "earliest-deadline-first")):
+        result = flown("three_servos", stop_time=0.6, computers__node__scheduling=how)
+        for name, period, color in (("slow", 6, RED), ("middle", 5, BLUE), ("fast", 4, GREEN)):
+            line(axes, result, f"{name}_servo.angle", color, f"every {period} ms")
+        axes.set(xlabel="time [s]", ylim=(-3.0, 3.0), title=how.replace("-", " "))
+    both[0].set(ylabel="angle [rad]")
+    both[1].legend(loc="upper right", fontsize=8)
+    return figure
+
+
 FIGURES: dict[str, Callable[[], Figure]] = {
-    draw.__name__: draw for draw in (water_tank, double_integrator, dc_servo, minimum_variance, four_components)
+    draw.__name__: draw
+    for draw in (
+        *(water_tank, double_integrator, dc_servo, three_servos),
+        *(minimum_variance, four_components),
+    )
 }
 
 

@@ -7,6 +7,7 @@ from fractions import Fraction
 from fmu_kit.trajectory import Trajectory
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
+from orchestration.engines.job_numbers import job_numbers
 from orchestration.engines.sources import (
     BuiltIn,
     Constant,
@@ -57,7 +58,8 @@ def checked(system: System, models: Mapping[str, Model]) -> Checked:
     for name, component in system.components.items():
         _expect_clock(name, component, models[name])
     parameters = _parameters(system, models)
-    system = objectives.known(system, signals_of(system, models), set(parameters))
+    of_jobs = job_numbers(system)
+    system = objectives.known(system, signals_of(system, models), {*parameters, *of_jobs})
     return Checked(system=system, parameters=parameters, units=units(system, models), follows=words)
 
 

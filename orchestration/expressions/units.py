@@ -7,7 +7,19 @@ from typing import TypeAlias
 from orchestration.basics.units import NUMBER, ONE, SECOND, Unit
 from orchestration.expressions.operators import OPERATORS
 from orchestration.expressions.recorded import STOP_TIME, TIME
-from orchestration.expressions.syntax import Call, Name, Node, Number, Operation, Sampled, is_over_run, text
+from orchestration.expressions.syntax import (
+    Call,
+    Name,
+    Node,
+    Number,
+    OfJobs,
+    Operation,
+    Sampled,
+    is_of_jobs,
+    is_over_run,
+    parse_of_jobs,
+    text,
+)
 from orchestration.expressions.unit_rules import Operand, agreed
 
 Units: TypeAlias = Mapping[str, Unit | None]
@@ -23,6 +35,8 @@ def unit_of(node: Node, units: Units) -> Unit | None:
     match node:
         case Number():
             return NUMBER
+        case OfJobs(what):
+            return SECOND if what == "response" else NUMBER
         case Name(name):
             return _named(name, units)
         case Sampled(_, argument):
@@ -38,6 +52,8 @@ def _operand(node: Node, units: Units) -> Operand:
 
 
 def _named(name: str, units: Units) -> Unit | None:
+    if is_of_jobs(name):
+        return unit_of(parse_of_jobs(name), units)
     if name in (TIME, STOP_TIME):
         return SECOND
     if name in units:

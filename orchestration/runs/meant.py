@@ -9,6 +9,7 @@ from typing import Any
 from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.basics.interrupt import Interrupted
 from orchestration.building import fmus
+from orchestration.engines.job_numbers import job_numbers
 from orchestration.engines.sources import Values
 from orchestration.engines.wiring import checked, signals_of, source_values
 from orchestration.fmi.model import Model, read_model
@@ -111,13 +112,14 @@ def held_to_fmus(asked: Request, announce: Announce | None = None) -> Meant:
 def result_of(meant: Meant, flown: Flown, recorder: Recorder, wall_time: float, interrupted: bool) -> Result:
     """The result of a run, with its metrics; raises `RunInterrupted` with it if it was `interrupted`."""
     recording = recorder.finish()
+    numbers = {**meant.parameters, **job_numbers(meant.system)}
     result = Result(
         asked=meant.asked,
         system=meant.system,
         recording=recording,
         metrics=objectives.compute(
             meant.system,
-            lambda: objectives.spans(meant.system, recording, meant.parameters, flown.end),
+            lambda: objectives.spans(meant.system, recording, numbers, flown.end),
             end=flown.end,
             divergence_time=flown.divergence_time,
             steps=flown.steps,

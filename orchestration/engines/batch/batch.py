@@ -12,12 +12,13 @@ from orchestration.basics.errors import QuadcosimError
 from orchestration.basics.simulator import Booleans, Floats, Integers
 from orchestration.engines import initial
 from orchestration.engines.batch.shape import Ends, Shape, changes_of, ends_of
+from orchestration.engines.job_numbers import job_numbers
 from orchestration.engines.sources import Values
 from orchestration.engines.structures import address, structures
 from orchestration.engines.wires import clock_of
 from orchestration.engines.wiring import source_values
 from orchestration.expressions.recorded import STOP_TIME
-from orchestration.expressions.syntax import Call
+from orchestration.expressions.syntax import Call, is_of_jobs
 from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.fmi.values import number_of, taken
 from orchestration.schedule.schedule import Schedule
@@ -90,6 +91,7 @@ class Batch:
         self._library = shape.library
         self._said: dict[Hashable, tuple[Floats, Floats]] = {}
         self._own = NOTHING
+        self._jobs_of: tuple[System, Mapping[str, float]] | None = None
         self._written = shape.written
         self._kept_arrays: list[Any] = []
         owners = [source.trajectory for source in shape.system.sources.values() if source.trajectory is not None]
@@ -97,6 +99,7 @@ class Batch:
         self._starts = {
             name: (component_of(name), variable_of(name), variable, number_of(variable, variable.start))
             for name in (*shape.numbers, *(each for names in self._trajectories.values() for each in names))
+            if not is_of_jobs(name)
             for variable in [shape.variable(name)]
         }
         kernels = list(shape.kernels.values())
@@ -263,9 +266,17 @@ class Batch:
     def _number(self, lane: int, system: System, name: str) -> float:
         if name in self._own:
             return float(self._own[name][lane])
+        if is_of_jobs(name):
+            return self._of_jobs(system)[name]
         owner, parameter, variable, start = self._starts[name]
         given = system.components[owner].parameters.get(parameter)
         return start if given is None else number_of(variable, given)
+
+    def _of_jobs(self, system: System) -> Mapping[str, float]:
+        """What expressions say of jobs, found once for each run."""
+        if self._jobs_of is None or self._jobs_of[0] is not system:
+            self._jobs_of = system, job_numbers(system)
+        return self._jobs_of[1]
 
     def _put_values(self, systems: Sequence[System], known: Mapping[Call, Floats]) -> None:
         """Start values, parameters, and all that differs from lane to lane."""

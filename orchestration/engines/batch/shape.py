@@ -19,7 +19,7 @@ from orchestration.engines.wires import Wires
 from orchestration.expressions.over_run import inlined, reductions
 from orchestration.expressions.recorded import STOP_TIME, TIME, vectors
 from orchestration.expressions.scalars import scalars
-from orchestration.expressions.syntax import Call, Node, names, parse
+from orchestration.expressions.syntax import Call, Node, is_of_jobs, names, parse
 from orchestration.fmi.model import Model, Variable
 from orchestration.results.objectives import GOOD
 from orchestration.schedule.plan import is_plain
@@ -164,7 +164,7 @@ class Shape:
     def numbers(self) -> tuple[str, ...]:
         """Parameters that expressions name, as COMPONENT.NAME."""
         wanted = self._wanted
-        return tuple(name for name in sorted(wanted) if self._is_parameter(name))
+        return tuple(name for name in sorted(wanted) if is_of_jobs(name) or self._is_parameter(name))
 
     @cached_property
     def seen(self) -> Mapping[str, tuple[str, ...]]:

@@ -1,7 +1,9 @@
 """Systems on computers and networks are flown to the same bits by all engines, in windows, and beyond a pause."""
 
 import json
+import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from orchestration.basics.errors import UsageError
+from orchestration.engines.batch.batches import Batches
 from orchestration.runs.simulation import prepared
 from orchestration.schedule import cursor
-from orchestration.system.model import System
+from orchestration.schedule.resources import timeline_of
+from orchestration.system.computers import Computer, Task
+from orchestration.system.distribution import Distribution
+from orchestration.system.model import Component, Connection, Criterion, Sampling, System
 from orchestration.system.paths import changed
 from tests.native import assert_the_same
 from tests.orchestration.engines.batch.lanes import assert_the_same_signals, in_lanes, shape_of
@@ -64,6 +71,101 @@ def test_and_go_on_from_a_pause_as_if_there_was_none(
         run.master.restore(state, saved)
         run.master.run()
         assert_the_same(run.result(), whole)
+
+
+def loop(fmu: Path, controller: Component, **keys: Any) -> System:
+    parts = {"plant": Component(fmu="stub", step=0.01), "controller": controller}
+    wires = (
+        Connection(name="measured", start=("plant.y",), end=("controller.u0y",), loss=0.1),
+        Connection(name="commanded", start=("controller.y",), end=("plant.u1y",), **keys.pop("command", {})),
+    )
+    return of(System(stop_time=1.0, components=parts, connections=wires, **keys), fmu)
+
+
+def on_a_computer(**keys: Any) -> dict[str, Computer]:
+    return {"one": Computer(tasks={"control": Task(component="controller", **keys)}, clock_ratio=1.01)}
+
+
+@pytest.mark.parametrize("command", [{}, {"delay": 0.03, "delay_jitter": 0.02, "loss": 0.2}])
+def test_one_task_alone_that_takes_no_time_flies_the_bits_of_sampling(
+    fmu: Path, kept: Kept, command: dict[str, Any]
+) -> None:
+    sampling = Sampling(period=0.02, offset=0.003, jitter=0.01, clock_ratio=1.01)
+    by_sampling = loop(
+        fmu, Component(fmu="stub", sampling=sampling), command=command, streams={"components.controller.jitter": 3}
+    )
+    by_task = loop(
+        fmu, Component(fmu="stub"), command=command, streams={"computers.one.tasks.control.jitter": 3},
+        computers=on_a_computer(period=0.02, offset=0.003, jitter=0.01),
+    )  # fmt: skip
+    assert_the_same(both(by_task, load=kept.load), both(by_sampling, load=kept.load))
+
+
+def test_a_constant_time_of_execution_flies_the_bits_of_a_delay(fmu: Path, kept: Kept) -> None:
+    by_delay = loop(
+        fmu, Component(fmu="stub", sampling=Sampling(period=0.02, clock_ratio=1.01)), command={"delay": 0.003}
+    )
+    by_task = loop(fmu, Component(fmu="stub"), computers=on_a_computer(period=0.02, execution=0.003))
+    found, expected = both(by_task, load=kept.load), both(by_delay, load=kept.load)
+    assert found.rows.tobytes() == expected.rows.tobytes()
+
+
+def test_what_objectives_say_of_jobs_is_the_same_in_lanes_and_of_each_run_its_own(fmu: Path, kept: Kept) -> None:
+    what = loop(
+        fmu, Component(fmu="stub"),
+        computers=on_a_computer(period=0.02, deadline=0.01, execution=Distribution(uniform=(0.0, 0.02))),
+        objectives={
+            "worst": "max(response(one.control))", "late": "mean(missed(control)) + 0 * last(plant.y)",
+            "share": "share(response(control) > 0.005) ** 2", "never": "max(missed(control)) - 1",
+        },
+        criterion=Criterion(good="worst < 1 and late < 2"),
+    )  # fmt: skip
+    crowd = [replace(what, seed=seed) for seed in range(3)]
+    alone = [ran(each, "compiled", load=kept.load).metrics for each in crowd]
+    assert len({each["worst"] for each in alone}) == 3
+    for each, found in zip(alone, Batches().run(crowd)):
+        assert found is not None
+        assert found.metrics == each
+    jobs = timeline_of(crowd[0]).jobs["one.control"]
+    assert alone[0]["late"] == pytest.approx(jobs.missed.sum() / jobs.due.sum())
+
+
+@pytest.mark.parametrize(
+    ("objective", "complaint"),
+    [
+        ("response(control)", "response(control): has a value for each job; expected it inside max, mean, share or"),
+        ("max(response(pilot))", "response(pilot): expected one of one.control"),
+        ("max(response(control) * missed(control))", "expected jobs of one task in one way, not response(control) and"),
+    ],
+)
+def test_what_cannot_be_said_of_jobs_is_refused(fmu: Path, objective: str, complaint: str) -> None:
+    with pytest.raises(UsageError, match=re.escape(complaint)):
+        ran(
+            loop(fmu, Component(fmu="stub"), computers=on_a_computer(period=0.02), objectives={"x": objective}),
+            "python",
+        )
+
+
+def test_a_component_of_fixed_steps_beside_a_task_needs_to_move(tmp_path: Path, fmu: Path) -> None:
+    fixed = moving(tmp_path, fixed_step=True)
+    what = loop(fmu, Component(fmu="stub"), computers=on_a_computer(period=0.03, execution=0.004))
+    for align in ("exact", "next"):
+        plant = replace(what.components["plant"], fmu=str(fixed), align=align)
+        with_it = replace(what, components={**what.components, "plant": plant})
+        if align == "next":
+            arrived = [each.time for each in both(with_it).events if each.kind == "arrived"]
+            assert all(time % 10_000_000 == 0 for time in arrived)
+        else:
+            with pytest.raises(
+                UsageError, match=r"^computers\.one\.tasks\.control: components\.plant takes steps of 0\.01"
+            ):
+                ran(with_it, "python")
+
+
+def test_a_system_without_components_is_not_run() -> None:
+    alone = System(stop_time=1.0, computers={"one": Computer(tasks={"load": Task(period=0.1)})})
+    with pytest.raises(UsageError, match=r"^components = none: expected at least one to run"):
+        ran(alone, "python")
 
 
 @st.composite
