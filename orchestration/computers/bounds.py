@@ -32,6 +32,8 @@ class Periodic:
     """from the nominal release; for earliest deadlines only"""
     priority: int = 1
     """1 is more urgent than 2"""
+    counts_when_queued: bool = False
+    """whether its responses count from when it is released, however late that is"""
 
 
 def fixed_priority(tasks: Sequence[Periodic], *, preemptive: bool, switch: int) -> list[int | None]:
@@ -150,7 +152,9 @@ def _uninterrupted(own: Periodic, above: Sequence[Periodic], *, blocking: int, s
         if found is None:
             return None
         begin = found
-        most = max(most, math.floor(begin + own.execution + own.jitter - number * own.period))
+        nominal = number * own.period - own.jitter
+        since = max(nominal, 0) if own.counts_when_queued else nominal
+        most = max(most, math.floor(begin + own.execution - since))
     return most
 
 

@@ -15,9 +15,9 @@ from tests.orchestration.computers.described import Described
 MS = 1_000_000
 
 
-def ranked(*tasks: tuple[int, int], **more: int) -> list[Periodic]:
+def ranked(*tasks: tuple[int, int]) -> list[Periodic]:
     """Of execution and period each, the first the most urgent."""
-    return [Periodic(execution=c, period=t, priority=i, **more) for i, (c, t) in enumerate(tasks)]
+    return [Periodic(execution=c, period=t, priority=i) for i, (c, t) in enumerate(tasks)]
 
 
 @pytest.mark.parametrize(
@@ -56,6 +56,13 @@ def test_nothing_is_said_of_what_comes_by_chance_nor_of_those_that_wait_for_it()
 def test_a_period_that_is_no_whole_number_is_as_a_nanosecond_of_jitter() -> None:
     thirds = [replace(task, period=Fraction(100, 3)) for task in ranked((10, 1), (10, 1))]
     assert fixed_priority(thirds, preemptive=True, switch=0) == [11, 21]
+
+
+def test_a_message_that_counts_from_when_it_is_queued_has_its_own_lateness_not_in_its_bound() -> None:
+    first, second = ranked((10, 100), (20, 200))
+    late = replace(second, jitter=50)
+    assert can([first, late], bit=1) == [30, 80]
+    assert can([first, replace(late, counts_when_queued=True)], bit=1) == [30, 30]
 
 
 def test_all_deadlines_are_met_where_the_demand_test_holds() -> None:
