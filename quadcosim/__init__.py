@@ -19,6 +19,7 @@ Where to begin:
 - `limit` finds the largest period, delay, loss or anything else that is still good;
 - `expect` gives the expectation of means of squares exactly, of the loop about its operating point, without a run;
 - `margin` certifies how far a delay, a jitter or a run of losses may vary without making the linear loop unstable;
+- `schedule` says who has the computers and networks of a system when, and what theory says of it;
 - `linearise` cuts a loop open about its operating point, sampled, held and late as it is: two systems of matrices;
 - `sweep` flies a `Study` over axes, `compare` controllers against each other, `tune` searches for gains: what is there
   is not flown again, and what they give becomes a table with `to_pandas`;
@@ -62,6 +63,7 @@ if TYPE_CHECKING:
     from orchestration.runs.pause import fly_until, resume
     from orchestration.runs.result import Result
     from orchestration.runs.run_directory import load_run, save_run
+    from orchestration.runs.scheduling import Scheduled, schedule
     from orchestration.runs.simulation import run
     from orchestration.runs.stepping import Simulation
     from orchestration.stability.linearise import Linearised, linearise
@@ -109,6 +111,8 @@ _HOMES = {
     "Criterion": "orchestration.system.model",
     "load_system": "orchestration.system.system_file",
     "changed": "orchestration.system.paths",
+    "schedule": "orchestration.runs.scheduling",
+    "Scheduled": "orchestration.runs.scheduling",
     "read_model": "orchestration.fmi.model",
     "Model": "orchestration.fmi.model",
     # many runs
@@ -176,6 +180,7 @@ __all__ = [
     "RunLost",
     "Sampling",
     "Scenario",
+    "Scheduled",
     "Simulation",
     "SimulatorError",
     "Source",
@@ -210,6 +215,7 @@ __all__ = [
     "resume",
     "run",
     "save_run",
+    "schedule",
     "sweep",
     "tune",
 ]

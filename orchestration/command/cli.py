@@ -14,7 +14,7 @@ from orchestration.basics.extras import extra_of
 from orchestration.basics.terminal import complain, progress_bar, say, warn
 from orchestration.basics.units import after
 from orchestration.building import consent
-from orchestration.command import completion, exact, interop, margin, plotting, studies
+from orchestration.command import completion, exact, interop, margin, plotting, scheduling, studies
 from orchestration.command import new as beginning
 from orchestration.command import registry as registering
 from orchestration.command import report as reports
@@ -331,6 +331,7 @@ def ssp(
 
 
 registering.add(app, FLY, run)
+scheduling.register(app)
 plotting.register(app)
 reports.register(app)
 beginning.register(app)

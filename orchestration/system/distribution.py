@@ -56,6 +56,19 @@ class Distribution:
         return span[1] if span is not None else float(self.table().max())
 
     @property
+    def mean(self) -> float:
+        """The value on average, likewise."""
+        if self.uniform is not None:
+            return sum(self.uniform) / 2.0
+        if self.normal is not None and self.range is not None:
+            (mean, deviation), (low, high) = self.normal, self.range
+            density = [math.exp(-(((end - mean) / deviation) ** 2) / 2.0) for end in (low, high)]
+            inside = self.share(high) - self.share(low)
+            return mean + deviation * (density[0] - density[1]) / (math.sqrt(2.0 * math.pi) * inside)
+        values = self.table()
+        return float(values.mean() if self.probabilities is None else values @ self.probabilities)
+
+    @property
     def is_random(self) -> bool:
         """Whether seeds make a difference, likewise."""
         return self.order == "drawn" and self.lowest < self.highest
@@ -135,6 +148,11 @@ def lowest(of: Varying) -> float:
 def highest(of: Varying) -> float:
     """The most that it can be."""
     return of.highest if isinstance(of, Distribution) else of
+
+
+def mean(of: Varying) -> float:
+    """What it is on average."""
+    return of.mean if isinstance(of, Distribution) else of
 
 
 def is_random(of: Varying) -> bool:

@@ -31,7 +31,7 @@ def test_a_name_that_there_is_not_is_an_attribute_error() -> None:
 
 def test_the_old_package_gives_the_same_objects() -> None:
     names = [name for name in quadcosim.__all__ if not isinstance(getattr(orchestration, name), ModuleType)]
-    assert {*quadcosim.__all__} - {*names} <= {"report"}
+    assert {*quadcosim.__all__} - {*names} <= {"report", "schedule"}
     assert all(getattr(orchestration, name) is getattr(quadcosim, name) for name in names)
 
 

@@ -1,17 +1,21 @@
 """Distributions and traces: what a file may say of them, what they are read as, and that they are told apart."""
 
+import math
 import os
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from orchestration.basics.errors import UsageError
+from orchestration.schedule.drawing import times_from
 from orchestration.system.description import timing, varying
-from orchestration.system.distribution import Distribution, content, highest, is_random, lowest
+from orchestration.system.distribution import Distribution, content, highest, is_random, lowest, mean
 from orchestration.system.files_read import files_read
 from orchestration.system.model import Connection, Sampling
 from orchestration.system.system_file import load_system
+from orchestration.system.times import NANOSECONDS
 
 SYSTEM = """
 stop_time = 1.0
@@ -135,3 +139,19 @@ def test_a_trace_that_is_written_anew_is_another(folder: Path) -> None:
     os.utime(folder / "trace.csv", ns=(1, 1))
     assert content(trace) != before
     assert highest(trace) == 0.0077
+
+
+@pytest.mark.parametrize(
+    ("of", "known"),
+    [
+        (Distribution(uniform=(0.001, 0.004)), 0.0025),
+        (Distribution(values=(0.0, 0.004), probabilities=(0.25, 0.75)), 0.003),
+        (Distribution(values=(0.001, 0.002, 0.006)), 0.003),
+        (Distribution(normal=(0.002, 0.001), range=(0.001, 0.003)), 0.002),
+        (Distribution(normal=(0.0, 1.0), range=(0.0, 9.0)), math.sqrt(2.0 / math.pi)),  # half a normal distribution
+    ],
+)
+def test_the_mean_is_that_of_what_is_drawn(of: Distribution, known: float) -> None:
+    drawn = times_from(of)(np.random.default_rng(1).random(40_000)) / NANOSECONDS
+    assert math.isclose(mean(of), known)
+    assert math.isclose(drawn.mean(), known, rel_tol=0.02)

@@ -1,0 +1,127 @@
+"""The command that is about computers and networks alone: who has them when, and what theory says of it."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from orchestration.basics.errors import UsageError
+from orchestration.basics.terminal import say
+from orchestration.command import registry as registering
+from orchestration.command.answer import Answer
+from orchestration.figures.names import FORMATS
+
+if TYPE_CHECKING:
+    from orchestration.runs.scheduling import Scheduled
+    from orchestration.schedule.responses import Responses
+
+HEAD = (
+    "", "jobs", "share", "least", "mean", "99 %", "most", "bound", "start ±", "end ±", "latency", "deadline", "missed",
+    "unfinished",
+)  # fmt: skip
+
+
+def schedule(
+    system: Annotated[Path, typer.Argument(help="System file, or SSP; its FMUs need not be there.")],
+    until: Annotated[
+        float | None,
+        typer.Option("--until", help="How far; default: stop_time.", metavar="SECONDS", show_default=False),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="Draw the Gantt chart, in the format of the ending.", metavar="FIGURE.png",
+                     show_default=False),
+    ] = None,
+    start: Annotated[
+        float | None, typer.Option("--from", help="Start of what is drawn, in seconds.", show_default=False)
+    ] = None,
+    end: Annotated[float | None, typer.Option("--to", help="End of what is drawn.", show_default=False)] = None,
+) -> Answer:  # fmt: skip
+    """Show who has the computers and networks of a system when: response times, missed deadlines, bounds of theory."""
+    if until is not None and not 0.0 < until < float("inf"):
+        raise UsageError(f"--until {until:g}: expected a positive number of seconds")
+    if out is not None and out.suffix[1:] not in FORMATS:
+        raise UsageError(f"--out {out}: expected a figure ending in one of {', '.join(FORMATS)}")
+    from orchestration.runs import scheduling
+
+    found = scheduling.schedule(system, until)
+    if out is not None:
+        say(str(_drawn(found, out, start, end)))
+    document = {
+        "until": found.until,
+        "tasks": {name: asdict(each) for name, each in found.tasks.items()},
+        "messages": {name: asdict(each) for name, each in found.messages.items()},
+        "busy": found.busy,
+    }
+    return Answer(document=document, lines=list(_lines(found)))
+
+
+def _drawn(found: "Scheduled", out: Path, start: float | None, end: float | None) -> Path:
+    from dataclasses import replace
+
+    from orchestration.figures import gantt
+    from orchestration.figures.style import SCREEN, save
+
+    whole = gantt.seen(found.timeline)
+    window = (start or 0.0, found.until if end is None and start is not None else end or whole[1])
+    if not 0.0 <= window[0] < window[1] or window[0] >= found.until:
+        expected = f"0 <= from < to, and from before the end at {found.until:g} s"
+        raise UsageError(f"--from {window[0]:g} --to {window[1]:g}: expected {expected}")
+    style = replace(SCREEN, formats=(out.suffix[1:],))
+    with style.applied():
+        figure = gantt.draw(found.timeline, style, window)
+    return save({out.stem: figure}, out.parent, style)[0]
+
+
+def _lines(found: "Scheduled") -> Iterator[str]:
+    """A table for the tasks and one for the messages."""
+    for kind, each in (("task", found.tasks), ("message", found.messages)):
+        if each:
+            yield from _table(kind, each)
+            yield ""
+    for name, share in found.busy.items():
+        yield f"{name}: busy {100.0 * share:.4g} % of {found.until:g} s"
+    if any(each.skipped or each.aborted for each in found.tasks.values()):
+        for name, task in found.tasks.items():
+            if task.skipped or task.aborted:
+                yield f"{name}: {task.skipped} releases skipped, {task.aborted} jobs aborted"
+
+
+def _table(kind: str, each: "Mapping[str, Responses]") -> Iterator[str]:
+    rows = [(kind, *HEAD[1:]), *((name, *_row(one)) for name, one in each.items())]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        first, *rest = (
+            cell.ljust(width) if i == 0 else cell.rjust(width)
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        )
+        yield "  ".join([first, *rest]).rstrip()
+
+
+def _row(of: "Responses") -> Sequence[str]:
+    from orchestration.system.description import seconds
+
+    def said(time: float | None) -> str:
+        return "-" if time is None else seconds(float(f"{time:.4g}"))
+
+    response, latency = of.response, of.latency
+    times = (None,) * 4 if response is None else (response.min, response.mean, response.p99, response.max)
+    return (
+        str(of.jobs),
+        f"{100.0 * of.utilisation:.4g} %",
+        *map(said, times),
+        said(of.bound),
+        said(of.start_jitter),
+        said(of.end_jitter),
+        said(None if latency is None else latency.max),
+        said(of.deadline),
+        "-" if of.missed is None else f"{100.0 * of.missed:.4g} %",
+        str(of.unfinished),
+    )
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the command line."""
+    registering.add(app, registering.FLY, schedule)

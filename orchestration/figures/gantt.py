@@ -1,0 +1,147 @@
+"""Who has the processors and the networks of a system when: a Gantt chart of its tasks and messages."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from orchestration.basics.simulator import Booleans, Integers
+from orchestration.computers.results import CORRUPTED, NEVER, RUN, SKIPPED, SWITCH, Frames, Jobs, Slices, Timeline
+from orchestration.figures.palette import BLACK, BLUE, BROWN, GREEN, GREY, ORANGE, PURPLE, RED, SKY
+from orchestration.figures.run import Window
+from orchestration.figures.style import Style
+
+PIECES = 160
+"""of the busiest processor or link, as many as can be told apart"""
+BAR, LATE = 0.62, 0.16
+"""Heights in a row: of what runs, and of what waits"""
+COLORS = (BLUE, GREEN, ORANGE, PURPLE, SKY, BROWN)
+"""Of tasks and messages; a switch is grey, what goes wrong is red"""
+_UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Row:
+    """A task or a message on one processor or link."""
+
+    name: str
+    color: str
+    slices: Slices
+    owner: int
+    of: Jobs | Frames
+
+
+def draw(timeline: Timeline, style: Style, window: Window | None = None) -> Figure:
+    """A panel for each processor and link, in it a row for each task and message; `window` [s] as `seen` unless told.
+
+    What runs is a bar, what waits a line from its release on; switches are grey. An arrow is a release, a short stroke
+    a deadline, a red one a deadline that is missed.
+    """
+    shown = window or seen(timeline)
+    panels = {name: rows for name, rows in _panels(timeline).items() if rows}
+    heights = [len(rows) for rows in panels.values()]
+    size, unit = next(each for each in _UNITS if shown[1] - shown[0] >= 2.0 * each[0] or each[1] == "ns")
+    figure = style.figure(5.0 + sum(2.0 * height + 2.2 for height in heights), layout="constrained")
+    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=[h + 0.6 for h in heights])
+    for panel, (name, rows) in zip(axes[:, 0], panels.items(), strict=True):
+        for place, row in enumerate(rows):
+            _draw_row(panel, row, place, shown, size, style)
+        panel.set_title(name, loc="left", fontsize=style.font)
+        panel.set(ylim=(len(rows) - 0.35, -0.85), xlim=(shown[0] / size, shown[1] / size))
+        panel.set_yticks(range(len(rows)), [row.name for row in rows])
+        panel.tick_params(axis="y", length=0)
+        panel.grid(axis="y", visible=False)
+    axes[-1, 0].set_xlabel(f"time [{unit}]")
+    figure.legend(handles=_legend(panels), loc="outside lower center", ncols=7 if style.is_wide else 3)
+    return figure
+
+
+def seen(timeline: Timeline) -> Window:
+    """From 0 to where the busiest processor or link has had `PIECES` pieces, or to the end [s]."""
+    shared = (*timeline.processors.values(), *timeline.links.values())
+    ends = [int(each.begin[PIECES]) for each in shared if len(each.begin) > PIECES]
+    return 0.0, min([timeline.stop, *ends]) / 1e9
+
+
+def _panels(timeline: Timeline) -> dict[str, list[_Row]]:
+    colors = {name: COLORS[i % len(COLORS)] for i, name in enumerate((*timeline.jobs, *timeline.frames))}
+    found: dict[str, list[_Row]] = {}
+    for what, shared in ((timeline.jobs, timeline.processors), (timeline.frames, timeline.links)):
+        for place, slices in shared.items():
+            found[place] = [
+                _Row(name=name.partition(".")[2], color=colors[name], slices=slices, owner=i, of=what[name])
+                for i, name in enumerate(slices.owners)
+                if name in what
+            ]
+    return found
+
+
+def _draw_row(axes: Axes, row: _Row, place: int, shown: Window, size: float, style: Style) -> None:
+    scale = 1e-9 / size
+    of, slices = row.of, row.slices
+    first, last = shown[0] * 1e9, shown[1] * 1e9
+    waits = _released(of)
+    ends = np.where(of.ended == NEVER, last, of.ended)
+    here = (waits <= last) & (ends >= first) & ~_left_out(of)
+    bars = _spans(waits[here], ends[here], scale)
+    axes.broken_barh(bars, (place - LATE / 2, LATE), facecolors=row.color, alpha=0.35, linewidth=0)
+    mine = (slices.owner == row.owner) & (slices.begin <= last) & (slices.end >= first)
+    for kind, how in _kinds(row.color).items():
+        some = mine & (slices.kind == kind)
+        axes.broken_barh(_spans(slices.begin[some], slices.end[some], scale), (place - BAR / 2, BAR), **how)
+    released = waits[(waits >= first) & (waits <= last) & ~_left_out(of)].tolist()
+    size = 0.4 * style.font
+    axes.plot([t * scale for t in released], [place - BAR / 2 - 0.12] * len(released), "^", color=BLACK, ms=size)
+    due = of.deadline[(of.deadline >= first) & (of.deadline <= last)]
+    missed = np.isin(due, of.deadline[of.missed])
+    for which, color in ((~missed, BLACK), (missed, RED)):
+        axes.vlines(due[which] * scale, place - BAR / 2, place + BAR / 2 + 0.08, colors=color, linewidth=style.line)
+
+
+def _released(of: Jobs | Frames) -> Integers:
+    return of.released if isinstance(of, Jobs) else of.queued
+
+
+def _left_out(of: Jobs | Frames) -> Booleans:
+    found: Booleans = of.outcome == SKIPPED if isinstance(of, Jobs) else np.zeros(len(of), dtype=np.bool_)
+    return found
+
+
+def _spans(begins: Integers, ends: Integers, scale: float) -> list[tuple[float, float]]:
+    """Begin and length of each, as they are drawn."""
+    return [(begin * scale, (end - begin) * scale) for begin, end in zip(begins.tolist(), ends.tolist(), strict=True)]
+
+
+def _kinds(color: str) -> Mapping[int, dict[str, Any]]:
+    return {
+        RUN: {"facecolors": color, "linewidth": 0},
+        SWITCH: {"facecolors": GREY, "linewidth": 0},
+        CORRUPTED: {"facecolors": "white", "edgecolors": RED, "hatch": "////", "linewidth": 0.5},
+    }
+
+
+def _legend(panels: Mapping[str, list[_Row]]) -> list[Line2D | Patch]:
+    return [*_always(), *_if_there(panels)]
+
+
+def _always() -> Iterator[Line2D | Patch]:
+    yield Patch(facecolor=BLUE, label="runs")
+    yield Patch(facecolor=BLUE, alpha=0.35, label="waits")
+    yield Line2D([], [], color=BLACK, marker="^", linestyle="", label="released")
+    yield Line2D([], [], color=BLACK, marker="|", linestyle="", label="deadline")
+
+
+def _if_there(panels: Mapping[str, list[_Row]]) -> Iterator[Line2D | Patch]:
+    rows = [row for some in panels.values() for row in some]
+    if any(row.of.missed.any() for row in rows):
+        yield Line2D([], [], color=RED, marker="|", linestyle="", label="missed")
+    kinds = {int(kind) for row in rows for kind in np.unique(row.slices.kind)}
+    if SWITCH in kinds:
+        yield Patch(facecolor=GREY, label="switch")
+    if CORRUPTED in kinds:
+        yield Patch(facecolor="white", edgecolor=RED, hatch="////", label="sent again")

@@ -1,0 +1,107 @@
+"""`quadcosim schedule`: its table, its document, its figure."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from orchestration.computers.results import Timeline
+from orchestration.figures import gantt
+from orchestration.figures.style import SCREEN
+from quadcosim import schedule
+from tests.commands import Main
+
+SYSTEM = """
+[computers.cpu]
+switch = 0.0001
+
+[computers.cpu.tasks.control]
+period = 0.004
+execution = 0.001
+
+[computers.cpu.tasks.telemetry]
+period = 0.013
+execution = 0.011
+priority = 2
+
+[networks.bus]
+kind = "can"
+bit_rate = 500e3
+error = 0.2
+
+[networks.bus.messages.status]
+period = 0.005
+bytes = 8
+identifier = 1
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    """A file of computers and networks alone, without an end."""
+    path = tmp_path / "system.toml"
+    path.write_text(SYSTEM)
+    return path
+
+
+def test_the_document_has_each_task_and_message_by_the_names_that_are_fixed(main: Main, file: Path) -> None:
+    document = json.loads(main("schedule", str(file), "--until", "0.1", "--json").stdout)
+    assert [*document["tasks"], *document["messages"]] == ["cpu.control", "cpu.telemetry", "bus.status"]
+    control = document["tasks"]["cpu.control"]
+    assert {"jobs", "utilisation", "response", "bound", "missed", "unfinished"} <= control.keys()
+    assert control["response"] == dict.fromkeys(("min", "mean", "p99", "max"), 0.0011)
+    assert (control["jobs"], control["utilisation"], control["bound"]) == (25, 0.25, 0.0011)
+    assert document["tasks"]["cpu.telemetry"]["bound"] is None
+    assert document["messages"]["bus.status"]["bound"] is None
+
+
+def test_the_table_has_a_row_for_each_and_says_what_is_not_known(main: Main, file: Path) -> None:
+    lines = main("schedule", str(file), "--until", "0.1").stdout.splitlines()
+    cells = lines[0].split()
+    assert cells[0] == "task"
+    assert "bound" in cells
+    assert lines[1].split()[:3] == ["cpu.control", "25", "25"]
+    assert " -  " in lines[2]
+    assert any(line.startswith("bus.status") for line in lines)
+    assert any(line.startswith("cpu: busy 100 % of 0.1 s") for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("flags", "message"),
+    [
+        ((), "stop_time: expected a value"),
+        (("--until", "0"), "--until 0: expected a positive number of seconds"),
+        (("--until", "1", "--out", "a.txt"), "--out a.txt: expected a figure ending in one of png, svg, pdf"),
+        (("--until", "1", "--out", "a.png", "--from", "2"), "expected 0 <= from < to, and from before the end at 1 s"),
+    ],
+)
+def test_what_cannot_be_is_refused(main: Main, file: Path, flags: tuple[str, ...], message: str) -> None:
+    done = main("schedule", str(file), *flags, code=2)
+    assert message in done.stderr
+
+
+def test_the_chart_is_written_where_it_is_asked_for(main: Main, file: Path) -> None:
+    out = file.parent / "chart.svg"
+    done = main("schedule", str(file), "--until", "0.1", "--out", str(out), "--from", "0.01", "--to", "0.05")
+    assert str(out) in done.stderr
+    text = out.read_text()
+    assert all(f">{word}<" in text for word in ("control", "telemetry", "status", "switch", "sent again", "time [ms]"))
+
+
+def test_a_chart_shows_no_more_than_can_be_told_apart(file: Path) -> None:
+    timeline: Timeline = schedule(file, 30.0).timeline
+    end = gantt.seen(timeline)[1]
+    assert max((each.begin < end * 1e9).sum() for each in timeline.processors.values()) == gantt.PIECES
+    assert gantt.seen(schedule(file, 0.01).timeline) == (0.0, 0.01)
+
+
+def test_a_chart_has_a_panel_for_each_processor_and_link_and_bars_as_long_as_they_run(file: Path) -> None:
+    found = schedule(file, 0.02)
+    with SCREEN.applied():
+        figure = gantt.draw(found.timeline, SCREEN)
+    cpu, bus = figure.axes
+    assert [axes.get_title(loc="left") for axes in (cpu, bus)] == ["cpu", "bus"]
+    assert [label.get_text() for label in cpu.get_yticklabels()] == ["control", "telemetry"]
+    bars = cpu.collections[1].get_paths()  # of the first task, behind those that wait
+    assert [round(path.get_extents().width, 6) for path in bars] == [1.0] * 5
+    assert [round(path.get_extents().x0, 6) for path in bars] == [0.1, 4.1, 8.1, 12.1, 16.1]
