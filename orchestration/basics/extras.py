@@ -14,6 +14,7 @@ EXTRAS = {
     "gym": ("gymnasium",),
     "control": ("control",),
     "certificates": ("clarabel", "flint", "python-flint"),
+    "can": ("cantools",),
 }
 """By the extra that brings them."""
 

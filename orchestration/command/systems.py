@@ -27,7 +27,13 @@ def schema() -> Answer:
 
 @builds
 def connect(
-    fmu: Annotated[list[str], typer.Argument(help="FMUs: paths, or names of this project's.", show_default=False)],
+    fmu: Annotated[
+        list[str],
+        typer.Argument(
+            help="FMUs: paths, or names of this project's; tables of tasks (.csv), databases of CAN buses (.dbc).",
+            show_default=False,
+        ),
+    ],
     out: Annotated[
         Path | None, typer.Option("--out", help="The system file; default: printed.", metavar="SYSTEM.toml")
     ] = None,
@@ -36,12 +42,16 @@ def connect(
     from orchestration.basics.errors import UsageError
     from orchestration.building import fmus
     from orchestration.fmi.model import read_model
+    from orchestration.requests.resource_files import resources_of
     from orchestration.system.proposal import propose
 
     if out is not None and out.exists():
         raise UsageError(f"--out {out}: is there already; expected a file that can be made")
+    resources, others = resources_of(fmu)
     proposal = propose(
-        [(text, read_model(fmus.locate(text, say))) for text in fmu], Path.cwd() if out is None else out.parent
+        [(text, read_model(fmus.locate(text, say))) for text in others],
+        Path.cwd() if out is None else out.parent,
+        resources,
     )
     for line in proposal.guessed:
         say(f"guessed: {line}")

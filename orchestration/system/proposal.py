@@ -5,8 +5,9 @@ import json
 import os
 import re
 from collections.abc import Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from orchestration.basics.errors import UsageError
 from orchestration.fmi.model import Model
@@ -41,7 +42,17 @@ class Proposal:
     undecided: tuple[str, ...]
 
 
-def propose(fmus: Sequence[tuple[str, Model]], folder: Path) -> Proposal:
+@dataclass(frozen=True, kw_only=True)
+class Resources:
+    """What else is proposed: computers and networks of other files."""
+
+    tables: Mapping[str, Any] = field(default_factory=dict)
+    """of a system file"""
+    guessed: tuple[str, ...] = ()
+    undecided: tuple[str, ...] = ()
+
+
+def propose(fmus: Sequence[tuple[str, Model]], folder: Path, resources: Resources | None = None) -> Proposal:
     """Components named after their models, connected by name, type and unit; for a file that lies in `folder`.
 
     Each FMU is given by the path or name that the user wrote, with what it says of itself.
@@ -49,7 +60,8 @@ def propose(fmus: Sequence[tuple[str, Model]], folder: Path) -> Proposal:
     One whose outputs are all discrete is proposed as sampled, and so is the controller of a loop; any other in
     continuous time. Raises `UsageError` without any FMU.
     """
-    if not fmus:
+    resources = resources or Resources()
+    if not (fmus or resources.tables):
         raise UsageError("expected at least one FMU")
     models = [model for _, model in fmus]
     named = dict(zip(_names(models), models))
@@ -60,23 +72,54 @@ def propose(fmus: Sequence[tuple[str, Model]], folder: Path) -> Proposal:
     stop = max((_experiment(model, "stopTime") or 0.0 for model in models), default=0.0) or STOP
     blocks = [
         [
-            "# Proposed from what the FMUs say of themselves. Look at each line: names are no proof.",
+            "# Proposed from what the FMUs say of themselves. Look at each line: names are no proof."
+            if fmus
+            else "# Proposed from what the files of tasks and messages say. Look at each line.",
             f"stop_time = {stop!r}",
         ],
         *(_component(name, text, model, folder, sampled.get(name)) for name, (text, model) in zip(named, fmus)),
         *_connections(sorted(matches.found, key=lambda m: list(named).index(component_of(m.start)))),
     ]
-    if matches.undecided:
-        blocks.append(["# Not decided:", *(f"# - {line}" for line in matches.undecided)])
+    blocks += _resources(resources.tables)
+    undecided = (*matches.undecided, *resources.undecided)
+    if undecided:
+        blocks.append(["# Not decided:", *(f"# - {line}" for line in undecided)])
     moving = sorted(named, key=lambda name: name in sampled)
     first = next((f"{n}.{v}" for n in moving for v in named[n].names("output", kinds=("Real",))), None)
     if first is not None:
         blocks.append([line.format(first) for line in _TO_FILL_IN])
     return Proposal(
         text="\n\n".join("\n".join(block) for block in blocks) + "\n",
-        guessed=(*_guesses(matches.found), *(f"{name} is sampled, as {why}" for name, why in guessed.items())),
-        undecided=matches.undecided,
+        guessed=(
+            *_guesses(matches.found),
+            *(f"{name} is sampled, as {why}" for name, why in guessed.items()),
+            *resources.guessed,
+        ),
+        undecided=undecided,
     )
+
+
+def _resources(tables: Mapping[str, Any]) -> list[list[str]]:
+    import tomli_w
+
+    return [
+        [
+            f"[{table}.{_key(name)}]",
+            *tomli_w.dumps({key: value for key, value in one.items() if key != parts}).splitlines(),
+            *(f"{parts}.{_key(part)} = {_inline(keys)}" for part, keys in one[parts].items()),
+        ]
+        for table, parts in (("computers", "tasks"), ("networks", "messages"))
+        for name, one in tables.get(table, {}).items()
+    ]
+
+
+def _inline(keys: Mapping[str, Any]) -> str:
+    said = (f"{key} = {_text(value) if isinstance(value, str) else repr(value)}" for key, value in keys.items())
+    return f"{{ {', '.join(said)} }}"
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _text(name)
 
 
 def _names(models: Iterable[Model]) -> list[str]:

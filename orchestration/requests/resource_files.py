@@ -1,0 +1,39 @@
+"""Files of tasks and messages among others, and what they say."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from orchestration.basics.errors import UsageError
+from orchestration.requests import can_database, task_table
+from orchestration.system.proposal import Resources
+
+
+def resources_of(given: Sequence[str]) -> tuple[Resources, list[str]]:
+    """The computers and networks of the files that have them, and what is given besides.
+
+    Raises `UsageError` for a file that cannot be read, and where two have the same computer or network.
+    """
+    tables: dict[str, dict[str, Any]] = {}
+    guessed: list[str] = []
+    undecided: list[str] = []
+    others = []
+    for text in given:
+        path = Path(text)
+        if path.suffix.lower() == ".csv":
+            _add(tables, "computers", path, task_table.computers_of(path))
+        elif path.suffix.lower() in can_database.ENDINGS:
+            bus = can_database.bus_of(path)
+            _add(tables, "networks", path, bus.networks)
+            guessed += bus.guessed
+            undecided += bus.undecided
+        else:
+            others.append(text)
+    return Resources(tables=tables, guessed=tuple(guessed), undecided=tuple(undecided)), others
+
+
+def _add(tables: dict[str, dict[str, Any]], table: str, path: Path, more: dict[str, Any]) -> None:
+    for name in more:
+        if name in tables.get(table, {}):
+            raise UsageError(f"{path}: {table}.{name}: is in a file before it already; expected another name")
+    tables.setdefault(table, {}).update(more)
