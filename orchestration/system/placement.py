@@ -169,7 +169,7 @@ class _Periods:
     ) -> None:  # fmt: skip
         self._components, self._tasks = components, tasks
         self._connections = {x.name: x for x in connections}
-        self._messages = {each.message.connection: each.message for each in placed_messages(networks)}
+        self._messages = {each.message.connection: each for each in placed_messages(networks)}
 
     def of(self, name: str, after: tuple[str, ...] = ()) -> float:
         """Of a component."""
@@ -186,13 +186,14 @@ class _Periods:
 
     def of_connection(self, place: str, connection: str, after: tuple[str, ...]) -> float:
         """Of the messages over a connection; raises `UsageError`, naming the `place`, where there are none."""
-        x, message = self._connections.get(connection), self._messages.get(connection)
+        x, over = self._connections.get(connection), self._messages.get(connection)
         known = ", ".join(self._connections) or "(there is none)"
         require(x is not None, place, connection, f"one of the connections {known}")
         assert x is not None
-        if message is not None and message.period is not None:
-            return message.period
         sender = self._components[x.sender]
+        if over is not None and sender.step is not None:
+            _expect_period(over, x.sender)
+            return over.message.period or 0.0
         if x.sender in after:
             raise UsageError(f"{place} = {connection}: expected something that begins: each waits for the other")
         expected = "one from a sampled component, or over a network: no other has messages of its own"
@@ -203,6 +204,11 @@ class _Periods:
         if of.task.arrivals is not None:
             return of.task.arrivals.gap
         return (of.task.period or 0.0) / of.computer.clock_ratio
+
+
+def _expect_period(of: PlacedMessage, sender: str) -> None:
+    """Of what a component in continuous time sends over a network."""
+    require(of.message.period is not None, f"{of.place}.period", "none", f"when {sender} sends, which does not say")
 
 
 def expect_placement(system: "System") -> None:
@@ -229,11 +235,13 @@ def expect_placement(system: "System") -> None:
         require(name not in seen, f"{one.place}.connection", name, f"another one than {seen.get(name)} has")
         seen[name] = one.place
         sampled = system.components[connections[name].sender].sampling is not None
-        stated = message.period is not None
         require(message.arrivals is None, f"{one.place}.arrivals", "given", "none: it is the message of a connection")
         sender = connections[name].sender
-        expected = f"none: it is sent when {sender} writes" if sampled else f"when {sender} sends, which does not say"
-        require(stated != sampled, f"{one.place}.period", message.period if stated else "none", expected)
+        if sampled:
+            expected = f"none: it is sent when {sender} writes"
+            require(message.period is None, f"{one.place}.period", message.period, expected)
+        else:
+            _expect_period(one, sender)
         expect_nodes(system, one)
 
 
