@@ -268,7 +268,9 @@ def processor() -> list[str]:
 
 def stalls() -> list[str]:
     """How long the law may be kept from the processor."""
-    return processors.stalls()
+    found = processors.stalls()
+    _save(lambda: processors.errors(found), "stalls")
+    return processors.told(found)
 
 
 def fly(name: str) -> pd.DataFrame:

@@ -3,7 +3,7 @@
 import csv
 import json
 import statistics
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 import quadcosim
 from orchestration.basics.documents import tables_in
 from orchestration.basics.statistics import wilson
+from orchestration.figures.palette import GREY
 from orchestration.figures.style import DOCS
 
 ROOT = Path(__file__).parent.parent
@@ -138,15 +139,36 @@ LAWS: dict[str, tuple[str, dict[str, Any], str]] = {
 """What flies the example of an autopilot: its FMU, its parameters, and its execution times"""
 
 
-def stalls() -> list[str]:
-    """For how long the memory card may hold the processor, once a second, in the example of an autopilot."""
-    lines = ["| law | largest stall that is good | the least that is not, and why |", "|---|---|---|"]
-    for name, (fmu, parameters, trace) in LAWS.items():
-        found = quadcosim.limit(
-            certain(fmu, parameters, trace), STALLED, first=0.01, last=0.6, scan=0.02, tolerance=0.001, progress=None
+def stalls() -> dict[str, quadcosim.Limit]:
+    """For how long the memory card may hold the processor, once a second, in the example of an autopilot: by law."""
+    return {
+        name: quadcosim.limit(
+            certain(*flown), STALLED, first=0.01, last=0.6, scan=0.02, tolerance=0.001, progress=None, announce=None
         )
-        lines.append(f"| {name} | {1e3 * (found.large_signal_limit or 0.0):.0f} ms | {found.note} |")
-    return lines
+        for name, flown in LAWS.items()
+    }
+
+
+def told(found: Mapping[str, quadcosim.Limit]) -> list[str]:
+    """A row of a table for each law."""
+    rows = [
+        f"| {name} | {1e3 * (one.large_signal_limit or 0.0):.0f} ms | {one.note.partition(';')[0]} |"
+        for name, one in found.items()
+    ]
+    return ["| law | largest stall that is good | the least that is not, and why |", "|---|---|---|", *rows]
+
+
+def errors(found: Mapping[str, quadcosim.Limit]) -> Figure:
+    """How far off the flight ends over the stall; what diverges has no point."""
+    made = DOCS.figure(32.0)
+    panel = made.add_subplot()
+    for (name, one), marker in zip(found.items(), "os^vx", strict=True):
+        known = {1e3 * each.value: each.measured for each in one.tried if each.measured is not None}
+        panel.plot([*known], [*known.values()], f"{marker}-", markersize=4, label=name.replace("`", ""))
+    panel.axhline(0.05, color=GREY, linestyle=":", linewidth=1.0, label="good: at most 5 cm")
+    panel.set(yscale="log", xlabel="stall, once a second [ms]", ylabel="largest error of the last third [m]")
+    made.legend(*panel.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return made
 
 
 def certain(fmu: str, parameters: dict[str, Any], trace: str) -> dict[str, Any]:
