@@ -73,8 +73,9 @@ if TYPE_CHECKING:
     from orchestration.studies.study_file import load_study
     from orchestration.studies.sweep import sweep
     from orchestration.studies.swept import Swept
+    from orchestration.system.computers import Arrivals, Computer, Message, Network, Task
     from orchestration.system.distribution import Distribution
-    from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
+    from orchestration.system.model import Component, Connection, Criterion, Sampling, SamplingOnArrival, Source, System
     from orchestration.system.paths import changed
     from orchestration.system.system_file import load_system
     from orchestration.tuning.tune import Tuned, tune
@@ -105,10 +106,16 @@ _HOMES = {
     "System": "orchestration.system.model",
     "Component": "orchestration.system.model",
     "Sampling": "orchestration.system.model",
+    "SamplingOnArrival": "orchestration.system.model",
     "Connection": "orchestration.system.model",
     "Source": "orchestration.system.model",
     "Distribution": "orchestration.system.distribution",
     "Criterion": "orchestration.system.model",
+    "Computer": "orchestration.system.computers",
+    "Task": "orchestration.system.computers",
+    "Network": "orchestration.system.computers",
+    "Message": "orchestration.system.computers",
+    "Arrivals": "orchestration.system.computers",
     "load_system": "orchestration.system.system_file",
     "changed": "orchestration.system.paths",
     "schedule": "orchestration.runs.scheduling",
@@ -155,12 +162,14 @@ _OTHERWISE = {"limit": "find", "check_certificate": "check", "margin_region": "r
 """Names that go by another one at home"""
 
 __all__ = [
+    "Arrivals",
     "Axis",
     "Certified",
     "Checked",
     "Compared",
     "Comparison",
     "Component",
+    "Computer",
     "Connection",
     "Criterion",
     "Distribution",
@@ -170,7 +179,9 @@ __all__ = [
     "FmuChoice",
     "Limit",
     "Linearised",
+    "Message",
     "Model",
+    "Network",
     "QuadcosimError",
     "Record",
     "ReferenceChoice",
@@ -179,6 +190,7 @@ __all__ = [
     "RunInterrupted",
     "RunLost",
     "Sampling",
+    "SamplingOnArrival",
     "Scenario",
     "Scheduled",
     "Simulation",
@@ -188,6 +200,7 @@ __all__ = [
     "Study",
     "Swept",
     "System",
+    "Task",
     "Timing",
     "Tuned",
     "Tuning",

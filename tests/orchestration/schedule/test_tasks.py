@@ -13,7 +13,7 @@ from orchestration.schedule.cursor import Cursor
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
 from orchestration.system.computers import Computer, Message, Network, Task
-from orchestration.system.model import Component
+from orchestration.system.model import Component, SamplingOnArrival
 from tests.orchestration.engines.stubs import continuous, sampled, system, wire
 
 MS = 1_000_000
@@ -206,3 +206,38 @@ def test_windows_of_any_length_are_one_schedule(monkeypatch):
 def test_what_no_task_can_have_is_refused_by_name(change, complaint):
     with pytest.raises(UsageError, match=complaint):
         loop(computers=computers(period=0.1), **change)
+
+
+def test_without_a_computer_too_a_component_may_run_on_arrivals():
+    networks = {"bus": Network(kind="can", bit_rate=500e3, stuffing="none", messages={
+        "sensed": Message(connection="sensed", bytes=8, identifier=1, period=0.1)})}  # fmt: skip
+    what = system(
+        {"plant": continuous(0.1), "filter": Component(fmu="stub", sampling=SamplingOnArrival(on="sensed"))},
+        [wire("plant.y", "filter.u", "sensed", loss=0.3), wire("filter.y", "plant.u", "filtered", delay=0.01)],
+        networks=networks, seed=2,
+    )  # fmt: skip
+    found = instants(what)
+    samples = [i.time for i in found if i.samples]
+    assert 4 < len(samples) < 10
+    assert samples == [i.time for i in found for m in i.arrivals if m[0] == 0]
+    assert {time % (100 * MS) for time in samples} == {222_000}
+    sent = [m[3] for i in found for s in i.samples for m in s.sent]
+    assert sent == [time + 10 * MS for time in samples]
+
+
+def test_a_gateway_between_two_buses_sends_on_what_arrives():
+    def bus(name, period=None):
+        message = Message(connection=name, bytes=8, identifier=1, period=period)
+        return Network(kind="can", bit_rate=500e3, stuffing="none", messages={name: message})
+
+    what = system(
+        {"sensor": continuous(0.1), "gateway": Component(fmu="stub"), "actuator": continuous(0.1)},
+        [wire("sensor.y", "gateway.u", "first"), wire("gateway.y", "actuator.u", "second")],
+        computers={
+            "node": Computer(tasks={"pass": Task(component="gateway", on="first", execution=0.001, deadline=1.0)})
+        },
+        networks={"one": bus("first", 0.1), "two": bus("second")},
+    )
+    found = instants(what)
+    there = [i.time for i in found for m in i.arrivals if m[0] == 1]
+    assert there == [k * 100 * MS + 2 * 222_000 + MS for k in range(10)]
