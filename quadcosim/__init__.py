@@ -40,6 +40,7 @@ tell_in(in_python)
 
 if TYPE_CHECKING:
     from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageError
+    from orchestration.certificates.basin import Basin, basin
     from orchestration.certificates.check import Checked
     from orchestration.certificates.check import check as check_certificate
     from orchestration.certificates.margin import Certified, margin
@@ -132,6 +133,8 @@ _HOMES = {
     "linearise": "orchestration.stability.linearise",
     "Linearised": "orchestration.stability.linearise",
     "StateSpace": "orchestration.stability.state_space",
+    "basin": "orchestration.certificates.basin",
+    "Basin": "orchestration.certificates.basin",
     "margin": "orchestration.certificates.margin",
     "Certified": "orchestration.certificates.margin",
     "margin_region": "orchestration.certificates.region",
@@ -164,6 +167,7 @@ _OTHERWISE = {"limit": "find", "check_certificate": "check", "margin_region": "r
 __all__ = [
     "Arrivals",
     "Axis",
+    "Basin",
     "Certified",
     "Checked",
     "Compared",
@@ -206,6 +210,7 @@ __all__ = [
     "Tuning",
     "UsageError",
     "Vehicle",
+    "basin",
     "changed",
     "check_certificate",
     "compare",

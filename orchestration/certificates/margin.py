@@ -171,11 +171,16 @@ def _unstable(varying: Varying, largest: float, searched: str, family: Family) -
 
 
 def largest_certified(
-    family_up_to: Callable[[float], Family], of: Sequence[str], top: float, progress: Share
+    family_up_to: Callable[[float], Family],
+    of: Sequence[str],
+    top: float,
+    progress: Share,
+    shares: Sequence[float] | None = None,
 ) -> tuple[float | None, str | None]:
     """The largest value for which a certificate is found, below `top`, and that; None where even 0 has none."""
     from orchestration.certificates.certify import certified
 
+    first, *more = shares or SHARES
     best: tuple[float | None, str | None] = (None, None)
     step, tried = 0, 0
 
@@ -189,11 +194,11 @@ def largest_certified(
             best, step = (value, found.certificate.to_json()), found.step
         return found is not None
 
-    if works(SHARES[0]):
-        all(works(share) for share in SHARES[1:])
+    if works(first):
+        all(works(share) for share in more)
         return best
     step = 0
-    low, high = 0.0, SHARES[0]
+    low, high = 0.0, first
     while high - low > FINEST:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if works(middle) else (low, middle)

@@ -21,6 +21,8 @@ from orchestration.requests.request import Asked, asked_for
 
 COLUMNS = 6
 """values of the first quantity, from 0 to what breaks the loop by itself"""
+SHARES = (0.95, 0.98)
+"""of what breaks the loop: tried for a certificate, as of one quantity"""
 LONGEST = 4
 """draws after which the sequences that are tried repeat"""
 
@@ -98,7 +100,7 @@ def region(asked: Asked, of: str, and_of: str, *, columns: int = COLUMNS, progre
             top = down_to_nanoseconds(timeline.largest() - a) if broken is None else broken.value
             if broken is not None:
                 breaking.append((a, broken.value))
-            b, text = largest_certified(_beside(timeline, a), paths, top, lambda share: None)
+            b, text = largest_certified(_beside(timeline, a), paths, top, lambda share: None, SHARES)
             if b is not None and text is not None:
                 certified.append((a, b))
                 texts.append(text)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -63,7 +64,6 @@ def _solved(
     nodes: Sequence[Node], edges: Sequence[tuple[Node, Node, int]], maps: Mapping[int, Sequence[Floats]], size: int
 ) -> dict[Node, Floats] | None:
     """Forms below the identity of which the least fall is largest; None where that is nothing."""
-    import clarabel
     from scipy import sparse
 
     basis = _symmetric_basis(size)
@@ -89,19 +89,43 @@ def _solved(
         columns.append(j + c)
         values.append(block[i, j])
     A = sparse.csc_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(row, t + 1))
-    cost = np.zeros(t + 1)
-    cost[t] = -1.0
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    cones = [clarabel.PSDTriangleConeT(size)] * (row // count)
-    solution = clarabel.DefaultSolver(
-        sparse.csc_matrix((t + 1, t + 1)), cost, A, np.concatenate(rest), cones, settings
-    ).solve()
-    x = np.array(solution.x)
+    x = _program(A, np.concatenate(rest), [size] * (row // count), -np.eye(t + 1)[t])
     if not np.isfinite(x).all() or x[t] < FALL:
         return None
     found = {node: (basis.T @ x[at : at + count]).reshape(size, size) for node, at in place.items()}
     return {node: 0.5 * (form + form.T) for node, form in found.items()}
+
+
+def least_cost(conditions: Sequence[Callable[[Floats], Floats]], count: int) -> Floats | None:
+    """The numbers with the least last one for which matrices, affine in them, are positive; None: there are none."""
+    from scipy import sparse
+
+    A, rest, sizes = list[Floats](), list[Floats](), list[int]()
+    for condition in conditions:
+        at_zero = condition(np.zeros(count))
+        basis = _symmetric_basis(len(at_zero))
+        A.append(np.column_stack([basis @ (at_zero - condition(unit)).ravel() for unit in np.eye(count)]))
+        rest.append(basis @ at_zero.ravel())
+        sizes.append(len(at_zero))
+    x = _program(sparse.csc_matrix(np.vstack(A)), np.concatenate(rest), sizes, np.eye(count)[-1])
+    return x if np.isfinite(x).all() and all(_is_nearly_positive(f(x)) for f in conditions) else None
+
+
+def _is_nearly_positive(matrix: Floats) -> bool:
+    values = np.linalg.eigvalsh(matrix)
+    return bool(values[0] > -1e-6 * values[-1])
+
+
+def _program(A: Any, rest: Floats, sizes: Sequence[int], cost: Floats) -> Floats:
+    """The x of least cost for which rest - A x, cut into symmetric matrices of these sizes, is positive."""
+    import clarabel
+    from scipy import sparse
+
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    cones = [clarabel.PSDTriangleConeT(size) for size in sizes]
+    nothing = sparse.csc_matrix((len(cost), len(cost)))
+    return np.array(clarabel.DefaultSolver(nothing, cost, A, rest, cones, settings).solve().x)
 
 
 def _symmetric_basis(size: int) -> Floats:
