@@ -76,7 +76,7 @@ def _cycles(family: Family, maps: dict[Draw, Floats], longest: int) -> Iterator[
 def least_breaking(family_up_to: Callable[[float], Family], limit: float, longest: int = LONGEST) -> Broken | None:
     """The least value up to `limit` at which a sequence is unstable, as far as the scan sees."""
     found = functools.cache(lambda value: unstable_sequence(family_up_to(value), longest))
-    rising = [limit * i / SCAN for i in range(SCAN + 1)]
+    rising = [min(limit, limit * i / SCAN) for i in range(SCAN + 1)]
     first = next((i for i in range(1, SCAN + 1) if found(rising[i])), None)
     if first is None:
         return None

@@ -22,8 +22,9 @@ LARGEST = 1000
 """inequalities of a search: steps of the ladder that ask for more are left out"""
 SEARCHED = 12
 """cells in which forms are looked for; of two parameters the square root of that along each"""
-FINER = (2, 4, 8)
-"""times as many in which they are proved: cells are refined first, forms looked for again second"""
+FINER = {1: (2, 4, 8), 2: (2, 4)}
+"""times as many, by how many parameters there are, in which they are proved: cells are refined first, forms looked for
+again second"""
 ROUNDS = 3
 """of the search, each in the coordinates of the forms that the one before found"""
 COUPLED = 1e-7
@@ -62,7 +63,7 @@ def _proved(certificate: Certificate, parts: Sequence[Sequence[int]], labels: in
         forms = forms_for(certificate, parts)
         if forms is None:
             return None
-        for finer in FINER:
+        for finer in FINER[max(1, *(len(letter.ranges) for letter in family.letters))]:
             refined = replace(certificate, forms=forms, cells=tuple(_divided(family, labels, finer)))
             try:
                 proven(refined)

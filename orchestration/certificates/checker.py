@@ -111,20 +111,20 @@ class _Enclosures:
             raise NotProven("the coordinates of the forms are not independent") from None
         self._last = coordinates * chosen
         self._factors: dict[tuple[Factor, Box], arb_mat] = {}
-        self._known: dict[int, list[tuple[Box, list[arb_mat]]]] = {}
+        self._known: dict[tuple[int, Box], list[arb_mat]] = {}
 
     def letter_of(self, label: int) -> Letter:
         pairs = zip(self._certificate.family.letters, self._certificate.cells)
         return next(letter for letter, cells in pairs if label in cells.labels)
 
-    def of(self, label: int) -> list[tuple[Box, list[arb_mat]]]:
+    def of(self, label: int) -> Iterator[tuple[Box, list[arb_mat]]]:
         """The cells of a label, and of each the maps at its corners, as wide as the map between them may be."""
-        if label not in self._known:
-            letter = self.letter_of(label)
-            cells = self._certificate.cells[self._certificate.family.letters.index(letter)]
-            boxes = [box for other, box in cells.boxes() if other == label]
-            self._known[label] = [(box, self._corners(letter, box)) for box in boxes]
-        return self._known[label]
+        letter = self.letter_of(label)
+        cells = self._certificate.cells[self._certificate.family.letters.index(letter)]
+        for box in [box for other, box in cells.boxes() if other == label]:
+            if (label, box) not in self._known:
+                self._known[label, box] = self._corners(letter, box)
+            yield box, self._known[label, box]
 
     def _corners(self, letter: Letter, box: Box) -> list[arb_mat]:
         beyond = None

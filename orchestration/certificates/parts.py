@@ -65,7 +65,8 @@ def loop_of(rest: AtRest) -> Loop:
         tangent = rest.tangents[name]
         if component.sampling is not None:
             components[name] = of_samples(tangent, component.sampling.period)
-            if minds_its_step(tangent, component.sampling.period):
+            varies = rest.simulation.instances[name].model.varies_step
+            if not varies or minds_its_step(tangent, component.sampling.period):
                 minds.add(name)
         else:
             assert component.step is not None
