@@ -1,14 +1,13 @@
 """How long a controller computes on a flight controller's processor: `python -m benchmarks.execution [--out FOLDER]`.
 
 For each law and each redesign the instructions of every step of a flight of 10 s at 100 Hz are counted under QEMU, in
-the C that `export-c` writes, at -O2: the same numbers each time. They are written as traces for `execution` of a task,
-a CSV file each: `instructions`, and `seconds`, at CYCLES cycles an instruction and the processor's clock. That model
-knows no caches, no wait states of the flash and no interrupts.
+the C that `export-c` writes, at -O2: the same numbers each time. As seconds, at CYCLES cycles an instruction and the
+processor's clock, they are traces for `execution` of a task: a CSV file for each processor, a column for each law. That
+model knows no caches, no wait states of the flash and no interrupts.
 """
 
 import argparse
 import statistics
-import subprocess
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -47,21 +46,18 @@ LAWS = {
     "geometric_mean": ("GeometricController", 4),
     "cascaded": ("CascadedController", 0),
 }
-"""By the name of the trace: the controller, and its discretisation, if it has any"""
+"""By the name of the column: the controller, and its discretisation, if it has any"""
 
 
-def counted(model: str, discretisation: int, processor: Processor, folder: Path) -> list[int] | None:
-    """Instructions of each step; None where the law fails in this precision."""
+def counted(model: str, discretisation: int, processor: Processor, folder: Path) -> list[int]:
+    """Instructions of each step; raises `subprocess.CalledProcessError` where one fails."""
     sources = [
         write(Target.parse(MODELS[name]), folder / name, single=processor.single and name == model)
         for name in (model, "QuadrotorPlant")
     ]
     prepared = f"c.par.discretisation = {discretisation};" if discretisation else ""
     given = (f"-DCONTROLLER={model}", f"-DPREPARED={prepared}", "-O2")
-    try:
-        return flown(sources, folder, processor.flags, *given)[1]
-    except subprocess.CalledProcessError:
-        return None
+    return flown(sources, folder, processor.flags, *given)[1]
 
 
 def main() -> None:
@@ -70,20 +66,17 @@ def main() -> None:
     folder: Path = parser.parse_args().out
     folder.mkdir(parents=True, exist_ok=True)
     rows = []
-    for name, (model, discretisation) in LAWS.items():
-        for machine, processor in PROCESSORS.items():
+    for machine, processor in PROCESSORS.items():
+        traces = {}
+        for name, (model, discretisation) in LAWS.items():
             with tempfile.TemporaryDirectory() as temporary:
                 counts = counted(model, discretisation, processor, Path(temporary))
-            if counts is None:
-                rows.append([name, machine, "fails", "", ""])
-                continue
-            seconds = [count * CYCLES / processor.clock for count in counts]
-            lines = [f"{count},{time:.9f}" for count, time in zip(counts, seconds)]
-            path = folder / f"{name}_{machine}.csv"
-            path.write_text("\n".join(["instructions,seconds", *lines]) + "\n", encoding="utf-8")
-            numbers = (f"{round(statistics.median(counts)):,}", f"{max(counts):,}", f"{max(seconds) * 1e6:.1f}")
-            rows.append([name, machine, *numbers])
-    print(table(["law", "processor", "instructions a step", "most", "longest [us]"], rows))
+            traces[name] = [count * CYCLES / processor.clock for count in counts]
+            numbers = (f"{round(statistics.median(counts)):,}", f"{max(counts):,}", f"{max(traces[name]) * 1e6:.1f}")
+            rows.append([machine, name, *numbers])
+        lines = [",".join(f"{time:.9f}" for time in row) for row in zip(*traces.values())]
+        (folder / f"{machine}.csv").write_text("\n".join([",".join(traces), *lines]) + "\n", encoding="utf-8")
+    print(table(["processor", "law", "instructions a step", "most", "longest [us]"], rows))
 
 
 if __name__ == "__main__":

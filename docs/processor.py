@@ -36,8 +36,8 @@ class Design:
     @property
     def cost(self) -> float:
         """A sample of it [s]."""
-        with (AUTOPILOT / "execution" / f"{self.trace}_{PROCESSOR}.csv").open(encoding="utf-8") as file:
-            return self.cost_of([float(row["seconds"]) for row in csv.DictReader(file)])
+        with (AUTOPILOT / "execution" / f"{PROCESSOR}.csv").open(encoding="utf-8") as file:
+            return self.cost_of([float(row[self.trace]) for row in csv.DictReader(file)])
 
     def cells(self) -> list[dict[str, Any]]:
         """Those of the comparison, by period."""
