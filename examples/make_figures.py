@@ -10,9 +10,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from orchestration.figures import gantt
 from orchestration.figures.palette import BLUE, GREEN, GREY, ORANGE, RED
 from orchestration.figures.style import DOCS, save
 from orchestration.runs.result import Result
+from orchestration.runs.scheduling import schedule
 from orchestration.runs.simulation import run
 from orchestration.system.paths import changed
 from orchestration.system.system_file import load_system
@@ -135,11 +137,17 @@ def three_servos() -> Figure:
     return figure
 
 
+def autopilot() -> Figure:
+    """Who has the processor and the bus at the beginning."""
+    found = schedule(HERE / "autopilot" / "flight.toml", until=0.2)
+    return gantt.draw(found.timeline, DOCS, (0.0, 0.05))
+
+
 FIGURES: dict[str, Callable[[], Figure]] = {
     draw.__name__: draw
     for draw in (
         *(water_tank, double_integrator, dc_servo, three_servos),
-        *(minimum_variance, four_components),
+        *(minimum_variance, four_components, autopilot),
     )
 }
 
