@@ -12,6 +12,7 @@ from orchestration.basics.simulator import Floats
 from orchestration.system.distribution import lowest
 from orchestration.system.model import Component, Criterion, Sampling, System
 from orchestration.system.paths import changed
+from orchestration.system.placement import punctual
 from orchestration.system.times import exact_nanoseconds
 
 AT_REST = 1e-6
@@ -51,6 +52,7 @@ def deterministic(system: System) -> System:
             else source
             for name, source in chosen.sources.items()
         },
+        **punctual(chosen),
         objectives={},
         criterion=Criterion(diverged=chosen.criterion.diverged),
     )

@@ -2,17 +2,18 @@
 
 from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from orchestration.basics.errors import UsageError
 from orchestration.system.computers import Computer, Message, Network, Task
-from orchestration.system.distribution import content
+from orchestration.system.distribution import content, lowest
 from orchestration.system.requirements import require
 
 if TYPE_CHECKING:
     from orchestration.system.model import Component, Connection, System
 
 
+Shared = TypeVar("Shared", Task, Message)
 SHARED: Mapping[str, tuple[str, type]] = {"computers": ("tasks", Task), "networks": ("messages", Message)}
 """The tables of what is shared, with the key of what shares it, and what that is"""
 
@@ -119,6 +120,28 @@ def content_of(system: "System") -> Hashable:
 def _values(of: Any) -> tuple[Hashable, ...]:
     found = (getattr(of, field.name) for field in fields(of))
     return tuple(content(value) for value in found if not isinstance(value, Mapping))
+
+
+def punctual(system: "System") -> dict[str, Any]:
+    """Its computers and networks, all of whose tasks and messages are on time: they take the least that they can.
+
+    What arrives by chance does so still.
+    """
+    computers = {
+        name: replace(
+            one, tasks={key: _punctual(task, execution=lowest(task.execution)) for key, task in one.tasks.items()}
+        )
+        for name, one in system.computers.items()
+    }
+    networks = {
+        name: replace(one, error=0.0, messages={key: _punctual(each) for key, each in one.messages.items()})
+        for name, one in system.networks.items()
+    }
+    return {"computers": computers, "networks": networks}
+
+
+def _punctual(of: Shared, **changes: Any) -> Shared:
+    return replace(of, jitter=0.0, **changes)
 
 
 def with_tasks(

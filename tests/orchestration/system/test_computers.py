@@ -1,5 +1,6 @@
 """Computers and networks as a file says them: read, written, changed by path, refused by name, told from each other."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from orchestration.system.computers import Message, Network
 from orchestration.system.frames import frame_nanoseconds
 from orchestration.system.model import SamplingOnArrival, TaskSampling
 from orchestration.system.paths import changed, value_at
+from orchestration.system.placement import SHARED, punctual
 from orchestration.system.system_file import is_system, load_system
 
 FILE = """
@@ -148,20 +150,19 @@ def test_a_trace_that_is_written_anew_has_a_schedule_of_its_own(file):
 
 def test_seeds_make_a_difference_where_anything_is_drawn(file):
     system = load_system(file)
-    calm = changed(
-        system,
-        {"networks.bus.error": 0.0, "computers.node.tasks.control.execution": 0.001,
-         "computers.node.tasks.radio.execution": 0.0, "computers.node.tasks.telemetry.jitter": 0.0},
-    )  # fmt: skip
+    calm = replace(system, **punctual(system))
     assert is_random(system)
     assert is_random(calm)  # arrivals come by chance
-    for name in ("computers", "networks"):
-        tables = {
-            key: type(one)(**{**vars(one), **{"tasks" if name == "computers" else "messages": {
-                k: v for k, v in (one.tasks if name == "computers" else one.messages).items() if v.arrivals is None}}})
-            for key, one in getattr(calm, name).items()
-        }  # fmt: skip
-        calm = type(calm)(**{**vars(calm), name: tables})
+    assert calm.computers["node"].tasks["control"].execution == 0.001
+    by_chance = {"tasks": "radio", "messages": "load"}
+    without: dict[str, Any] = {
+        table: {
+            name: replace(one, **{part: {key: x for key, x in getattr(one, part).items() if key != by_chance[part]}})
+            for name, one in getattr(calm, table).items()
+        }
+        for table, (part, _) in SHARED.items()
+    }
+    calm = replace(calm, **without)
     assert not is_random(calm)
     assert is_random(changed(calm, {"networks.bus.error": 0.1}))
 
