@@ -25,6 +25,7 @@ from orchestration.requests.request import Asked, asked_for
 from orchestration.stability.delay_bounds import SampledLoop, certain_jitter
 from orchestration.stability.known_loops import LOOPS
 from orchestration.stability.linear_loop import at_rest
+from orchestration.system.distribution import lowest
 from orchestration.system.model import variable_of
 from orchestration.system.request import Request, in_its_own_words, system_meant
 from orchestration.system.times import NANOSECONDS
@@ -229,7 +230,8 @@ def small_gain(loop: Loop, varying: Varying) -> float | None:
     moved = [of.inputs.index(variable_of(end)) for end in command.end]
     F = command.scale * measurement.scale * controller.D[np.ix_(said, heard)] @ of.C[taken]
     period = float(loop.period) / NANOSECONDS
-    return certain_jitter(SampledLoop(A=of.A, B=of.B[:, moved], F=F, period=period, delay=command.delay))
+    delay = lowest(command.delay)
+    return certain_jitter(SampledLoop(A=of.A, B=of.B[:, moved], F=F, period=period, delay=delay))
 
 
 def down_to_nanoseconds(value: float) -> float:

@@ -18,6 +18,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
 from orchestration.certificates.family import Factor, Family, Letter
 from orchestration.certificates.parts import Assigned, Layout, Loop
+from orchestration.system.distribution import lowest
 from orchestration.system.model import Connection, variable_of
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 
@@ -114,7 +115,7 @@ class Timeline:
                 by = self._slopes(JITTER, name)
                 found.append(_Event(time, by, (1, rank, k), "sample", name))
                 for place, x in enumerate(loop.system.connections):
-                    delay = exact_nanoseconds(x.delay)
+                    delay = exact_nanoseconds(lowest(x.delay))
                     own = self._slopes(DELAY, x.name)
                     if x.receiver == name and not loop.is_sampled(x.sender) and self._is_late(x):
                         slopes = tuple(a - b for a, b in zip(by, own))
@@ -135,7 +136,7 @@ class Timeline:
         return frozenset(event.whom for event in self._events if event.what != "sample")
 
     def _is_late(self, x: Connection) -> bool:
-        return x.delay > 0.0 or any(self._slopes(DELAY, x.name))
+        return lowest(x.delay) > 0.0 or any(self._slopes(DELAY, x.name))
 
     def _slopes(self, kind: str, name: str) -> tuple[int, ...]:
         return tuple(int((each.kind, each.name) == (kind, name)) for each in self._timed)
@@ -295,7 +296,7 @@ class _Built:
         loop, found = self._layout.loop, {}
         for x in loop.system.connections:
             owner = x.sender if loop.is_sampled(x.sender) else x.receiver
-            delay = exact_nanoseconds(x.delay)
+            delay = exact_nanoseconds(lowest(x.delay))
             step = loop.period / len(loop.samples_of(owner))
             if x.order == "jacobi" and loop.is_sampled(x.sender):
                 delay += step
