@@ -57,6 +57,7 @@ bench: .venv/.test
 	$(BIN)/python -m benchmarks.batch
 	$(BIN)/python -m benchmarks.stores
 	$(BIN)/python -m benchmarks.cluster
+	$(BIN)/python -m benchmarks.peers
 
 figures: .venv/.base
 	$(BIN)/python -m docs.make_figures
