@@ -54,9 +54,8 @@ def main() -> None:
     """Everything, in the order of the page."""
     began = time.perf_counter()
     sections = (
-        compared, pictures, period, limits, continuous, delay, bounds, gains, bandwidth, finite_time, monte_carlo,
-        sensitivity, agreement,
-        processor, stalls,
+        compared, pictures, period, limits, continuous, delay, bounds, certificates, gains, bandwidth, finite_time,
+        monte_carlo, sensitivity, agreement, processor, stalls,
     )  # fmt: skip
     for section in [one for one in sections if one.__name__ in sys.argv[1:] or not sys.argv[1:]]:
         print(f"\n## {section.__name__}", flush=True)
@@ -203,6 +202,17 @@ def bounds() -> list[str]:
         f"{_ms(one.period)}: constant {_ms(one.delay_limit)}, certain {_ms(one.certain_jitter)}, breaking "
         f"{_ms(one.breaking_jitter)} by {one.breaking_sequence}"
         for one in found
+    ]
+
+
+def certificates() -> list[str]:
+    """Late samples and late commands at once: what is proved, and what breaks hover."""
+    slow = PAPER.with_changes(timing={"period": 0.04})
+    found = quadcosim.margin_region(slow, "components.controller.sampling.jitter", "connections.command.delay_jitter")
+    _save(lambda: found.figure(DOCS), "margin_region")
+    return [
+        f"{name}: " + ", ".join(f"{_ms(a)} with {_ms(b)}" for a, b in pairs)
+        for name, pairs in (("certified", found.certified), ("breaking", found.breaking))
     ]
 
 
