@@ -1,6 +1,6 @@
 """Who has the processors and the networks of a system when: a Gantt chart of its tasks and messages."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,8 +13,9 @@ from matplotlib.patches import Patch
 from orchestration.basics.simulator import Booleans, Integers
 from orchestration.computers.results import CORRUPTED, NEVER, RUN, SKIPPED, SWITCH, Frames, Jobs, Slices, Timeline
 from orchestration.figures.palette import BLACK, BLUE, BROWN, GREEN, GREY, ORANGE, PURPLE, RED, SKY
-from orchestration.figures.run import Window
+from orchestration.figures.run import Run, Window
 from orchestration.figures.style import Style
+from orchestration.schedule.resources import timeline_of
 
 PIECES = 160
 """of the busiest processor or link, as many as can be told apart"""
@@ -34,6 +35,14 @@ class _Row:
     slices: Slices
     owner: int
     of: Jobs | Frames
+
+
+def chart(runs: Sequence[Run], style: Style) -> Figure | None:
+    """Of the computers and networks of one run; None where there are none, or several runs to lay over each other."""
+    system = runs[0].system
+    if len(runs) > 1 or not (system.computers or system.networks):
+        return None
+    return draw(timeline_of(system), style, runs[0].window)
 
 
 def draw(timeline: Timeline, style: Style, window: Window | None = None) -> Figure:

@@ -42,13 +42,14 @@ class View:
 
 
 def _of_any_system() -> Drawing:
+    from orchestration.figures.gantt import chart
     from orchestration.figures.signals import signals
 
-    return Drawing(makers={"signals": signals}, columns=None)
+    return Drawing(makers={"signals": signals, "schedule": chart}, columns=None)
 
 
 ANY = "run"
-VIEWS = {ANY: View(names=("signals",), first=("signals",), load=_of_any_system)}
+VIEWS = {ANY: View(names=("signals", "schedule"), first=("signals", "schedule"), load=_of_any_system)}
 """By kind of request; rooms above enter theirs"""
 
 

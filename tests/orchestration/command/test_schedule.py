@@ -1,13 +1,18 @@
 """`quadcosim schedule`: its table, its document, its figure."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from orchestration.computers.results import Timeline
 from orchestration.figures import gantt
+from orchestration.figures.run import Run, Window
 from orchestration.figures.style import SCREEN
+from orchestration.recording.recording import InMemory
+from orchestration.system.model import System
+from orchestration.system.system_file import load_system
 from quadcosim import schedule
 from tests.commands import Main
 
@@ -34,6 +39,18 @@ period = 0.005
 bytes = 8
 identifier = 1
 """
+
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+
+
+def run_of(system: System, window: Window | None = None) -> Run:
+    """A run as figures see it, of which nothing was recorded."""
+    recording = InMemory().finish()
+    return Run(
+        name="", place=0, title="", system=system, recording=recording, whole=recording, described={}, parameters={},
+        window=window,
+    )  # fmt: skip
 
 
 @pytest.fixture
@@ -105,3 +122,16 @@ def test_a_chart_has_a_panel_for_each_processor_and_link_and_bars_as_long_as_the
     bars = cpu.collections[1].get_paths()  # of the first task, behind those that wait
     assert [round(path.get_extents().width, 6) for path in bars] == [1.0] * 5
     assert [round(path.get_extents().x0, 6) for path in bars] == [0.1, 4.1, 8.1, 12.1, 16.1]
+
+
+def test_a_run_of_a_system_without_computers_has_no_chart() -> None:
+    of = load_system(EXAMPLES / "water_tank" / "system.toml")
+    assert gantt.chart([run_of(of)], SCREEN) is None
+
+
+def test_a_chart_of_a_run_is_of_its_window() -> None:
+    of = replace(load_system(EXAMPLES / "three_servos" / "can.toml"), stop_time=0.1)
+    figure = gantt.chart([run_of(of, window=(0.02, 0.04))], SCREEN)
+    assert figure is not None
+    assert {axes.get_xlim() for axes in figure.axes} == {(20.0, 40.0)}
+    assert gantt.chart([run_of(of), run_of(of)], SCREEN) is None
