@@ -51,7 +51,8 @@ def tables_of(path: Path, timing: Mapping[str, Any] | None) -> dict[str, Any]:
     models = {place: read_model(fmu) for place, fmu in structure.components.items()}
     tables: dict[str, Any] = {**timing}
     fed = {end for source in timing.get("sources", {}).values() for end in _ends(source.get("to"))}
-    tables["components"] = _components(structure, names, models, timing.get("components", {}), fed)
+    tasks = _components_of_tasks(timing)
+    tables["components"] = _components(structure, names, models, timing.get("components", {}), fed, tasks)
     tables["connections"] = _connections(_signals(structure, names, models), timing.get("connections", []))
     if "stop_time" not in tables:
         if structure.stop is None:
@@ -75,14 +76,25 @@ def _ends(to: object) -> list[str]:
     return [end for end in to if isinstance(end, str)] if isinstance(to, list) else []
 
 
+def _components_of_tasks(timing: Mapping[str, Any]) -> set[str]:
+    """The components whose steps are jobs of computers."""
+    computers = [each for each in timing.get("computers", {}).values() if isinstance(each.get("tasks"), dict)]
+    tasks = [task for computer in computers for task in computer["tasks"].values() if isinstance(task, dict)]
+    return {name for task in tasks if isinstance(name := task.get("component"), str)}
+
+
 def _components(
     structure: Structure,
     names: Mapping[Path_, str],
     models: Mapping[Path_, Model],
     timing: Mapping[str, Any],
     fed: Set[str],
+    tasks: Set[str],
 ) -> dict[str, Any]:
-    """In the order of `timing`, then in that of the SSP; its values for inputs that sources feed are left out."""
+    """In the order of `timing`, then in that of the SSP; its values for inputs that sources feed are left out.
+
+    Those that are `tasks` of computers are stepped when these say.
+    """
     for name in timing:
         if name not in names.values():
             raise UsageError(
@@ -93,11 +105,11 @@ def _components(
         given = dict(timing.get(name, {}))
         parameters = _parameters(structure, place, models[place])
         parameters = {key: value for key, value in parameters.items() if f"{name}.{key}" not in fed}
-        if "sampling" in given:  # which goes before the clock that the SSP gave the component
+        if "sampling" in given or name in tasks:  # which goes before the clock that the SSP gave the component
             parameters = {key: value for key, value in parameters.items() if key not in CLOCK}
         parameters |= dict(given.pop("parameters", {}))
         table = {"fmu": str(structure.components[place]), "parameters": parameters, **given}
-        if "step" not in table and "sampling" not in table:
+        if "step" not in table and "sampling" not in table and name not in tasks:
             if structure.step is None:
                 raise UsageError(
                     f"components.{name}: the SSP does not say how it is stepped; expected step or sampling of it in a "

@@ -46,7 +46,7 @@ def _left_to_say(system: System) -> dict[str, Any]:
 
 def expect_tables(timing: Mapping[str, Any]) -> None:
     """Raise `UsageError` for a document in which what is to be laid over an SSP has another shape."""
-    for kind in ("components", "sources"):
+    for kind in ("components", "sources", "computers"):
         for name, table in _expect(dict, kind, timing.get(kind, {})).items():
             _expect(dict, f"{kind}.{name}", table)
             for key in ("parameters",) if kind == "components" else ():

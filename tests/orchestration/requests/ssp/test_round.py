@@ -43,6 +43,17 @@ def test_an_example_has_the_same_rows_in_the_same_order_as_before(name: str, tmp
     assert read.operating_point == system.operating_point
 
 
+def test_computers_and_networks_are_in_the_annotation_and_tasks_are_stepped_by_them(tmp_path: Path) -> None:
+    system = load_request(EXAMPLES / "three_servos" / "can.toml")
+    assert isinstance(system, System)
+    ssp, timing = writing.write_with_timing(system, tmp_path / "loop.ssp")
+    read = load_request(ssp, timing)
+    assert isinstance(read, System)
+    assert load_request(ssp) == read
+    assert (read.computers, read.networks) == (system.computers, system.networks)
+    assert run(read).metrics == run(system).metrics
+
+
 def test_a_component_that_nothing_is_connected_to_is_flown_back(tmp_path: Path) -> None:
     system = carried("double_integrator")
     alone = dataclasses.replace(
