@@ -17,7 +17,7 @@ LATER = 2**62
 
 Stream: TypeAlias = Callable[[int], Integers]
 """The next so many numbers: times [ns], or 0 and 1"""
-AT_ONCE = 1024
+AT_ONCE = 512
 """Numbers that are drawn at once"""
 
 FIXED_PRIORITY, EARLIEST_DEADLINE, FIRST_COME = range(3)

@@ -254,14 +254,14 @@ def _one_after_the_other(grids: list[Grid], stop: int) -> Stream:
 
     def drawn(count: int) -> Integers:
         nonlocal first
-        numbers = np.arange(first, first + count)
         first += count
         found = np.full(count, LATER, dtype=np.int64)
         for i, grid in enumerate(grids):
-            which = np.flatnonzero((numbers % many == i) & (numbers // many <= lasts[i]))
-            if len(which):
-                k = numbers[which] // many
-                found[which] = grid.between(int(k[0]), int(k[-1]) + 1)
+            k = -(-(first - count - i) // many)  # of the grid's first instant among these
+            places = found[k * many + i - (first - count) :: many]
+            end = min(k + len(places), lasts[i] + 1)
+            if end > k:
+                places[: end - k] = grid.between(k, end)
         return found
 
     return drawn
