@@ -59,12 +59,15 @@ class Region:
 
     def figure(self, style: Style = SCREEN) -> Figure:
         """The pairs that are certified, and those that break the loop."""
-        figure = style.figure(70.0)
+        figure = style.figure(38.0)
         axes = figure.add_subplot()
-        steps = [(1e3 * a, 1e3 * b) for a, b in self.certified]
-        for i, (a, b) in enumerate(steps):
-            axes.fill_between([0.0, a], [b, b], color=BLUE, alpha=0.25, linewidth=0.0, label=None if i else "certified")
-        axes.plot(*zip(*steps), ".", color=BLUE)
+        certified = [(1e3 * a, 1e3 * b) for a, b in self.certified]
+        if len(certified) > 1:
+            heights = [max(b for _, b in certified[i:]) for i in range(1, len(certified))]
+            axes.stairs(
+                heights, [0.0, *(a for a, _ in certified[1:])], fill=True, color=BLUE, alpha=0.25, label="certified"
+            )
+        axes.plot([a for a, _ in certified], [b for _, b in certified], ".", color=BLUE)
         if self.breaking:
             axes.plot(
                 *zip(*[(1e3 * a, 1e3 * b) for a, b in self.breaking]), "x-", color=RED, label="a sequence breaks it"
