@@ -3,7 +3,7 @@
     python -m benchmarks.random_loops --count 30
 
 Loops of one or two rates around an integrator or a servo, of the examples, with delays beyond a period, jitter, losses
-in bursts, both holds and orders, noise and quantisation. Of each with a fourth-moment radius below 0.95 as many runs as
+in bursts, both holds and orders, and noise. Of each with a fourth-moment radius below 0.95 as many runs as
 are asked for give a mean and its standard error; z is how many of these it is from what is expected.
 """
 

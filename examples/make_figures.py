@@ -8,8 +8,11 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
+from orchestration.building.inputs import files_of
+from orchestration.exact.loops import Loops
 from orchestration.figures import gantt
 from orchestration.figures.palette import BLUE, GREEN, GREY, ORANGE, RED
 from orchestration.figures.style import DOCS, save
@@ -143,10 +146,45 @@ def autopilot() -> Figure:
     return gantt.draw(found.timeline, DOCS, (0.0, 0.05))
 
 
+def distributed_servo() -> Figure:
+    """The exact cost over period and delay, with the line from which on there is none."""
+    system = load_system(HERE / "distributed_servo" / "system.toml")
+    periods, delays = np.linspace(0.001, 0.016, 31), np.linspace(0.0, 0.016, 33)
+    cost, radius = (np.full((len(delays), len(periods)), np.nan) for _ in range(2))
+    for j, period in enumerate(periods.tolist()):
+        varied = changed(system, {f"components.controller.{key}": period for key in PERIOD})
+        loops = Loops(files_of(system).models_of(system))
+        for i, delay in enumerate(delays.tolist()):
+            found = loops.solved(changed(varied, {"connections.command.delay": delay}))
+            radius[i, j] = found.loop.radius
+            cost[i, j] = sum(found.means.values()) if found.means is not None else NO_END
+    figure = Figure(figsize=(7.0, 4.2))
+    axes = figure.subplots()
+    levels = [40.0, 50.0, 65.0, 80.0, 100.0, 150.0, 250.0, 500.0, 1000.0]
+    shades = axes.contourf(1e3 * periods, 1e3 * delays, cost, levels, norm=LogNorm(), cmap="viridis", extend="both")
+    axes.contourf(1e3 * periods, 1e3 * delays, radius, [1.0, np.inf], colors=["white"])
+    axes.contour(1e3 * periods, 1e3 * delays, radius, [1.0], colors=[RED])
+    known = np.array([0.0, 3.0, 6.0])
+    axes.plot(
+        np.full(3, 6.0), known, "o", color="white", markeredgecolor="black", clip_on=False,
+        label="known: 65.5, 86.2, 123.0",
+    )  # fmt: skip
+    figure.colorbar(shades, label="J = mean of y² + u²", ticks=levels, format="%g")
+    axes.set(xlabel="period [ms]", ylabel="delay [ms]", title="beyond the red line there is no finite expectation")
+    axes.legend(loc="lower right", frameon=True, framealpha=0.9)
+    return figure
+
+
+NO_END = 1e9
+"""in place of a cost that is not finite, for what is drawn beside it"""
+PERIOD = ("sampling.period", "parameters.period")
+"""of the PD controller: when it samples, and for which it is programmed"""
+
+
 FIGURES: dict[str, Callable[[], Figure]] = {
     draw.__name__: draw
     for draw in (
-        *(water_tank, double_integrator, dc_servo, three_servos),
+        *(water_tank, double_integrator, dc_servo, distributed_servo, three_servos),
         *(minimum_variance, four_components, autopilot),
     )
 }

@@ -94,6 +94,7 @@ class Loops:
     def solved(self, system: System, *, agree: float = AGREE) -> Solved:
         """A system by finer and finer rules, until they agree; raises `UsageError` where there is too much of it."""
         system = changed(system, system.operating_point)
+        _expect_unshared(system)
         linear = self.linear(system)
         tasks, links = tasks_of(system), links_of(system)
         effects = self._effects(system, linear)
@@ -130,6 +131,16 @@ class Loops:
             return TrueEffects(system, linear.parts, names, linear.noise)
         expect_rows(system, tasks, links_of(system))
         return SimulatedEffects(system, linear.parts, names)
+
+
+def _expect_unshared(system: System) -> None:
+    """Raise `UsageError` for what a scheduler decides: how late a task is depends on all that were before."""
+    for table in ("computers", "networks"):
+        for name in getattr(system, table):
+            raise UsageError(
+                f"{table}.{name}: what a scheduler makes late has no exact expectation here; expected delays and "
+                "jitter of connections and components"
+            )
 
 
 def _unhurried(system: System) -> System:

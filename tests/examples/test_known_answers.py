@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from orchestration.building import fmus
+from orchestration.exact.expect import expect
 from orchestration.limits import limit
 from orchestration.runs.simulation import run
+from orchestration.system.distribution import Distribution
 from orchestration.system.model import System
 from tests.examples import common
 
@@ -95,6 +97,29 @@ def test_minimum_variance_control_has_the_cost_of_theory(gain: float, weight: fl
     half_width = 5.41 * np.std(found, ddof=1) / math.sqrt(len(found))
     assert half_width < 0.1 * expected
     assert abs(np.mean(found) - excess - expected) < half_width
+
+
+SHORT, LONG = (tuple(0.00015 * k for k in range(count)) for count in (11, 21))
+"""[s], of each of two delays"""
+
+
+@pytest.mark.parametrize(
+    ("delays", "expected"),
+    [
+        ((0.0,), 65.5234406988),
+        ((0.0015,), 86.2175992472),
+        (SHORT, 74.720524553),
+        ((0.003,), 123.022639193),
+        (LONG, 86.5141979439),
+    ],
+    ids=["none", "1.5 ms", "up to 1.5 ms", "3 ms", "up to 3 ms"],
+)
+def test_the_servo_over_two_networks_costs_what_jitterbug_says(delays: tuple[float, ...], expected: float) -> None:
+    """Each delay on its own, to nine digits; both are drawn, one on top of the other."""
+    each = Distribution(values=delays)
+    system = common.example("distributed_servo", {COMMAND_DELAY: each, f"{COMMAND_DELAY}_jitter": each})
+    found = expect(system).objectives["J"]
+    assert found == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize(("period", "delay"), [(0.1, 0.25), (0.5, 0.0), (0.07, 1.0), (0.25, 0.1)])

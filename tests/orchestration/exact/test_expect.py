@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from orchestration.exact.expect import Expected, expect
+from orchestration.system.computers import Computer, Task
 from orchestration.system.model import Source
 from quadcosim import UsageError, limit
 from tests.commands import Main
@@ -156,3 +157,16 @@ values = [5.0]
 """
     )
     assert f"{NO_END} at 1 of 3 points" in main("sweep", study, "--out", tmp_path / "store").stderr
+
+
+def test_what_a_scheduler_makes_late_is_refused_by_name() -> None:
+    whole = example("minimum_variance")
+    controller = dataclasses.replace(whole.components["controller"], sampling=None)
+    task = Task(component="controller", period=1.0, execution=0.1)
+    placed = dataclasses.replace(
+        whole,
+        components={**whole.components, "controller": controller},
+        computers={"board": Computer(tasks={"control": task})},
+    )
+    with pytest.raises(UsageError, match=r"computers\.board: what a scheduler makes late has no exact expectation"):
+        expect(placed)
