@@ -23,7 +23,7 @@ from orchestration.expressions.syntax import Call
 from orchestration.fmi.model import Model
 from orchestration.fmi.reuse import Instances
 from orchestration.stability.linear_loop import Beside, at_rest
-from orchestration.system.model import System, component_of
+from orchestration.system.model import System, component_of, is_foreseen
 from orchestration.system.paths import changed
 from orchestration.system.written import tables_of
 
@@ -135,12 +135,17 @@ class Loops:
 
 def _expect_unshared(system: System) -> None:
     """Raise `UsageError` for what a scheduler decides: how late a task is depends on all that were before."""
-    for table in ("computers", "networks"):
-        for name in getattr(system, table):
-            raise UsageError(
-                f"{table}.{name}: what a scheduler makes late has no exact expectation here; expected delays and "
-                "jitter of connections and components"
-            )
+    places = [f"{table}.{name}" for table in ("computers", "networks") for name in getattr(system, table)]
+    places += [
+        f"components.{name}.sampling.on"
+        for name, one in system.components.items()
+        if one.sampling is not None and is_foreseen(one.sampling)
+    ]
+    for place in places:
+        raise UsageError(
+            f"{place}: what a scheduler makes late has no exact expectation here; expected delays and jitter of "
+            "connections and components"
+        )
 
 
 def _unhurried(system: System) -> System:

@@ -10,7 +10,7 @@ import pytest
 
 from orchestration.exact.expect import Expected, expect
 from orchestration.system.computers import Computer, Task
-from orchestration.system.model import Source
+from orchestration.system.model import SamplingOnArrival, Source
 from quadcosim import UsageError, limit
 from tests.commands import Main
 from tests.examples.common import EXAMPLES, example
@@ -170,3 +170,22 @@ def test_what_a_scheduler_makes_late_is_refused_by_name() -> None:
     )
     with pytest.raises(UsageError, match=r"computers\.board: what a scheduler makes late has no exact expectation"):
         expect(placed)
+
+
+def test_what_runs_on_arrivals_is_refused_by_name() -> None:
+    whole = example("minimum_variance")
+    controller = dataclasses.replace(whole.components["controller"], sampling=SamplingOnArrival(on="measurement"))
+    measured = dataclasses.replace(
+        whole,
+        components={
+            **whole.components, "controller": controller,
+            "sensor": dataclasses.replace(whole.components["controller"]),
+        },
+        connections=(
+            dataclasses.replace(whole.connections[0], end=("sensor.x",), name="sensed"),
+            dataclasses.replace(whole.connections[0], start=("sensor.u",)),
+            whole.connections[1],
+        ),
+    )  # fmt: skip
+    with pytest.raises(UsageError, match=r"components\.controller\.sampling\.on: what a scheduler makes late"):
+        expect(measured)
