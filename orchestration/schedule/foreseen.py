@@ -121,7 +121,10 @@ class Foreseen:
         self._reached = LATER if self._scheduler.reached == LATER else time
         self._scheduler.run(time)
         notes = self._scheduler.taken()
-        kinds = {kind: notes[notes[:, 1] == kind] for kind in (SAMPLED, SENT, ARRIVES)}
+        if not len(notes):
+            return
+        what = np.ascontiguousarray(notes[:, 1])
+        kinds = {kind: notes[what == kind] for kind in (SAMPLED, SENT, ARRIVES)}
         for name, task in self._tasks.items():
             found = kinds[SAMPLED]
             self.samples[name].hear(found[found[:, 2] == task, 4])

@@ -1,5 +1,6 @@
 """Time in integer nanoseconds, from the decimal form in which people write seconds."""
 
+import functools
 import itertools
 import math
 from collections.abc import Iterator
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
 NANOSECONDS = 1_000_000_000
 
 
+@functools.lru_cache(maxsize=4096)  # the runs of a study have most times in common
 def exact_nanoseconds(seconds: float) -> Fraction:
     """The rational number that the decimal form of `seconds` means, in nanoseconds."""
     return Fraction(repr(float(seconds))) * NANOSECONDS
