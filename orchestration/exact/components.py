@@ -13,6 +13,7 @@ from orchestration.basics.simulator import Floats
 from orchestration.exact.linear import Components, Continuous, Sampled
 from orchestration.stability.linear_loop import AtRest
 from orchestration.stability.linearised_component import Tangent
+from orchestration.stability.matrices import minds_its_step
 from orchestration.system.times import NANOSECONDS, nanoseconds
 
 LARGE_PULSE = 1.0
@@ -86,6 +87,7 @@ def _sampled(tangent: Tangent, period: float) -> Sampled:
     return Sampled(
         inputs=tangent.inputs, outputs=tangent.outputs,
         A=by_state[count:], B=by_input[count:], C=by_state[:count], D=by_input[:count],
+        minds_step=minds_its_step(tangent, period),
     )  # fmt: skip
 
 

@@ -37,6 +37,8 @@ class Sampled:
     B: Floats
     C: Floats
     D: Floats
+    minds_step: bool = False
+    """whether a sample does something else where the next one comes at another time"""
 
 
 Components = dict[str, Continuous | Sampled]

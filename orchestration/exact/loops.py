@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,10 +12,10 @@ import numpy as np
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
 from orchestration.exact.as_simulated import SimulatedEffects, expect_rows
-from orchestration.exact.clockwork import Clockwork
+from orchestration.exact.clockwork import Clockwork, Task
 from orchestration.exact.components import components_of
 from orchestration.exact.effects import LoopEffects, TrueEffects
-from orchestration.exact.linear import Components, Continuous
+from orchestration.exact.linear import Components, Continuous, Sampled
 from orchestration.exact.moments import JumpLinear
 from orchestration.exact.timing import links_of, tasks_of
 from orchestration.exact.wanted import Wanted
@@ -97,6 +97,7 @@ class Loops:
         _expect_unshared(system)
         linear = self.linear(system)
         tasks, links = tasks_of(system), links_of(system)
+        expect_same_steps(tasks, linear.parts)
         effects = self._effects(system, linear)
         used = [call for call, mean in linear.wanted.means.items() if np.any(mean.Q)]
         effects.charge([linear.wanted.means[call] for call in used])
@@ -146,6 +147,17 @@ def _expect_unshared(system: System) -> None:
             f"{place}: what a scheduler makes late has no exact expectation here; expected delays and jitter of "
             "connections and components"
         )
+
+
+def expect_same_steps(tasks: Sequence[Task], parts: Components) -> None:
+    """Raise `UsageError` for a task whose samples are irregular, and do what depends on when the next one is."""
+    for task in tasks:
+        part = parts[task.name]
+        if isinstance(part, Sampled) and part.minds_step and not task.jitter.is_certain:
+            raise UsageError(
+                f"components.{task.name}.sampling.jitter: what {task.name} does depends on how long it is to the next "
+                "sample; expected none"
+            )
 
 
 def _unhurried(system: System) -> System:

@@ -6,9 +6,13 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from orchestration.exact.expect import Expected, expect
+from orchestration.exact.linear import Sampled
+from orchestration.exact.loops import expect_same_steps
+from orchestration.exact.timing import tasks_of
 from orchestration.system.computers import Computer, Task
 from orchestration.system.model import SamplingOnArrival, Source
 from quadcosim import UsageError, limit
@@ -189,3 +193,12 @@ def test_what_runs_on_arrivals_is_refused_by_name() -> None:
     )  # fmt: skip
     with pytest.raises(UsageError, match=r"components\.controller\.sampling\.on: what a scheduler makes late"):
         expect(measured)
+
+
+def test_a_task_that_minds_how_long_its_step_is_has_no_jitter() -> None:
+    system = example("minimum_variance", {"components.controller.sampling.jitter": 0.1})
+    none = np.zeros((0, 0))
+    minding = Sampled(inputs=(), outputs=(), A=none, B=none, C=none, D=none, minds_step=True)
+    with pytest.raises(UsageError, match=r"components\.controller\.sampling\.jitter: what controller does depends on"):
+        expect_same_steps(tasks_of(system), {"controller": minding})
+    expect_same_steps(tasks_of(example("minimum_variance")), {"controller": minding})
