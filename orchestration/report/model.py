@@ -72,6 +72,20 @@ class Track:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Bars:
+    """Who has a computer or a network when, in pieces; arrays as places of blobs."""
+
+    rows: tuple[str, ...]
+    """tasks and messages"""
+    row: int
+    """of each piece"""
+    begin: int
+    """[s]"""
+    end: int
+    """[s]"""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Run:
     """A run that the page can open."""
 
@@ -86,6 +100,8 @@ class Run:
     note: str | None = None
     """what is to be known of its track"""
     track: Track | None = None
+    bars: Bars | None = None
+    """of a system with computers or networks"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,21 +3,27 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from orchestration.basics.documents import tables_in
 from orchestration.basics.errors import UsageError
 from orchestration.report.blobs import Blobs
-from orchestration.report.model import Report, Run, Setting
+from orchestration.report.model import Bars, Report, Run, Setting
 from orchestration.report.number_format import number
 from orchestration.report.tracks import Tracks
 from orchestration.results import display_names as labels
 from orchestration.results import quantities
 from orchestration.runs.result import Result
+from orchestration.schedule.resources import timeline_of
+from orchestration.system.model import System
 
 BYTES = 9_000_000
 """Characters that the signals of all runs may take"""
 MOST_ROWS, LEAST_ROWS = 6000, 200
 """of a run"""
 MOST_RUNS = 200
+MOST_PIECES = 20_000
+"""Of the time of a computer or of a network, of those that are drawn"""
 SETTLING = "settling_time"
 """The objective that says when a run settles, of systems that have it"""
 _CODED = 4.0 * 4.0 / 3.0
@@ -32,7 +38,7 @@ def report_of(results: Mapping[str, Result], command: str) -> Report:
     tracks = Tracks(blobs)
     columns = sum(len(result.columns) for result in results.values())
     rows = int(min(MOST_ROWS, max(LEAST_ROWS, BYTES / _CODED / columns)))
-    runs = [_run(name, result, tracks, rows) for name, result in results.items()]
+    runs = [_run(name, result, tracks, blobs, rows) for name, result in results.items()]
     some = next(iter(results.values()))
     told = [_told(name, result) for name, result in results.items()]
     return Report(
@@ -57,7 +63,7 @@ def report_of(results: Mapping[str, Result], command: str) -> Report:
     )
 
 
-def _run(name: str, result: Result, tracks: Tracks, rows: int) -> Run:
+def _run(name: str, result: Result, tracks: Tracks, blobs: Blobs, rows: int) -> Run:
     signals = dict(result.signals)
     return Run(
         name=name,
@@ -66,7 +72,24 @@ def _run(name: str, result: Result, tracks: Tracks, rows: int) -> Run:
         message=result.divergence or result.termination,
         note=None if result.interrupted_at is None else f"interrupted at {number(result.interrupted_at)} s",
         track=tracks.whole(result.system, signals, result.described, rows),
+        bars=_bars(result.system, blobs),
     )
+
+
+def _bars(system: System, blobs: Blobs) -> Bars | None:
+    """Who has its computers and networks when; the first pieces of each where there are very many."""
+    if not (system.computers or system.networks):
+        return None
+    timeline = timeline_of(system)
+    rows: list[str] = []
+    pieces = []
+    for shared in (*timeline.processors.values(), *timeline.links.values()):
+        places = np.arange(len(rows), len(rows) + len(shared.owners))
+        rows += shared.owners
+        some = slice(MOST_PIECES)
+        pieces.append(np.column_stack([places[shared.owner[some]], shared.begin[some] / 1e9, shared.end[some] / 1e9]))
+    row, begin, end = np.vstack(pieces).T
+    return Bars(rows=tuple(rows), row=blobs.exact(row), begin=blobs.exact(begin), end=blobs.exact(end))
 
 
 def _settings(result: Result) -> dict[str, Setting]:

@@ -33,10 +33,15 @@ function signalsOf(run) {
     run.track.columns.forEach((place, i) => {
       Object.defineProperty(columns, layout.columns[i], { enumerable: true, get: () => numbersOf(place) });
     });
-    run.signals = { time: numbersOf(run.track.time), columns, layout };
+    run.signals = { time: numbersOf(run.track.time), columns, layout, bars: barsOf(run) };
     addAngles(run.signals);
   }
   return run.signals;
+}
+
+/** Who has its computers and networks when; null for a run without any. */
+function barsOf({ bars }) {
+  return bars && { rows: bars.rows, row: numbersOf(bars.row), begin: numbersOf(bars.begin), end: numbersOf(bars.end) };
 }
 
 /** Roll, pitch and yaw [deg] about the body's axes, from the quaternion; of the attitude that it should have too. */

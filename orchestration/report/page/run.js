@@ -180,7 +180,7 @@ function showSignals() {
     nameScene(beside);
   }
   setTime(0);
-  buildPanelChoice(signals.layout);
+  buildPanelChoice(signals);
   pending = setTimeout(() => drawTimePlot(signals, beside, [player.run.name, player.beside ? player.beside.name : ""]).then(noteFirstPlot), 30);
 }
 
@@ -208,8 +208,8 @@ function buildSignalControls() {
   );
 }
 
-function buildPanelChoice(layout) {
-  const boxes = layout.panels.map((panel) => {
+function buildPanelChoice({ layout, bars }) {
+  const boxes = [...layout.panels, ...(bars ? [{ title: BARS, unit: null, shown: true }] : [])].map((panel) => {
     const box = element("input", { type: "checkbox", checked: timePlot.shownPanels.get(panel.title) ?? panel.shown });
     box.onchange = () => { timePlot.shownPanels.set(panel.title, box.checked); redrawSignals(); };
     return element("label", {}, box, titled(panel.title, panel.unit));

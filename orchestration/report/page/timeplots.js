@@ -3,6 +3,7 @@
 const PANEL = 128;
 const MARGIN = { l: 62, r: 14, t: 34, b: 44 };
 const NARROW = 620;
+const BARS = "who has computers and networks";
 
 const timePlot = { signals: null, beside: null, shownPanels: new Map(), isDrawn: false };
 
@@ -20,13 +21,19 @@ function panelsOf(layout) {
   return layout.panels.filter((panel) => timePlot.shownPanels.get(panel.title) ?? panel.shown);
 }
 
+/** Those of a run: of its layout, and of its computers and networks. */
+function panelsOfRun(signals) {
+  const bars = signals.bars ? [{ title: BARS, unit: null, lines: [], bars: signals.bars }] : [];
+  return [...panelsOf(signals.layout), ...bars.filter(() => timePlot.shownPanels.get(BARS) ?? true)];
+}
+
 /** Draw them, `whole` with insets where peaks are clipped. */
 function drawTimePlot(signals, beside, names, whole = true) {
   Object.assign(timePlot, { signals, beside, whole });
-  const panels = panelsOf(signals.layout);
+  const panels = panelsOfRun(signals);
   const height = topMargin() + MARGIN.b + panels.length * PANEL + (panels.length - 1) * gap();
   const byPanel = panels.map((panel, k) => tracesOf(panel, k, signals, beside, names));
-  const peaks = byPanel.map((traces, k) => (whole && !panels[k].logarithmic ? peakOf(traces) : null));
+  const peaks = byPanel.map((traces, k) => (whole && !panels[k].logarithmic && !panels[k].bars ? peakOf(traces) : null));
   const traces = [...byPanel.flat(), ...peaks.flatMap((peak, k) => (peak ? tracesOfInset(byPanel[k], peak, panels.length + 1 + k) : []))];
   const holder = byId("time-plot");
   holder.style.height = `${height}px`;
@@ -37,7 +44,21 @@ function drawTimePlot(signals, beside, names, whole = true) {
   });
 }
 
+/** The pieces of a row are one line with gaps. */
+function tracesOfBars({ rows, row, begin, end }, k) {
+  const lines = rows.map(() => ({ x: [], y: [] }));
+  for (let i = 0; i < row.length; i += 1) {
+    lines[row[i]].x.push(begin[i], end[i], null);
+    lines[row[i]].y.push(row[i], row[i], null);
+  }
+  return lines.map(({ x, y }, place) => ({
+    x, y, name: escaped(rows[place]), yaxis: k ? `y${k + 1}` : "y", mode: "lines", showlegend: false, connectgaps: false,
+    line: { color: COLORS[place % 8], width: Math.min(12, 90 / rows.length) }, hovertemplate: `${escaped(rows[place])}<extra></extra>`,
+  }));
+}
+
 function tracesOf(panel, k, signals, beside, names) {
+  if (panel.bars) return tracesOfBars(panel.bars, k);
   const found = [];
   panel.lines.forEach((line, i) => {
     if (!(line.column in signals.columns)) return;
@@ -90,7 +111,7 @@ function timeLayout(panels, height, signals, peaks) {
   panels.forEach((panel, k) => {
     const top = 1 - (k * (PANEL + gap())) / inner;
     layout[k ? `yaxis${k + 1}` : "yaxis"] = {
-      domain: [top - PANEL / inner, top], type: panel.logarithmic ? "log" : "linear", nticks: 5, exponentformat: "e", ...(panel.logarithmic ? powersIn(panel, signals) : {}),
+      ...(panel.bars ? rowsOf(panel.bars) : {}), domain: [top - PANEL / inner, top], type: panel.logarithmic ? "log" : "linear", nticks: 5, exponentformat: "e", ...(panel.logarithmic ? powersIn(panel, signals) : {}),
     };
     layout[k ? `legend${k + 1}` : "legend"] = {
       orientation: "h", x: isNarrow ? 0 : 1, xanchor: isNarrow ? "left" : "right", y: top + 2 / inner, yanchor: "bottom", font: { size: 11 },
@@ -108,6 +129,11 @@ function timeLayout(panels, height, signals, peaks) {
     });
   });
   return layout;
+}
+
+/** An axis with a row for each task and message, the first on top. */
+function rowsOf({ rows }) {
+  return { tickvals: rows.map((_, place) => place), ticktext: rows.map((name) => escaped(name.slice(name.indexOf(".") + 1))), range: [rows.length - 0.5, -0.5], tickfont: { size: 9 }, zeroline: false };
 }
 
 /** Ticks of a logarithmic axis at few powers of ten, as 10⁻³. */
@@ -144,7 +170,8 @@ function showSpan(from, to) {
   if (timePlot.whole) redrawSignals(false); // who looks closer sees peaks where they are
   const range = [Math.max(first, from), Math.min(last, to)];
   const update = { "xaxis.range": range };
-  panelsOf(timePlot.signals.layout).forEach((panel, k) => {
+  panelsOfRun(timePlot.signals).forEach((panel, k) => {
+    if (panel.bars) return;
     const own = k ? `y${k + 1}` : "y";
     const seen = seenRange(byId("time-plot").data.filter((trace) => trace.yaxis === own), range, panel.logarithmic);
     update[`yaxis${k ? k + 1 : ""}.${seen ? "range" : "autorange"}`] = seen ?? true;

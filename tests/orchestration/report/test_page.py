@@ -13,7 +13,10 @@ from orchestration.comparison.run import compare
 from orchestration.report.writing import report
 from orchestration.runs.simulation import run
 from orchestration.studies.study import Study
+from orchestration.system.paths import changed
+from orchestration.system.system_file import load_system
 from quadcosim import Scenario, Timing
+from tests.examples.common import EXAMPLES
 from tests.native import NATIVE
 from tests.orchestration.studies.common import axis, sweep
 from tests.patience import PATIENCE
@@ -65,6 +68,23 @@ def of_runs(show: Show, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Two runs, one of which diverges."""
     folder = tmp_path_factory.mktemp("runs")
     return show(report(run(scenario()), run(scenario(period=0.2)), out=folder / "report.html"))
+
+
+def test_who_has_a_computer_is_drawn_over_the_same_time_as_the_signals(show: Show, tmp_path: Path) -> None:
+    system = changed(load_system(EXAMPLES / "autopilot" / "flight.toml"), {"stop_time": 0.3})
+    page = show(report(run(system), out=tmp_path / "report.html"))
+    drawn = page.evaluate(
+        "document.getElementById('time-plot').data.filter((one) => /^(autopilot|bus)/.test(one.name))"
+        ".map((one) => [one.name, one.x.length, one.x[0], one.x.at(-2), one.xaxis ?? 'x'])"
+    )
+    assert [name for name, *_ in drawn] == [
+        *(f"autopilot.{task}" for task in ("storage", "radio", "estimator", "control", "telemetry")),
+        *(f"bus.{message}" for message in ("command", "airspeed", "status")),
+    ]
+    _, points, begin, end, axis = drawn[0]
+    assert (points, axis) == (6, "x"), "the switch and the job, and a gap after each"
+    assert (begin, end) == (pytest.approx(0.0021), pytest.approx(0.007102))
+    page.close()
 
 
 @pytest.fixture(scope="module")
