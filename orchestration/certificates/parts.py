@@ -12,7 +12,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
 from orchestration.schedule.plan import Plan
 from orchestration.stability.linear_loop import AtRest
-from orchestration.stability.matrices import Matrices, in_continuous_time, minds_its_step, of_samples
+from orchestration.stability.matrices import Matrices, in_continuous_time, minds_its_step, of_samples, told_by_outputs
 from orchestration.stability.operating_point import true_period
 from orchestration.system.model import Connection, System, variable_of
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
@@ -53,6 +53,8 @@ class Loop:
 
 def loop_of(rest: AtRest) -> Loop:
     """The loop of a system at rest; raises `UsageError` for what this is not for."""
+    from scipy.linalg import expm  # comes with an extra
+
     system = rest.simulation.system
     for x in system.connections:
         if x.hold != "zero":
@@ -64,13 +66,17 @@ def loop_of(rest: AtRest) -> Loop:
     for name, component in system.components.items():
         tangent = rest.tangents[name]
         if component.sampling is not None:
-            components[name] = of_samples(tangent, component.sampling.period)
+            found = of_samples(tangent, component.sampling.period)
+            components[name] = told_by_outputs(found, found.A)
             varies = rest.simulation.instances[name].model.varies_step
             if not varies or minds_its_step(tangent, component.sampling.period):
                 minds.add(name)
         else:
             assert component.step is not None
-            components[name] = in_continuous_time(tangent, name, min(component.step, period), period)
+            found, unfit = in_continuous_time(tangent, min(component.step, period))
+            if unfit is not None:
+                raise UsageError(f"{name}: {unfit}, so it is no linear system in continuous time")
+            components[name] = told_by_outputs(found, expm(found.A * period))
     for x in system.connections:
         for start, end in zip(x.start, x.end):
             known = (components[x.sender].outputs, components[x.receiver].inputs)

@@ -6,21 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from orchestration.basics.simulator import Floats
+from orchestration.stability.matrices import Matrices
 
 Derivatives = Callable[[float], tuple[Floats, Floats]]
 """Of the outputs after a step of a length [s] and, below, of the state then: by the state before, and by the inputs"""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Continuous:
+class Continuous(Matrices):
     """x' = A x + B u, y = C x + D u."""
 
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    A: Floats
-    B: Floats
-    C: Floats
-    D: Floats
     step: Derivatives | None = None
     """as it is stepped, where that is not what the matrices say"""
     unfit: str | None = None
@@ -28,15 +23,9 @@ class Continuous:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sampled:
+class Sampled(Matrices):
     """At each sample y = C x + D u, and then x becomes A x + B u."""
 
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    A: Floats
-    B: Floats
-    C: Floats
-    D: Floats
     minds_step: bool = False
     """whether a sample does something else where the next one comes at another time"""
 

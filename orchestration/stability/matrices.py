@@ -1,15 +1,24 @@
-"""A component about rest as matrices, in coordinates that mean something: values of its outputs, now and later."""
+"""A component about rest as matrices, from the derivatives that its FMU shows."""
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
 from orchestration.stability.linearised_component import Tangent
+from orchestration.system.times import NANOSECONDS, nanoseconds
 
-CONTINUOUS = 1e-7
-"""by how much two steps of half the length may differ from one, relative"""
+NEAR, FAR = 0.1, 0.5
+"""of the norm of Φ(h) - I: between them its logarithm is known best"""
+HALVINGS = 40
+BLURRED = 1e-7
+"""of Φ(2h): what Φ(h)² may differ from it by, where they are known by small differences; more, and the component is no
+linear system in continuous time"""
+NO_FEEDTHROUGH = 1e-6
+"""of the most that an input makes of an output in a step: what is smaller comes through states alone"""
+TERMS = 24
 APART = (0.1, 1e-3, 1e-5, 1e-8)
 """of a coordinate: how much of it, relative, those before it must leave open; tried in turn"""
 
@@ -18,60 +27,53 @@ APART = (0.1, 1e-3, 1e-5, 1e-8)
 class Matrices:
     """y = C x + D u; ẋ = A x + B u of a component in continuous time, x⁺ = A x + B u of one that is sampled."""
 
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
     A: Floats
     B: Floats
     C: Floats
     D: Floats
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-
-
-def in_continuous_time(tangent: Tangent, name: str, step: float, period: float) -> Matrices:
-    """Of a component that is stepped at most `step` [s] at a time; raises `UsageError` where its steps are no flow."""
-    from scipy.linalg import expm, logm
-
-    cut, n, m = len(tangent.outputs), len(tangent.state), len(tangent.inputs)
-    whole, half = (_stepped(tangent, h) for h in (step, 0.5 * step))
-    if np.abs(half @ half - whole)[: n + m].max(initial=0.0) > CONTINUOUS * max(1.0, np.abs(whole).max()):
-        raise UsageError(
-            f"{name}: two half steps differ from a whole one, so it is no linear system in continuous time"
-        )
-    by_state, by_input = tangent.derivatives(step)
-    A = np.real(logm(whole)) / step if n + m else whole
-    C = by_state[:cut] @ np.linalg.inv(whole[:n, :n])
-    D = by_input[:cut] - C @ whole[:n, n:]
-    D[np.abs(D) < CONTINUOUS * np.abs(by_input[:cut]).max(initial=1.0)] = 0.0
-    found = Matrices(A=A[:n, :n], B=A[:n, n:], C=C, D=D, inputs=tangent.inputs, outputs=tangent.outputs)
-    return _told(found, expm(found.A * period))
 
 
 def of_samples(tangent: Tangent, period: float) -> Matrices:
     """Of a component that is sampled every `period` [s]."""
     by_state, by_input = tangent.derivatives(period)
-    cut = len(tangent.outputs)
-    found = Matrices(
-        A=by_state[cut:], B=by_input[cut:], C=by_state[:cut], D=by_input[:cut], inputs=tangent.inputs,
-        outputs=tangent.outputs,
+    count = len(tangent.outputs)
+    return Matrices(
+        inputs=tangent.inputs, outputs=tangent.outputs,
+        A=by_state[count:], B=by_input[count:], C=by_state[:count], D=by_input[:count],
     )  # fmt: skip
-    return _told(found, found.A)
+
+
+def in_continuous_time(tangent: Tangent, first: float, differs: float = BLURRED) -> tuple[Matrices, str | None]:
+    """Of a component in continuous time, and why they do not say what it does; None: they do.
+
+    `first` is a step [s] that it takes; two steps may differ from one of twice the length by `differs`, relative.
+    """
+    count = len(tangent.outputs)
+    h = first if tangent.unit is not None else _telling(tangent, first)
+    by_state, by_input = tangent.derivatives(h)
+    state, moved = by_state[count:], by_input[count:]
+    change = state - np.eye(len(state))
+    if len(change) and np.linalg.norm(change, 2) > 2.0 * FAR:
+        unfit: str | None = f"a step of {h:g} s is too long to tell what happens within it"
+        A, B, C, D = np.zeros_like(change), np.zeros_like(moved), by_state[:count], by_input[:count]
+    else:
+        unfit = _unfit(tangent, state, h, differs)
+        A = _logarithm(change) / h
+        B = np.asarray(np.linalg.solve(_mean_exponential(A * h), moved)) / h
+        C = by_state[:count] @ np.linalg.inv(state)
+        D = _through(by_input[:count], C @ moved)
+    return Matrices(inputs=tangent.inputs, outputs=tangent.outputs, A=A, B=B, C=C, D=D), unfit
 
 
 def minds_its_step(tangent: Tangent, period: float) -> bool:
     """Whether a sample does something else where the next one comes at another time."""
     usual, sooner = (np.hstack(tangent.derivatives(h)) for h in (period, 0.9 * period))
-    return bool(np.abs(usual - sooner).max(initial=0.0) > CONTINUOUS * np.abs(usual).max(initial=1.0))
+    return bool(np.abs(usual - sooner).max(initial=0.0) > BLURRED * np.abs(usual).max(initial=1.0))
 
 
-def _stepped(tangent: Tangent, h: float) -> Floats:
-    """The derivative of a step of `h` [s], the inputs as further states that stay."""
-    by_state, by_input = tangent.derivatives(h)
-    cut, n, m = len(tangent.outputs), len(tangent.state), len(tangent.inputs)
-    found: Floats = np.eye(n + m)
-    found[:n, :n], found[:n, n:] = by_state[cut:], by_input[cut:]
-    return found
-
-
-def _told(of: Matrices, after: Floats) -> Matrices:
+def told_by_outputs(of: Matrices, after: Floats) -> Matrices:
     """In coordinates that are outputs, now or, by `after`, periods later, the inputs at rest: the first that serve."""
     rows, power = [], np.eye(len(of.A))
     for _ in range(max(len(of.A), 1)):
@@ -91,4 +93,63 @@ def _told(of: Matrices, after: Floats) -> Matrices:
         return of
     onto = np.array(chosen).reshape(len(of.A), len(of.A))
     back = np.linalg.inv(onto) if len(onto) else onto
-    return Matrices(A=onto @ of.A @ back, B=onto @ of.B, C=of.C @ back, D=of.D, inputs=of.inputs, outputs=of.outputs)
+    return replace(of, A=onto @ of.A @ back, B=onto @ of.B, C=of.C @ back)
+
+
+def _through(whole: Floats, by_states: Floats) -> Floats:
+    """What inputs make of outputs at once: none where it may be rounding."""
+    found: Floats = whole - by_states
+    found[np.abs(found) <= NO_FEEDTHROUGH * np.abs(whole).max(axis=1, keepdims=True, initial=0.0)] = 0.0
+    return found
+
+
+def _unfit(tangent: Tangent, once: Floats, h: float, differs: float) -> str | None:
+    """Why what it does is not that of a linear system in continuous time; None: it is."""
+    count = len(tangent.outputs)
+    twice = tangent.derivatives(2.0 * h)[0][count:]
+    apart = float(np.abs(twice - once @ once).max(initial=0.0)) / max(1.0, float(np.abs(twice).max(initial=0.0)))
+    if apart <= differs:
+        return None
+    return f"a step of {2 * h:g} s differs from two of {h:g} s by {apart:.1g}"
+
+
+def _telling(tangent: Tangent, first: float) -> float:
+    """A step over which the state changes neither too little nor too much."""
+    count, h = len(tangent.outputs), first
+    for _ in range(HALVINGS):
+        by_state = tangent.derivatives(h)[0][count:]
+        size = float(np.linalg.norm(by_state - np.eye(len(by_state)), 2)) if len(by_state) else NEAR
+        if size > FAR and nanoseconds(h) >= 2:
+            h = whole(0.5 * h)
+        elif size < NEAR and h < 64.0 * first:
+            h = 2.0 * h
+        else:
+            break
+    return h
+
+
+def whole(seconds: float) -> float:
+    """In whole nanoseconds, by which derivatives are known."""
+    return max(1, nanoseconds(seconds)) / NANOSECONDS
+
+
+def _logarithm(change: Floats) -> Floats:
+    """Of I + change, by the series of the inverse hyperbolic tangent."""
+    if not len(change):
+        return change
+    x = np.linalg.solve(2.0 * np.eye(len(change)) + change, change)
+    square, power = x @ x, x
+    found: Floats = np.zeros_like(x)
+    for k in range(TERMS):
+        found = found + power / (2 * k + 1)
+        power = power @ square
+    return 2.0 * found
+
+
+def _mean_exponential(A: Floats) -> Floats:
+    """(e^A - I) A⁻¹, by its series."""
+    found, term = np.eye(len(A)), np.eye(len(A))
+    for k in range(1, TERMS + 1):
+        term = term @ A / (k + 1)
+        found = found + term
+    return found

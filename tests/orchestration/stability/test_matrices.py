@@ -1,4 +1,4 @@
-"""Components as matrices: in coordinates that are their outputs, now and later."""
+"""Components as matrices, and in coordinates that are their outputs, now and later."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from orchestration.basics.errors import UsageError
 from orchestration.fmi.reuse import Instances
 from orchestration.stability.linear_loop import at_rest
 from orchestration.stability.linearised_component import Tangent
-from orchestration.stability.matrices import in_continuous_time, minds_its_step, of_samples
+from orchestration.stability.matrices import in_continuous_time, minds_its_step, of_samples, told_by_outputs
 from tests.examples.common import example
 
 
@@ -24,7 +23,9 @@ def tangents() -> Iterator[dict[str, Any]]:
 
 
 def test_a_double_integrator_has_its_matrices(tangents: dict[str, Tangent]) -> None:
-    found = in_continuous_time(tangents["plant"], "plant", 0.05, 0.05)
+    found, unfit = in_continuous_time(tangents["plant"], 0.05)
+    found = told_by_outputs(found, expm(0.05 * found.A))
+    assert unfit is None
     assert pytest.approx(np.array([[0.0, 1.0], [0.0, 0.0]]), abs=1e-9) == found.A
     assert pytest.approx(np.array([[0.0], [1.0]]), abs=1e-9) == found.B
     assert pytest.approx(np.eye(2), abs=1e-12) == found.C
@@ -41,7 +42,7 @@ def test_a_law_without_memory_is_its_gains(tangents: dict[str, Tangent]) -> None
 class Stepped:
     """In the place of a tangent."""
 
-    outputs, inputs = ("y",), ("u",)
+    outputs, inputs, unit = ("y",), ("u",), None
 
     def __init__(self, flow: np.ndarray, feedthrough: float = 0.0, euler: bool = False) -> None:
         self._flow, self._through, self._euler = flow, feedthrough, euler
@@ -59,14 +60,17 @@ OSCILLATOR = np.array([[0.0, 3.0, 0.0], [-3.0, -0.2, 1.0], [0.0, 0.0, 0.0]])
 
 def test_what_one_output_does_not_tell_it_tells_a_period_later() -> None:
     tangent: Any = Stepped(OSCILLATOR, feedthrough=0.5)
-    found = in_continuous_time(tangent, "plant", 0.1, 0.3)
+    found, unfit = in_continuous_time(tangent, 0.1)
+    found = told_by_outputs(found, expm(0.3 * found.A))
+    assert unfit is None
     assert pytest.approx(np.array([[1.0, 0.0]]), abs=1e-9) == found.C
     assert pytest.approx(np.array([[0.5]]), abs=1e-9) == found.D
     assert found.C @ expm(0.3 * found.A) == pytest.approx(np.array([[0.0, 1.0]]), abs=1e-9)
     assert np.linalg.eigvals(found.A) == pytest.approx(np.linalg.eigvals(OSCILLATOR[:2, :2]), abs=1e-9)
 
 
-def test_steps_that_are_no_flow_are_refused() -> None:
+def test_of_steps_that_are_no_flow_it_is_said_why() -> None:
     tangent: Any = Stepped(OSCILLATOR, euler=True)
-    with pytest.raises(UsageError, match="two half steps differ"):
-        in_continuous_time(tangent, "plant", 0.1, 0.3)
+    _, unfit = in_continuous_time(tangent, 0.1)
+    assert unfit is not None
+    assert unfit.startswith("a step of 0.2 s differs from two of 0.1 s by ")
