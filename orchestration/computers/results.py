@@ -17,24 +17,17 @@ RUN, SWITCH, CORRUPTED = range(3)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Jobs:
-    """The jobs of one task, a number each in the order of their releases, those included that a skip left out."""
+class _Served:
+    """What was asked of a processor or a network, in the order in which it was."""
 
     nominal: Integers
-    """when each should be released; responses and deadlines count from here"""
-    released: Integers
-    """when it was"""
+    """when each should be released or queued; responses and deadlines count from here"""
     started: Integers
-    """when its own first instruction was"""
+    """when its own first instruction was, or its first bit was sent the first time"""
     ended: Integers
-    """when it was done"""
-    written: Integers
-    """when its outputs were sent"""
+    """when it was done, or received"""
     deadline: Integers
-    preemptions: Integers
-    """how often another took the processor from it"""
-    outcome: Integers
-    """DONE, UNFINISHED, SKIPPED or ABORTED"""
+    """the largest number where it has none"""
     stop: int
 
     def __len__(self) -> int:
@@ -42,13 +35,13 @@ class Jobs:
 
     @property
     def done(self) -> Booleans:
-        """Which of them are done."""
-        found: Booleans = self.outcome == DONE
+        """Which of them are done, or received."""
+        found: Booleans = self.ended != NEVER
         return found
 
     @property
     def responses(self) -> Integers:
-        """Of those that are done, from the nominal release to the end."""
+        """Of those that are done, from the nominal instant to the end."""
         found: Integers = (self.ended - self.nominal)[self.done]
         return found
 
@@ -61,51 +54,37 @@ class Jobs:
     @property
     def missed(self) -> Booleans:
         """Which of those that are `due` were not done by their deadline, skipped and aborted ones included."""
-        return _missed(self)
+        found: Booleans = self.due & ((self.ended == NEVER) | (self.ended > self.deadline))
+        return found
 
 
 @dataclass(frozen=True, kw_only=True)
-class Frames:
-    """The messages of one name, in the order in which they were queued."""
+class Jobs(_Served):
+    """The jobs of one task, a number each in the order of their releases, those included that a skip left out."""
 
-    nominal: Integers
-    """when each should be queued; responses and deadlines count from here"""
-    queued: Integers
-    started: Integers
-    """when its first bit was sent the first time"""
-    ended: Integers
-    """when it was received"""
-    deadline: Integers
-    """the largest number where it has none"""
-    attempts: Integers
-    """how often it was sent, the last time included; over two links twice"""
-    stop: int
-
-    def __len__(self) -> int:
-        return len(self.nominal)
+    released: Integers
+    """when it was"""
+    written: Integers
+    """when its outputs were sent"""
+    preemptions: Integers
+    """how often another took the processor from it"""
+    outcome: Integers
+    """DONE, UNFINISHED, SKIPPED or ABORTED"""
 
     @property
     def done(self) -> Booleans:
-        """Which of them are received."""
-        found: Booleans = self.ended != NEVER
+        """Which of them are done: an aborted one has ended too."""
+        found: Booleans = self.outcome == DONE
         return found
 
-    @property
-    def responses(self) -> Integers:
-        """Of those that are received, from the nominal instant to the last bit."""
-        found: Integers = (self.ended - self.nominal)[self.done]
-        return found
 
-    @property
-    def due(self) -> Booleans:
-        """Which of them have their deadline within the run."""
-        found: Booleans = self.deadline <= self.stop
-        return found
+@dataclass(frozen=True, kw_only=True)
+class Frames(_Served):
+    """The messages of one name, in the order in which they were queued."""
 
-    @property
-    def missed(self) -> Booleans:
-        """Which of those that are `due` were not received by their deadline."""
-        return _missed(self)
+    queued: Integers
+    attempts: Integers
+    """how often it was sent, the last time included; over two links twice"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,8 +132,3 @@ class Timeline:
     """by network or, where it has several links, as `NETWORK: NODE -> switch`"""
     happenings: Callable[[], Iterator[Happening]]
     """what happened, in order"""
-
-
-def _missed(of: Jobs | Frames) -> Booleans:
-    found: Booleans = of.due & ((of.ended == NEVER) | (of.ended > of.deadline))
-    return found

@@ -10,7 +10,7 @@ from orchestration.building import fmus
 from orchestration.runs.result import Result
 from orchestration.runs.simulation import run
 from orchestration.system.model import System
-from tests.examples.common import EXAMPLES, NAMES, example
+from tests.examples.common import NAMES, example
 from tests.native import assert_near, assert_the_same, natives
 
 SHORTER = {"minimum_variance": 100.0, "double_integrator": 30.0, "four_components": 25.0}
@@ -24,8 +24,9 @@ def system(name: str) -> System:
 
 def on_native(name: str, folder: Path, mathematics: Mathematics) -> Result:
     """Its run with the same slaves written out as C."""
-    built = natives(fmus.slaves_of(EXAMPLES / name), folder, mathematics)
     asked = system(name)
+    places = {Path(each.fmu).resolve().parent for each in asked.components.values()}
+    built = {k: v for place in places for k, v in natives(fmus.slaves_of(place), folder, mathematics).items()}
     components = {key: replace(each, fmu=str(built[Path(each.fmu).stem])) for key, each in asked.components.items()}
     return run(replace(asked, components=components))
 

@@ -101,6 +101,25 @@ def both(system: System, **keys: Any) -> Result:
     return one
 
 
+def expect_that_a_pause_changes_nothing(
+    system: System, share: float, engines: tuple[Any, Any], size: int, load: Any
+) -> None:
+    """Pause after a share of the run in one engine, in windows of some size, and go on with another."""
+    first, then = engines
+    whole = ran(system, "python", load=load)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cursor, "INSTANTS", size)
+        with prepared(system, engine=first, load=load) as run:
+            run.master.initialise()
+            if run.master.run(pause_at=int(share * 1e9 * system.stop_time)):
+                return
+            state, saved = json.loads(json.dumps(run.master.state())), run.master.saved()
+    with prepared(system, engine=then, load=load) as run:
+        run.master.restore(state, saved)
+        run.master.run()
+        assert_the_same(run.result(), whole)
+
+
 def of(system: System, fmu: Path, **parameters: Mapping[str, float]) -> System:
     """A system of stubs with the FMU in their place; `parameters` by component."""
     parts = {
@@ -302,19 +321,7 @@ def test_a_run_that_one_engine_pauses_another_ends(first: Any, then: Any, fmu: P
 def test_random_systems_go_on_from_a_pause_as_if_there_was_none(
     fmu: Path, kept: Kept, what: System, share: float, engines: tuple[Any, Any], size: int
 ) -> None:
-    system, (first, then) = of(what, fmu), engines
-    whole = ran(system, "python", load=kept.load)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cursor, "INSTANTS", size)
-        with prepared(system, engine=first, load=kept.load) as run:
-            run.master.initialise()
-            if run.master.run(pause_at=int(share * 1e9 * system.stop_time)):
-                return
-            state, saved = json.loads(json.dumps(run.master.state())), run.master.saved()
-    with prepared(system, engine=then, load=kept.load) as run:
-        run.master.restore(state, saved)
-        run.master.run()
-        assert_the_same(run.result(), whole)
+    expect_that_a_pause_changes_nothing(of(what, fmu), share, engines, size, kept.load)
 
 
 def test_a_run_may_be_stopped_and_go_on_in_the_same_process(fmu: Path) -> None:

@@ -1,6 +1,5 @@
 """Systems on computers and networks are flown to the same bits by all engines, in windows, and beyond a pause."""
 
-import json
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,7 +12,6 @@ from hypothesis import strategies as st
 
 from orchestration.basics.errors import UsageError
 from orchestration.engines.batch.batches import Batches
-from orchestration.runs.simulation import prepared
 from orchestration.schedule import cursor
 from orchestration.schedule.resources import timeline_of
 from orchestration.system.computers import Computer, Task
@@ -24,7 +22,14 @@ from tests.native import assert_the_same
 from tests.orchestration.engines.batch.lanes import assert_the_same_signals, in_lanes, shape_of
 from tests.orchestration.engines.moving import moving
 from tests.orchestration.engines.systems_on_computers import systems_on_computers
-from tests.orchestration.engines.test_compiled import ENGINES, Kept, both, of, ran
+from tests.orchestration.engines.test_compiled import (
+    ENGINES,
+    Kept,
+    both,
+    expect_that_a_pause_changes_nothing,
+    of,
+    ran,
+)
 from tests.orchestration.fmi.small import needs_compiler
 
 pytestmark = needs_compiler
@@ -58,19 +63,7 @@ def test_random_systems_on_computers_run_the_same_in_schedules_of_any_length(
 def test_and_go_on_from_a_pause_as_if_there_was_none(
     fmu: Path, kept: Kept, what: System, share: float, engines: tuple[Any, Any], size: int
 ) -> None:
-    system, (first, then) = of(what, fmu), engines
-    whole = ran(system, "python", load=kept.load)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cursor, "INSTANTS", size)
-        with prepared(system, engine=first, load=kept.load) as run:
-            run.master.initialise()
-            if run.master.run(pause_at=int(share * 1e9 * system.stop_time)):
-                return
-            state, saved = json.loads(json.dumps(run.master.state())), run.master.saved()
-    with prepared(system, engine=then, load=kept.load) as run:
-        run.master.restore(state, saved)
-        run.master.run()
-        assert_the_same(run.result(), whole)
+    expect_that_a_pause_changes_nothing(of(what, fmu), share, engines, size, kept.load)
 
 
 def loop(fmu: Path, controller: Component, **keys: Any) -> System:
