@@ -10,13 +10,14 @@ class DrivenServo(Slave):
     """DC servo: command and disturbance in, angle and speed out.
 
     1000/(s (s + 1)): angle' = speed, speed' = gain · (u + w) - speed, with u and w held over a step.
+    Nothing has a unit: the cost adds up squares of the angle and of the command.
     """
 
-    u = Input("command", "V")
-    w = Input("disturbance at the input", "V")
-    angle = State("of the shaft", "rad")
-    speed = State("of the shaft", "rad/s")
-    gain = Parameter("speed per command at rest", "rad/(s.V)", 1000.0)
+    u = Input("command", None)
+    w = Input("disturbance at the input", None)
+    angle = State("of the shaft", None)
+    speed = State("of the shaft", None)
+    gain = Parameter("speed per command at rest", None, 1000.0)
 
     def step(self, t: float, h: float) -> None:
         """Advance by the exponential of the system matrix, which is triangular, over `h`."""
