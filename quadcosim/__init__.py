@@ -79,6 +79,7 @@ if TYPE_CHECKING:
     from orchestration.system.model import Component, Connection, Criterion, Sampling, SamplingOnArrival, Source, System
     from orchestration.system.paths import changed
     from orchestration.system.system_file import load_system
+    from orchestration.tuning.exact import ExactTuning
     from orchestration.tuning.tune import Tuned, tune
     from orchestration.tuning.tuning import Tuning
     from orchestration.tuning.tuning_file import load_tuning
@@ -152,6 +153,7 @@ _HOMES = {
     "load_comparison": "orchestration.comparison.file",
     "tune": "orchestration.tuning.tune",
     "Tuning": "orchestration.tuning.tuning",
+    "ExactTuning": "orchestration.tuning.exact",
     "Tuned": "orchestration.tuning.tune",
     "load_tuning": "orchestration.tuning.tuning_file",
     # errors
@@ -178,6 +180,7 @@ __all__ = [
     "Criterion",
     "Distribution",
     "DisturbanceChoice",
+    "ExactTuning",
     "Expected",
     "Flights",
     "FmuChoice",

@@ -90,7 +90,7 @@ def _fields(shape: Any) -> dict[str, Any]:
 
 def docs_of_keys(shape: Any) -> dict[str, str]:
     """What the source says of each key of a table or a record."""
-    classes = (getattr(shape, "declared_by", shape), shape)
+    classes = (*reversed(getattr(shape, "declared_by", shape).__mro__), shape)
     said = {name: each.text for one in classes for name, each in attribute_docs(one.__module__, one.__name__).items()}
     return {field.alias or name: said[name] for name, field in _fields(shape).items() if name in said}
 

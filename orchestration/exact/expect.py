@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from orchestration.building.inputs import files_of
 from orchestration.exact.loops import Loops
 from orchestration.fmi.foreign import computed
-from orchestration.fmi.model import Model
 from orchestration.requests.request import Asked, asked_for
-from orchestration.stability.known_loops import LOOPS
+from orchestration.stability.known_loops import rested
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.request import in_its_own_words
@@ -54,16 +53,15 @@ def expect(asked: Asked, *, as_simulated: bool = False) -> Expected:
     Raises `UsageError` for a system that does not rest there, or of which there is no exact answer, naming why.
     """
     request = asked_for(asked)
-    known = LOOPS.of(request.kind)
     with in_its_own_words(request):
-        system = request.as_system() if known is None else known.at_rest(request)
+        system = rested(request)
         files = files_of(system)
-        return computed(files.fmus.values(), expected_of, system, files.models_of(system), as_simulated)
+        loops = Loops(files.models_of(system), simulated=as_simulated)
+        return computed(files.fmus.values(), expected_of, system, loops)
 
 
-def expected_of(system: System, models: Mapping[str, Model], simulated: bool = False) -> Expected:
+def expected_of(system: System, loops: Loops) -> Expected:
     """As `expect`, of a system whose FMUs are loaded in this process."""
-    loops = Loops(models, simulated=simulated)
     found, linear = loops.solved(system), loops.linear(changed(system, system.operating_point))
     radius = found.loop.radius
     if found.means is None:
@@ -76,7 +74,7 @@ def expected_of(system: System, models: Mapping[str, Model], simulated: bool = F
     return Expected(
         objectives=values, reasons={name: reasons[name] for name in system.objectives if name in reasons},
         mean_square_radius=radius, fourth_moment_radius=found.loop.fourth_moment_radius, accuracy=found.apart + known,
-        method=_method(linear.how, found.order, system, simulated=simulated), period=found.period,
+        method=_method(linear.how, found.order, system, simulated=loops.simulated), period=found.period,
     )  # fmt: skip
 
 

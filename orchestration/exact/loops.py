@@ -64,7 +64,8 @@ class Loops:
     """Takes systems apart, those that differ in nothing but delays, losses and jitter once."""
 
     def __init__(self, models: Mapping[str, Model], *, simulated: bool = False) -> None:
-        self._models, self._simulated = models, simulated
+        self.simulated = simulated
+        self._models = models
         self._known: dict[str, Linear] = {}
 
     def linear(self, system: System) -> Linear:
@@ -75,7 +76,7 @@ class Loops:
         return self._known[key]
 
     def _taken_apart(self, system: System) -> Linear:
-        noise = _white(system, simulated=self._simulated)
+        noise = _white(system, simulated=self.simulated)
         wanted = Wanted(system, self._models)
         instances = Instances()
         try:
@@ -85,7 +86,7 @@ class Loops:
         finally:
             instances.close()
         for name, part in parts.items():
-            if isinstance(part, Continuous) and part.unfit is not None and not self._simulated:
+            if isinstance(part, Continuous) and part.unfit is not None and not self.simulated:
                 raise UsageError(
                     f"{name} is no linear system in continuous time: {part.unfit}; expected --as-simulated"
                 )
@@ -128,7 +129,7 @@ class Loops:
     def _effects(self, system: System, linear: Linear) -> LoopEffects:
         tasks = tasks_of(system)
         names = [task.name for task in tasks]
-        if not self._simulated:
+        if not self.simulated:
             return TrueEffects(system, linear.parts, names, linear.noise)
         expect_rows(system, tasks, links_of(system))
         return SimulatedEffects(system, linear.parts, names)

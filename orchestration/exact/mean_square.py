@@ -10,7 +10,7 @@ from orchestration.basics.errors import SimulatorError, UsageError
 from orchestration.exact.loops import Loops
 from orchestration.fmi.model import Model
 from orchestration.requests.ranges import Varied
-from orchestration.stability.known_loops import LOOPS
+from orchestration.stability.known_loops import rested
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 
@@ -30,10 +30,8 @@ class MeanSquareLimit:
 
 def mean_square_limit(varied: Varied, span: Range, models: Mapping[str, Model]) -> MeanSquareLimit:
     """The first value of a quantity, from below, at which the mean-square radius of the loop is 1."""
-    known = LOOPS.of(varied.request.kind)
     try:
-        system = varied.system if known is None else known.at_rest(varied.request)
-        return _first(system, varied.paths, span, Loops(models))
+        return _first(rested(varied.request), varied.paths, span, Loops(models))
     except (UsageError, SimulatorError) as error:
         return MeanSquareLimit(reason=f"no mean-square limit: {error}")
 

@@ -42,3 +42,9 @@ class KnownLoop(Protocol):
 
 LOOPS: ByKind[KnownLoop] = ByKind()
 """Rooms above enter theirs"""
+
+
+def rested(request: Request) -> System:
+    """The system that a request means, as one that is at rest at its operating point."""
+    known = LOOPS.of(request.kind)
+    return request.as_system() if known is None else known.at_rest(request)

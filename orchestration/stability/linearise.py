@@ -8,7 +8,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.fmi.reuse import Instances
 from orchestration.requests.request import Asked, asked_for
 from orchestration.runs.replaced import component_named
-from orchestration.stability.known_loops import LOOPS
+from orchestration.stability.known_loops import rested
 from orchestration.stability.linear_loop import AtRest, at_rest, map_of
 from orchestration.stability.linear_simulator import Opened
 from orchestration.stability.operating_point import true_period
@@ -42,10 +42,10 @@ def linearise(asked: Asked, component: str | None = None) -> Linearised:
     not sampled, or more often than another one.
     """
     request = asked_for(asked)
-    known, instances = LOOPS.of(request.kind), Instances()
+    instances = Instances()
     try:
         with in_its_own_words(request):
-            system = request.as_system() if known is None else known.at_rest(request)
+            system = rested(request)
             name = component_named(system, component, "at which to cut the loop open")
             if system.components[name].sampling is None:
                 raise UsageError(f"component: {name}: expected one that is sampled")

@@ -1,20 +1,24 @@
 """Searches for every period and seed of a tuning, and nothing twice."""
 
 import dataclasses
+import functools
 import hashlib
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
+from orchestration.basics.errors import UsageError
 from orchestration.basics.extras import explained, needs
 from orchestration.basics.progress import ShareHeard, of_share
 from orchestration.basics.terminal import say
 from orchestration.building.inputs import Files
 from orchestration.results import html
 from orchestration.system.following import followed
-from orchestration.tuning.tuning import Fly, Found, Tuning, best_by_period, search
+from orchestration.tuning.exact import ExactFound, ExactTuning, search_exactly
+from orchestration.tuning.sought import Outcome, Sought, best_by_period
+from orchestration.tuning.tuning import Found, Tuning, search
 from orchestration.tuning.tuning_file import gains_text
 from orchestration.workers.choice import EngineChoice, chosen
 from orchestration.workers.executors import RunEvaluator
@@ -23,19 +27,21 @@ from orchestration.workers.provenance import versions
 if TYPE_CHECKING:
     import pandas as pd
 
+One = TypeVar("One", bound=Outcome)
+
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Tuned:
     """What a tuning has found."""
 
-    searches: tuple[Found, ...]
+    searches: tuple[Outcome, ...]
     """Every search, one for each period and seed."""
     written: tuple[Path, ...]
     """The files of tuned parameters, one for each period, that scenario files and comparisons read."""
 
     @property
-    def best(self) -> dict[float, Found]:
-        """By period [s] the search whose parameters cost least on the starts that they were tuned on."""
+    def best(self) -> dict[float, Outcome]:
+        """By period [s] the search whose parameters cost least where they were tuned."""
         return {one.period: one for one in best_by_period(self.searches)}
 
     def __repr__(self) -> str:
@@ -47,17 +53,13 @@ class Tuned:
         rows = [
             (f"{name} at {period:g} s", html.number(value), "")
             for period, found in self.best.items()
-            for name, value in {
-                **found.values,
-                f"survive, of {found.judged}": found.survives,
-                "cost of those": found.survivors_cost,
-            }.items()
+            for name, value in {**found.values, "cost": found.cost, **found.figures}.items()
         ]
         return html.card("A tuning", None, None, f"{len(self.searches)} searches", rows)
 
     @explained
     def to_pandas(self) -> "pd.DataFrame":
-        """A row for each search: period [s], seed, tuned values, costs, how many other starts survive and are good."""
+        """A row for each search: period [s], seed, tuned values, cost, and what else is known of its outcome."""
         import pandas as pd
 
         table = pd.DataFrame(
@@ -72,7 +74,7 @@ class Tuned:
 
 @needs("cma", "filelock")
 def tune(
-    tuning: Tuning,
+    tuning: Tuning | ExactTuning,
     *,
     out: str | Path,
     folder: str | Path | None = None,
@@ -82,53 +84,76 @@ def tune(
     progress: ShareHeard = "bar",
     announce: Callable[[str], None] | None = say,
 ) -> Tuned:
-    """Tune the parameters of a controller on an ensemble of starts, and judge them on others.
+    """Tune the parameters of a controller, by runs or by exact expectations.
+
+    A `Tuning` flies an ensemble of starts and is judged on others: by `workers` processes and an engine as in `sweep`.
+    An `ExactTuning` flies nothing.
 
     For each period of the tuning a file of parameters is written into `out`; it says that it was made by `command`.
-    What each search has found is kept in `folder`, default `results/NAME`, so that no search is done twice. Runs
-    are flown by `workers` processes and an engine as in `sweep`. `progress` hears the
-    share that is done, `announce` a line for each search; None for silence.
+    What each search has found is kept in `folder`, default `results/NAME`, so that no search is done twice. `progress`
+    hears the share that is done, `announce` a line for each search; None for silence.
 
     Raises `UsageError` for what cannot be, `QuadcosimError` if a run fails, `KeyboardInterrupt` after Ctrl-C.
     """
+    folder, announce = Path(folder or Path("results") / tuning.name), announce or (lambda line: None)
+    done: Sequence[Outcome]
+    if isinstance(tuning, Tuning):
+        done = _flown(tuning, folder, workers, engine, progress, announce)
+    elif workers != 1 or engine != "auto":
+        raise UsageError("--workers and --engine: expected none; a tuning by expect flies nothing")
+    else:
+        with of_share(progress, "searching") as hear:
+            find = functools.partial(search_exactly, tuning)
+            done = searched(tuning, tuning.files(), folder, find, ExactFound, progress=hear, announce=announce)
+    return Tuned(searches=tuple(done), written=tuple(write(tuning, done, Path(out), command)))
+
+
+def _flown(
+    tuning: Tuning,
+    folder: Path,
+    workers: int,
+    engine: EngineChoice,
+    progress: ShareHeard,
+    announce: Callable[[str], None],
+) -> list[Found]:
+    """What the searches of a tuning by runs find."""
     how = chosen(engine, tuning.native, lambda native: dataclasses.replace(tuning, native=native).first())
     asked = dataclasses.replace(tuning, native=how.native)
     files = asked.files()
-    announce = announce or (lambda line: None)
     if engine == "auto":
         announce(str(how))
     if follows := followed(asked.origin, files.models_of(asked.origin)):
         announce(f"follows {follows}")
     with of_share(progress, "searching") as hear, RunEvaluator(files, workers, how.engine) as pool:
-        done = searched(
-            asked, files, Path(folder or Path("results") / asked.name),
-            lambda systems: pool.fly_all(systems, in_lanes=how.in_lanes), pool.fly_all,
-            progress=hear, announce=announce,
-        )  # fmt: skip
-    return Tuned(searches=tuple(done), written=tuple(write(asked, done, Path(out), command)))
+        fly = functools.partial(pool.fly_all, in_lanes=how.in_lanes)
+
+        def find(period: float, seed: int, heard: Callable[[float], None]) -> Found:
+            return search(asked, period, seed, fly, pool.fly_all, heard)
+
+        return searched(asked, files, folder, find, Found, progress=hear, announce=announce)
 
 
 def searched(
-    tuning: Tuning,
+    tuning: Sought,
     files: Files,
     folder: Path,
-    fly: Fly,
-    judge: Fly,
+    find: Callable[[float, int, Callable[[float], None]], One],
+    kind: type[One],
     *,
     progress: Callable[[float], None],
     announce: Callable[[str], None],
-) -> list[Found]:
-    """What each search finds; that is kept in `folder`.
+) -> list[One]:
+    """What each search finds, of a kind, by its period, seed and who hears its share; that is kept in `folder`.
 
     A search that is done, of the same tuning with the same software, is not done again.
     """
-    record = folder / f"{_key(tuning, files)[:16]}.json"
-    done = [Found(**each) for each in json.loads(record.read_text())] if record.is_file() else []
+    record = folder / f"{_key(tuning, files, kind)[:16]}.json"
+    done = [kind(**each) for each in json.loads(record.read_text())] if record.is_file() else []
     searches = [(period, seed) for period in tuning.periods for seed in tuning.seeds]
     for i, (period, seed) in enumerate(searches):
         if any((one.period, one.seed) == (period, seed) for one in done):
             continue
-        one = search(tuning, period, seed, fly, judge, _part(progress, i, len(searches)))
+        one = find(period, seed, _part(progress, i, len(searches)))
         done.append(one)
         announce(f"period {period:g} s, seed {seed}: cost {one.cost:.5g}; {one.judgement}")
         folder.mkdir(parents=True, exist_ok=True)
@@ -136,7 +161,7 @@ def searched(
     return done
 
 
-def write(tuning: Tuning, done: list[Found], out: Path, command: str) -> Iterator[Path]:
+def write(tuning: Sought, done: Sequence[Outcome], out: Path, command: str) -> Iterator[Path]:
     """Write the files of tuned parameters, one for each period; their paths."""
     out.mkdir(parents=True, exist_ok=True)
     for best in best_by_period(done):
@@ -150,9 +175,9 @@ def _part(progress: Callable[[float], None], index: int, count: int) -> Callable
     return lambda share: progress((index + share) / count)
 
 
-def _key(tuning: Tuning, files: Files) -> str:
+def _key(tuning: Sought, files: Files, kind: type[Outcome]) -> str:
     """Of all that a search depends on."""
     asked = json.dumps(dataclasses.asdict(tuning), default=str)
-    told = [each.name for each in dataclasses.fields(Found)]
-    content = [asked, sorted(files.hashes.items()), sorted(versions().items()), told]
+    told = [each.name for each in dataclasses.fields(kind)]
+    content = [type(tuning).__name__, asked, sorted(files.hashes.items()), sorted(versions().items()), told]
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()

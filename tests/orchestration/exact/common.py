@@ -44,7 +44,7 @@ def integrator(*, nodes: int = 3, sampling: dict[str, Any] | None = None, **comm
 SERVO_PERIOD = 0.006
 
 
-def servo(*, nodes: int = 3, **command: Any) -> JumpLinear:
+def servo(*, nodes: int = 3, K: float = 1.5, Td: float = 0.035, **command: Any) -> JumpLinear:
     """1000/(s² + s) (u + w) under a PD controller with the last sample in it; its cost is y² + u²."""
     system = System(
         stop_time=1.0,
@@ -57,7 +57,7 @@ def servo(*, nodes: int = 3, **command: Any) -> JumpLinear:
             Connection(name="command", start=("law.u",), end=("servo.u",), **command),
         ),
     )
-    K, derivative = 1.5, 0.035 / SERVO_PERIOD
+    derivative = Td / SERVO_PERIOD
     components: Components = {
         "servo": Continuous(
             inputs=("u", "w"), outputs=("y",), A=np.array([[0.0, 1.0], [0.0, -1.0]]),

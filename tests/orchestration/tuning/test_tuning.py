@@ -2,7 +2,6 @@ import itertools
 import math
 import re
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
@@ -10,8 +9,9 @@ from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError
 from orchestration.quadrotor.initial_conditions import Starts
 from orchestration.system.paths import value_at
+from orchestration.tuning.sought import best_by_period
 from orchestration.tuning.tune import searched, write
-from orchestration.tuning.tuning import Tuning, best_by_period, search
+from orchestration.tuning.tuning import Found, Tuning, search
 from orchestration.tuning.tuning_file import load_tuning
 
 FILE = """
@@ -49,10 +49,16 @@ stop = 20.0
 GAINS = "components.controller.parameters.gain"
 
 
+def loaded(path) -> Tuning:
+    found = load_tuning(path)
+    assert isinstance(found, Tuning)
+    return found
+
+
 @pytest.fixture
 def tuning(tmp_path) -> Tuning:
     (tmp_path / "bowl.toml").write_text(FILE)
-    return load_tuning(tmp_path / "bowl.toml")
+    return loaded(tmp_path / "bowl.toml")
 
 
 def bowl(systems):
@@ -145,12 +151,19 @@ def test_a_tuning_goes_on_where_it_was_stopped(tuning, tmp_path):
             raise KeyboardInterrupt
         return bowl(systems)
 
-    how: dict[str, Any] = {"progress": lambda share: None, "announce": told.append}
+    def searched_by(fly):
+        def find(period, seed, hear):
+            return search(tuning, period, seed, fly, fly, hear)
+
+        return searched(
+            tuning, files, tmp_path / "kept", find, Found, progress=lambda share: None, announce=told.append
+        )
+
     with pytest.raises(KeyboardInterrupt):
-        searched(tuning, files, tmp_path / "kept", fly, fly, **how)
+        searched_by(fly)
     before = list(told)
     assert 0 < len(before) < 4
-    done = searched(tuning, files, tmp_path / "kept", bowl, bowl, **how)
+    done = searched_by(bowl)
     written = list(write(tuning, done, tmp_path / "gains", "quadcosim tune"))
     assert len(told) == 4
     assert [path.name for path in written] == ["bowl_10ms.toml", "bowl_20ms.toml"]
@@ -158,7 +171,7 @@ def test_a_tuning_goes_on_where_it_was_stopped(tuning, tmp_path):
     def fail(systems):
         pytest.fail("flown again")
 
-    assert searched(tuning, files, tmp_path / "kept", fail, fail, **how) == done
+    assert searched_by(fail) == done
     gains = read_toml(written[0], "gains")["controller"]
     assert set(gains) == {"gain.attitude", "gain.theta", "gain.surface"}
     comments = written[0].read_text()
@@ -169,7 +182,7 @@ def test_a_tuning_goes_on_where_it_was_stopped(tuning, tmp_path):
 @pytest.mark.parametrize(
     ("before", "after", "named"),
     [
-        ('bad = 10.0', 'bad = 10.0\nworse = 1', "cost.worse: no such key; expected one of of, bad"),
+        ('bad = 10.0', 'bad = 10.0\nworse = 1', "cost.worse: no such key; expected one of of, by, bad"),
         ("stop = 20.0", "", "axis surface: expected values, or start and stop, with number or to be sampled"),
         ("start = 0.5\nstop = 20.0", "values = [1.0]", "parameters surface: expected start and stop, and what it sets"),
         ("seeds = [1, 2]", "seeds = []", "seeds: expected at least one"),
@@ -205,7 +218,7 @@ LOW = '"trajectory.start_z" = -10.0'
 def test_starts_lie_around_the_trajectory_of_the_base(text, tmp_path):
     (tmp_path / "low_flier.toml").write_text(f"[controller]\n{LOW}\n")
     (tmp_path / "low.toml").write_text(text)
-    low = load_tuning(tmp_path / "low.toml")
+    low = loaded(tmp_path / "low.toml")
     for starts in (low.starts, low.judging()):
         systems = low.systems(0.01, low.values([0.5, 0.5]), starts)
         heights = [value_at(system, "components.plant.parameters.initial.position.z") for system in systems]
