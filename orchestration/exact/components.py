@@ -6,10 +6,13 @@ pulse it is known to rounding. Any other is known as far as small differences te
 
 from __future__ import annotations
 
+import json
+from dataclasses import asdict, dataclass
+
 import numpy as np
 
 from orchestration.basics.errors import SimulatorError, UsageError
-from orchestration.exact.linear import Components, Continuous, Sampled
+from orchestration.exact.linear import Continuous, Sampled
 from orchestration.stability.linear_loop import AtRest
 from orchestration.stability.linearised_component import Tangent
 from orchestration.stability.matrices import BLURRED, in_continuous_time, minds_its_step, of_samples, whole
@@ -22,23 +25,51 @@ DIFFERS = 1e-9
 """of a step of 2h: what two of h may differ from it by, of a component that is known to rounding"""
 
 
-def components_of(loop: AtRest) -> tuple[Components, dict[str, str]]:
-    """The components of a loop as matrices, and how each is known."""
-    large = _larger(loop)
-    found: Components = {}
-    how: dict[str, str] = {}
-    for name, component in loop.simulation.system.components.items():
-        is_linear = large is not None and _agree(loop.tangents[name], large[name], _step_of(loop, name))
-        tangent = large[name] if large is not None and is_linear else loop.tangents[name]
-        how[name] = "saved states, to rounding" if is_linear else "saved states, by differences"
-        if component.sampling is not None:
-            period = component.sampling.period
-            found[name] = Sampled(**vars(of_samples(tangent, period)), minds_step=minds_its_step(tangent, period))
-        else:
-            differs = DIFFERS if is_linear else BLURRED
-            matrices, unfit = in_continuous_time(tangent, _step_of(loop, name), differs)
-            found[name] = Continuous(**vars(matrices), step=tangent.derivatives, unfit=unfit)
-    return found, how
+@dataclass(frozen=True, kw_only=True)
+class Known:
+    """A component as matrices."""
+
+    part: Continuous | Sampled
+    how: str
+    """it is known"""
+
+
+class Measured:
+    """Components as matrices, each measured once about each point where it rests."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[object, ...], Known] = {}
+
+    def of(self, loop: AtRest) -> dict[str, Known]:
+        """The components of a loop."""
+        found = {}
+        for name in loop.simulation.instances:
+            key = _all_of(loop, name)
+            if key not in self._known:
+                self._known[key] = _measured(loop, name)
+            found[name] = self._known[key]
+        return found
+
+
+def _all_of(loop: AtRest, name: str) -> tuple[object, ...]:
+    """All that the matrices of a component depend on."""
+    component = json.dumps(asdict(loop.simulation.system.components[name]), default=str, sort_keys=True)
+    rest = loop.rest_of(name)
+    return name, component, loop.begun[name], rest.inputs, rest.held.tobytes(), rest.outputs, rest.time, loop.period
+
+
+def _measured(loop: AtRest, name: str) -> Known:
+    component, step = loop.simulation.system.components[name], _step_of(loop, name)
+    small, large = loop.tangent(name, loop.pulse), _by_large_pulses(loop, name)
+    is_linear = large is not None and _agree(small, large, step)
+    tangent = large if large is not None and is_linear else small
+    part: Continuous | Sampled
+    if component.sampling is not None:
+        part = Sampled(**vars(of_samples(tangent, step)), minds_step=minds_its_step(tangent, step))
+    else:
+        matrices, unfit = in_continuous_time(tangent, step, DIFFERS if is_linear else BLURRED)
+        part = Continuous(**vars(matrices), step=tangent.derivatives, unfit=unfit)
+    return Known(part=part, how="saved states, to rounding" if is_linear else "saved states, by differences")
 
 
 def _step_of(loop: AtRest, name: str) -> float:
@@ -51,10 +82,10 @@ def _step_of(loop: AtRest, name: str) -> float:
     return whole(float(loop.period) / NANOSECONDS / 4.0)
 
 
-def _larger(loop: AtRest) -> dict[str, Tangent] | None:
-    """The tangents by large pulses, where all components take them."""
+def _by_large_pulses(loop: AtRest, name: str) -> Tangent | None:
+    """A component by large pulses, where it takes them."""
     try:
-        return loop.retaken(LARGE_PULSE)
+        return loop.tangent(name, LARGE_PULSE)
     except (UsageError, SimulatorError, ValueError, np.linalg.LinAlgError):
         return None
 

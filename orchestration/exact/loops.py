@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
 from orchestration.exact.as_simulated import SimulatedEffects, expect_rows
 from orchestration.exact.clockwork import Clockwork, Task
-from orchestration.exact.components import components_of
+from orchestration.exact.components import Measured
 from orchestration.exact.effects import LoopEffects, TrueEffects
 from orchestration.exact.linear import Components, Continuous, Sampled
 from orchestration.exact.moments import JumpLinear
@@ -67,6 +68,12 @@ class Loops:
         self.simulated = simulated
         self._models = models
         self._known: dict[str, Linear] = {}
+        self._measured = Measured()
+
+    @cached_property
+    def _instances(self) -> Instances:
+        """FMUs in the process that computes, kept from system to system."""
+        return Instances()
 
     def linear(self, system: System) -> Linear:
         """The components and objectives of a system; raises `UsageError` for one that is not linear about a rest."""
@@ -78,13 +85,10 @@ class Loops:
     def _taken_apart(self, system: System) -> Linear:
         noise = _white(system, simulated=self.simulated)
         wanted = Wanted(system, self._models)
-        instances = Instances()
-        try:
-            with at_rest(system, instances, beside=Beside(moved=tuple(noise), seen=wanted.seen)) as loop:
-                wanted.about(loop)
-                parts, how = components_of(loop)
-        finally:
-            instances.close()
+        with at_rest(system, self._instances, beside=Beside(moved=tuple(noise), seen=wanted.seen)) as loop:
+            wanted.about(loop)
+            known = self._measured.of(loop)
+        parts, how = {name: one.part for name, one in known.items()}, {name: one.how for name, one in known.items()}
         for name, part in parts.items():
             if isinstance(part, Continuous) and part.unfit is not None and not self.simulated:
                 raise UsageError(

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
 
@@ -67,7 +68,7 @@ class AtRest:
     """A system that has come to rest, and its components about it."""
 
     simulation: PreparedRun
-    tangents: dict[str, Tangent]
+    pulse: float
     beside: Beside
     begun: Mapping[str, bytes]
     """the saved states of the components there"""
@@ -76,11 +77,31 @@ class AtRest:
     period: Fraction
     """after which all sampled components are due together again [ns]"""
 
-    def retaken(self, pulse: float) -> dict[str, Tangent]:
-        """The tangents by other pulses."""
-        for name, instance in self.simulation.instances.items():
-            instance.restore(self.begun[name])
-        return _tangents(self.simulation, self.period, pulse, self.beside)
+    @cached_property
+    def tangents(self) -> dict[str, Tangent]:
+        """The components about it."""
+        return {name: self.tangent(name, self.pulse) for name in self.simulation.instances}
+
+    def tangent(self, name: str, pulse: float) -> Tangent:
+        """A component about it, by pulses of that size."""
+        self.simulation.instances[name].restore(self.begun[name])
+        return _tangent(self, name, pulse)
+
+    def rest_of(self, name: str) -> Rest:
+        """What was done to a component last, and which of its variables count."""
+        fmu, system = cast("Watched", self.simulation.instances[name]), self.simulation.system
+        ends = [*(end for x in system.connections for end in x.end), *self.beside.moved]
+        starts = [*(start for x in system.connections for start in x.start), *self.beside.seen]
+        given = dict.fromkeys(variable_of(end) for end in ends if component_of(end) == name)
+        inputs = tuple(end for end in given if fmu.model.variables[end].kind == "Real")
+        taken = dict.fromkeys(variable_of(start) for start in starts if component_of(start) == name)
+        return Rest(
+            fmu=fmu.fmu,
+            inputs=inputs,
+            held=np.array([fmu.written[end] for end in inputs]),
+            outputs=tuple(output for output in taken if fmu.model.variables[output].kind == "Real"),
+            time=fmu.time,
+        )
 
 
 @contextmanager
@@ -99,7 +120,7 @@ def at_rest(system: System, instances: Instances, pulse: float = PULSE, beside: 
         _come_to_rest(simulation, begin, period)
         yield AtRest(
             simulation=simulation, begun={name: one.save() for name, one in simulation.instances.items()},
-            tangents=_tangents(simulation, period, pulse, beside), beside=beside, begin=begin, period=period,
+            pulse=pulse, beside=beside, begin=begin, period=period,
         )  # fmt: skip
 
 
@@ -137,25 +158,9 @@ def _come_to_rest(simulation: PreparedRun, begin: Fraction, period: Fraction) ->
     expect_rest(system, np.array(rows))
 
 
-def _tangents(simulation: PreparedRun, period: Fraction, pulse: float, beside: Beside) -> dict[str, Tangent]:
-    return {name: _tangent(simulation, name, period, pulse, beside) for name in simulation.system.components}
-
-
-def _tangent(simulation: PreparedRun, name: str, period: Fraction, pulse: float, beside: Beside) -> Tangent:
-    fmu, system = cast("Watched", simulation.instances[name]), simulation.system
-    ends = [*(end for x in system.connections for end in x.end), *beside.moved]
-    starts = [*(start for x in system.connections for start in x.start), *beside.seen]
-    given = dict.fromkeys(variable_of(end) for end in ends if component_of(end) == name)
-    inputs = tuple(end for end in given if fmu.model.variables[end].kind == "Real")
-    taken = dict.fromkeys(variable_of(start) for start in starts if component_of(start) == name)
-    rest = Rest(
-        fmu=fmu.fmu,
-        inputs=inputs,
-        held=np.array([fmu.written[end] for end in inputs]),
-        outputs=tuple(output for output in taken if fmu.model.variables[output].kind == "Real"),
-        time=fmu.time,
-    )
-    component = system.components[name]
+def _tangent(loop: AtRest, name: str, pulse: float) -> Tangent:
+    fmu, rest, period = loop.simulation.instances[name], loop.rest_of(name), loop.period
+    component = loop.simulation.system.components[name]
     if component.sampling is not None:
         return Tangent(rest, [component.sampling.period] * RUNGS_OF_TASK, pulse)
     first = FINEST * float(period) / NANOSECONDS

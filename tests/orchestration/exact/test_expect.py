@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestration.exact.expect import Expected, expect
+from orchestration.building.inputs import files_of
+from orchestration.exact.expect import Expected, expect, expected_of
 from orchestration.exact.linear import Sampled
-from orchestration.exact.loops import expect_same_steps
+from orchestration.exact.loops import Loops, expect_same_steps
 from orchestration.exact.timing import tasks_of
 from orchestration.system.computers import Computer, Task
 from orchestration.system.model import SamplingOnArrival, Source
@@ -30,6 +31,15 @@ def test_minimum_variance_control_costs_what_theory_says_through_its_fmus() -> N
     assert found.objectives["effort"] == pytest.approx(math.sqrt(3.0), abs=1e-9)
     assert found.accuracy < 1e-9
     assert not found.reasons
+
+
+def test_of_one_system_after_the_other_only_components_that_change_are_measured_again() -> None:
+    one, other = (example("distributed_servo", {"components.controller.parameters.K": K}) for K in (1.5, 1.0))
+    loops = Loops(files_of(one).models_of(one))
+    first, second = loops.linear(one).parts, loops.linear(other).parts
+    assert second["servo"] is first["servo"]
+    assert pytest.approx(first["controller"].D / 1.5, rel=1e-9) == second["controller"].D
+    assert expected_of(other, loops).objectives == pytest.approx(expect(other).objectives, rel=1e-12)
 
 
 def test_with_a_uniform_delay_through_its_fmus_too() -> None:
