@@ -38,7 +38,7 @@ def endless(request: Request, systems: Sequence[System], files: Files) -> str | 
     if not chosen:
         return None
     try:
-        radii = computed(files.fmus.values(), radii_of, [*chosen.values()], files.models_of(systems[0]))
+        radii = computed(files.fmus.values(), radii_of, [*chosen.values()], files.models)
     except QuadcosimError:
         return None
     above = [radius for radius in radii if radius is not None and radius >= 1.0]

@@ -56,7 +56,7 @@ def expect(asked: Asked, *, as_simulated: bool = False) -> Expected:
     with in_its_own_words(request):
         system = rested(request)
         files = files_of(system)
-        loops = Loops(files.models_of(system), simulated=as_simulated)
+        loops = Loops(files.models, simulated=as_simulated)
         return computed(files.fmus.values(), expected_of, system, loops)
 
 

@@ -62,7 +62,10 @@ class Solved:
 
 
 class Loops:
-    """Takes systems apart, those that differ in nothing but delays, losses and jitter once."""
+    """Takes systems apart, those that differ in nothing but delays, losses and jitter once.
+
+    Models are by what systems call their FMUs.
+    """
 
     def __init__(self, models: Mapping[str, Model], *, simulated: bool = False) -> None:
         self.simulated = simulated
@@ -84,8 +87,10 @@ class Loops:
 
     def _taken_apart(self, system: System) -> Linear:
         noise = _white(system, simulated=self.simulated)
-        wanted = Wanted(system, self._models)
-        with at_rest(system, self._instances, beside=Beside(moved=tuple(noise), seen=wanted.seen)) as loop:
+        models = {name: self._models[component.fmu] for name, component in system.components.items()}
+        wanted = Wanted(system, models)
+        beside = Beside(moved=tuple(noise), seen=wanted.seen)
+        with at_rest(system, self._instances, beside=beside, models=models) as loop:
             wanted.about(loop)
             known = self._measured.of(loop)
         parts, how = {name: one.part for name, one in known.items()}, {name: one.how for name, one in known.items()}

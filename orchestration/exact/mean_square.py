@@ -31,7 +31,9 @@ class MeanSquareLimit:
 def mean_square_limit(varied: Varied, span: Range, models: Mapping[str, Model]) -> MeanSquareLimit:
     """The first value of a quantity, from below, at which the mean-square radius of the loop is 1."""
     try:
-        return _first(rested(varied.request), varied.paths, span, Loops(models))
+        system = rested(varied.request)
+        by_fmu = {component.fmu: models[name] for name, component in system.components.items()}
+        return _first(system, varied.paths, span, Loops(by_fmu))
     except (UsageError, SimulatorError) as error:
         return MeanSquareLimit(reason=f"no mean-square limit: {error}")
 

@@ -101,11 +101,16 @@ def held_to_fmus(asked: Request, announce: Announce | None = None) -> Meant:
         if not system.components:
             raise UsageError("components = none: expected at least one to run; computers and networks alone have none")
         paths = fmus.of_components(system.fmus, announce)
-        models = {name: read_model(path) for name, path in paths.items()}
-        found = checked(system, models)
+    return held_to(asked, {name: read_model(path) for name, path in paths.items()})
+
+
+def held_to(asked: Request, models: Mapping[str, Model]) -> Meant:
+    """Likewise, of FMUs that have been found."""
+    with in_its_own_words(asked):
+        found = checked(asked.as_system(), models)
     return Meant(
-        asked=asked, system=found.system, paths=paths, models=models, parameters=found.parameters, units=found.units,
-        follows=found.follows,
+        asked=asked, system=found.system, paths={name: model.path for name, model in models.items()}, models=models,
+        parameters=found.parameters, units=found.units, follows=found.follows,
     )  # fmt: skip
 
 

@@ -21,8 +21,10 @@ from orchestration.basics.simulator import Floats, Transfer
 from orchestration.engines.master import Master
 from orchestration.engines.wiring import fixed_steps
 from orchestration.fmi.instance import Instance, Loader
+from orchestration.fmi.model import Model
 from orchestration.fmi.reuse import Instances
 from orchestration.recording.recording import Chunk, InMemory
+from orchestration.runs.meant import held_to
 from orchestration.runs.simulation import PreparedRun, prepared
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
@@ -105,17 +107,25 @@ class AtRest:
 
 
 @contextmanager
-def at_rest(system: System, instances: Instances, pulse: float = PULSE, beside: Beside = NOTHING) -> Iterator[AtRest]:
+def at_rest(
+    system: System,
+    instances: Instances,
+    pulse: float = PULSE,
+    beside: Beside = NOTHING,
+    models: Mapping[str, Model] | None = None,
+) -> Iterator[AtRest]:
     """`system` at its operating point, punctual and without loss, noise and quantisation.
 
-    Raises `UsageError` where it does not rest there, or cannot be put into a linear loop, saying why.
+    Its FMUs may have been found (`models`); else they are found, and built if need be. Raises `UsageError` where it
+    does not rest there, or cannot be put into a linear loop, saying why.
     """
     calm = deterministic(system)
     period = _expect_period(calm)
     delay = max((exact_nanoseconds(highest(x.delay)) for x in calm.connections), default=Fraction(0))
     begin = latest_offset(calm) + (math.ceil(delay / period) + HELD) * period
     calm = replace(calm, stop_time=float(begin + (SETTLED + 2) * period) / NANOSECONDS)
-    with prepared(calm, load=_watching(instances)) as simulation:
+    meant = None if models is None else held_to(calm, models)
+    with prepared(calm, load=_watching(instances), meant=meant) as simulation:
         _expect_states(simulation)
         _come_to_rest(simulation, begin, period)
         yield AtRest(

@@ -58,7 +58,7 @@ class ExactFound(Outcome):
 def search_exactly(tuning: ExactTuning, period: float, seed: int, progress: Callable[[float], None]) -> ExactFound:
     """The best of one search."""
     files = tuning.files()
-    loops = Loops(files.models_of(tuning.origin))
+    loops = Loops(files.models)
 
     def expected(points: Sequence[Sequence[float]]) -> list[Expected]:
         systems = [tuning.system(period, tuning.values(shares)) for shares in points]

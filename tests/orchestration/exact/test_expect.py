@@ -35,7 +35,7 @@ def test_minimum_variance_control_costs_what_theory_says_through_its_fmus() -> N
 
 def test_of_one_system_after_the_other_only_components_that_change_are_measured_again() -> None:
     one, other = (example("distributed_servo", {"components.controller.parameters.K": K}) for K in (1.5, 1.0))
-    loops = Loops(files_of(one).models_of(one))
+    loops = Loops(files_of(one).models)
     first, second = loops.linear(one).parts, loops.linear(other).parts
     assert second["servo"] is first["servo"]
     assert pytest.approx(first["controller"].D / 1.5, rel=1e-9) == second["controller"].D
