@@ -29,13 +29,17 @@ def expect(
     as_simulated: Annotated[
         bool, typer.Option("--as-simulated", help="What runs print on average: noise held, means over their rows.")
     ] = False,
+    horizon: Annotated[
+        float | None,
+        typer.Option("--horizon", help="Means from the initial conditions to this time.", metavar="SECONDS"),
+    ] = None,
     *,
     flags: FlightFlags,
 ) -> Answer:
     """Expect the objectives that are means of squares exactly, of the loop about its operating point, without a run."""
     from orchestration.exact.expect import expect as expected
 
-    found = expected(request_from(scenario, flags, timing), as_simulated=as_simulated)
+    found = expected(request_from(scenario, flags, timing), as_simulated=as_simulated, horizon=horizon)
     return Answer(document=found, lines=_lines(found))
 
 

@@ -25,10 +25,10 @@ class SimulatedEffects(LoopEffects):
 
     holds_wires = True
 
-    def __init__(self, system: System, components: Components, tasks: Sequence[str]) -> None:
+    def __init__(self, system: System, components: Components, tasks: Sequence[str], *, one: bool = False) -> None:
         """Of noise, each value is held for the period of its source."""
         self.noise = [name for name, source in system.sources.items() if source.noise]
-        super().__init__(system, components, tasks)
+        super().__init__(system, components, tasks, one=one)
         self._plan = Plan(system)
         self._flows = {
             name: Flows(*_held(part)) for name, part in self.continuous.items() if part.unfit is None
@@ -159,7 +159,7 @@ class SimulatedEffects(LoopEffects):
                 points = ((starts, 1.0 / 6.0), (middles, 4.0 / 6.0), (ends, 1.0 / 6.0))
             else:
                 points = ((starts, 0.5), (ends, 0.5))  # type: ignore[assignment]
-            found[k] = sum(h * weight * rows.T @ mean.Q @ rows for rows, weight in points)
+            found[k] = sum(h * weight * self.form(mean, rows) for rows, weight in points)
         return found
 
     def _is_wired(self, end: str) -> bool:

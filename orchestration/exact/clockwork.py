@@ -8,6 +8,7 @@ happen is gone through, instant by instant in the order of `docs/timing.md`.
 from __future__ import annotations
 
 import bisect
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -170,7 +171,8 @@ class Clockwork:
         """
         self.tasks, self.links, self._effects, self._order, self._grids = tasks, links, effects, order, grids
         self.period = together([*(t.period for t in tasks), *(x.step for x in links if x.step is not None), *grids])
-        self._whole = _attoseconds(self.period)
+        self.whole = _attoseconds(self.period)
+        """the period [attoseconds]"""
         self._ahead = [
             max((x.longest for x in links if x.is_read_ahead and x.receiver == i), default=0) for i in range(len(tasks))
         ]
@@ -185,7 +187,7 @@ class Clockwork:
         for i, task in enumerate(self.tasks):
             for k in range(int(self.period / task.period)):
                 time = _attoseconds(task.offset + k * task.period) - self._ahead[i]
-                found.setdefault(time % self._whole, []).append(("sample", i))
+                found.setdefault(time % self.whole, []).append(("sample", i))
         for i, link in enumerate(self.links):
             for k in range(int(self.period / link.step) if link.step is not None else 0):
                 assert link.step is not None
@@ -207,14 +209,14 @@ class Clockwork:
                         ends |= {
                             end + link.delay + late for end in ends for late in (link.late.lowest, link.late.highest)
                         }
-                found |= {end % self._whole for end in ends}
+                found |= {end % self.whole for end in ends}
         return sorted(found)
 
     def _between(self, low: int, high: int) -> list[int]:
         """The kinks strictly between two times."""
-        found, turn = [], low // self._whole
-        while turn * self._whole < high:
-            shift = turn * self._whole
+        found, turn = [], low // self.whole
+        while turn * self.whole < high:
+            shift = turn * self.whole
             first = bisect.bisect_right(self._bends, low - shift)
             last = bisect.bisect_left(self._bends, high - shift)
             found += [shift + at for at in self._bends[first:last]]
@@ -233,7 +235,7 @@ class Clockwork:
         while waiting:
             i, mode = waiting.pop()
             then = (i + 1) % len(self.cuts)
-            for end, probability, piece in self._onward(i, mode):
+            for end, probability, piece in self.onward(i, mode):
                 if end not in modes[then]:
                     modes[then][end] = len(modes[then])
                     waiting.append((then, end))
@@ -251,10 +253,49 @@ class Clockwork:
     def _empty(self) -> Mode:
         return (), (), (False,) * len(self.links), tuple((0, None) for _ in self.links)
 
-    def _onward(self, i: int, mode: Mode) -> Iterator[tuple[Mode, float, Piece]]:
-        """From a mode at a cut: modes at the next one, how likely, and by what."""
+    def cut(self, k: int) -> int:
+        """When the k-th cut from 0 on is."""
+        turns, i = divmod(k, len(self.cuts))
+        return self.cuts[i] + turns * self.whole
+
+    def begun(self, end: int) -> Iterator[tuple[Mode, float, Piece]]:
+        """From the beginning of a run at 0: modes at the first cut, or at `end` if that is before, and by what.
+
+        Nothing is on its way, bursts are as likely as ever, and what is to be read before 0 is read at 0. Raises
+        `UsageError` for a task that does not begin within its first period.
+        """
+        for task in self.tasks:
+            if task.offset >= task.period:
+                raise UsageError(
+                    f"components.{task.name}.sampling.offset: expected less than its period, {float(task.period):g} s, "
+                    "for a horizon"
+                )
+        for bursts in itertools.product(*([False, True] if link.has_bursts else [False] for link in self.links)):
+            shares = [x.loss if lost else 1.0 - x.loss for x, lost in zip(self.links, bursts) if x.has_bursts]
+            state = State(
+                time=0, items=(), tokens=(), bursts=bursts, holds=tuple((0, None) for _ in self.links), born=0,
+                probability=math.prod(shares), piece=Piece.start(self._effects.size, self._effects.costs),
+            )  # fmt: skip
+            states = [state]
+            for which, nominal in self._read_before():
+                states = [after for each in states for after in self._due(each, which, nominal)]
+            for each in states:
+                for reached in self._until(each, min(self.cuts[0], end)):
+                    yield self._mode(reached)
+
+    def _read_before(self) -> Iterator[tuple[int, int]]:
+        """Tasks and nominal times of the samples whose measurements may be due before 0."""
+        for i, task in enumerate(self.tasks):
+            for k in itertools.count():
+                nominal = _attoseconds(task.offset + k * task.period)
+                if nominal >= self._ahead[i]:
+                    break
+                yield i, nominal
+
+    def onward(self, i: int, mode: Mode, until: int | None = None) -> Iterator[tuple[Mode, float, Piece]]:
+        """From a mode at a cut: modes at the next one, or at a time before it, how likely, and by what."""
         begin = self.cuts[i]
-        until = self.cuts[i + 1] if i + 1 < len(self.cuts) else self.cuts[0] + self._whole
+        until = self.cut(i + 1) if until is None else until
         items, sizes, bursts, holds = mode
         state = State(
             time=begin,
@@ -283,9 +324,11 @@ class Clockwork:
         elif kind == "tick":
             yield replace(state, piece=self._effects.ticked(state.piece, which))
         else:
-            nominal = state.time + self._ahead[which]
-            for late, p in self.tasks[which].jitter.draws(nominal, self._between, self._order):
-                yield from self._begun_sample(_likely(state, p), which, nominal + late)
+            yield from self._due(state, which, state.time + self._ahead[which])
+
+    def _due(self, state: State, task: int, nominal: int) -> Iterator[State]:
+        for late, p in self.tasks[task].jitter.draws(nominal, self._between, self._order):
+            yield from self._begun_sample(_likely(state, p), task, nominal + late)
 
     def _begun_sample(self, state: State, task: int, time: int) -> Iterator[State]:
         """A sample is known to be at a time: so are the measurements for it, and when what waits for it arrives."""
@@ -465,7 +508,7 @@ class Clockwork:
             raise UsageError(f"{link.name}: a first-order hold that may lose more than {LONGEST_AGE} messages in a row")
         most = _attoseconds((longest + 3) * between) + link.longest + self._clock_of(link).jitter.highest
         if age > most:
-            age -= math.ceil((age - most) / self._whole) * self._whole
+            age -= math.ceil((age - most) / self.whole) * self.whole
         return age, gap
 
     def _clock_of(self, link: Link) -> Task:

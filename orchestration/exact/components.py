@@ -32,6 +32,8 @@ class Known:
     part: Continuous | Sampled
     how: str
     """it is known"""
+    tangent: Tangent
+    """in whose coordinates its state is"""
 
 
 class Measured:
@@ -69,7 +71,8 @@ def _measured(loop: AtRest, name: str) -> Known:
     else:
         matrices, unfit = in_continuous_time(tangent, step, DIFFERS if is_linear else BLURRED)
         part = Continuous(**vars(matrices), step=tangent.derivatives, unfit=unfit)
-    return Known(part=part, how="saved states, to rounding" if is_linear else "saved states, by differences")
+    how = "saved states, to rounding" if is_linear else "saved states, by differences"
+    return Known(part=part, how=how, tangent=tangent)
 
 
 def _step_of(loop: AtRest, name: str) -> float:

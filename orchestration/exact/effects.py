@@ -21,6 +21,7 @@ from orchestration.exact.flows import Flows
 from orchestration.exact.linear import Components, Continuous, Sampled
 from orchestration.exact.objectives import Mean
 from orchestration.exact.pieces import Piece
+from orchestration.exact.start import Start
 from orchestration.schedule.plan import Plan
 from orchestration.system.model import Connection, System, component_of, variable_of
 
@@ -49,7 +50,8 @@ class Places:
 class LoopEffects(ABC):
     """The effects that both readings of a loop have in common."""
 
-    def __init__(self, system: System, components: Components, tasks: Sequence[str]) -> None:
+    def __init__(self, system: System, components: Components, tasks: Sequence[str], *, one: bool = False) -> None:
+        """With `one` a number of the state is 1, so that moments have means in them."""
         self.system, self.parts, self.tasks = system, components, list(tasks)
         self.places = places = Places()
         self.wires = {system.connections[i].name for i in Plan(system).wires}
@@ -68,6 +70,8 @@ class LoopEffects(ABC):
             places.add("state", name, len(task.A))
             places.add("output", name, len(task.outputs))
         self._add_places(places)
+        if one:
+            places.add("one", "", 1)
         self.size = places.size
         self.costs = 0
         self._noise = {x.name: _noise_of(x) for x in system.connections}
@@ -87,6 +91,31 @@ class LoopEffects(ABC):
     @abstractmethod
     def charge(self, means: Sequence[Mean]) -> None:
         """The costs are these means, over time."""
+
+    def begin(self, start: Start) -> Floats:
+        """The state there."""
+        found = np.zeros(self.size)
+        found[self.places("one", "")] = 1.0
+        for name in self.parts:
+            found[self.places("state", name)] = start.states[name]
+            if self.places.has("output", name):
+                found[self.places("output", name)] = start.outputs[name]
+        for x in self.system.connections:
+            for kind in ("received", "last"):
+                if self.places.has(kind, x.name):
+                    found[self.places(kind, x.name)] = start.received[x.name]
+        return found
+
+    def form(self, mean: Mean, rows: Floats) -> Floats:
+        """Q of z'Q z, what is averaged by the rows of its signals, but for its constant.
+
+        Without a 1 in the state it is without what is linear, too, whose stationary mean is 0.
+        """
+        found: Floats = rows.T @ mean.Q @ rows
+        if self.places.has("one", ""):
+            linear = np.outer(rows.T @ mean.g, self.one("one", "", 0))
+            found += 0.5 * (linear + linear.T)
+        return found
 
     # -- rows over the state -------------------------------------------------------------------------------------
 
@@ -202,10 +231,16 @@ class TrueEffects(LoopEffects):
     """The loop as it is meant: continuous time goes by continuously, noise of sources is white."""
 
     def __init__(
-        self, system: System, components: Components, tasks: Sequence[str], noise: Mapping[str, float] | None = None
+        self,
+        system: System,
+        components: Components,
+        tasks: Sequence[str],
+        noise: Mapping[str, float] | None = None,
+        *,
+        one: bool = False,
     ) -> None:
         """`noise` has the intensities of white noise by input."""
-        super().__init__(system, components, tasks)
+        super().__init__(system, components, tasks, one=one)
         self._outputs = self._algebra(noise or {})
 
     def _algebra(self, noise: Mapping[str, float]) -> dict[str, Floats]:
@@ -274,7 +309,7 @@ class TrueEffects(LoopEffects):
         Q = np.zeros((self.costs, self.size, self.size))
         for k, mean in enumerate(means):
             rows = np.array([self.signal(name) for name in mean.signals])
-            Q[k] = rows.T @ mean.Q @ rows
+            Q[k] = self.form(mean, rows)
         self._flows = Flows(self.F, self.R, Q)
 
     def passed(self, piece: Piece, duration: int) -> Piece:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from orchestration.basics.errors import UsageError
 from orchestration.building.inputs import files_of
 from orchestration.exact.loops import Loops
+from orchestration.exact.wanted import Wanted
+from orchestration.expressions.syntax import Call
 from orchestration.fmi.foreign import computed
 from orchestration.requests.request import Asked, asked_for
-from orchestration.stability.known_loops import rested
+from orchestration.stability.known_loops import LOOPS, rested
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.request import in_its_own_words
@@ -20,7 +24,7 @@ ROUNDING, DIFFERENCES = 1e-11, 1e-7
 
 @dataclass(frozen=True, kw_only=True)
 class Expected:
-    """Expectations of a linear loop, where it has come to stay."""
+    """Expectations of a linear loop, where it has come to stay, or from its beginning to a horizon."""
 
     objectives: Mapping[str, float | None]
     """By name; None: there is none."""
@@ -37,53 +41,78 @@ class Expected:
     """How the components are known, and what was done."""
     period: float
     """The common period of all that samples [s]."""
+    horizon: float | None = None
+    """Over which the means are, from initial conditions [s]; None: stationary ones."""
 
     def __repr__(self) -> str:
         listed = ", ".join(f"{name} {'-' if v is None else f'{v:.6g}'}" for name, v in self.objectives.items())
         return f"<Expected: {listed or 'no objectives'}; mean-square radius {self.mean_square_radius:.6g}>"
 
 
-def expect(asked: Asked, *, as_simulated: bool = False) -> Expected:
+def expect(asked: Asked, *, as_simulated: bool = False, horizon: float | None = None) -> Expected:
     """The stationary expectation of each objective that is made of means of quadratic expressions of signals.
 
     The system is linearised about its operating point, or where it begins. Noise of sources is white; delays, jitter
     and losses are drawn as a run draws them. `as_simulated` it is the expectation of what a run prints when it is long:
-    noise is held for the period of its source, what is in continuous time is stepped, and means are over rows.
+    noise is held for the period of its source, what is in continuous time is stepped, and means are over rows. With a
+    `horizon` [s] means are from 0 to there, the system beginning as it does by itself, not at its operating point.
 
     Raises `UsageError` for a system that does not rest there, or of which there is no exact answer, naming why.
     """
+    if horizon is not None and not 1e-9 <= horizon < math.inf:
+        raise UsageError(f"horizon = {horizon:g} s: expected a finite time above 0")
     request = asked_for(asked)
+    if horizon is not None and LOOPS.of(request.kind) is not None:
+        raise UsageError("horizon: expected a system, of which it is known where it begins")
     with in_its_own_words(request):
         system = rested(request)
         files = files_of(system)
         loops = Loops(files.models, simulated=as_simulated)
-        return computed(files.fmus.values(), expected_of, system, loops)
+        return computed(files.fmus.values(), expected_of, system, loops, horizon)
 
 
-def expected_of(system: System, loops: Loops) -> Expected:
+def expected_of(system: System, loops: Loops, horizon: float | None = None) -> Expected:
     """As `expect`, of a system whose FMUs are loaded in this process."""
     found, linear = loops.solved(system), loops.linear(changed(system, system.operating_point))
-    radius = found.loop.radius
-    if found.means is None:
+    radius, means, apart, order = found.loop.radius, found.means, found.apart, found.order
+    if horizon is not None:
+        until = loops.until(system, horizon)
+        means, apart, order = until.means, until.apart, until.order
+    if means is None:
         why = f"the mean-square radius is {radius:.6g}: the mean has no finite expectation"
         values: dict[str, float | None] = dict.fromkeys(system.objectives)
         reasons = {**linear.wanted.reasons, **dict.fromkeys(linear.wanted.calls, why)}
     else:
-        values, reasons = linear.wanted.values(found.means), linear.wanted.reasons
+        values, reasons = _finite(linear.wanted, means), linear.wanted.reasons
     known = max((DIFFERENCES if "differences" in by else ROUNDING for by in linear.how.values()), default=ROUNDING)
     return Expected(
         objectives=values, reasons={name: reasons[name] for name in system.objectives if name in reasons},
-        mean_square_radius=radius, fourth_moment_radius=found.loop.fourth_moment_radius, accuracy=found.apart + known,
-        method=_method(linear.how, found.order, system, simulated=loops.simulated), period=found.period,
+        mean_square_radius=radius, fourth_moment_radius=found.loop.fourth_moment_radius, accuracy=apart + known,
+        method=_method(linear.how, order, system, simulated=loops.simulated, horizon=horizon), period=found.period,
+        horizon=horizon,
     )  # fmt: skip
 
 
-def _method(how: Mapping[str, str], order: int | None, system: System, *, simulated: bool) -> str:
+def _finite(wanted: Wanted, means: Mapping[Call, float]) -> dict[str, float | None]:
+    """The objectives, but for those that have grown beyond all numbers."""
+    found = wanted.values(means)
+    for name, value in found.items():
+        if value is not None and not math.isfinite(value):
+            found[name] = None
+            wanted.reasons[name] = "grows beyond all numbers before the horizon"
+    return found
+
+
+def _method(
+    how: Mapping[str, str], order: int | None, system: System, *, simulated: bool, horizon: float | None
+) -> str:
     known: dict[str, list[str]] = {}
     for name, by in how.items():
         known.setdefault(by, []).append(name)
     said = ["second moments of the loop about its operating point"]
     said += [f"{', '.join(listed)} known by {by}" for by, listed in known.items()]
+    if horizon is not None:
+        said.append(f"from its initial conditions to {horizon:g} s")
     if simulated:
         said.append("noise held, steps and means over rows as in a run")
     if order is not None:

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Generic, TypeVar
 
 import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
 from orchestration.exact.as_simulated import SimulatedEffects, expect_rows
-from orchestration.exact.clockwork import Clockwork, Task
+from orchestration.exact.clockwork import ATTOSECONDS, Clockwork, Task
 from orchestration.exact.components import Measured
 from orchestration.exact.effects import LoopEffects, TrueEffects
+from orchestration.exact.horizon import costs_until
 from orchestration.exact.linear import Components, Continuous, Sampled
 from orchestration.exact.moments import JumpLinear
+from orchestration.exact.start import Start, start_of
 from orchestration.exact.timing import links_of, tasks_of
 from orchestration.exact.wanted import Wanted
 from orchestration.expressions.syntax import Call
@@ -26,7 +29,10 @@ from orchestration.fmi.reuse import Instances
 from orchestration.stability.linear_loop import Beside, at_rest
 from orchestration.system.model import System, component_of, is_foreseen
 from orchestration.system.paths import changed
+from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 from orchestration.system.written import tables_of
+
+T = TypeVar("T")
 
 ORDERS = (1, 2, 4, 8, 16, 32)
 """of Gauss's rule, tried in turn until the next one changes nothing"""
@@ -44,6 +50,8 @@ class Linear:
     wanted: Wanted
     noise: Mapping[str, float]
     """the intensities of white noise, by input"""
+    start: Start | None = None
+    """where the system begins, if that was asked for"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +67,25 @@ class Solved:
     """what the last doubling of the nodes has changed, relative"""
     order: int | None
     """of Gauss's rule; None: all random times are listed"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Until:
+    """A loop from where it begins to a given time, as `Solved`."""
+
+    means: Mapping[Call, float]
+    """over that time"""
+    apart: float
+    order: int | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Finest(Generic[T]):
+    found: tuple[T, Floats]
+    """an answer, and the numbers of it that were compared"""
+    period: float
+    apart: float
+    order: int | None
 
 
 class Loops:
@@ -78,70 +105,116 @@ class Loops:
         """FMUs in the process that computes, kept from system to system."""
         return Instances()
 
-    def linear(self, system: System) -> Linear:
-        """The components and objectives of a system; raises `UsageError` for one that is not linear about a rest."""
-        key = json.dumps(tables_of(_unhurried(system)), default=str, sort_keys=True)
+    def linear(self, system: System, *, begins: System | None = None) -> Linear:
+        """The components and objectives of a system; raises `UsageError` for one that is not linear about a rest.
+
+        With where `begins` does by itself, if that is given.
+        """
+        key = json.dumps([tables_of(_unhurried(x)) for x in (system, begins) if x], default=str, sort_keys=True)
         if key not in self._known:
-            self._known[key] = self._taken_apart(system)
+            self._known[key] = self._taken_apart(system, begins)
         return self._known[key]
 
-    def _taken_apart(self, system: System) -> Linear:
+    def _taken_apart(self, system: System, begins: System | None) -> Linear:
+        _expect_unshared(system)
         noise = _white(system, simulated=self.simulated)
         models = {name: self._models[component.fmu] for name, component in system.components.items()}
-        wanted = Wanted(system, models)
+        wanted, start = Wanted(system, models), None
         beside = Beside(moved=tuple(noise), seen=wanted.seen)
         with at_rest(system, self._instances, beside=beside, models=models) as loop:
             wanted.about(loop)
             known = self._measured.of(loop)
-        parts, how = {name: one.part for name, one in known.items()}, {name: one.how for name, one in known.items()}
+            parts = {name: one.part for name, one in known.items()}
+            if begins is not None:
+                tangents = {name: one.tangent for name, one in known.items()}
+                start = start_of(begins, loop, parts, tangents, self._instances)
+        how = {name: one.how for name, one in known.items()}
         for name, part in parts.items():
             if isinstance(part, Continuous) and part.unfit is not None and not self.simulated:
                 raise UsageError(
                     f"{name} is no linear system in continuous time: {part.unfit}; expected --as-simulated"
                 )
-        return Linear(parts=parts, how=how, wanted=wanted, noise=noise)
+        return Linear(parts=parts, how=how, wanted=wanted, noise=noise, start=start)
 
     def solved(self, system: System, *, agree: float = AGREE) -> Solved:
         """A system by finer and finer rules, until they agree; raises `UsageError` where there is too much of it."""
         system = changed(system, system.operating_point)
-        _expect_unshared(system)
         linear = self.linear(system)
-        tasks, links = tasks_of(system), links_of(system)
-        expect_same_steps(tasks, linear.parts)
-        effects = self._effects(system, linear)
         used = [call for call, mean in linear.wanted.means.items() if np.any(mean.Q)]
-        effects.charge([linear.wanted.means[call] for call in used])
+
+        def answer(clock: Clockwork) -> tuple[JumpLinear, Floats]:
+            loop = JumpLinear(*clock.stages())
+            costs = loop.costs() / float(clock.period) if loop.radius < 1.0 else np.full(len(used), math.inf)
+            return loop, np.array([loop.radius, *costs])
+
+        finest = self._finest(system, linear, self._effects(system, linear, used), answer, agree)
+        (loop, (_, *costs)) = finest.found
+        means = None
+        if loop.radius < 1.0:
+            means = {call: mean.c for call, mean in linear.wanted.means.items()}
+            means |= {call: means[call] + cost for call, cost in zip(used, costs)}
+        return Solved(loop=loop, period=finest.period, means=means, apart=finest.apart, order=finest.order)
+
+    def until(self, system: System, horizon: float) -> Until:
+        """The means of a system from where it begins to `horizon` [s], as `solved`."""
+        rests = changed(system, system.operating_point)
+        linear = self.linear(rests, begins=system)
+        used = [call for call, mean in linear.wanted.means.items() if np.any(mean.Q) or np.any(mean.g)]
+        effects = self._effects(rests, linear, used, one=True)
+        assert linear.start is not None
+        start, one = effects.begin(linear.start), effects.places("one", "").start
+        end = round(exact_nanoseconds(horizon) * (ATTOSECONDS // NANOSECONDS))
+
+        def answer(clock: Clockwork) -> tuple[None, Floats]:
+            return None, costs_until(clock, start, one, end) / (end / ATTOSECONDS) if used else np.zeros(0)
+
+        finest = self._finest(rests, linear, effects, answer, AGREE)
+        means = {call: mean.c for call, mean in linear.wanted.means.items()}
+        means |= {call: means[call] + cost for call, cost in zip(used, finest.found[1].tolist())}
+        return Until(means=means, apart=finest.apart, order=finest.order)
+
+    def _finest(
+        self,
+        system: System,
+        linear: Linear,
+        effects: LoopEffects,
+        answer: Callable[[Clockwork], tuple[T, Floats]],
+        agree: float,
+    ) -> _Finest[T]:
+        """An answer, numbers of which may not change any more, by the least order of Gauss's rule that will do."""
+        tasks, links = tasks_of(system), links_of(system)
         by_rule = any(x.late.is_by_rule for x in links) or any(task.jitter.is_by_rule for task in tasks)
-        found: list[tuple[JumpLinear, Floats]] = []
+        found: list[tuple[T, Floats]] = []
         apart, order, period = 0.0, ORDERS[0], 1.0
         for next_order in ORDERS if by_rule else ORDERS[:1]:
             try:
                 clock = Clockwork(tasks, links, effects, order=next_order, grids=effects.grids)
-                loop = JumpLinear(*clock.stages())
+                one = answer(clock)
             except UsageError:
                 if len(found) < 2:
                     raise
                 break
             order, period = next_order, float(clock.period)
-            found.append((loop, loop.costs() / period if loop.radius < 1.0 else np.full(len(used), math.inf)))
+            found.append(one)
             if len(found) > 1:
-                apart = _apart(found[-2], found[-1])
+                apart = _apart(found[-2][1], found[-1][1])
                 if apart <= agree:
                     break
-        loop, costs = found[-1]
-        means = None
-        if loop.radius < 1.0:
-            means = {call: mean.c for call, mean in linear.wanted.means.items()}
-            means |= {call: means[call] + cost for call, cost in zip(used, costs.tolist())}
-        return Solved(loop=loop, period=period, means=means, apart=apart, order=order if by_rule else None)
+        return _Finest(found=found[-1], period=period, apart=apart, order=order if by_rule else None)
 
-    def _effects(self, system: System, linear: Linear) -> LoopEffects:
+    def _effects(self, system: System, linear: Linear, used: Sequence[Call], *, one: bool = False) -> LoopEffects:
+        """Of which the costs are these means."""
         tasks = tasks_of(system)
+        expect_same_steps(tasks, linear.parts)
         names = [task.name for task in tasks]
-        if not self.simulated:
-            return TrueEffects(system, linear.parts, names, linear.noise)
-        expect_rows(system, tasks, links_of(system))
-        return SimulatedEffects(system, linear.parts, names)
+        effects: LoopEffects
+        if self.simulated:
+            expect_rows(system, tasks, links_of(system))
+            effects = SimulatedEffects(system, linear.parts, names, one=one)
+        else:
+            effects = TrueEffects(system, linear.parts, names, linear.noise, one=one)
+        effects.charge([linear.wanted.means[call] for call in used])
+        return effects
 
 
 def _expect_unshared(system: System) -> None:
@@ -201,9 +274,8 @@ def _white(system: System, *, simulated: bool) -> dict[str, float]:
     return found
 
 
-def _apart(one: tuple[JumpLinear, Floats], other: tuple[JumpLinear, Floats]) -> float:
-    """How far two answers are from each other, relative."""
-    radii = abs(one[0].radius - other[0].radius) / max(other[0].radius, 1e-300)
-    if not (np.isfinite(one[1]).all() and np.isfinite(other[1]).all()):
-        return radii
-    return max(radii, float((np.abs(one[1] - other[1]) / np.maximum(np.abs(other[1]), 1e-300)).max(initial=0.0)))
+def _apart(one: Floats, other: Floats) -> float:
+    """How far the numbers of two answers are from each other, relative."""
+    finite = np.isfinite(one) & np.isfinite(other)
+    one, other = one[finite], other[finite]
+    return float((np.abs(one - other) / np.maximum(np.abs(other), 1e-300)).max(initial=0.0))

@@ -125,7 +125,7 @@ def at_rest(
     begin = latest_offset(calm) + (math.ceil(delay / period) + HELD) * period
     calm = replace(calm, stop_time=float(begin + (SETTLED + 2) * period) / NANOSECONDS)
     meant = None if models is None else held_to(calm, models)
-    with prepared(calm, load=_watching(instances), meant=meant) as simulation:
+    with prepared(calm, load=watching(instances), meant=meant) as simulation:
         _expect_states(simulation)
         _come_to_rest(simulation, begin, period)
         yield AtRest(
@@ -316,7 +316,9 @@ class Watched:
         self.time = t + h
 
 
-def _watching(instances: Instances) -> Loader:
+def watching(instances: Instances) -> Loader:
+    """Loads instances of which is known what was done to them last."""
+
     @contextmanager
     def load(path: Path, instance_name: str) -> Iterator[Instance]:
         with instances.load(path, instance_name) as fmu:

@@ -29,6 +29,8 @@ TURN = 1e-3
 """of the answer to a pulse on all inputs: what may differ from sample to sample"""
 FEWEST = 6
 """points of the ladder at which states are made at least"""
+LINEAR = 1e-6
+"""of what a state makes of outputs, or absolute where that is smaller than 1: what the derivatives may miss of it"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,6 +150,31 @@ class Tangent(Linear):
             after, moved = (np.column_stack(c) if c else np.zeros((size, 0)) for c in (by_pair, by_input))
             self._known[key] = after @ self._inverse, moved
         return self._known[key]
+
+    def coordinates_of(self, saved: bytes, time: float) -> Floats:
+        """The coordinates of a saved state, to be stepped next at `time` [s], as its deviation from rest.
+
+        Raises `UsageError` for one that no input makes, or from which the component is not linear.
+        """
+        state, h = _State(saved, time), self._ladder[0]
+        found: Floats = self._axes.T @ self._deviation(state)
+        outputs, later = self._stepped(state, self._held, h)
+        at_rest, _ = self._stepped(self._rest, self._held, h)
+        seen = [self._deviation(state), outputs - at_rest, self._axes.T @ self._deviation(later)]
+        predicted = np.concatenate([self._axes @ found, self.derivatives(h)[0] @ found])
+        missed = np.abs(np.concatenate(seen) - predicted).max(initial=0.0)
+        if not missed <= LINEAR * max(1.0, np.abs(predicted).max(initial=0.0)):
+            raise UsageError(
+                f"{self._fmu.name}: does not begin as a linear one about its operating point: expected initial values "
+                "that its inputs could have made, near to it"
+            )
+        return found
+
+    def _deviation(self, state: _State) -> Floats:
+        """The coordinates of a state before they are reduced."""
+        here, rest = (self._outputs_after(s, self._held, self._ladder[: self._shown]) for s in (state, self._rest))
+        found: Floats = ((here - rest) / self._weight).ravel()
+        return found
 
     def _stepped(self, start: _State, held: Floats, h: float) -> tuple[Floats, _State]:
         outputs = self._outputs_after(start, held, [h])[0]

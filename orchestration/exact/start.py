@@ -1,0 +1,78 @@
+"""Where a system begins, about where it rests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from orchestration.basics.errors import UsageError
+from orchestration.basics.simulator import Floats
+from orchestration.exact.linear import Components
+from orchestration.fmi.instance import Instance
+from orchestration.fmi.reuse import Instances
+from orchestration.runs.simulation import prepared
+from orchestration.stability.linear_loop import AtRest, watching
+from orchestration.stability.linearised_component import Tangent
+from orchestration.stability.operating_point import deterministic
+from orchestration.system.model import System
+from orchestration.system.paths import changed
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """Deviations from rest after the first exchange, which is never lost, late or noisy."""
+
+    states: Mapping[str, Floats]
+    """by component"""
+    outputs: Mapping[str, Floats]
+    """likewise"""
+    received: Mapping[str, Floats]
+    """by connection"""
+
+
+def start_of(
+    system: System, loop: AtRest, parts: Components, tangents: Mapping[str, Tangent], instances: Instances
+) -> Start:
+    """Where `system` begins by itself, as the components `parts` of its loop at rest know it.
+
+    Raises `UsageError` where that is not near enough to be linear.
+    """
+    _expect_same_sources(system)
+    calm = deterministic(replace(system, operating_point={}))
+    prompt = {
+        name: one if one.sampling is None else replace(one, sampling=replace(one.sampling, offset=0.0))
+        for name, one in calm.components.items()
+    }
+    with prepared(replace(calm, components=prompt), load=watching(instances)) as run:
+        run.master.initialise()
+        if run.master.divergence is not None:
+            raise UsageError(f"it does not begin: {run.master.divergence}")
+        saved = {name: instance.save() for name, instance in run.instances.items()}
+        outputs = {name: _outputs(run.instances[name], part.outputs) for name, part in parts.items()}
+        received = [channel.received.copy() for channel in run.master.channels]
+    for name, state in loop.begun.items():
+        loop.simulation.instances[name].restore(state)
+    rest = {name: _outputs(loop.simulation.instances[name], part.outputs) for name, part in parts.items()}
+    told = [channel.received for channel in loop.simulation.master.channels]
+    return Start(
+        states={name: tangents[name].coordinates_of(saved[name], 0.0) for name in parts},
+        outputs={name: outputs[name] - rest[name] for name in parts},
+        received={x.name: now - then for x, now, then in zip(system.connections, received, told)},
+    )
+
+
+def _outputs(instance: Instance, names: tuple[str, ...]) -> Floats:
+    return np.array([float(instance.get(name)) for name in names])
+
+
+def _expect_same_sources(system: System) -> None:
+    """Raise `UsageError` for what goes on driving the system away from where it rests."""
+    at_rest = changed(system, system.operating_point)
+    for name, source in system.sources.items():
+        if not source.is_held or source.constant != at_rest.sources[name].constant:
+            raise UsageError(
+                f"sources.{name}: expected noise, or a constant that is the same at the operating point: a horizon has "
+                "initial conditions, and nothing else that the loop does not rest at"
+            )
