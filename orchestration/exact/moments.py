@@ -22,6 +22,8 @@ LARGEST = 100_000
 """Numbers in the second moments of all modes together"""
 LARGEST_FOURTH = 1e8
 """Products in what a period makes of fourth moments"""
+MOST_DOUBLINGS = 60
+"""of how many periods are summed up"""
 DENSE = 400
 """Numbers of which an operator is made a matrix"""
 
@@ -104,11 +106,26 @@ class JumpLinear:
     @functools.cached_property
     def radius(self) -> float:
         """The mean-square radius: by how much second moments grow in a period."""
+        if self._certain is not None:
+            return _spectral_radius(self._certain) ** 2
         return _radius(self._turned, self._basis)
+
+    @functools.cached_property
+    def _certain(self) -> Floats | None:
+        """What a period makes of the state, where nothing is left to chance but noise; None: something is."""
+        if any(len(stage) != 1 for stage in self._stages):
+            return None
+        found: Floats = np.eye(self._sizes[0][0])
+        for (passage,) in self._stages:
+            found = passage.piece.Z @ found
+        return found
 
     def stationary(self) -> list[Floats]:
         """The second moments that stay, by mode where the period begins; there are such where the radius is below 1."""
-        added = self._basis.numbers(self._flown(self._none(0))[0])
+        first = self._flown(self._none(0))[0]
+        if self._certain is not None:
+            return [_summed(self._certain, first[0])]
+        added = self._basis.numbers(first)
         if self.numbers > DENSE:
             return self._basis.matrices(solved(self._turned, added))
         operator = np.array([self._turned(unit) for unit in np.eye(self.numbers)]).T
@@ -133,6 +150,8 @@ class JumpLinear:
     @functools.cached_property
     def fourth_moment_radius(self) -> float | None:
         """By how much fourth moments grow in a period; None where there are too many of them to be told."""
+        if self._certain is not None:
+            return _spectral_radius(self._certain) ** 4
         halves = [[n * (n + 1) // 2 for n in sizes] for sizes in self._sizes]
         work = sum(halves[i][p.begin] ** 3 for i, stage in enumerate(self._stages) for p in stage)
         if work > LARGEST_FOURTH:
@@ -154,11 +173,25 @@ class JumpLinear:
         return _radius(turned, basis)
 
 
+def _spectral_radius(matrix: Floats) -> float:
+    return float(np.abs(np.linalg.eigvals(matrix)).max(initial=0.0))
+
+
+def _summed(turn: Floats, added: Floats) -> Floats:
+    """The sum of Φᵏ W Φᵏᵀ over all k, by doubling; the powers of Φ die out."""
+    found = added
+    for _ in range(MOST_DOUBLINGS):
+        more = turn @ found @ turn.T
+        found, turn = found + more, turn @ turn
+        if np.abs(more).max(initial=0.0) <= 1e-17 * np.abs(found).max(initial=0.0):
+            break
+    return found
+
+
 def _radius(turned: Map, basis: _Symmetric) -> float:
     if basis.count > DENSE:
         return largest(turned, basis.numbers([np.eye(n) for n in basis.sizes]))
-    operator = np.array([turned(unit) for unit in np.eye(basis.count)]).reshape(basis.count, basis.count)
-    return float(np.abs(np.linalg.eigvals(operator)).max(initial=0.0))
+    return _spectral_radius(np.array([turned(unit) for unit in np.eye(basis.count)]).reshape(basis.count, basis.count))
 
 
 class _Batches:
