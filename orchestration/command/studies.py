@@ -2,7 +2,7 @@
 
 import dataclasses
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,6 +16,9 @@ from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.flags import FlightFlags, Timing, flies, request_from
 from orchestration.command.limit_flags import TimeLimit
 from orchestration.command.shared_flags import takes
+
+if TYPE_CHECKING:
+    from orchestration.studies.study import Study
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file.", metavar="STUDY.toml", show_default=False)]
 Out = Annotated[Path | None, typer.Option("--out", help="Folder of the store; default: results/NAME.", metavar="DIR")]
@@ -52,6 +55,7 @@ def sweep(
     from orchestration.workers.choice import choice_named
 
     chosen = load_study(study)
+    _say_if_endless(chosen)
     summary = fly(
         chosen, folder=out, workers=workers, dask=dask, retry_failed=retry_failed,
         engine=choice_named(engine), time_limit=time_limit,
@@ -62,12 +66,19 @@ def sweep(
         lines.append(f"engine batch: {summary.agreement}")
     for each in summary.follows:
         say(f"follows {each}")
-    files = chosen.files()
-    first = range(min(len(chosen.points), FIRST))
-    exact.say_if_endless(chosen.base, [chosen.system(i, files.starts_of(chosen.origin)) for i in first], files)
     told = ("total", "flown", "failed", "path", "engine", "agreement", "follows")
     document = {name: getattr(summary, name) for name in told}
     return Answer(document=document, lines=lines, good=not summary.failed)
+
+
+def _say_if_endless(study: "Study") -> None:
+    """Before it is flown: what becomes of its files meanwhile changes nothing."""
+    from orchestration.stability.known_loops import LOOPS
+
+    if LOOPS.of(study.base.kind) is None:
+        files = study.files()
+        first = range(min(len(study.points), FIRST))
+        exact.say_if_endless(study.base, [study.system(i, files.starts_of(study.origin)) for i in first], files)
 
 
 def status(study: StudyFile, out: Out = None) -> Answer:

@@ -21,7 +21,7 @@ def some(*values: Any) -> st.SearchStrategy[float]:
 
 
 ORDERS: tuple[TraceOrder, ...] = ("drawn", "as recorded")
-TRACE = Path(__file__).parents[2] / "data" / "trace.csv"
+TRACE = Path(__file__).with_name("trace.csv")
 
 
 @st.composite
