@@ -153,7 +153,7 @@ def distributed_servo() -> Figure:
     cost, radius = (np.full((len(delays), len(periods)), np.nan) for _ in range(2))
     for j, period in enumerate(periods.tolist()):
         varied = changed(system, {f"components.controller.{key}": period for key in PERIOD})
-        loops = Loops(files_of(system).models_of(system))
+        loops = Loops(files_of(system).models)
         for i, delay in enumerate(delays.tolist()):
             found = loops.solved(changed(varied, {"connections.command.delay": delay}))
             radius[i, j] = found.loop.radius
