@@ -22,6 +22,12 @@ PROCESSOR = "m7"
 NINE_IN_TEN = 0.9
 
 
+def steps_of(trace: str) -> list[float]:
+    """How long each step of a law takes [s]."""
+    with (AUTOPILOT / "execution" / f"{PROCESSOR}.csv").open(encoding="utf-8") as file:
+        return [float(row[trace]) for row in csv.DictReader(file)]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Design:
     """A controller of a comparison, and what a sample of it takes."""
@@ -36,8 +42,7 @@ class Design:
     @property
     def cost(self) -> float:
         """A sample of it [s]."""
-        with (AUTOPILOT / "execution" / f"{PROCESSOR}.csv").open(encoding="utf-8") as file:
-            return self.cost_of([float(row[self.trace]) for row in csv.DictReader(file)])
+        return self.cost_of(steps_of(self.trace))
 
     def cells(self) -> list[dict[str, Any]]:
         """Those of the comparison, by period."""
@@ -177,7 +182,6 @@ def certain(fmu: str, parameters: dict[str, Any], trace: str) -> dict[str, Any]:
     told["components"]["controller"] |= {"fmu": f"native/{fmu}", "parameters": parameters}
     tasks, network = told["computers"]["autopilot"]["tasks"], told["networks"]["bus"]
     tasks["radio"] |= {"jitter": 0.0, "execution": 0.001}
-    design = Design(comparison="", controller="", trace=trace, cost_of=statistics.mean, color="")
-    tasks["control"]["execution"] = round(design.cost, 9)
+    tasks["control"]["execution"] = round(statistics.mean(steps_of(trace)), 9)
     network["error"], network["messages"]["airspeed"]["jitter"] = 0.0, 0.0
     return told
