@@ -68,7 +68,10 @@ def _lines(found: "Expected") -> list[str]:
     lines = [f"{name:<{width}}  {value}" for name, value in told.items()]
     if fourth is not None and found.mean_square_radius < 1.0 <= fourth:
         lines.append("fourth moments have no end: an interval of a mean square over runs means nothing here")
-    return [*lines, *(f"no {name}: {why}" for name, why in found.reasons.items())]
+    without: dict[str, list[str]] = {}
+    for name, why in found.reasons.items():
+        without.setdefault(why, []).append(name)
+    return [*lines, *(f"no {', '.join(listed)}: {why}" for why, listed in without.items())]
 
 
 def register(app: typer.Typer) -> None:

@@ -57,7 +57,7 @@ def _averages(system: System) -> list[str]:
     found = []
     for name, node in whole(system.objectives).items():
         try:
-            means_of(node, name)
+            means_of(node)
         except UsageError:
             continue
         found.append(name)

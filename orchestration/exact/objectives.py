@@ -44,19 +44,23 @@ class Mean:
     Q: Floats
 
 
-def means_of(node: Node, place: str) -> list[Call]:
+def means_of(node: Node) -> list[Call]:
     """The means in an objective, `rms` as one of them; raises `UsageError` naming what else it is made of."""
     found = list(dict.fromkeys(reductions(node)))
     for call in found:
         if call.function not in ("mean", "rms"):
-            raise UsageError(f"{place}: {text(call)}: expected mean(…) or rms(…), of which there are expectations")
+            raise UsageError(_no_mean(f"{call.function}(…)"))
         if isinstance(call.arguments[0], Sampled):
-            raise UsageError(f"{place}: {text(call)}: expected a mean over time, not over arrivals")
+            raise UsageError("over arrivals: expected a mean over time")
         if any(True for part in reductions(call.arguments[0])):
-            raise UsageError(f"{place}: {text(call)}: expected a mean of signals, not of other numbers of a run")
+            raise UsageError("of other numbers of the run: expected a mean of signals")
     if not found:
-        raise UsageError(f"{place}: {text(node)}: expected mean(…) or rms(…), of which there are expectations")
+        raise UsageError(_no_mean(text(node)))
     return found
+
+
+def _no_mean(written: str) -> str:
+    return f"{written}: expected mean(…) or rms(…), of which there are expectations"
 
 
 def whole(objectives: Mapping[str, str]) -> dict[str, Node]:
@@ -88,7 +92,7 @@ def value(node: Node, means: Mapping[Call, float], numbers: Mapping[str, float])
     raise UsageError(f"{text(node)} has a value at each instant; expected one number of the run")
 
 
-def quadratic(node: Node, rest: Mapping[str, float], numbers: Mapping[str, float], place: str) -> Mean:
+def quadratic(node: Node, rest: Mapping[str, float], numbers: Mapping[str, float]) -> Mean:
     """An expression about `rest` as a quadratic polynomial, by second differences, which are exact for one.
 
     Raises `UsageError` for one that is none, and for what depends on time.
@@ -96,8 +100,8 @@ def quadratic(node: Node, rest: Mapping[str, float], numbers: Mapping[str, float
     used = list(dict.fromkeys(names(node)))
     for name in (TIME, STOP_TIME):
         if name in used:
-            raise UsageError(f"{place}: depends on {name}: expected signals alone, whose mean stays")
-    signals = _signals(used, rest, numbers, place)
+            raise UsageError(f"depends on {name}: expected signals alone, whose mean stays")
+    signals = _signals(used, rest, numbers)
     fixed = [name for name in used if name in numbers]
     places = {name: i for i, name in enumerate([*signals, *fixed])}
     function = compiled(node, places)
@@ -116,11 +120,11 @@ def quadratic(node: Node, rest: Mapping[str, float], numbers: Mapping[str, float
         for j in range(i):
             both = of(unit[i] + unit[j])
             Q[i, j] = Q[j, i] = (both - c - g[i] - g[j] - Q[i, i] - Q[j, j]) / 2.0
-    _expect_quadratic(of, c, g, Q, f"{place}: {text(node)}")
+    _expect_quadratic(of, c, g, Q, text(node))
     return Mean(signals=tuple(signals), c=c, g=g, Q=Q)
 
 
-def _signals(used: Sequence[str], rest: Mapping[str, float], numbers: Mapping[str, float], place: str) -> list[str]:
+def _signals(used: Sequence[str], rest: Mapping[str, float], numbers: Mapping[str, float]) -> list[str]:
     """The signals of an expression, vectors by their components."""
     found: list[str] = []
     for name in used:
@@ -128,12 +132,12 @@ def _signals(used: Sequence[str], rest: Mapping[str, float], numbers: Mapping[st
             continue
         parts = [name] if name in rest else [f"{name}.{axis}" for axis in "xyzw" if f"{name}.{axis}" in rest]
         if not parts:
-            raise UsageError(f"{place}: there is no {name} of which the linear loop knows")
+            raise UsageError(f"there is no {name} of which the linear loop knows")
         found += parts
     return list(dict.fromkeys(found))
 
 
-def _expect_quadratic(of: object, c: float, g: Floats, Q: Floats, place: str) -> None:
+def _expect_quadratic(of: object, c: float, g: Floats, Q: Floats, written: str) -> None:
     assert callable(of)
     draw = np.random.default_rng(0)
     for _ in range(TRIALS):
@@ -142,4 +146,4 @@ def _expect_quadratic(of: object, c: float, g: Floats, Q: Floats, place: str) ->
         size = abs(c) + np.abs(g) @ np.abs(y) + np.abs(y) @ np.abs(Q) @ np.abs(y)
         found = of(y)
         if not (math.isfinite(found) and abs(found - expected) <= NOT_QUADRATIC * max(size, 1e-300)):
-            raise UsageError(f"{place}: expected a polynomial of signals of degree two at most")
+            raise UsageError(f"{written}: expected a polynomial of signals of degree two at most")

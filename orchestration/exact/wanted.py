@@ -24,7 +24,7 @@ class Wanted:
         self._numbers: Mapping[str, float] = {}
         for name, node in self._nodes.items():
             try:
-                self.calls[name] = means_of(node, name)
+                self.calls[name] = means_of(node)
             except UsageError as error:
                 self.reasons[name] = str(error)
         used = {part for calls in self.calls.values() for call in calls for part in names(call)}
@@ -49,7 +49,7 @@ class Wanted:
             try:
                 for call in calls:
                     if call not in self.means:
-                        self.means[call] = quadratic(squared(call), rest, self._numbers, name)
+                        self.means[call] = quadratic(squared(call), rest, self._numbers)
             except UsageError as error:
                 self.reasons[name] = str(error)
                 del self.calls[name]
@@ -61,7 +61,7 @@ class Wanted:
             try:
                 found[name] = value(self._nodes[name], means, self._numbers)
             except UsageError as error:
-                self.reasons[name] = f"{name}: {error}"
+                self.reasons[name] = str(error)
         return found
 
 

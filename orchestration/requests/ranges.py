@@ -79,7 +79,7 @@ def range_asked_for(
     high = last if last is not None else known.last if known is not None else 0.0
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise UsageError(f"--from {low:g} --to {high:g}: expected finite numbers, the first one smaller")
-    step = scan if scan is not None else known.step if known is not None else (high - low) / STEPS
+    step = scan if scan is not None else known.step if known is not None else float(f"{(high - low) / STEPS:.12g}")
     return Range(
         before=known.before if known is not None and first is None else (),
         first=low,

@@ -2,6 +2,7 @@
 
 import atexit
 import functools
+import gc
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,6 +10,8 @@ from typing import Any, NamedTuple
 
 import fmpy
 from fmpy import fmi2
+
+gc.freeze()  # scripts that collect garbage after each call do not look through what was imported
 
 
 @functools.cache

@@ -9,7 +9,7 @@ from threading import Thread
 import fmpy
 from fmpy import fmi2
 
-THREADS, REPETITIONS = 8, 200
+THREADS, REPETITIONS = 8, 100
 SWITCH_INTERVAL = 1e-5
 """[s]; Python's own 5 ms would let most instantiations run through."""
 
