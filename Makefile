@@ -64,6 +64,7 @@ figures: .venv/.base
 	$(BIN)/python -m docs.make_icons
 	$(BIN)/python examples/make_figures.py
 	$(BIN)/python examples/linear/design.py
+	$(BIN)/python examples/lqg/design.py
 
 site: .venv/.test
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet

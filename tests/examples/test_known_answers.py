@@ -10,12 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from examples.lqg import design as lqg
 from orchestration.building import fmus
-from orchestration.exact.expect import expect
+from orchestration.building.inputs import files_of
+from orchestration.exact.expect import expect, expected_of
+from orchestration.exact.loops import Loops
 from orchestration.limits import limit
 from orchestration.runs.simulation import run
 from orchestration.system.distribution import Distribution
 from orchestration.system.model import System
+from orchestration.system.paths import changed
 from tests.examples import common
 
 PERIOD = "components.controller.sampling.period"
@@ -120,6 +124,32 @@ def test_the_servo_over_two_networks_costs_what_jitterbug_says(delays: tuple[flo
     system = common.example("distributed_servo", {COMMAND_DELAY: each, f"{COMMAND_DELAY}_jitter": each})
     found = expect(system).objectives["J"]
     assert found == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.03, 0.1])
+def test_lqg_costs_what_its_riccati_equations_say(delay: float) -> None:
+    """To nine digits, with what is between samples, for a late command that filter and gain are designed for."""
+    found = expect(lqg.at(delay, gain_knows=True, filter_knows=True)).objectives["J"]
+    assert found == pytest.approx(lqg.lqg(delay).cost, rel=1e-9)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.05])
+def test_any_other_gain_or_filter_than_that_of_lqg_costs_more(delay: float) -> None:
+    """One part in a hundred away along each of them, up and down: more by the second order of that alone."""
+    best = lqg.at(delay, gain_knows=True, filter_knows=True)
+    values = {**lqg.lqg(delay).gains, "omega": lqg.OMEGA}
+    loops = Loops(files_of(best).models)
+
+    def cost(changes: Mapping[str, Any]) -> float:
+        found = expected_of(changed(best, changes), loops).objectives["J"]
+        assert found is not None
+        return found
+
+    least = cost({})
+    for name, value in values.items():
+        size = 0.01 * max(0.1, abs(value))
+        beside = [cost({f"{lqg.PARAMETERS}.{name}": value + sign * size}) for sign in (1, -1)]
+        assert least < min(beside) < max(beside) < 1.01 * least
 
 
 @pytest.mark.parametrize(("period", "delay"), [(0.1, 0.25), (0.5, 0.0), (0.07, 1.0), (0.25, 0.1)])

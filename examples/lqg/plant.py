@@ -1,0 +1,29 @@
+"""An inverted pendulum about upright, which a disturbance drives, solved exactly over each step."""
+
+import math
+
+from fmu_kit.interface import Input, Parameter, State
+from fmu_kit.slave import Slave
+
+
+class Pendulum(Slave):
+    """Inverted pendulum about upright: command and disturbance in, angle and rate out.
+
+    angle'' = omega^2 (angle - u) + w, with u and w held over a step.
+    """
+
+    u = Input("command: the angle at which it is in balance with the weight", "rad")
+    w = Input("disturbance", "rad/s2")
+    angle = State("from upright", "rad")
+    rate = State("of the angle", "rad/s")
+    omega = Parameter("how fast it falls: sqrt(gravity / length)", "1/s", 3.0, above=0.0)
+
+    def step(self, t: float, h: float) -> None:
+        """Advance by what grows and what dies out, about the angle at which u and w leave it."""
+        omega = self.omega
+        balanced = self.u - self.w / (omega * omega)
+        off = self.angle - balanced
+        growing = 0.5 * (off + self.rate / omega) * math.exp(omega * h)
+        dying = 0.5 * (off - self.rate / omega) * math.exp(-omega * h)
+        self.angle = balanced + growing + dying
+        self.rate = omega * (growing - dying)
