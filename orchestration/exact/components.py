@@ -1,7 +1,7 @@
 """The components of a system about its rest as matrices, from the derivatives that their FMUs show.
 
-A component that answers a pulse of 1 as it answers one of 1e-6 is linear as far as that can be seen: by the larger
-pulse it is known to rounding. Any other is known as far as small differences tell.
+A component that answers a pulse of 1 as it answers one of 1e-3 is linear as far as that can be seen: by the larger
+pulse it is known to rounding. Any other is known by small differences, as far as pulses of ten times the size agree.
 """
 
 from __future__ import annotations
@@ -18,9 +18,14 @@ from orchestration.stability.linearised_component import Tangent
 from orchestration.stability.matrices import BLURRED, in_continuous_time, minds_its_step, of_samples, whole
 from orchestration.system.times import NANOSECONDS
 
-LARGE_PULSE = 1.0
-SAME = 1e-7
-"""of an answer: what those to both pulses may differ by"""
+LARGE_PULSE, LESS = 1.0, 1e-3
+"""pulses that a linear component answers alike"""
+SAME = 1e-9
+"""of an answer: what those to both may differ by"""
+MORE = 10.0
+"""times as large are the pulses that tell how far small ones can be trusted"""
+ROUNDING = 1e-11
+"""of an answer: what rounding makes of it at least, on its way to a figure"""
 DIFFERS = 1e-9
 """of a step of 2h: what two of h may differ from it by, of a component that is known to rounding"""
 
@@ -32,6 +37,8 @@ class Known:
     part: Continuous | Sampled
     how: str
     """it is known"""
+    accuracy: float
+    """how far: of its answers, relative"""
     tangent: Tangent
     """in whose coordinates its state is"""
 
@@ -62,9 +69,7 @@ def _all_of(loop: AtRest, name: str) -> tuple[object, ...]:
 
 def _measured(loop: AtRest, name: str) -> Known:
     component, step = loop.simulation.system.components[name], _step_of(loop, name)
-    small, large = loop.tangent(name, loop.pulse), _by_large_pulses(loop, name)
-    is_linear = large is not None and _agree(small, large, step)
-    tangent = large if large is not None and is_linear else small
+    tangent, is_linear, apart = _by_pulses(loop, name, step)
     part: Continuous | Sampled
     if component.sampling is not None:
         part = Sampled(**vars(of_samples(tangent, step)), minds_step=minds_its_step(tangent, step))
@@ -72,7 +77,18 @@ def _measured(loop: AtRest, name: str) -> Known:
         matrices, unfit = in_continuous_time(tangent, step, DIFFERS if is_linear else BLURRED)
         part = Continuous(**vars(matrices), step=tangent.derivatives, unfit=unfit)
     how = "saved states, to rounding" if is_linear else "saved states, by differences"
-    return Known(part=part, how=how, tangent=tangent)
+    return Known(part=part, how=how, accuracy=max(ROUNDING, apart), tangent=tangent)
+
+
+def _by_pulses(loop: AtRest, name: str, step: float) -> tuple[Tangent, bool, float]:
+    """A component by the pulses that serve it, whether it is linear, and how far its answers are known."""
+    large, less = (_by_large_pulses(loop, name, pulse) for pulse in (LARGE_PULSE, LESS))
+    if large is not None and less is not None:
+        apart = _apart(large, less, step)
+        if apart <= SAME:
+            return large, True, apart
+    small = loop.tangent(name, loop.pulse)
+    return small, False, _apart(small, loop.tangent(name, MORE * loop.pulse), step)
 
 
 def _step_of(loop: AtRest, name: str) -> float:
@@ -85,18 +101,18 @@ def _step_of(loop: AtRest, name: str) -> float:
     return whole(float(loop.period) / NANOSECONDS / 4.0)
 
 
-def _by_large_pulses(loop: AtRest, name: str) -> Tangent | None:
+def _by_large_pulses(loop: AtRest, name: str, pulse: float) -> Tangent | None:
     """A component by large pulses, where it takes them."""
     try:
-        return loop.tangent(name, LARGE_PULSE)
+        return loop.tangent(name, pulse)
     except (UsageError, SimulatorError, ValueError, np.linalg.LinAlgError):
         return None
 
 
-def _agree(small: Tangent, large: Tangent, step: float) -> bool:
-    """Whether the answers to both pulses are the same: over a step, and over several, which go through the states."""
+def _apart(one: Tangent, other: Tangent, step: float) -> float:
+    """How far the answers to two pulses are from each other: over a step, and over several, through the states."""
     answers = []
-    for tangent in (small, large):
+    for tangent in (one, other):
         by_state, by_input = tangent.derivatives(step)
         count = len(tangent.outputs)
         state, parts = by_input[count:], [by_input[:count]]
@@ -105,4 +121,4 @@ def _agree(small: Tangent, large: Tangent, step: float) -> bool:
             state = by_state[count:] @ state
         answers.append(np.array(parts))
     scale = np.abs(answers[0]).max(axis=(0, 2), initial=0.0)[:, None]
-    return bool((np.abs(answers[0] - answers[1]) <= SAME * np.maximum(scale, 1e-300)).all())
+    return float((np.abs(answers[0] - answers[1]) / np.maximum(scale, 1e-300)).max(initial=0.0))

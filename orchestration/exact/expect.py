@@ -18,9 +18,6 @@ from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.request import in_its_own_words
 
-ROUNDING, DIFFERENCES = 1e-11, 1e-7
-"""of a figure: how far it is known, by how the components are"""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Expected:
@@ -84,11 +81,11 @@ def expected_of(system: System, loops: Loops, horizon: float | None = None) -> E
         reasons = {**linear.wanted.reasons, **dict.fromkeys(linear.wanted.calls, why)}
     else:
         values, reasons = _finite(linear.wanted, means), linear.wanted.reasons
-    known = max((DIFFERENCES if "differences" in by else ROUNDING for by in linear.how.values()), default=ROUNDING)
     return Expected(
         objectives=values, reasons={name: reasons[name] for name in system.objectives if name in reasons},
-        mean_square_radius=radius, fourth_moment_radius=found.loop.fourth_moment_radius, accuracy=apart + known,
-        method=_method(linear.how, order, system, simulated=loops.simulated, horizon=horizon), period=found.period,
+        mean_square_radius=radius, fourth_moment_radius=found.loop.fourth_moment_radius,
+        accuracy=apart + linear.accuracy, period=found.period,
+        method=_method(linear.how, order, system, simulated=loops.simulated, horizon=horizon),
         horizon=horizon,
     )  # fmt: skip
 

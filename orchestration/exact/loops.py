@@ -47,6 +47,8 @@ class Linear:
     parts: Components
     how: Mapping[str, str]
     """each is known"""
+    accuracy: float
+    """of what the least known of them answers, relative"""
     wanted: Wanted
     noise: Mapping[str, float]
     """the intensities of white noise, by input"""
@@ -129,12 +131,13 @@ class Loops:
                 tangents = {name: one.tangent for name, one in known.items()}
                 start = start_of(begins, loop, parts, tangents, self._instances)
         how = {name: one.how for name, one in known.items()}
+        accuracy = max((one.accuracy for one in known.values()), default=0.0)
         for name, part in parts.items():
             if isinstance(part, Continuous) and part.unfit is not None and not self.simulated:
                 raise UsageError(
                     f"{name} is no linear system in continuous time: {part.unfit}; expected --as-simulated"
                 )
-        return Linear(parts=parts, how=how, wanted=wanted, noise=noise, start=start)
+        return Linear(parts=parts, how=how, accuracy=accuracy, wanted=wanted, noise=noise, start=start)
 
     def solved(self, system: System, *, agree: float = AGREE) -> Solved:
         """A system by finer and finer rules, until they agree; raises `UsageError` where there is too much of it."""

@@ -9,7 +9,8 @@ from orchestration.exact.objectives import Mean, means_of, quadratic, squared, v
 from orchestration.expressions.syntax import Call, names
 from orchestration.fmi.model import Model
 from orchestration.stability.linear_loop import AtRest
-from orchestration.system.model import System, component_of, variable_of
+from orchestration.system.following import AT_REST
+from orchestration.system.model import Source, System, component_of, variable_of
 
 
 class Wanted:
@@ -43,7 +44,7 @@ class Wanted:
             for signal in self._signals
         }
         for name, source in self._system.sources.items():
-            rest |= dict.fromkeys(source.signals(name), source.constant or 0.0) if source.is_held else {}
+            rest |= _at_rest(name, source)
         self._numbers = loop.simulation.parameters
         for name, calls in [*self.calls.items()]:
             try:
@@ -63,6 +64,14 @@ class Wanted:
             except UsageError as error:
                 self.reasons[name] = str(error)
         return found
+
+
+def _at_rest(name: str, source: Source) -> dict[str, float]:
+    """The signals of a source that stays where it is, whatever its noise does; none of any other."""
+    if source.signal == AT_REST:
+        places = {f"position.{axis}": source.scale * source.parameters.get(axis, 0.0) for axis in "xyz"}
+        return {each: places.get(".".join(each.split(".")[-2:]), 0.0) for each in source.signals(name)}
+    return dict.fromkeys(source.signals(name), source.constant or 0.0) if source.is_held else {}
 
 
 def _signals_of(name: str, models: Mapping[str, Model]) -> list[str]:

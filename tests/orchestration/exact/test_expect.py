@@ -14,11 +14,15 @@ from orchestration.exact.expect import Expected, expect, expected_of
 from orchestration.exact.linear import Sampled
 from orchestration.exact.loops import Loops, expect_same_steps
 from orchestration.exact.timing import tasks_of
+from orchestration.flight.hover_loop import HoverLoop
+from orchestration.quadrotor.scenario import FmuChoice, Scenario
+from orchestration.quadrotor.timing import Timing
 from orchestration.system.computers import Computer, Task
 from orchestration.system.model import SamplingOnArrival, Source
 from quadcosim import UsageError, limit
 from tests.commands import Main
 from tests.examples.common import EXAMPLES, example
+from tests.orchestration.fmi.small import needs_compiler
 
 
 def expected(name: str, **changes: Any) -> Expected:
@@ -171,6 +175,20 @@ values = [5.0]
 """
     )
     assert f"{NO_END} at 1 of 3 points" in main("sweep", study, "--out", tmp_path / "store").stderr
+
+
+@needs_compiler
+def test_what_is_nearly_linear_is_known_by_small_pulses_and_how_far() -> None:
+    """A pulse of 1 turns the quadrotor by a few microradians in a step of 11 ms: it answers nearly as a linear one."""
+    flight = Scenario(
+        controller=FmuChoice(fmu="native/UnifiedController"), plant=FmuChoice(fmu="native/QuadrotorPlant"),
+        timing=Timing(period=0.011, noise={"position": 1e-4}),
+    )  # fmt: skip
+    found = expect(flight)
+    assert found.mean_square_radius == pytest.approx(HoverLoop.of(flight).spectral_radius(0.011, 0.0) ** 2, rel=1e-6)
+    assert "plant, controller known by saved states, by differences" in found.method
+    assert 1e-11 < found.accuracy < 2e-9
+    assert found.objectives["position_rmse"] == pytest.approx(2.8758e-5, rel=1e-4)
 
 
 def test_what_a_scheduler_makes_late_is_refused_by_name() -> None:
