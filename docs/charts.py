@@ -6,6 +6,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 
 from docs import theory
@@ -80,6 +81,24 @@ def margins(constant: Array, certain: Array, breaking: Array) -> Figure:
     panel.plot(periods, 1e3 * certain, "^-", color=BLUE, label="jitter: no sequence can (Kao and Lincoln)")
     panel.set(xlabel="period [ms]", ylabel="delay, or jitter of the delay [ms]", ylim=(0.0, None))
     panel.legend()
+    return figure
+
+
+def wind(costs: Mapping[str, Array]) -> Figure:
+    """Over period and delay what a white force makes of position and torque, up to where neither has an end."""
+    figure = DOCS.figure(36.0)
+    panels = figure.subplots(1, 2, sharey=True)
+    periods, delays = 1e3 * np.array(theory.WIND_PERIODS), 1e3 * np.array(theory.WIND_DELAYS)
+    for panel, name, scale, levels, label in (
+        (panels[0], "position_rmse", 1e3, np.arange(0.209, 0.2251, 0.002), "position [mm]"),
+        (panels[1], "torque_rms", 1e3, np.array([20, 25, 30, 40, 50, 70, 100, 200, 400]), "torque [mN m]"),
+    ):
+        norm = BoundaryNorm(levels, 256, extend="both")
+        shades = panel.pcolormesh(periods, delays, scale * costs[name], norm=norm, cmap=SHADES, shading="nearest")
+        panel.contour(periods, delays, costs["radius"], [1.0], colors=[RED])
+        figure.colorbar(shades, ax=panel, label=f"rms of the {label}", ticks=levels, format="%.4g")
+        panel.set(xlabel="period [ms]")
+    panels[0].set_ylabel("delay of each command [ms]")
     return figure
 
 

@@ -54,8 +54,8 @@ def main() -> None:
     """Everything, in the order of the page."""
     began = time.perf_counter()
     sections = (
-        compared, pictures, period, limits, continuous, delay, bounds, certificates, gains, bandwidth, finite_time,
-        monte_carlo, sensitivity, agreement, processor, stalls,
+        compared, pictures, period, limits, continuous, delay, bounds, certificates, wind, gains, bandwidth,
+        finite_time, monte_carlo, sensitivity, agreement, processor, stalls,
     )  # fmt: skip
     for section in [one for one in sections if one.__name__ in sys.argv[1:] or not sys.argv[1:]]:
         print(f"\n## {section.__name__}", flush=True)
@@ -214,6 +214,24 @@ def certificates() -> list[str]:
         f"{name}: " + ", ".join(f"{_ms(a)} with {_ms(b)}" for a, b in pairs)
         for name, pairs in (("certified", found.certified), ("breaking", found.breaking))
     ]
+
+
+def wind() -> list[str]:
+    """What a white force costs about hover, exactly, over period and delay; and runs of some of it."""
+    costs = theory.costs_of_wind()
+    _save(lambda: charts.wind(costs), "wind")
+    finite = costs["radius"] < 1.0
+    lines = [f"{finite.sum()} of {finite.size} have an end"]
+    for name in theory.WIND_COSTS:
+        values = costs[name][finite]
+        lines.append(f"{name}: {values.min():.6g} to {values.max():.6g}")
+    for period, delay in theory.WIND_FLOWN:
+        for name, squares in theory.flown_in_wind(period, delay).items():
+            exact = costs[name][theory.WIND_DELAYS.index(delay), theory.WIND_PERIODS.index(period)]
+            found, width = np.sqrt(squares.mean()), 2.13 * squares.std(ddof=1) / np.sqrt(len(squares))
+            flown = f"{len(squares)} runs {found:.4g} +- {width / (2.0 * found):.2g}"
+            lines.append(f"{_ms(period)}, {_ms(delay)}: {name} {exact:.6g}; {flown}")
+    return lines
 
 
 def monte_carlo() -> list[str]:

@@ -9,13 +9,17 @@ import numpy as np
 
 import quadcosim
 from fmu_kit.trajectory import Trajectory
-from orchestration.flight.hover_loop import HoverLoop
+from orchestration.building.inputs import files_of
+from orchestration.exact.expect import expected_of
+from orchestration.exact.loops import Loops
+from orchestration.flight.hover_loop import HoverLoop, at_hover
 from orchestration.flight.local_limit import local_limit
+from orchestration.quadrotor import wiring
 from orchestration.quadrotor.scenario import FmuChoice, Scenario
 from orchestration.studies.axes import Axis
 from orchestration.studies.linked_settings import LinkedSettings
 from orchestration.studies.study import Study
-from orchestration.system.model import Parameter
+from orchestration.system.model import Parameter, Source, System
 
 Array = Any
 
@@ -166,3 +170,42 @@ def exponent_of(factors: Array, values: Array) -> tuple[float, float, float]:
 
 MARGIN_PERIODS = (0.005, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07)
 """[s]"""
+
+
+# -- what wind costs about hover, exactly ----------------------------------------------------------------------------
+
+WIND = 1e-6
+"""Intensity of a white force along each axis [N² s]: the error stays well within the boundary layer of 1 mm"""
+WIND_PERIODS = tuple(0.005 * k for k in range(1, 21))
+WIND_DELAYS = tuple(0.0025 * k for k in range(21))
+"""[s]"""
+WIND_FLOWN = ((0.01, 0.0), (0.06, 0.02))
+"""Periods and delays of runs beside [s]"""
+WIND_COSTS = ("position_rmse", "torque_rms")
+
+
+def in_wind(period: float = 0.01, delay: float = 0.0) -> System:
+    """The paper's law about hover under a white force, with the rms of its error and of its command as objectives."""
+    hover = at_hover(PAPER)
+    to = tuple(f"plant.{name}" for name in wiring.EXTERNAL_FORCE)
+    force = Source(noise=WIND, period=PAPER.timing.plant_interval, to=to)
+    asked = {**hover.objectives, "torque_rms": "rms(norm(plant.torque))"}
+    return quadcosim.changed(
+        replace(hover, sources={**hover.sources, "wind": force}, objectives=asked),
+        {"components.controller.sampling.period": period, "connections.command.delay": delay},
+    )
+
+
+def costs_of_wind() -> dict[str, Array]:
+    """By objective its exact value, shape (delays, periods), nan where it has no end; and the mean-square `radius`."""
+    loops = Loops(files_of(in_wind()).models)
+    found = [[expected_of(in_wind(T, d), loops) for T in WIND_PERIODS] for d in WIND_DELAYS]
+    costs = {name: [[each.objectives[name] for each in row] for row in found] for name in WIND_COSTS}
+    radius = np.array([[each.mean_square_radius for each in row] for row in found])
+    return {**{name: np.array(each, float) for name, each in costs.items()}, "radius": radius}
+
+
+def flown_in_wind(period: float, delay: float) -> dict[str, Array]:
+    """The squares of the same of 16 runs of 60 s."""
+    runs = [quadcosim.run(replace(in_wind(period, delay), seed=seed)).metrics for seed in range(16)]
+    return {name: np.array([run[name] for run in runs]) ** 2 for name in WIND_COSTS}

@@ -1,6 +1,7 @@
 """What the findings say from theory is what the equations do; what they measure is measured rightly."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -8,6 +9,9 @@ import pytest
 
 import quadcosim
 from docs import theory
+from orchestration.building.inputs import files_of
+from orchestration.exact.expect import expected_of
+from orchestration.exact.loops import Loops
 from orchestration.flight.hover_loop import HoverLoop
 
 
@@ -88,3 +92,25 @@ def test_a_flight_with_the_papers_exponent_decays_and_one_with_a_small_exponent_
     assert np.isnan(times[1, 2])
     assert np.isnan(rates[1, 1:]).all()
     assert 1e-3 < remains[1] < 1e-2
+
+
+@pytest.mark.parametrize(("period", "delay"), [(0.011, 0.0), (0.04, 0.0225), (0.065, 0.01)])
+def test_wind_about_hover_has_a_finite_cost_where_the_loop_is_stable_and_is_known_to_nine_digits(
+    period: float, delay: float
+) -> None:
+    """The mean-square radius against the plant's own steps; the position nearly the same everywhere."""
+    system = theory.in_wind(period, delay)
+    found = expected_of(system, Loops(files_of(system).models))
+    radius = HoverLoop.of(theory.PAPER).spectral_radius(period, delay)
+    assert found.mean_square_radius == pytest.approx(radius**2, rel=1e-6)
+    assert found.accuracy < 2e-9
+    assert found.objectives["position_rmse"] == pytest.approx(0.000215, rel=0.03)
+
+
+def test_runs_in_wind_have_the_command_that_is_expected() -> None:
+    system = theory.in_wind(0.03)
+    exact = expected_of(system, Loops(files_of(system).models)).objectives["torque_rms"]
+    found = np.sqrt(
+        np.mean([quadcosim.run(replace(system, seed=seed)).metrics["torque_rms"] ** 2 for seed in range(4)])
+    )
+    assert found == pytest.approx(exact, rel=0.02)
