@@ -7,6 +7,7 @@ pulse it is known to rounding. Any other is known by small differences, as far a
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -82,13 +83,13 @@ def _measured(loop: AtRest, name: str) -> Known:
 
 def _by_pulses(loop: AtRest, name: str, step: float) -> tuple[Tangent, bool, float]:
     """A component by the pulses that serve it, whether it is linear, and how far its answers are known."""
-    large, less = (_by_large_pulses(loop, name, pulse) for pulse in (LARGE_PULSE, LESS))
-    if large is not None and less is not None:
-        apart = _apart(large, less, step)
+    with suppress(UsageError, SimulatorError, ValueError, np.linalg.LinAlgError):  # one that takes no large pulses
+        large = loop.tangent(name, LARGE_PULSE)
+        apart = large.missed_by(LESS, step)
         if apart <= SAME:
             return large, True, apart
     small = loop.tangent(name, loop.pulse)
-    return small, False, _apart(small, loop.tangent(name, MORE * loop.pulse), step)
+    return small, False, small.missed_by(MORE * loop.pulse, step)
 
 
 def _step_of(loop: AtRest, name: str) -> float:
@@ -99,26 +100,3 @@ def _step_of(loop: AtRest, name: str) -> float:
     if not loop.simulation.instances[name].model.varies_step:
         return component.step or 0.0
     return whole(float(loop.period) / NANOSECONDS / 4.0)
-
-
-def _by_large_pulses(loop: AtRest, name: str, pulse: float) -> Tangent | None:
-    """A component by large pulses, where it takes them."""
-    try:
-        return loop.tangent(name, pulse)
-    except (UsageError, SimulatorError, ValueError, np.linalg.LinAlgError):
-        return None
-
-
-def _apart(one: Tangent, other: Tangent, step: float) -> float:
-    """How far the answers to two pulses are from each other: over a step, and over several, through the states."""
-    answers = []
-    for tangent in (one, other):
-        by_state, by_input = tangent.derivatives(step)
-        count = len(tangent.outputs)
-        state, parts = by_input[count:], [by_input[:count]]
-        for _ in range(4):
-            parts.append(by_state[:count] @ state)
-            state = by_state[count:] @ state
-        answers.append(np.array(parts))
-    scale = np.abs(answers[0]).max(axis=(0, 2), initial=0.0)[:, None]
-    return float((np.abs(answers[0] - answers[1]) / np.maximum(scale, 1e-300)).max(initial=0.0))

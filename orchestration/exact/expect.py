@@ -15,7 +15,6 @@ from orchestration.fmi.foreign import computed
 from orchestration.requests.request import Asked, asked_for
 from orchestration.stability.known_loops import LOOPS, rested
 from orchestration.system.model import System
-from orchestration.system.paths import changed
 from orchestration.system.request import in_its_own_words
 
 
@@ -70,8 +69,8 @@ def expect(asked: Asked, *, as_simulated: bool = False, horizon: float | None = 
 
 def expected_of(system: System, loops: Loops, horizon: float | None = None) -> Expected:
     """As `expect`, of a system whose FMUs are loaded in this process."""
-    found, linear = loops.solved(system), loops.linear(changed(system, system.operating_point))
-    radius, means, apart, order = found.loop.radius, found.means, found.apart, found.order
+    found = loops.solved(system)
+    linear, radius, means, apart, order = found.linear, found.loop.radius, found.means, found.apart, found.order
     if horizon is not None:
         until = loops.until(system, horizon)
         means, apart, order = until.means, until.apart, until.order

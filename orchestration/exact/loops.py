@@ -60,6 +60,7 @@ class Linear:
 class Solved:
     """A loop under its timing."""
 
+    linear: Linear
     loop: JumpLinear
     period: float
     """[s]"""
@@ -156,7 +157,9 @@ class Loops:
         if loop.radius < 1.0:
             means = {call: mean.c for call, mean in linear.wanted.means.items()}
             means |= {call: means[call] + cost for call, cost in zip(used, costs)}
-        return Solved(loop=loop, period=finest.period, means=means, apart=finest.apart, order=finest.order)
+        return Solved(
+            linear=linear, loop=loop, period=finest.period, means=means, apart=finest.apart, order=finest.order
+        )
 
     def until(self, system: System, horizon: float) -> Until:
         """The means of a system from where it begins to `horizon` [s], as `solved`."""

@@ -29,6 +29,8 @@ TURN = 1e-3
 """of the answer to a pulse on all inputs: what may differ from sample to sample"""
 FEWEST = 6
 """points of the ladder at which states are made at least"""
+LATER = 4
+"""steps over which answers to pulses of several sizes are compared"""
 LINEAR = 1e-6
 """of what a state makes of outputs, or absolute where that is smaller than 1: what the derivatives may miss of it"""
 
@@ -97,12 +99,12 @@ class Tangent(Linear):
             return
         rest, first, h = self._rest, None, self._ladder[0]
         for _ in self._ladder:
-            up, down = (self._stepped(rest, self._held + sign * self._pulse, h)[0] for sign in (1, -1))
-            answer = (up - down) / (2.0 * PULSE)
+            struck = self._outputs_after(rest, self._held + self._pulse, [h])[0]
+            calm, rest = self._stepped(rest, self._held, h)
+            answer = (struck - calm) / PULSE
             first = answer if first is None else first
             if np.abs(answer - first).max(initial=0.0) > TURN * max(1.0, np.abs(first).max(initial=0.0)):
                 raise UsageError(f"{self._fmu.name}: answers a pulse at some samples otherwise than at others")
-            rest = self._stepped(rest, self._held, h)[1]
 
     # -- what it is made of --------------------------------------------------------------------------------------
 
@@ -150,6 +152,26 @@ class Tangent(Linear):
             after, moved = (np.column_stack(c) if c else np.zeros((size, 0)) for c in (by_pair, by_input))
             self._known[key] = after @ self._inverse, moved
         return self._known[key]
+
+    def missed_by(self, pulse: float, h: float) -> float:
+        """How far answers to pulses of another size are from what it says, of the largest of each output.
+
+        Over a step of `h` [s], and over the next ones, the inputs at rest again.
+        """
+        by_state, by_input = self.derivatives(h)
+        count, sizes = len(self.outputs), pulse * np.maximum(1.0, np.abs(self._held))
+        said, state = [by_input[:count]], by_input[count:]
+        for _ in range(LATER):
+            said.append(by_state[:count] @ state)
+            state = by_state[count:] @ state
+        told = np.zeros((LATER + 1, count, len(self.inputs)))
+        for i, unit in enumerate(np.diag(sizes)):
+            struck = [self._stepped(self._rest, self._held + sign * unit, h) for sign in (1, -1)]
+            later = [self._outputs_after(state, self._held, [h] * LATER) for _, state in struck]
+            up, down = (np.vstack([first, rest]) for (first, _), rest in zip(struck, later))
+            told[:, :, i] = (up - down) / (2.0 * sizes[i])
+        scale = np.abs(told).max(axis=(0, 2), initial=0.0)[:, None]
+        return float((np.abs(told - np.array(said)) / np.maximum(scale, 1e-300)).max(initial=0.0))
 
     def coordinates_of(self, saved: bytes, time: float) -> Floats:
         """The coordinates of a saved state, to be stepped next at `time` [s], as its deviation from rest.

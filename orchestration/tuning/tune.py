@@ -20,7 +20,7 @@ from orchestration.tuning.exact import ExactFound, ExactTuning, search_exactly
 from orchestration.tuning.sought import Outcome, Sought, best_by_period
 from orchestration.tuning.tuning import Found, Tuning, search
 from orchestration.tuning.tuning_file import gains_text
-from orchestration.workers.choice import EngineChoice, chosen
+from orchestration.workers.choice import EngineChoice, alone, chosen
 from orchestration.workers.executors import RunEvaluator
 from orchestration.workers.provenance import versions
 
@@ -87,7 +87,7 @@ def tune(
     """Tune the parameters of a controller, by runs or by exact expectations.
 
     A `Tuning` flies an ensemble of starts and is judged on others: by `workers` processes and an engine as in `sweep`.
-    An `ExactTuning` flies nothing.
+    An `ExactTuning` flies nothing; it measures native FMUs where they can be had.
 
     For each period of the tuning a file of parameters is written into `out`; it says that it was made by `command`.
     What each search has found is kept in `folder`, default `results/NAME`, so that no search is done twice. `progress`
@@ -102,9 +102,10 @@ def tune(
     elif workers != 1 or engine != "auto":
         raise UsageError("--workers and --engine: expected none; a tuning by expect flies nothing")
     else:
+        exact = dataclasses.replace(tuning, base=alone(tuning.base, "auto")[0])
         with of_share(progress, "searching") as hear:
-            find = functools.partial(search_exactly, tuning)
-            done = searched(tuning, tuning.files(), folder, find, ExactFound, progress=hear, announce=announce)
+            find = functools.partial(search_exactly, exact)
+            done = searched(exact, exact.files(), folder, find, ExactFound, progress=hear, announce=announce)
     return Tuned(searches=tuple(done), written=tuple(write(tuning, done, Path(out), command)))
 
 

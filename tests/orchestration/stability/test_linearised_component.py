@@ -70,6 +70,21 @@ def test_more_states_than_the_ladder_tells_apart_are_refused_by_name() -> None:
         tangent(Line(6), 5)
 
 
+class Bent(Line):
+    """One that takes the cube of what goes in, too."""
+
+    def step(self, t: float, h: float) -> None:
+        self.kept = np.concatenate([[self.u + self.u**3], 0.9 * self.kept[:-1]])
+
+
+@pytest.mark.parametrize("samples", [1, 3])
+def test_answers_to_larger_pulses_are_missed_by_what_is_not_linear(samples: int) -> None:
+    assert tangent(Line(samples), 32).missed_by(1.0, 1.0) < 1e-9
+    bent = tangent(Bent(samples), 32)
+    assert bent.missed_by(0.1, 1.0) == pytest.approx(0.01 / 1.01, rel=1e-6)
+    assert bent.missed_by(1e-5, 1.0) < 1e-9
+
+
 def test_states_are_saved_and_put_back() -> None:
     measured = tangent(Line(3), 8)
     answers(measured, 1)
