@@ -3,10 +3,11 @@
 Times are in nanoseconds; NEVER stands where something did not happen before the end.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from orchestration.basics.simulator import Booleans, Integers
+from orchestration.recording.recording import Events
 
 NEVER = -1
 """Of what did not happen"""
@@ -104,20 +105,6 @@ class Slices:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Happening:
-    """An event of a task or a message."""
-
-    time: int
-    what: str
-    """`released`, `started`, `preempted`, `resumed`, `finished`, `missed`, `skipped`, `aborted`; `queued`,
-    `transmitted`, `retransmitted`"""
-    owner: str
-    """as COMPUTER.TASK or NETWORK.MESSAGE"""
-    number: int
-    """which job or frame"""
-
-
-@dataclass(frozen=True, kw_only=True)
 class Timeline:
     """What has become of all computers and networks of a system, up to a time."""
 
@@ -130,5 +117,5 @@ class Timeline:
     """by computer"""
     links: Mapping[str, Slices]
     """by network or, where it has several links, as `NETWORK: NODE -> switch`"""
-    happenings: Callable[[], Iterator[Happening]]
+    happenings: Callable[[], Events]
     """what happened, in order"""

@@ -1,12 +1,13 @@
 """From what the scheduler has noted to what has become of each task and message."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from orchestration.basics.simulator import Booleans, Integers
+from orchestration.computers.happenings import Happenings
 from orchestration.computers.parts import (
     ABORTED,
     BEGUN,
@@ -36,22 +37,18 @@ from orchestration.computers.results import (
     SWITCH,
     UNFINISHED,
     Frames,
-    Happening,
     Jobs,
     Slices,
     Timeline,
 )
 from orchestration.computers.results import SKIPPED as WAS_SKIPPED
+from orchestration.recording.recording import Events
 
 _OF_TASKS = (RELEASED, STARTED, PREEMPTED, RESUMED, FINISHED, ABORTED, SKIPPED, SWITCHING, INTERRUPTED, WRITTEN)
 _OF_MESSAGES = (QUEUED, BEGUN, SPOILT, PASSED)
 _ON_A_PROCESSOR = (SWITCHING, STARTED, RESUMED, PREEMPTED, FINISHED, INTERRUPTED)
 NEEDED = frozenset((*_OF_TASKS, *_OF_MESSAGES))
 """The kinds of notes that a timeline is made of"""
-_SAID = {
-    RELEASED: "released", STARTED: "started", PREEMPTED: "preempted", RESUMED: "resumed", FINISHED: "finished",
-    ABORTED: "aborted", SKIPPED: "skipped", QUEUED: "queued",
-}  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +61,11 @@ class Names:
     messages: Sequence[str]
     """as NETWORK.MESSAGE"""
     links: Sequence[str]
+
+    @property
+    def all(self) -> Sequence[str]:
+        """Of all that things happen to."""
+        return (*self.tasks, *self.messages)
 
 
 def timeline(
@@ -91,7 +93,7 @@ def timeline(
         links={
             name: _slices_of_link(of_messages, parts, k, names.messages, until) for k, name in enumerate(names.links)
         },
-        happenings=partial(_happenings, notes, parts, names, jobs, without),
+        happenings=partial(_happenings, notes, parts, names, without),
     )
 
 
@@ -185,24 +187,6 @@ def _slices(
     )
 
 
-def _happenings(
-    notes: Integers, parts: Parts, names: Names, jobs: Sequence[Jobs], without: Collection[str]
-) -> Iterator[Happening]:
-    """What happened, in order; what is missed after all else that happens at the deadline."""
-    rows: list[tuple[int, int, int, str, str, int]] = []
-    for place, (time, what, whose, which, more) in enumerate(notes.tolist()):
-        if what in _SAID:
-            owner = (names.messages if what == QUEUED else names.tasks)[whose]
-            if owner not in without:
-                rows.append((time, 0, place, _SAID[what], owner, which))
-        elif what == SPOILT:
-            rows.append((time, 0, place, "retransmitted", names.messages[whose], which))
-        elif what == PASSED and more == len(parts.messages[whose].legs) - 1:
-            rows.append((time, 0, place, "transmitted", names.messages[whose], which))
-    for name, of in zip(names.tasks, jobs):
-        if name in without:
-            continue
-        missed = of.missed.nonzero()[0].tolist()
-        rows += [(int(of.deadline[j]), 1, j, "missed", name, j) for j in missed]
-    for time, _, _, said, owner, which in sorted(rows):
-        yield Happening(time=time, what=said, owner=owner, number=which)
+def _happenings(notes: Integers, parts: Parts, names: Names, without: Collection[str]) -> Events:
+    found = Happenings(parts, names.all, without)
+    return Events(found.names, found.before(parts.stop + 1, notes))

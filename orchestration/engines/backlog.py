@@ -6,7 +6,8 @@ import numpy as np
 
 from orchestration.basics.simulator import Floats, Integers
 from orchestration.engines.at_work import AtWork
-from orchestration.recording.recording import BYTES, EVENTS, ROWS, Chunk, Events, Recorder
+from orchestration.recording.recording import BYTES, EVENTS, ROWS, Chunk, Recorder
+from orchestration.schedule.happened import Happened
 from orchestration.system.times import NANOSECONDS
 
 
@@ -73,9 +74,9 @@ class Backlog:
 
     def __init__(self, work: AtWork, tables: Tables, recorder: Recorder) -> None:
         self._work, self.tables, self._recorder = work, tables, recorder
-        self._connections = tuple(x.name for x in work.system.connections)
-        self.handed_over = False
-        """whether anything has been"""
+        self._happened = Happened(work.system)
+        self.handed_over: int | None = None
+        """up to when [ns]; None: nothing has been"""
         recorder.begin(work.columns)
 
     def pending(self) -> Chunk:
@@ -84,7 +85,7 @@ class Backlog:
         return Chunk(
             columns=self._work.columns,
             rows=self.tables.rows_with_sources(),
-            events=Events(self._connections, in_order(events)),
+            events=self._happened.with_messages(events, self._work.now),
         )
 
     def hand_over(self) -> None:
@@ -92,11 +93,12 @@ class Backlog:
         self._recorder.take(self.pending())
         self.tables.keep_events(self._past_and_later()[1])
         self.tables.keep_rows(b"")
-        self.handed_over = True
+        self.handed_over = self._work.now
+        self._happened.hand_over(self._work.now)
 
     def hand_over_rest(self) -> None:
         """At the end of the run: a recorder hears of at least one chunk."""
-        if not (self.tables.is_empty() and self.handed_over):
+        if self.handed_over is None or not self.tables.is_empty() or len(self.pending().events):
             self.hand_over()
 
     def drop_later_events(self) -> None:
@@ -105,7 +107,7 @@ class Backlog:
 
     def expect_a_row(self) -> None:
         """A run that has ended before its first row has one of where it was."""
-        if not len(self.tables.rows()) and not self.handed_over:
+        if not len(self.tables.rows()) and self.handed_over is None:
             self._work.board.row[0] = self._work.now / NANOSECONDS
             self.tables.keep_rows(self._work.board.row.tobytes())
 
@@ -117,11 +119,13 @@ class Backlog:
         """All that are not handed over."""
         return self.tables.events()
 
-    def restore(self, rows: bytes, events: Integers, *, handed_over: bool) -> None:
+    def restore(self, rows: bytes, events: Integers, *, handed_over: int | None) -> None:
         """Continue with what a paused run had."""
         self.tables.keep_rows(rows)
         self.tables.keep_events(events)
         self.handed_over = handed_over
+        if handed_over is not None:
+            self._happened.hand_over(handed_over)
 
     def _past_and_later(self) -> tuple[Integers, Integers]:
         """The events up to now, and those of messages that go out later."""
@@ -138,11 +142,3 @@ def rows_of_a_chunk(work: AtWork) -> int:
 def events_of_a_chunk() -> int:
     """How many events make a chunk whole."""
     return EVENTS
-
-
-def in_order(events: Integers) -> Integers:
-    """A table of events sorted by time, a new one."""
-    if (events[1:, 0] >= events[:-1, 0]).all():
-        return np.array(events)
-    ordered: Integers = events[np.argsort(events[:, 0], kind="stable")]
-    return ordered

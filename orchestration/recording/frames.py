@@ -26,7 +26,7 @@ def signals(recording: Recording, about: About) -> "pd.DataFrame":
 
 
 def events(recording: Recording) -> "pd.DataFrame":
-    """A row for each event in order of time: `time` [s], `event`, `what` (the connection) and `sample` (its index)."""
+    """A row for each event in order of time: `time` [s], `event`, `what` it happened to and `sample`, its index."""
     import pandas as pd
 
     table = pd.concat([_events(chunk.events) for chunk in recording.chunks(("time",))], ignore_index=True)

@@ -17,20 +17,25 @@ BYTES = 2**27
 
 
 class Event(NamedTuple):
-    """Something that happened to one message."""
+    """Something that happened to one message, or to one job of a task."""
 
     time: int
     """[ns]"""
     kind: str
-    """sampled, sent, arrived or lost"""
+    """One of `KINDS`"""
     what: str
-    """name of the connection"""
+    """The name of the connection; of what a computer or a network does, COMPUTER.TASK or NETWORK.MESSAGE"""
     sample: int
-    """index of the message"""
+    """The index of the message, or of the job or frame"""
 
 
-KINDS = ("sampled", "sent", "arrived", "lost")
-SAMPLED, SENT, ARRIVED, LOST = range(len(KINDS))
+KINDS = (
+    "sampled", "sent", "arrived", "lost",
+    "released", "started", "preempted", "resumed", "finished", "missed", "skipped", "aborted",
+    "queued", "transmitted", "retransmitted",
+)  # fmt: skip
+"""Of messages of connections; of jobs of tasks; and of frames of messages over networks"""
+SAMPLED, SENT, ARRIVED, LOST = range(4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,9 +43,9 @@ class Events(Sequence[Event]):
     """Events in order, as columns: one object for all of them, where a million are no rarity."""
 
     names: tuple[str, ...]
-    """of connections"""
+    """what they happen to"""
     table: Integers
-    """shape (n, 4): time [ns], index in `KINDS`, index in `names`, index of the message"""
+    """shape (n, 4): time [ns], index in `KINDS`, index in `names`, index of the message, job or frame"""
 
     @classmethod
     def of(cls, events: Iterable[Event]) -> "Events":
@@ -51,7 +56,7 @@ class Events(Sequence[Event]):
         return cls(names, np.array(rows, dtype=np.int64).reshape(-1, 4))
 
     def are(self, kind: str, what: str | None = None) -> npt.NDArray[np.bool_]:
-        """Which are of a kind, and of that connection if it is given; shape (n,)."""
+        """Which are of a kind, and happen to `what` if it is given; shape (n,)."""
         found: npt.NDArray[np.bool_] = self.table[:, 1] == KINDS.index(kind)
         if what is not None:
             found &= self.table[:, 2] == (self.names.index(what) if what in self.names else -1)

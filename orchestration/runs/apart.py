@@ -8,17 +8,18 @@ from pathlib import Path
 
 from orchestration.basics import scratch
 from orchestration.basics.interrupt import interrupts_held_back
-from orchestration.engines.backlog import in_order
 from orchestration.engines.engine import Engine
 from orchestration.engines.room import Left, left_in
 from orchestration.processes import subprocesses
 from orchestration.processes.child import Child, Died
 from orchestration.processes.limits import UNLIMITED
-from orchestration.recording.recording import Chunk, Events, Recorder
+from orchestration.recording.recording import Chunk, Recorder
 from orchestration.runs.meant import Course, Flown, Meant, Progress, RunLost, result_of
 from orchestration.runs.result import Result
+from orchestration.schedule.happened import Happened
 from orchestration.schedule.streams import Streams
 from orchestration.system.request import Request
+from orchestration.system.times import NANOSECONDS
 
 _MESSAGES = logging.getLogger("quadcosim")
 _PATIENCE = 5.0
@@ -147,7 +148,7 @@ def _lost(meant: Meant, heard: _Heard, room: Path, why: str, started: float) -> 
         elif len(left.rows) or heard.recorded_until >= 0.0:
             called = []
         if len(left.rows) and left.rows[-1, 0] > heard.recorded_until:
-            heard.take(_chunk(meant, heard.columns, left))
+            heard.take(_chunk(meant, heard, left))
     end = heard.recorded_until
     who = [f"{name} ({meant.models[name].name})" for name in called]
     which = "" if not who else f", {doing} {who[0]}" if len(who) == 1 else f", {doing} one of {', '.join(who)}"
@@ -162,11 +163,14 @@ def _lost(meant: Meant, heard: _Heard, room: Path, why: str, started: float) -> 
     return RunLost(text, result_of(meant, found, heard.recorder, time.perf_counter() - started, interrupted=False))
 
 
-def _chunk(meant: Meant, columns: tuple[str, ...], left: Left) -> Chunk:
+def _chunk(meant: Meant, heard: _Heard, left: Left) -> Chunk:
     """Rows and events that the compiled loop has not handed over, with what sources say."""
-    rows, system = left.rows, meant.system
+    rows, system, columns = left.rows, meant.system, heard.columns
     for name, values in meant.sources(Streams(system.seed, system.streams)).items():
         places = [columns.index(signal) for signal in system.sources[name].signals(name)]
         rows[:, places] = values.over(rows[:, 0])
-    names = tuple(x.name for x in system.connections)
-    return Chunk(columns=columns, rows=rows, events=Events(names, in_order(left.events)))
+    happened = Happened(system)
+    if heard.recorded_until >= 0.0:
+        happened.hand_over(round(heard.recorded_until * NANOSECONDS))
+    events = happened.with_messages(left.events, round(float(rows[-1, 0]) * NANOSECONDS))
+    return Chunk(columns=columns, rows=rows, events=events)

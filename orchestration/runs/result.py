@@ -123,7 +123,7 @@ class Result:
 
     @cached_property
     def events(self) -> tuple[Event, ...]:
-        """All that happened to messages, in order of time."""
+        """All that happened to messages, jobs of tasks and frames of networks, in order of time."""
         return tuple(event for chunk in self.recording.chunks(("time",)) for event in chunk.events)
 
     @property

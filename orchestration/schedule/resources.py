@@ -9,6 +9,7 @@ import numpy as np
 
 from orchestration.basics.simulator import Integers
 from orchestration.computers.compiled import scheduler
+from orchestration.computers.happenings import Happenings
 from orchestration.computers.parts import (
     ABORT,
     EARLIEST_DEADLINE,
@@ -120,8 +121,11 @@ class Resources:
         at_work.run(LATER)
         dues = [each.message.due for each in self._over]
         deadlines = [LATER if due is None else nanoseconds(due) for due in dues]
-        alone = frozenset(self._alone)
-        return timeline(self.parts, self._names, deadlines, at_work.taken(), without=alone)
+        return timeline(self.parts, self._names, deadlines, at_work.taken(), without=self._alone)
+
+    def happenings(self) -> Happenings:
+        """What makes events of the notes of a scheduler of these parts."""
+        return Happenings(self.parts, self._names.all, without=self._alone)
 
     # -- tasks -----------------------------------------------------------------------------------------------------
 

@@ -82,7 +82,7 @@ def test_every_begin_and_every_resume_costs_a_switch_and_one_that_is_interrupted
     ]  # fmt: skip
     assert timeline.jobs["1"].started.tolist() == [11]
     assert timeline.jobs["1"].preemptions.tolist() == [1]
-    said = [(each.time, each.what) for each in timeline.happenings() if each.owner == "1"]
+    said = [(each.time, each.kind) for each in timeline.happenings() if each.what == "1"]
     assert said == [(1, "released"), (11, "started"), (15, "preempted"), (58, "resumed"), (74, "finished")]
 
 

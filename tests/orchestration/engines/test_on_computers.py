@@ -12,9 +12,12 @@ from hypothesis import strategies as st
 
 from orchestration.basics.errors import UsageError
 from orchestration.engines.batch.batches import Batches
+from orchestration.recording.recording import KINDS
+from orchestration.runs.pause import fly_until, resume
+from orchestration.runs.run_directory import load_run
 from orchestration.schedule import cursor
 from orchestration.schedule.resources import timeline_of
-from orchestration.system.computers import Computer, Task
+from orchestration.system.computers import Computer, Message, Network, Task
 from orchestration.system.distribution import Distribution
 from orchestration.system.model import Component, Connection, Criterion, Sampling, System
 from orchestration.system.paths import changed
@@ -91,7 +94,9 @@ def test_one_task_alone_that_takes_no_time_flies_the_bits_of_sampling(
         fmu, Component(fmu="stub"), command=command, streams={"computers.one.tasks.control.jitter": 3},
         computers=on_a_computer(period=0.02, offset=0.003, jitter=0.01),
     )  # fmt: skip
-    assert_the_same(both(by_task, load=kept.load), both(by_sampling, load=kept.load))
+    found, expected = both(by_task, load=kept.load), both(by_sampling, load=kept.load)
+    assert found.rows.tobytes() == expected.rows.tobytes()
+    assert [event for event in found.events if event.what != "one.control"] == list(expected.events)
 
 
 def test_a_constant_time_of_execution_flies_the_bits_of_a_delay(fmu: Path, kept: Kept) -> None:
@@ -153,6 +158,38 @@ def test_a_component_of_fixed_steps_beside_a_task_needs_to_move(tmp_path: Path, 
                 UsageError, match=r"^computers\.one\.tasks\.control: components\.plant takes steps of 0\.01"
             ):
                 ran(with_it, "python")
+
+
+CROWDED = {
+    "one": Computer(tasks={
+        "control": Task(component="controller", period=0.02, priority=2, execution=Distribution(uniform=(0.0, 0.02))),
+        "load": Task(period=0.05, execution=0.01),
+    }),
+}  # fmt: skip
+BUS = {
+    "bus": Network(kind="can", bit_rate=1e4, error=0.2, messages={
+        "command": Message(connection="commanded", bytes=2, identifier=1),
+        "load": Message(period=0.1, bytes=1, identifier=0),
+    }),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("engine", ["python", "compiled"])
+def test_a_run_tells_what_becomes_of_tasks_and_frames_beside_messages_and_so_do_its_files_after_a_pause(
+    fmu: Path, engine: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("orchestration.engines.backlog.ROWS", 30)  # before the pause chunks are handed over
+    what = loop(fmu, Component(fmu="stub"), computers=CROWDED, networks=BUS)
+    messages = [x.name for x in what.connections]
+    assert fly_until(what, 0.6, tmp_path / "half", engine=engine, in_process=True) is None
+    resume(tmp_path / "half", tmp_path / "whole", engine=engine, in_process=True)
+    events = load_run(tmp_path / "whole").events
+    assert events == ran(what, engine).events
+    assert [event for event in events if event.what not in messages] == [*timeline_of(what).happenings()]
+    assert {event.kind for event in events} == set(KINDS) - {"skipped", "aborted"}
+    assert [event.time for event in events] == sorted(event.time for event in events)
+    at_once = [(event.kind, event.what) for event in events if event.time == 10_000_000]
+    assert at_once == [("finished", "one.load"), ("started", "one.control"), ("sampled", "measured")]
 
 
 def test_a_system_without_components_is_not_run() -> None:

@@ -1,0 +1,70 @@
+"""The events of a run: what its engine notes of messages, beside what becomes of tasks and frames meanwhile."""
+
+import numpy as np
+
+from orchestration.basics.simulator import Integers
+from orchestration.computers.compiled import scheduler
+from orchestration.computers.happenings import NEEDED
+from orchestration.recording.recording import Events
+from orchestration.schedule.resources import Resources
+from orchestration.schedule.streams import Streams
+from orchestration.system.model import System
+from orchestration.system.times import nanoseconds
+
+_AT_ONCE = 1_000_000_000
+"""[ns] of events that nobody wants are gone through at a time"""
+
+
+class _OnComputers:
+    """What happens to the tasks and frames of a system, as far as it was asked for."""
+
+    def __init__(self, system: System) -> None:
+        resources = Resources(system, Streams(system.seed, system.streams), nanoseconds(system.stop_time))
+        self._scheduler, self._happenings = scheduler(resources.parts, NEEDED), resources.happenings()
+        self.names = self._happenings.names
+        self.reached = -1
+
+    def up_to(self, time: int) -> Integers:
+        """What happens after that which was asked for last up to `time` [ns]."""
+        self.reached = time
+        self._scheduler.run(time + 1)
+        return self._happenings.before(time + 1, self._scheduler.taken())
+
+
+class Happened:
+    """Events that are not handed over yet."""
+
+    def __init__(self, system: System) -> None:
+        connections = tuple(x.name for x in system.connections)
+        self._on_computers = _OnComputers(system) if system.computers or system.networks else None
+        self._shift = np.array([0, 0, len(connections), 0])
+        self._names = connections if self._on_computers is None else (*connections, *self._on_computers.names)
+        self._kept: Integers = np.zeros((0, 4), dtype=np.int64)
+
+    def with_messages(self, events: Integers, time: int) -> Events:
+        """Those of tasks and frames up to `time` [ns] and `events` of messages, as a table of `Events`, in order.
+
+        At one instant computers and networks come first.
+        """
+        if self._on_computers is not None:
+            found = self._on_computers.up_to(time)
+            self._kept = np.concatenate([self._kept, found + self._shift])
+            events = np.concatenate([self._kept, events])
+        return Events(self._names, _in_order(events))
+
+    def hand_over(self, time: int) -> None:
+        """Those up to `time` [ns] are wanted no more."""
+        if self._on_computers is not None:
+            begin = self._on_computers.reached
+            for until in range(begin, time, max(_AT_ONCE, (time - begin) // 1000)):
+                self._on_computers.up_to(until)
+            self._on_computers.up_to(time)
+            self._kept = self._kept[:0]
+
+
+def _in_order(events: Integers) -> Integers:
+    """A table of events sorted by time, a new one."""
+    if (events[1:, 0] >= events[:-1, 0]).all():
+        return np.array(events)
+    ordered: Integers = events[np.argsort(events[:, 0], kind="stable")]
+    return ordered

@@ -1,0 +1,61 @@
+"""The events of tasks and frames are told as a run goes on, the same whenever one asks."""
+
+from itertools import pairwise
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orchestration.recording.recording import Event
+from orchestration.schedule.happened import Happened
+from orchestration.schedule.resources import timeline_of
+from orchestration.system.computers import Computer, Task
+from orchestration.system.model import System
+from tests.orchestration.engines.systems_on_computers import systems_on_computers
+
+NO_MESSAGES = np.zeros((0, 4), dtype=np.int64)
+
+
+@settings(max_examples=100, derandomize=True, deadline=None)
+@given(systems_on_computers(), st.lists(st.tuples(st.floats(0.0, 1.0), st.booleans()), max_size=8))
+def test_events_are_the_same_in_parts_of_any_length_and_behind_any_time(
+    system: System, parts: list[tuple[float, bool]]
+) -> None:
+    """Some parts are handed over without anybody asking for them, as on the way to where a run was paused."""
+    stop, whole = round(system.stop_time * 1e9), list(timeline_of(system).happenings())
+    happened, found, expected = Happened(system), list[Event](), list[Event]()
+    ends = [(-1, True), *sorted((round(share * stop), is_asked) for share, is_asked in parts), (stop, True)]
+    for (begin, _), (end, is_asked) in pairwise(ends):
+        if is_asked:
+            found += happened.with_messages(NO_MESSAGES, end)
+            expected += [event for event in whole if begin < event.time <= end]
+        happened.hand_over(end)
+    assert found == expected
+
+
+@settings(max_examples=100, derandomize=True, deadline=None)
+@given(systems_on_computers())
+def test_what_is_told_is_what_became_of_each_job_and_frame(system: System) -> None:
+    timeline = timeline_of(system)
+    found = {(event.kind, event.what, event.sample): event.time for event in timeline.happenings()}
+
+    def told(kind: str, what: str) -> dict[int, int]:
+        return {sample: time for (a, b, sample), time in found.items() if (a, b) == (kind, what)}
+
+    for name, jobs in timeline.jobs.items():
+        assert told("finished", name) == {int(k): int(jobs.ended[k]) for k in np.flatnonzero(jobs.done)}
+        assert told("missed", name) == {int(k): int(jobs.deadline[k]) for k in np.flatnonzero(jobs.missed)}
+        begun = dict(enumerate(jobs.released.tolist()))
+        assert told("released", name) | told("skipped", name) == begun
+    for name, frames in timeline.frames.items():
+        assert told("queued", name) == dict(enumerate(frames.queued.tolist()))
+        assert told("transmitted", name) == {int(k): int(frames.ended[k]) for k in np.flatnonzero(frames.done)}
+
+
+def test_of_a_starved_task_only_what_is_not_late_yet_is_kept_in_mind() -> None:
+    tasks = {"all": Task(period=0.001, execution=0.001), "none": Task(period=0.001, priority=2)}
+    happened = Happened(System(stop_time=10.0, computers={"one": Computer(tasks=tasks)}))
+    found = happened.with_messages(NO_MESSAGES, 9_999_500_000)
+    missed = found.table[found.are("missed", "one.none")]
+    assert missed[:, 3].tolist() == list(range(9999))
+    assert missed[:, 0].tolist() == [1_000_000 * (k + 1) for k in range(9999)]
