@@ -26,7 +26,8 @@ from orchestration.stability.delay_bounds import SampledLoop, certain_jitter
 from orchestration.stability.known_loops import LOOPS
 from orchestration.stability.linear_loop import at_rest
 from orchestration.system.distribution import lowest
-from orchestration.system.model import variable_of
+from orchestration.system.model import System, variable_of
+from orchestration.system.placement import carried, tasks_of
 from orchestration.system.request import Request, in_its_own_words, system_meant
 from orchestration.system.times import NANOSECONDS
 
@@ -98,10 +99,27 @@ def _measured(request: Request) -> Loop:
     try:
         with in_its_own_words(request):
             system = request.as_system() if known is None else known.at_rest(request)
+            _expect_unshared(system)
             with at_rest(system, instances) as rest:
                 return loop_of(rest)
     finally:
         instances.close()
+
+
+def _expect_unshared(system: System) -> None:
+    """Raise `UsageError` for what a scheduler decides, saying what to ask for instead."""
+    of_delays = "a certificate is of delays, whoever causes them; expected"
+    for name, task in tasks_of(system).items():
+        sent = next((x.name for x in system.connections if x.sender == name), "NAME")
+        raise UsageError(
+            f"{task.place}: {of_delays} a sampling of {name} in its place, whose jitter is the start_jitter of "
+            f"quadcosim schedule, and --of connections.{sent}.delay_jitter, which is its latency"
+        )
+    for name, message in carried(system).items():
+        raise UsageError(
+            f"{message.place}: {of_delays} {name} without it, and --of connections.{name}.delay_jitter, which is the "
+            "response of quadcosim schedule"
+        )
 
 
 def varying_of(request: Request, of: str) -> Varying:

@@ -191,23 +191,30 @@ def expect_rows(system: System, tasks: Sequence[Task], links: Sequence[Link]) ->
     (step,) = steps
     single = len(continuous) == 1
     plan = Plan(system)
+
+    def on_grid_all(*times: Fraction) -> bool:
+        return all(time % step == 0 for time in times)
+
     for i, task in enumerate(tasks):
-        on_grid = task.jitter.is_certain and task.offset % step == 0 and task.period % step == 0
+        regular = on_grid_all(task.period, *task.offsets)
+        on_grid = task.jitter.is_certain and regular
         measures = any(x.receiver == i and x.is_measured and not x.is_read_ahead for x in links)
         if not on_grid and not (single and measures):
             raise UsageError(
                 f"--as-simulated: {task.name} samples between the steps of {', '.join(continuous)}, which are not all "
                 "measured then"
             )
-        if not task.jitter.is_certain and (task.offset % step or task.period % step):
+        if not task.jitter.is_certain and not regular:
             raise UsageError(f"--as-simulated: {task.name} has jitter, and is due between the steps of {continuous[0]}")
     for i, link in enumerate(links):
         if i in plan.wires:
             continue
         sender = tasks[link.sender] if link.sender is not None else None
-        punctual = sender is None or (sender.jitter.is_certain and sender.offset % step == sender.period % step == 0)
-        on_grid = punctual and link.late.is_certain and Fraction(link.delay, ATTOSECONDS) % step == 0
-        if not on_grid and (not single or (link.sender is not None and link.receiver is not None)):
+        punctual = sender is None or (sender.jitter.is_certain and on_grid_all(sender.period, *sender.offsets))
+        lateness = [Fraction(link.delay + each, ATTOSECONDS) for each in link.behind if each is not None]
+        on_grid = punctual and link.late.is_certain and on_grid_all(*link.posts, *lateness)
+        read_later = system.components[system.connections[i].receiver].sampling is not None and not link.is_measured
+        if not on_grid and (not single or read_later):
             raise UsageError(f"--as-simulated: {link.name} arrives between the steps of {', '.join(continuous)}")
         if link.is_read_ahead and Fraction(link.longest, ATTOSECONDS) % step:
             raise UsageError(f"--as-simulated: {link.name} is measured between the steps of {', '.join(continuous)}")

@@ -33,11 +33,12 @@ LONGEST_AGE = 100
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """What samples: at offset + k period + jitter."""
+    """What samples: at each offset + k period + jitter."""
 
     name: str
     period: Fraction
-    offset: Fraction = Fraction(0)
+    offsets: tuple[Fraction, ...] = (Fraction(0),)
+    """in order"""
     jitter: Chance = CERTAIN
 
 
@@ -54,6 +55,11 @@ class Link:
     """the task that receives, likewise"""
     step: Fraction | None = None
     """from message to message, where no task sends or receives"""
+    posts: tuple[Fraction, ...] = (Fraction(0),)
+    """when messages go in each step"""
+    behind: tuple[int | None, ...] = (0,)
+    """for each offset of its sender, or of `posts`, how long it is on its way before its delay counts; None: nothing is
+    sent"""
     delay: int = 0
     late: Chance = CERTAIN
     loss: float = 0.0
@@ -65,7 +71,7 @@ class Link:
     @property
     def longest(self) -> int:
         """The longest delay."""
-        return self.delay + self.late.highest
+        return max((each for each in self.behind if each is not None), default=0) + self.delay + self.late.highest
 
     @property
     def is_measured(self) -> bool:
@@ -119,6 +125,8 @@ class Item(NamedTuple):
     of: int
     token: int
     """of its message; -1: it has none"""
+    place: int = 0
+    """of a sample or a posted message, which of those of a period it is"""
 
 
 ARRIVES, POSTS, MEASURES, SAMPLES = 1, 2, 3, 4
@@ -144,7 +152,7 @@ class State:
 
 
 Mode = tuple[
-    tuple[tuple[int, int, int, str, int, int], ...],
+    tuple[tuple[int, int, int, str, int, int, int], ...],
     tuple[int, ...],
     tuple[bool, ...],
     tuple[tuple[int, int | None], ...],
@@ -182,33 +190,35 @@ class Clockwork:
 
     # -- what begins when ----------------------------------------------------------------------------------------
 
-    def _cuts(self) -> dict[int, list[tuple[str, int]]]:
-        found: dict[int, list[tuple[str, int]]] = {}
+    def _cuts(self) -> dict[int, list[tuple[str, int, int]]]:
+        found: dict[int, list[tuple[str, int, int]]] = {}
         for i, task in enumerate(self.tasks):
-            for k in range(int(self.period / task.period)):
-                time = _attoseconds(task.offset + k * task.period) - self._ahead[i]
-                found.setdefault(time % self.whole, []).append(("sample", i))
+            for time, place in self._all(task.period, task.offsets):
+                found.setdefault((time - self._ahead[i]) % self.whole, []).append(("sample", i, place))
         for i, link in enumerate(self.links):
-            for k in range(int(self.period / link.step) if link.step is not None else 0):
-                assert link.step is not None
-                found.setdefault(_attoseconds(k * link.step), []).append(("post", i))
+            for time, place in self._all(link.step, link.posts) if link.step is not None else ():
+                found.setdefault(time, []).append(("post", i, place))
         for i, grid in enumerate(self._grids):
-            for k in range(int(self.period / grid)):
-                found.setdefault(_attoseconds(k * grid), []).append(("tick", i))
+            for time, place in self._all(grid, (Fraction(0),)):
+                found.setdefault(time, []).append(("tick", i, place))
         return found or {0: []}
+
+    def _all(self, period: Fraction, offsets: Sequence[Fraction]) -> Iterator[tuple[int, int]]:
+        """The times of offset + k period in the common one, each with the place of its offset."""
+        for k in range(int(self.period / period)):
+            for place, offset in enumerate(offsets):
+                yield _attoseconds(offset + k * period), place
 
     def _kinks(self) -> list[int]:
         """Where what comes of an instant may bend, within a period: where others sample, where messages may wait."""
         found: set[int] = set(self.cuts)
         for i, task in enumerate(self.tasks):
-            for k in range(int(self.period / task.period)):
-                nominal = _attoseconds(task.offset + k * task.period)
+            for nominal, place in self._all(task.period, task.offsets):
                 ends = {nominal, nominal + task.jitter.lowest, nominal + task.jitter.highest}
                 for link in self.links:
                     if link.sender == i and not link.is_measured:
-                        ends |= {
-                            end + link.delay + late for end in ends for late in (link.late.lowest, link.late.highest)
-                        }
+                        late = link.delay + (link.behind[place] or 0)
+                        ends |= {end + late + more for end in ends for more in (link.late.lowest, link.late.highest)}
                 found |= {end % self.whole for end in ends}
         return sorted(found)
 
@@ -265,7 +275,7 @@ class Clockwork:
         `UsageError` for a task that does not begin within its first period.
         """
         for task in self.tasks:
-            if task.offset >= task.period:
+            if max(task.offsets, default=0) >= task.period:
                 raise UsageError(
                     f"components.{task.name}.sampling.offset: expected less than its period, {float(task.period):g} s, "
                     "for a horizon"
@@ -277,20 +287,22 @@ class Clockwork:
                 probability=math.prod(shares), piece=Piece.start(self._effects.size, self._effects.costs),
             )  # fmt: skip
             states = [state]
-            for which, nominal in self._read_before():
-                states = [after for each in states for after in self._due(each, which, nominal)]
+            for which, nominal, place in self._read_before():
+                states = [after for each in states for after in self._due(each, which, nominal, place)]
             for each in states:
                 for reached in self._until(each, min(self.cuts[0], end)):
                     yield self._mode(reached)
 
-    def _read_before(self) -> Iterator[tuple[int, int]]:
-        """Tasks and nominal times of the samples whose measurements may be due before 0."""
+    def _read_before(self) -> Iterator[tuple[int, int, int]]:
+        """Tasks, nominal times and places of the samples whose measurements may be due before 0."""
         for i, task in enumerate(self.tasks):
             for k in itertools.count():
-                nominal = _attoseconds(task.offset + k * task.period)
-                if nominal >= self._ahead[i]:
+                if not task.offsets or _attoseconds(task.offsets[0] + k * task.period) >= self._ahead[i]:
                     break
-                yield i, nominal
+                for place, offset in enumerate(task.offsets):
+                    nominal = _attoseconds(offset + k * task.period)
+                    if nominal < self._ahead[i]:
+                        yield i, nominal, place
 
     def onward(self, i: int, mode: Mode, until: int | None = None) -> Iterator[tuple[Mode, float, Piece]]:
         """From a mode at a cut: modes at the next one, or at a time before it, how likely, and by what."""
@@ -300,8 +312,8 @@ class Clockwork:
         state = State(
             time=begin,
             items=tuple(
-                Item(begin + time if time != NEVER else NEVER, phase, rank, birth, kind, of, token)
-                for birth, (time, phase, rank, kind, of, token) in enumerate(items)
+                Item(begin + time if time != NEVER else NEVER, phase, rank, birth, kind, of, token, place)
+                for birth, (time, phase, rank, kind, of, token, place) in enumerate(items)
             ),
             tokens=tuple(enumerate(sizes)),
             bursts=bursts,
@@ -311,28 +323,28 @@ class Clockwork:
             piece=Piece.start(self._effects.size + sum(sizes), self._effects.costs),
         )
         states = [state]
-        for kind, which in self._begins[begin]:
-            states = [after for each in states for after in self._begun(each, kind, which)]
+        for kind, which, place in self._begins[begin]:
+            states = [after for each in states for after in self._begun(each, kind, which, place)]
         for each in states:
             for end in self._until(each, until):
                 yield self._mode(end)
 
-    def _begun(self, state: State, kind: str, which: int) -> Iterator[State]:
+    def _begun(self, state: State, kind: str, which: int, place: int) -> Iterator[State]:
         """What begins at a cut is put among what is to happen."""
         if kind == "post":
-            yield self._with(state, state.time, POSTS, which, "post", which)
+            yield self._with(state, state.time, POSTS, which, "post", which, place=place)
         elif kind == "tick":
             yield replace(state, piece=self._effects.ticked(state.piece, which))
         else:
-            yield from self._due(state, which, state.time + self._ahead[which])
+            yield from self._due(state, which, state.time + self._ahead[which], place)
 
-    def _due(self, state: State, task: int, nominal: int) -> Iterator[State]:
+    def _due(self, state: State, task: int, nominal: int, place: int) -> Iterator[State]:
         for late, p in self.tasks[task].jitter.draws(nominal, self._between, self._order):
-            yield from self._begun_sample(_likely(state, p), task, nominal + late)
+            yield from self._begun_sample(_likely(state, p), task, nominal + late, place)
 
-    def _begun_sample(self, state: State, task: int, time: int) -> Iterator[State]:
+    def _begun_sample(self, state: State, task: int, time: int, place: int) -> Iterator[State]:
         """A sample is known to be at a time: so are the measurements for it, and when what waits for it arrives."""
-        states = [self._with(state, time, SAMPLES, 2 * task + 1, "sample", task)]
+        states = [self._with(state, time, SAMPLES, 2 * task + 1, "sample", task, place=place)]
         for i, link in enumerate(self.links):
             if link.is_read_ahead and link.receiver == task:
                 states = [after for each in states for after in self._begun_measurement(each, i, time)]
@@ -378,7 +390,7 @@ class Clockwork:
         if item.kind == "arrive":
             yield self._arrived(state, item.of, item.token)
         elif item.kind == "sample":
-            yield from self._sampled(state, item.of)
+            yield from self._sampled(state, item.of, item.place)
         else:  # a message of what is in continuous time, measured or posted
             for lost, likely in self._losses(state, item.of):
                 if lost:
@@ -388,9 +400,9 @@ class Clockwork:
                     rank = 2 * (self.links[item.of].receiver or 0)
                     yield self._with(taken, state.time + item.token, SAMPLES, rank, "arrive", item.of, token)
                 else:
-                    yield from self._sent(likely, item.of)
+                    yield from self._sent(likely, item.of, item.place)
 
-    def _sampled(self, state: State, task: int) -> Iterator[State]:
+    def _sampled(self, state: State, task: int, place: int) -> Iterator[State]:
         states = [state]
         for i, link in enumerate(self.links):
             if link.is_measured and not link.is_read_ahead and link.receiver == task:
@@ -405,7 +417,7 @@ class Clockwork:
                     after
                     for s in states
                     for lost, each in self._losses(s, i)
-                    for after in ([each] if lost else self._sent(each, i))
+                    for after in ([each] if lost else self._sent(each, i, place))
                 ]
         yield from states
 
@@ -424,10 +436,14 @@ class Clockwork:
             found.append((lost, replace(_likely(state, probability), bursts=bursts)))
         return found
 
-    def _sent(self, state: State, i: int) -> Iterator[State]:
+    def _sent(self, state: State, i: int, place: int) -> Iterator[State]:
         """A message that is not lost."""
         link = self.links[i]
-        sent: int | None = state.time
+        behind = link.behind[place]
+        if behind is None:
+            yield state
+            return
+        sent: int | None = state.time + behind
         if link.jacobi and link.sender is not None:
             sent = next((x.time for x in state.items if x.kind == "sample" and x.of == link.sender), None)
         if sent is None:
@@ -450,9 +466,11 @@ class Clockwork:
 
     # -- what it does to the state -------------------------------------------------------------------------------
 
-    def _with(self, state: State, time: int, phase: int, rank: int, kind: str, of: int, token: int = -1) -> State:
+    def _with(
+        self, state: State, time: int, phase: int, rank: int, kind: str, of: int, token: int = -1, place: int = 0
+    ) -> State:
         items = list(state.items)
-        bisect.insort(items, Item(time, phase, rank, state.born, kind, of, token))
+        bisect.insort(items, Item(time, phase, rank, state.born, kind, of, token, place))
         return replace(state, items=tuple(items), born=state.born + 1)
 
     def _taken(self, state: State, i: int) -> tuple[State, int]:
@@ -490,7 +508,7 @@ class Clockwork:
         piece = state.piece if rows == list(range(at)) else state.piece.mapped(np.eye(at)[rows])
         items = tuple(
             (x.time - state.time if x.time != NEVER else NEVER, x.phase, x.rank, x.kind, x.of,
-             x.token if x.kind == "measure" or x.token < 0 else order.index(x.token))
+             x.token if x.kind == "measure" or x.token < 0 else order.index(x.token), x.place)
             for x in state.items
         )  # fmt: skip
         holds = tuple(self._age(i, state.time - at, gap) for i, (at, gap) in enumerate(state.holds))

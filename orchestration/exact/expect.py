@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from orchestration.basics.errors import UsageError
 from orchestration.building.inputs import files_of
 from orchestration.exact.loops import Loops
+from orchestration.exact.shared import is_shared
 from orchestration.exact.wanted import Wanted
 from orchestration.expressions.syntax import Call
 from orchestration.fmi.foreign import computed
@@ -109,6 +110,8 @@ def _method(
     said += [f"{', '.join(listed)} known by {by}" for by, listed in known.items()]
     if horizon is not None:
         said.append(f"from its initial conditions to {horizon:g} s")
+    if is_shared(system):
+        said.append("computers and networks by their timetable, which repeats itself")
     if simulated:
         said.append("noise held, steps and means over rows as in a run")
     if order is not None:

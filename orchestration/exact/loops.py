@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -14,20 +15,24 @@ import numpy as np
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
 from orchestration.exact.as_simulated import SimulatedEffects, expect_rows
-from orchestration.exact.clockwork import ATTOSECONDS, Clockwork, Task
+from orchestration.exact.clockwork import ATTOSECONDS, Clockwork, Link, Task
 from orchestration.exact.components import Measured
 from orchestration.exact.effects import LoopEffects, TrueEffects
 from orchestration.exact.horizon import costs_until
 from orchestration.exact.linear import Components, Continuous, Sampled
 from orchestration.exact.moments import JumpLinear
+from orchestration.exact.repeating import foretold
+from orchestration.exact.shared import by_itself
 from orchestration.exact.start import Start, start_of
 from orchestration.exact.timing import links_of, tasks_of
 from orchestration.exact.wanted import Wanted
 from orchestration.expressions.syntax import Call
 from orchestration.fmi.model import Model
 from orchestration.fmi.reuse import Instances
+from orchestration.schedule.plan import Plan
 from orchestration.stability.linear_loop import Beside, at_rest
-from orchestration.system.model import System, component_of, is_foreseen
+from orchestration.stability.operating_point import true_period
+from orchestration.system.model import Sampling, System, component_of, is_foreseen
 from orchestration.system.paths import changed
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 from orchestration.system.written import tables_of
@@ -113,13 +118,13 @@ class Loops:
 
         With where `begins` does by itself, if that is given.
         """
+        system, begins = by_itself(system), None if begins is None else by_itself(begins)
         key = json.dumps([tables_of(_unhurried(x)) for x in (system, begins) if x], default=str, sort_keys=True)
         if key not in self._known:
             self._known[key] = self._taken_apart(system, begins)
         return self._known[key]
 
     def _taken_apart(self, system: System, begins: System | None) -> Linear:
-        _expect_unshared(system)
         noise = _white(system, simulated=self.simulated)
         models = {name: self._models[component.fmu] for name, component in system.components.items()}
         wanted, start = Wanted(system, models), None
@@ -151,7 +156,8 @@ class Loops:
             costs = loop.costs() / float(clock.period) if loop.radius < 1.0 else np.full(len(used), math.inf)
             return loop, np.array([loop.radius, *costs])
 
-        finest = self._finest(system, linear, self._effects(system, linear, used), answer, agree)
+        effects = self._effects(system, linear, used)
+        finest = self._finest(self._timing(system, linear, effects), effects, answer, agree)
         (loop, (_, *costs)) = finest.found
         means = None
         if loop.radius < 1.0:
@@ -174,21 +180,20 @@ class Loops:
         def answer(clock: Clockwork) -> tuple[None, Floats]:
             return None, costs_until(clock, start, one, end) / (end / ATTOSECONDS) if used else np.zeros(0)
 
-        finest = self._finest(rests, linear, effects, answer, AGREE)
+        finest = self._finest(self._timing(rests, linear, effects, horizon), effects, answer, AGREE)
         means = {call: mean.c for call, mean in linear.wanted.means.items()}
         means |= {call: means[call] + cost for call, cost in zip(used, finest.found[1].tolist())}
         return Until(means=means, apart=finest.apart, order=finest.order)
 
     def _finest(
         self,
-        system: System,
-        linear: Linear,
+        timing: tuple[Sequence[Task], Sequence[Link]],
         effects: LoopEffects,
         answer: Callable[[Clockwork], tuple[T, Floats]],
         agree: float,
     ) -> _Finest[T]:
         """An answer, numbers of which may not change any more, by the least order of Gauss's rule that will do."""
-        tasks, links = tasks_of(system), links_of(system)
+        tasks, links = timing
         by_rule = any(x.late.is_by_rule for x in links) or any(task.jitter.is_by_rule for task in tasks)
         found: list[tuple[T, Floats]] = []
         apart, order, period = 0.0, ORDERS[0], 1.0
@@ -210,43 +215,57 @@ class Loops:
 
     def _effects(self, system: System, linear: Linear, used: Sequence[Call], *, one: bool = False) -> LoopEffects:
         """Of which the costs are these means."""
-        tasks = tasks_of(system)
-        expect_same_steps(tasks, linear.parts)
-        names = [task.name for task in tasks]
+        names = Plan(system).sampled
         effects: LoopEffects
         if self.simulated:
-            expect_rows(system, tasks, links_of(system))
             effects = SimulatedEffects(system, linear.parts, names, one=one)
         else:
             effects = TrueEffects(system, linear.parts, names, linear.noise, one=one)
         effects.charge([linear.wanted.means[call] for call in used])
         return effects
 
-
-def _expect_unshared(system: System) -> None:
-    """Raise `UsageError` for what a scheduler decides: how late a task is depends on all that were before."""
-    places = [f"{table}.{name}" for table in ("computers", "networks") for name in getattr(system, table)]
-    places += [
-        f"components.{name}.sampling.on"
-        for name, one in system.components.items()
-        if one.sampling is not None and is_foreseen(one.sampling)
-    ]
-    for place in places:
-        raise UsageError(
-            f"{place}: what a scheduler makes late has no exact expectation here; expected delays and jitter of "
-            "connections and components"
-        )
+    def _timing(
+        self, system: System, linear: Linear, effects: LoopEffects, horizon: float | None = None
+    ) -> tuple[Sequence[Task], Sequence[Link]]:
+        """When what happens, where the scheduler decides it too: again and again, or up to a `horizon` [s]."""
+        by_themselves = [task.period for task in tasks_of(system) if not is_foreseen(_sampling(system, task.name))]
+        steps = [link.step for link in links_of(system) if link.step is not None]
+        told = foretold(system, horizon=horizon, beside=[*by_themselves, *steps, *effects.grids])
+        tasks, links = tasks_of(system, told), links_of(system, told)
+        expect_same_steps(system, tasks, linear.parts, repeating=horizon is None)
+        if self.simulated:
+            expect_rows(system, tasks, links)
+        return tasks, links
 
 
-def expect_same_steps(tasks: Sequence[Task], parts: Components) -> None:
-    """Raise `UsageError` for a task whose samples are irregular, and do what depends on when the next one is."""
+def expect_same_steps(system: System, tasks: Sequence[Task], parts: Components, *, repeating: bool = True) -> None:
+    """Raise `UsageError` for a task whose samples are irregular, and do what depends on when the next one is.
+
+    They come again in the next period where that is `repeating`.
+    """
     for task in tasks:
         part = parts[task.name]
-        if isinstance(part, Sampled) and part.minds_step and not task.jitter.is_certain:
+        if not (isinstance(part, Sampled) and part.minds_step):
+            continue
+        if not task.jitter.is_certain:
             raise UsageError(
                 f"components.{task.name}.sampling.jitter: what {task.name} does depends on how long it is to the next "
                 "sample; expected none"
             )
+        step = true_period(_sampling(system, task.name)) / NANOSECONDS
+        ends = [*task.offsets, *(task.period + offset for offset in task.offsets[:1] if repeating)]
+        if any(then - now != step for now, then in itertools.pairwise(ends)):
+            raise UsageError(
+                f"components.{task.name}: what it does depends on how long it is to the next sample, which is not "
+                f"{float(step):g} s each time; expected nobody else to make it late"
+            )
+
+
+def _sampling(system: System, name: str) -> Sampling:
+    """Of a component that is sampled."""
+    sampling = system.components[name].sampling
+    assert sampling is not None
+    return sampling
 
 
 def _unhurried(system: System) -> System:

@@ -8,14 +8,15 @@ from fractions import Fraction
 from orchestration.basics.errors import UsageError
 from orchestration.exact.chances import CERTAIN, Chance, normal, table, uniform
 from orchestration.exact.clockwork import ATTOSECONDS, Link, Task
+from orchestration.exact.foretold import NOTHING, Foretold
 from orchestration.schedule.plan import Plan
 from orchestration.system.distribution import Distribution, Varying
 from orchestration.system.model import Connection, System
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 
 
-def tasks_of(system: System) -> list[Task]:
-    """The sampled components, in the order of those that are due at once.
+def tasks_of(system: System, told: Foretold = NOTHING) -> list[Task]:
+    """The sampled components, in the order of those that are due at once; of some a scheduler has `told` when.
 
     Raises `UsageError` for one that keeps its own clock.
     """
@@ -23,23 +24,39 @@ def tasks_of(system: System) -> list[Task]:
     for name in Plan(system).sampled:
         sampling = system.components[name].sampling
         assert sampling is not None
+        if name in told.samples:
+            found.append(Task(name=name, period=told.period, offsets=told.samples[name]))
+            continue
         if sampling.clock == "fmu":
             raise UsageError(f"components.{name}.sampling.clock: fmu: expected the master's")
         ratio = Fraction(repr(float(sampling.clock_ratio)))
         found.append(
             Task(
-                name=name, period=_seconds(sampling.period) / ratio, offset=_seconds(sampling.offset) / ratio,
+                name=name, period=_seconds(sampling.period) / ratio, offsets=(_seconds(sampling.offset) / ratio,),
                 jitter=_late(sampling.jitter, sampling.jitter_distribution, f"components.{name}.sampling.jitter"),
             )
         )  # fmt: skip
     return found
 
 
-def links_of(system: System) -> list[Link]:
-    """The connections; those that are wires carry no messages."""
+def links_of(system: System, told: Foretold = NOTHING) -> list[Link]:
+    """The connections; those that are wires carry no messages, of some a scheduler has `told` when they do."""
     plan = Plan(system)
     tasks = list(plan.sampled)
-    return [_link(x, tasks, system, wire=i in plan.wires) for i, x in enumerate(system.connections)]
+    links = [_link(x, tasks, system, wire=i in plan.wires) for i, x in enumerate(system.connections)]
+    return [_told(link, x, told) for link, x in zip(links, system.connections)]
+
+
+def _told(link: Link, x: Connection, told: Foretold) -> Link:
+    if x.sender in told.samples:
+        nothing = (0,) * len(told.samples[x.sender])
+        link = replace(link, behind=told.behind.get(x.name, nothing))
+    if x.name in told.sent:
+        step, posts = told.period, told.sent[x.name]
+        link = replace(link, receiver=None, step=step, posts=posts, behind=told.behind[x.name])
+    if x.name in told.settled:
+        link = replace(link, delay=0, late=CERTAIN, loss=0.0, burst=None)
+    return link
 
 
 def _link(x: Connection, tasks: list[str], system: System, *, wire: bool) -> Link:

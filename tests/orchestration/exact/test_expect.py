@@ -17,8 +17,7 @@ from orchestration.exact.timing import tasks_of
 from orchestration.flight.hover_loop import HoverLoop
 from orchestration.quadrotor.scenario import FmuChoice, Scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.system.computers import Computer, Task
-from orchestration.system.model import SamplingOnArrival, Source
+from orchestration.system.model import Source
 from quadcosim import UsageError, limit
 from tests.commands import Main
 from tests.examples.common import EXAMPLES, example
@@ -191,42 +190,11 @@ def test_what_is_nearly_linear_is_known_by_small_pulses_and_how_far() -> None:
     assert found.objectives["position_rmse"] == pytest.approx(2.8758e-5, rel=1e-4)
 
 
-def test_what_a_scheduler_makes_late_is_refused_by_name() -> None:
-    whole = example("minimum_variance")
-    controller = dataclasses.replace(whole.components["controller"], sampling=None)
-    task = Task(component="controller", period=1.0, execution=0.1)
-    placed = dataclasses.replace(
-        whole,
-        components={**whole.components, "controller": controller},
-        computers={"board": Computer(tasks={"control": task})},
-    )
-    with pytest.raises(UsageError, match=r"computers\.board: what a scheduler makes late has no exact expectation"):
-        expect(placed)
-
-
-def test_what_runs_on_arrivals_is_refused_by_name() -> None:
-    whole = example("minimum_variance")
-    controller = dataclasses.replace(whole.components["controller"], sampling=SamplingOnArrival(on="measurement"))
-    measured = dataclasses.replace(
-        whole,
-        components={
-            **whole.components, "controller": controller,
-            "sensor": dataclasses.replace(whole.components["controller"]),
-        },
-        connections=(
-            dataclasses.replace(whole.connections[0], end=("sensor.x",), name="sensed"),
-            dataclasses.replace(whole.connections[0], start=("sensor.u",)),
-            whole.connections[1],
-        ),
-    )  # fmt: skip
-    with pytest.raises(UsageError, match=r"components\.controller\.sampling\.on: what a scheduler makes late"):
-        expect(measured)
-
-
 def test_a_task_that_minds_how_long_its_step_is_has_no_jitter() -> None:
     system = example("minimum_variance", {"components.controller.sampling.jitter": 0.1})
     none = np.zeros((0, 0))
     minding = Sampled(inputs=(), outputs=(), A=none, B=none, C=none, D=none, minds_step=True)
     with pytest.raises(UsageError, match=r"components\.controller\.sampling\.jitter: what controller does depends on"):
-        expect_same_steps(tasks_of(system), {"controller": minding})
-    expect_same_steps(tasks_of(example("minimum_variance")), {"controller": minding})
+        expect_same_steps(system, tasks_of(system), {"controller": minding})
+    regular = example("minimum_variance")
+    expect_same_steps(regular, tasks_of(regular), {"controller": minding})
