@@ -36,6 +36,24 @@ typedef struct {
     const SampleInstant *samples;
 } Schedule;
 
+typedef struct { /* in order, each once */
+    const int64_t *times;
+    const bool *stepped; /* of each, whether the components in continuous time are stepped to it */
+    int64_t count, at;   /* how many, and which is next */
+} Instants;
+
+typedef struct { /* what happens from one time to another, as orchestration/schedule/spans.py has it */
+    Instants regular, own;
+    const Message *posted, *measured, *arrivals, *exchanged;
+    const SampleInstant *samples;
+    const int64_t *sampled; /* [ns], the times of the samples */
+    int64_t posted_count, measured_count, arrivals_count, samples_count;
+    int64_t posted_at, measured_at, arrivals_at, samples_at; /* which are next */
+    int64_t end;                                             /* [ns] of the instant after these */
+} Span;
+
+enum { WINDOW = 64 }; /* instants of a span that are put in order at a time, few enough for the processor's caches */
+
 /* -- values of FMUs ------------------------------------------------------------------------------------------------ */
 
 typedef struct { /* one call that moves values of one type between an FMU and a buffer */
@@ -134,8 +152,11 @@ typedef struct { /* runs that share a schedule */
     int64_t stop; /* [ns] */
     int64_t *now; /* [ns] of each component in continuous time */
     /* of kernels */
-    const double *seen[L]; /* sources as objectives see them, and as inputs get them, at each instant */
-    const double *given[L];
+    Span span;     /* from which the schedule is filled */
+    int64_t *room; /* for it */
+    const int64_t *said; /* of each instant of the schedule, which regular one it is; of another, ~ which own one */
+    const double *seen[L], *given[L]; /* sources as objectives see them, and as inputs get them, at regular instants */
+    const double *seen_own[L], *given_own[L]; /* and at own ones */
     int64_t one_for_all, unused; /* whether these are the same for all lanes */
 } Track;
 
@@ -192,7 +213,7 @@ typedef struct {
 
 #define SIZE_OF(structure) {#structure, sizeof(structure)}
 #define SIZES \
-    SIZE_OF(Message), SIZE_OF(SampleInstant), SIZE_OF(Schedule), SIZE_OF(Part), SIZE_OF(Transfer), SIZE_OF(Feed), \
+    SIZE_OF(Message), SIZE_OF(SampleInstant), SIZE_OF(Schedule), SIZE_OF(Instants), SIZE_OF(Span), SIZE_OF(Part), SIZE_OF(Transfer), SIZE_OF(Feed), \
     SIZE_OF(Inputs), SIZE_OF(Fed), SIZE_OF(Kept), SIZE_OF(List), SIZE_OF(Component), SIZE_OF(Channel), SIZE_OF(Track), SIZE_OF(Loop), \
     SIZE_OF(Size)
 #define EXPORT __attribute__((visibility("default")))

@@ -1,27 +1,41 @@
 """The schedules of runs: runs of one timing in which nothing is left to chance share one."""
 
 from collections import OrderedDict
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
-from orchestration.schedule.cursor import INSTANTS
-from orchestration.schedule.schedule import Schedule
+from orchestration.schedule.frame import Frame
+from orchestration.schedule.spans import Span
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
 from orchestration.system import placement
 from orchestration.system.distribution import content
 from orchestration.system.model import System
 
+INSTANTS = 2**15
+"""Of one span, about"""
 MOST = 2**17
 """Instants of a schedule that is kept"""
 _KEPT = 8
 
 
-def timing(system: System) -> Hashable:
+@dataclass(frozen=True)
+class Timing:
+    """What the schedule of a system follows from."""
+
+    regular: Hashable
+    """without what is drawn"""
+    drawn: Hashable
+    """None: nothing is left to chance"""
+
+
+def timing(system: System) -> Timing:
     """What the schedule of a system follows from."""
     samplings = [c.sampling for c in system.components.values() if c.sampling is not None]
     chance = any(each.is_random for each in samplings) or any(x.is_random for x in system.connections)
     chance = chance or placement.is_random(system)
-    return (
+    regular = (
         system.stop_time,
         tuple((name, c.step, c.sampling) for name, c in system.components.items()),
         tuple(content(each.jitter) for each in samplings),
@@ -31,30 +45,57 @@ def timing(system: System) -> Hashable:
         ),
         placement.content_of(system),
         tuple((source.to, source.period) for source in system.sources.values() if source.period is not None),
-        (system.seed, tuple(sorted(system.streams.items()))) if chance else None,
     )
+    return Timing(regular, (system.seed, tuple(sorted(system.streams.items()))) if chance else None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Course:
+    """What happens when in a run."""
+
+    first_samples: Mapping[str, int]
+    """as of a `Timetable`"""
+    spans: Iterator[Span]
 
 
 class ScheduleCache:
-    """Gives the windows of the schedules of runs, those that are asked for again from memory."""
+    """Gives what happens when in runs, what is asked for again from memory."""
 
     def __init__(self) -> None:
-        self._kept: OrderedDict[Hashable, Sequence[Schedule]] = OrderedDict()
+        self._frames: OrderedDict[Hashable, Frame] = OrderedDict()
+        self._kept: OrderedDict[Hashable, tuple[Mapping[str, int], Sequence[Span]]] = OrderedDict()
 
-    def of(self, key: Hashable, system: System) -> Iterator[Schedule]:
-        """The windows of a system whose outline and timing are `key`, in order."""
+    def of(self, outline: Hashable, timing: Timing, system: System) -> Course:
+        """What happens when in a system that has an outline and a timing; raises `UsageError` as a `Timetable`."""
+        key = outline, timing
         if key in self._kept:
             self._kept.move_to_end(key)
-            yield from self._kept[key]
-            return
-        table, found = Timetable(system, Streams(system.seed, system.streams)), []
+            first_samples, spans = self._kept[key]
+            return Course(first_samples=first_samples, spans=iter(spans))
+        table = Timetable(system, Streams(system.seed, system.streams), frame=self._frame(outline, timing, system))
+        return Course(first_samples=table.first_samples, spans=self._spans(key, table))
+
+    def _frame(self, outline: Hashable, timing: Timing, system: System) -> Frame:
+        key = outline, timing.regular
+        if key not in self._frames:
+            _keep(self._frames, key, Frame(system, {}))
+        self._frames.move_to_end(key)
+        return self._frames[key]
+
+    def _spans(self, key: Hashable, table: Timetable) -> Iterator[Span]:
+        found: list[Span] = []
         count = 0
-        while (window := table.following(INSTANTS)) is not None:
-            count += len(window)
+        for span in table.spans(INSTANTS):
+            count += len(span.regular) + len(span.own)
             if count <= MOST:
-                found.append(window)
-            yield window
+                found.append(span)
+            yield span
         if count <= MOST:
-            self._kept[key] = found
-            while len(self._kept) > _KEPT:
-                self._kept.popitem(last=False)
+            _keep(self._kept, key, (table.first_samples, found))
+
+
+def _keep(kept: OrderedDict[Hashable, Any], key: Hashable, value: Any) -> None:
+    """The last few."""
+    kept[key] = value
+    while len(kept) > _KEPT:
+        kept.popitem(last=False)

@@ -131,28 +131,76 @@ static void note(Loop *l, int kind, const Messages *m, const Instant *now) {
     if (kind == MEASURED) now->marks[connection] |= come & ~m->beyond;
 }
 
+/* -- what happens when --------------------------------------------------------------------------------------------- */
+
+static int64_t time_in(const Instants *some) { return some->at < some->count ? some->times[some->at] : INT64_MAX; }
+
+static int64_t next_time(const Span *span) {
+    int64_t regular = time_in(&span->regular), own = time_in(&span->own);
+    return regular < own ? regular : own;
+}
+
+/* Where rows of a time, which are next in a table, begin; its place moves behind them. */
+#define BEGIN(table, time_of_row) \
+    (schedule->table##_at = table##_at, schedule->table = span->table, table##_at[n] = span->table##_at); \
+    while (span->table##_at < span->table##_count && span->time_of_row == time) span->table##_at++
+
+/* Fill the schedule of a track with the next instants of its span. */
+static void unroll(Loop *l, Track *track) {
+    Span *span = &track->span;
+    Schedule *schedule = &track->schedule;
+    int64_t count = l->continuous.count, *times = track->room, *said = times + WINDOW + 1;
+    int64_t *posted_at = said + WINDOW + 1, *measured_at = posted_at + WINDOW + 1, *arrivals_at = measured_at + WINDOW + 1;
+    int64_t *samples_at = arrivals_at + WINDOW + 1, *stepped_at = samples_at + WINDOW + 1, *stepped = stepped_at + WINDOW + 1;
+    int64_t n = 0, steps = 0, time;
+    for (; n < WINDOW && (time = next_time(span)) < INT64_MAX; n++) {
+        const Instants *regular = time_in(&span->regular) == time ? &span->regular : NULL;
+        const Instants *own = time_in(&span->own) == time ? &span->own : NULL;
+        times[n] = time, said[n] = regular ? regular->at : ~own->at, stepped_at[n] = steps;
+        for (int64_t i = 0; i < count; i++)
+            if ((regular && regular->stepped[regular->at * count + i]) || (own && own->stepped[own->at * count + i]))
+                stepped[steps++] = l->continuous.items[i];
+        span->regular.at += regular != NULL, span->own.at += own != NULL;
+        BEGIN(posted, posted[span->posted_at].sent);
+        BEGIN(measured, measured[span->measured_at].sent);
+        BEGIN(arrivals, arrivals[span->arrivals_at].arrival);
+        BEGIN(samples, sampled[span->samples_at]);
+    }
+    time = next_time(span);
+    times[n] = time < INT64_MAX ? time : span->end, stepped_at[n] = steps;
+    posted_at[n] = span->posted_at, measured_at[n] = span->measured_at;
+    arrivals_at[n] = span->arrivals_at, samples_at[n] = span->samples_at;
+    schedule->times = times, schedule->stepped_at = stepped_at, schedule->stepped = stepped;
+    schedule->exchanged = span->exchanged;
+    track->said = said, track->at = 0, track->count = n;
+}
+
 /* -- a run --------------------------------------------------------------------------------------------------------- */
+
+static const double *said(const double *const *regular, const double *const *own, int lane, int64_t row, int64_t n) {
+    return row < 0 ? own[lane] + ~row * n : regular[lane] + row * n;
+}
 
 /* What sources say at the instants that tracks have reached. */
 static void hear(Loop *l, const Instant *now) {
     TRACKS(track, now->tracks) {
         Lanes lanes = track->lanes & l->alive;
-        int64_t at = track->at;
+        int64_t row = track->said[track->at];
         if (track->one_for_all) {
             int lane = __builtin_ctzll(track->lanes);
             q_mask mask = mask_of(lanes);
-            const double *seen = track->seen[lane] + at * l->seen_count;
-            const double *given = track->given[lane] + at * l->given_count;
+            const double *seen = said(track->seen, track->seen_own, lane, row, l->seen_count);
+            const double *given = said(track->given, track->given_own, lane, row, l->given_count);
             for (int64_t i = 0; i < l->seen_count; i++)
                 AT(l->seen, i) = q_select(mask, q_all(seen[i]), READ(l->seen, i));
             for (int64_t i = 0; i < l->given_count; i++)
                 AT(l->given, i) = q_select(mask, q_all(given[i]), READ(l->given, i));
         } else
             EACH(lane, lanes) {
-                for (int64_t i = 0; i < l->seen_count; i++)
-                    l->seen[i * L + lane] = track->seen[lane][at * l->seen_count + i];
-                for (int64_t i = 0; i < l->given_count; i++)
-                    l->given[i * L + lane] = track->given[lane][at * l->given_count + i];
+                const double *seen = said(track->seen, track->seen_own, lane, row, l->seen_count);
+                const double *given = said(track->given, track->given_own, lane, row, l->given_count);
+                for (int64_t i = 0; i < l->seen_count; i++) l->seen[i * L + lane] = seen[i];
+                for (int64_t i = 0; i < l->given_count; i++) l->given[i * L + lane] = given[i];
             }
     }
 }
@@ -196,7 +244,8 @@ EXPORT int run(Loop *l) {
         for (int64_t i = 0; i < l->track_count; i++) {
             Track *track = &l->tracks[i];
             if (!(track->lanes & l->alive)) continue;
-            if (track->at == track->count) {
+            if (track->at == track->count) unroll(l, track);
+            if (!track->count) {
                 if (track->last_window) continue;
                 l->track = i;
                 return NEXT_WINDOW;

@@ -1,6 +1,7 @@
 """A batch at work: as many runs of one shape as there are lanes, from their start values to what they come to."""
 
 import ctypes
+from collections import OrderedDict
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -21,11 +22,10 @@ from orchestration.expressions.recorded import STOP_TIME
 from orchestration.expressions.syntax import Call, is_of_jobs
 from orchestration.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.fmi.values import number_of, taken
-from orchestration.schedule.schedule import Schedule
-from orchestration.schedule.schedule_cache import ScheduleCache
+from orchestration.schedule.schedule_cache import Course, ScheduleCache, Timing
+from orchestration.schedule.spans import Instants, Span
 from orchestration.schedule.streams import NOISE, Streams
-from orchestration.schedule.timetable import Timetable
-from orchestration.system.model import System, component_of, is_foreseen, variable_of
+from orchestration.system.model import System, component_of, variable_of
 from orchestration.system.times import NANOSECONDS, nanoseconds
 
 MOST_ROWS = 2**20
@@ -34,7 +34,7 @@ Columns = Mapping[str, Floats]
 """Real parameters as COMPONENT.NAME, a value for each run"""
 NOTHING: Columns = MappingProxyType({})
 _SAID = 64
-"""Windows for which values of sources are kept"""
+"""Instants at which values of sources are kept"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +64,8 @@ class _Run:
     """as `Batch.parameters`"""
     seen: list[Values]
     given: list[Values]
+    said: Hashable
+    """what the values of its sources follow from"""
     noise: dict[int, np.random.Generator] = field(default_factory=dict)
     arrays: list[Any] = field(default_factory=list)
     """that C has the addresses of"""
@@ -74,13 +76,13 @@ class _Track:
     """Runs that share a schedule."""
 
     lanes: list[int]
-    timing: Hashable
-    windows: Iterator[Schedule]
-    ahead: Schedule | None
-    window: Schedule | None = None
-    now: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    alike: bool = False
+    spans: Iterator[Span]
+    ahead: Span | None
+    now: Integers
+    """[ns] of each component"""
+    alike: bool
     """whether sources are the same for all of them"""
+    span: Span | None = None
 
 
 class Batch:
@@ -89,7 +91,7 @@ class Batch:
     def __init__(self, shape: Shape, schedules: ScheduleCache) -> None:
         self._shape, self._schedules, self._lanes = shape, schedules, shape.lanes
         self._library = shape.library
-        self._said: dict[Hashable, tuple[Floats, Floats]] = {}
+        self._said: OrderedDict[Hashable, tuple[Floats, Floats]] = OrderedDict()
         self._own = NOTHING
         self._jobs_of: tuple[System, Mapping[str, float]] | None = None
         self._written = shape.written
@@ -113,7 +115,9 @@ class Batch:
         self._ratios = [self._array(1) for _ in kernels]
         self._begins: list[Floats] = [np.zeros(self._lanes) for _ in kernels]
         self._components = (c.Component * len(kernels))(*map(self._component, range(len(kernels))))
-        self._tracks = (c.Track * self._lanes)()
+        size = 7 * (c.WINDOW + 1) + c.WINDOW * len(shape.wires.continuous)
+        self._rooms: Integers = np.zeros((self._lanes, size), dtype=np.int64)
+        self._tracks = (c.Track * self._lanes)(*(c.Track(room=address(room)) for room in self._rooms))
         seen, fed = sum(map(len, shape.seen.values())), sum(len(s.to) for s in shape.system.sources.values())
         self._given_count = fed if shape.fed_changes else 0
         self._state = self._array(len(self._written.states))
@@ -142,7 +146,7 @@ class Batch:
     def run(
         self,
         systems: Sequence[System],
-        timings: Sequence[Hashable],
+        timings: Sequence[Timing],
         record: Sequence[str] | None = None,
         own: Columns = NOTHING,
     ) -> BatchResult:
@@ -160,7 +164,7 @@ class Batch:
     def _once(
         self,
         systems: Sequence[System],
-        timings: Sequence[Hashable],
+        timings: Sequence[Timing],
         known: Mapping[Call, Floats],
         record: Sequence[str] | None,
     ) -> BatchResult:
@@ -172,12 +176,16 @@ class Batch:
         for name in ("outcome", "outcome_component", "outcome_time", "steps", "record_counts"):
             getattr(batch, name)[:] = [0] * self._lanes
         batch.alive, batch.no_memory = (1 << count) - 1, 0
-        self._put_values(systems, known)
+        courses = {
+            timing: self._schedules.of(id(self._shape), timing, systems[timings.index(timing)])
+            for timing in dict.fromkeys(timings)
+        }
+        self._put_values(systems, known, [courses[timing].first_samples for timing in timings])
         wrong = self._initialise(runs)
         for lane in np.flatnonzero(wrong[:count]).tolist():
             batch.outcome[lane] = self._c.REFUSED
             batch.alive &= ~(1 << lane)
-        tracks = self._tracks_of(runs, timings)
+        tracks = self._tracks_of(runs, timings, courses)
         recorded = self._record(record, tracks)
         self._pass(runs, tracks)
         return self._result(systems, recorded)
@@ -185,10 +193,13 @@ class Batch:
     def _pass(self, runs: Sequence[_Run], tracks: Sequence[_Track]) -> None:
         batch = self._batch
         batch.track_count = len(tracks)
-        for i in range(len(tracks)):
-            self._next_window(i, tracks[i], runs)
+        for i, track in enumerate(tracks):
+            into = self._tracks[i]
+            into.now, into.lanes = address(track.now), sum(1 << lane for lane in track.lanes)
+            into.stop, into.one_for_all = nanoseconds(runs[track.lanes[0]].system.stop_time), track.alike
+            self._next_span(i, track, runs)
         while (code := self._library.run(ctypes.addressof(batch))) == self._c.NEXT_WINDOW:
-            self._next_window(batch.track, tracks[batch.track], runs)
+            self._next_span(batch.track, tracks[batch.track], runs)
         if code == self._c.NO_MEMORY:
             raise QuadcosimError("a batch of runs: expected memory for the messages that are on their way")
 
@@ -239,7 +250,10 @@ class Batch:
         }
         given = [at_work[name] for name, source in system.sources.items() if source.to]
         seen = [at_work[name] for name in shape.seen]
-        return _Run(system=system, streams=streams, numbers=parameters, seen=seen, given=given, noise=noisy)
+        return _Run(
+            system=system, streams=streams, numbers=parameters, seen=seen, given=given,
+            said=self._sources_of(system, parameters), noise=noisy,
+        )  # fmt: skip
 
     def numbers(self, systems: Sequence[System]) -> dict[str, Floats]:
         """What has one value in a run, of each of those that were run last."""
@@ -278,7 +292,9 @@ class Batch:
             self._jobs_of = system, job_numbers(system)
         return self._jobs_of[1]
 
-    def _put_values(self, systems: Sequence[System], known: Mapping[Call, Floats]) -> None:
+    def _put_values(
+        self, systems: Sequence[System], known: Mapping[Call, Floats], first_samples: Sequence[Mapping[str, int]]
+    ) -> None:
         """Start values, parameters, and all that differs from lane to lane."""
         shape = self._shape
         for index, (name, kernel) in enumerate(shape.kernels.items()):
@@ -307,7 +323,7 @@ class Batch:
         for lane, system in enumerate(systems):
             for i, name in enumerate(shape.numbers):
                 self._numbers[i, lane] = self._number(lane, system, name)
-            self._begin(lane, system)
+            self._begin(lane, system, first_samples[lane])
             self._numbers[len(shape.numbers), lane] = nanoseconds(system.stop_time) / NANOSECONDS
             for i, call in enumerate(shape.inner):
                 self._numbers[len(shape.numbers) + 1 + i, lane] = known[call][lane] if known else 0.0
@@ -359,14 +375,11 @@ class Batch:
         taken_: Floats = np.where(kinds == c.TRUTH, values != 0.0, np.where(kinds == c.WHOLE, np.rint(values), values))
         return taken_
 
-    def _begin(self, lane: int, system: System) -> None:
+    def _begin(self, lane: int, system: System, first_samples: Mapping[str, int]) -> None:
         """When the own time of each component begins, as `Master` has it: 0 unless it begins with a later sample."""
         waits = {name for name, model in self._shape.models.items() if model.waits}
-        samplings = [component.sampling for name, component in system.components.items() if name not in waits]
-        is_late = any(each is not None and (each.offset or each.jitter or is_foreseen(each)) for each in samplings)
-        first = Timetable(system, Streams(system.seed, system.streams)).first_samples if is_late else {}
         for index, name in enumerate(self._shape.names):
-            ratio, sample = clock_of(system, name, first)
+            ratio, sample = clock_of(system, name, first_samples)
             self._begins[index][lane] = 0.0 if name in waits else ratio * sample
 
     def _compute(self, index: int) -> Booleans:
@@ -382,70 +395,77 @@ class Batch:
 
     # -- schedules -------------------------------------------------------------------------------------------------
 
-    def _tracks_of(self, runs: Sequence[_Run], timings: Sequence[Hashable]) -> list[_Track]:
-        found: dict[Hashable, list[int]] = {}
+    def _tracks_of(
+        self, runs: Sequence[_Run], timings: Sequence[Timing], courses: Mapping[Timing, Course]
+    ) -> list[_Track]:
+        found: dict[Timing, list[int]] = {}
         for lane, timing in enumerate(timings):
             found.setdefault(timing, []).append(lane)
-        tracks = []
-        for timing, lanes in found.items():
-            windows = self._schedules.of((timing, id(self._shape)), runs[lanes[0]].system)
-            keys = {self._sources_of(runs[lane]) for lane in lanes}
-            tracks.append(
-                _Track(lanes=lanes, timing=timing, windows=windows, ahead=next(windows, None), alike=len(keys) == 1)
+        return [
+            _Track(
+                lanes=lanes, spans=courses[timing].spans, ahead=next(courses[timing].spans, None),
+                now=np.zeros(len(self._shape.names), dtype=np.int64),
+                alike=len({runs[lane].said for lane in lanes}) == 1,
             )
-        return tracks
+            for timing, lanes in found.items()
+        ]  # fmt: skip
 
-    def _sources_of(self, run: _Run) -> Hashable:
-        """What the values of the sources follow from, where it is not the structure."""
+    def _sources_of(self, system: System, numbers: Mapping[str, float]) -> Hashable:
+        """What the values of the sources of a run follow from, where it is not the structure."""
         found: list[Any] = []
-        system = run.system
         for name, source in system.sources.items():
             if name in self._shape.seen or source.to:
                 found += [source, system.seed if source.is_random else None]
             if source.trajectory is not None:
-                found.append(tuple(run.numbers[each] for each in self._trajectories[source.trajectory]))
+                found.append(tuple(numbers[each] for each in self._trajectories[source.trajectory]))
         return tuple(map(repr, found))
 
-    def _next_window(self, number: int, track: _Track, runs: Sequence[_Run]) -> None:
-        """Give the next window of a track to C."""
+    def _next_span(self, number: int, track: _Track, runs: Sequence[_Run]) -> None:
+        """Give the next span of a track to C."""
         into = self._tracks[number]
-        if track.window is None:
-            track.now = np.zeros(len(self._shape.names), dtype=np.int64)
-            into.now, into.lanes = address(track.now), sum(1 << lane for lane in track.lanes)
-            into.stop = nanoseconds(runs[track.lanes[0]].system.stop_time)
-        window = track.window = track.ahead
-        into.at, into.last_window = 0, 0
-        if window is None:
-            into.count, into.last_window = 0, 1
+        span = track.span = track.ahead
+        into.at, into.count = 0, 0
+        track.ahead = None if span is None else next(track.spans, None)
+        into.last_window = track.ahead is None
+        if span is None:
             return
-        track.ahead = next(track.windows, None)
-        into.count, into.last_window = len(window), track.ahead is None
-        for name, _ in self._c.Schedule._fields_:
-            setattr(into.schedule, name, address(getattr(window, name)))
-        t = window.times[:-1] / NANOSECONDS
-        into.one_for_all = track.alike
+        of = self._c.Span(end=span.end)
+        for name in ("regular", "own"):
+            instants = getattr(span, name)
+            places = self._c.Instants(
+                times=address(instants.times), stepped=address(instants.stepped), count=len(instants)
+            )
+            setattr(of, name, places)
+        for name in ("posted", "measured", "arrivals", "samples"):
+            setattr(of, name, address(getattr(span, name)))
+            setattr(of, f"{name}_count", len(getattr(span, name)))
+        of.exchanged, of.sampled = address(span.exchanged), address(span.sampled)
+        into.span = of
         for lane in track.lanes[:1] if track.alike else track.lanes:
             run = runs[lane]
-            run.arrays = list(self._values_over(run, t, track, window))
-            into.seen[lane], into.given[lane] = map(address, run.arrays)
+            regular, own = (self._values_at(run, instants) for instants in (span.regular, span.own))
+            run.arrays = [*regular, *own]
+            into.seen[lane], into.given[lane], into.seen_own[lane], into.given_own[lane] = map(address, run.arrays)
         for lane in track.lanes:
-            self._draw_noise(lane, runs[lane], window)
+            self._draw_noise(lane, runs[lane], span)
 
-    def _values_over(self, run: _Run, t: Floats, track: _Track, window: Schedule) -> tuple[Floats, Floats]:
-        """What sources say at the instants of a window; what many runs have in common is found once."""
-        key = (track.timing, self._sources_of(run), int(window.times[0]), len(window))
+    def _values_at(self, run: _Run, instants: Instants) -> tuple[Floats, Floats]:
+        """What sources say at some instants; what many runs have in common is found once."""
+        key = instants, run.said
         if key not in self._said:
-            while len(self._said) >= _SAID:
-                del self._said[next(iter(self._said))]
+            t = instants.times / NANOSECONDS
             self._said[key] = (
                 np.ascontiguousarray(np.column_stack([values.over(t) for values in run.seen] or [t[:, None]])),
                 np.ascontiguousarray(np.column_stack([values.each(t) for values in run.given] or [t[:, None]])),
             )
+            while len(self._said) > _SAID:
+                self._said.popitem(last=False)
+        self._said.move_to_end(key)
         return self._said[key]
 
-    def _draw_noise(self, lane: int, run: _Run, window: Schedule) -> None:
+    def _draw_noise(self, lane: int, run: _Run, span: Span) -> None:
         for i, stream in run.noise.items():
-            count, _ = window.of(i, self._shape.wires.table(i))
+            count = span.count_of(i, self._shape.wires.table(i))
             noise = stream.standard_normal((count, len(self._ends[i].start)))
             run.arrays.append(noise)
             self._channels[i].noise[lane] = address(noise)

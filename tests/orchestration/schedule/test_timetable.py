@@ -8,8 +8,9 @@ from orchestration.basics.errors import UsageError
 from orchestration.schedule import cursor
 from orchestration.schedule.cursor import Cursor
 from orchestration.schedule.fixed_step import FixedStep
+from orchestration.schedule.frame import LONGEST
 from orchestration.schedule.streams import Streams
-from orchestration.schedule.timetable import LONGEST, Timetable
+from orchestration.schedule.timetable import Timetable
 from orchestration.system.model import Source
 from orchestration.system.paths import changed
 from orchestration.system.times import Grid, exact_nanoseconds

@@ -13,6 +13,7 @@ from orchestration.engines.batch.batches import Batches
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.runs.in_lanes import located as with_files
+from orchestration.schedule import schedule_cache
 from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
 from orchestration.system.paths import changed
 from tests.orchestration.engines.batch.lanes import in_lanes, shape_of
@@ -123,18 +124,26 @@ def test_what_a_component_refuses_or_makes_infinite_is_left_to_be_flown_alone(fm
     assert found[3].metrics == alone.metrics
 
 
-def test_components_that_are_told_of_their_first_sample_need_no_timetable_to_begin(
+def test_a_run_in_lanes_draws_its_samples_once_and_what_is_regular_is_found_once_for_all(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Lanes whose samples come at random times would each draw all of them a second time."""
+    made = dict.fromkeys(("Timetable", "Frame"), 0)
 
-    def drawn(*_: Any) -> None:
-        raise AssertionError("a timetable for the begin of a run")
+    def counted(name: str) -> None:
+        there = getattr(schedule_cache, name)
 
-    monkeypatch.setattr("orchestration.engines.batch.batch.Timetable", drawn)
+        def one(*given: Any, **named: Any) -> Any:
+            made[name] += 1
+            return there(*given, **named)
+
+        monkeypatch.setattr(schedule_cache, name, one)
+
+    for name in made:
+        counted(name)
     late = Scenario(timing=Timing(jitter=0.002), stop_time=0.05).as_system()
     found = Batches().run([with_files(replace(late, seed=seed)) for seed in range(2)])
     assert None not in found
+    assert made == {"Timetable": 2, "Frame": 1}
 
 
 @pytest.mark.parametrize("lanes", [2, 4])

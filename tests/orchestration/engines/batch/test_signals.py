@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from orchestration.schedule import schedule_cache
 from orchestration.system.distribution import highest
 from orchestration.system.model import System
 from orchestration.system.system_file import load_system
@@ -52,11 +53,15 @@ def crowds(draw: st.DrawFn) -> list[System]:
 
 
 @settings(max_examples=40, derandomize=True, deadline=None)
-@given(crowds())
-def test_random_systems_have_the_same_signals_beside_any_others(fmu: Path, kept: Kept, crowd: list[System]) -> None:
+@given(crowds(), st.sampled_from((1, 70, schedule_cache.INSTANTS)))
+def test_random_systems_have_the_same_signals_beside_any_others(
+    fmu: Path, kept: Kept, crowd: list[System], instants: int
+) -> None:
     flown = [of(what, fmu) for what in crowd]
     shape = shape_of(flown[0])
-    found = in_lanes(shape, flown)
+    with pytest.MonkeyPatch.context() as context:
+        context.setattr(schedule_cache, "INSTANTS", instants)  # of a span
+        found = in_lanes(shape, flown)
     for lane, what in enumerate(flown):
         assert_the_same_signals(shape, found, lane, ran(what, "compiled", load=kept.load))
 

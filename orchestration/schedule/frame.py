@@ -1,0 +1,175 @@
+"""What of a timetable no seed changes: who is stepped when if nothing is left to chance, and what cannot be."""
+
+from collections import OrderedDict
+from collections.abc import Mapping
+from fractions import Fraction
+
+import numpy as np
+
+from orchestration.basics.errors import UsageError
+from orchestration.schedule.fixed_step import FixedStep, seconds
+from orchestration.schedule.plan import Plan
+from orchestration.schedule.spans import Collected, Instants
+from orchestration.system.computers import require_less
+from orchestration.system.distribution import highest
+from orchestration.system.frames import ERROR_BITS, frame_nanoseconds
+from orchestration.system.model import Sampling, System, is_foreseen
+from orchestration.system.placement import carried, placed_messages, placed_tasks, tasks_of
+from orchestration.system.times import NANOSECONDS, Grid, exact_nanoseconds, nanoseconds
+
+LONGEST = 2**60
+"""[ns], 36 years: a few of them together still are a whole number of 64 bits"""
+
+
+MOST_AHEAD = 10**6
+"""Samples that a measurement may be late by: all of them are drawn before the first one"""
+_KEPT = 8
+"""Spans of which the regular instants are kept"""
+
+
+class Frame:
+    """What the timetables of a system have in common, whatever is drawn."""
+
+    def __init__(self, system: System, fixed: Mapping[str, FixedStep]) -> None:
+        """`fixed` has the components that take steps of one length only.
+
+        Raises `UsageError` if the end is between two points of one of them, or for times beyond `LONGEST`.
+        """
+        _expect_no_longer(system)
+        self.system, self.fixed, self.plan = system, fixed, Plan(system)
+        self.stop = nanoseconds(system.stop_time)
+        for each in fixed.values():
+            each.expect_end(self.stop)
+        _expect_moves(system, fixed)
+        names = list(system.components)
+        self.continuous = np.array([names.index(name) for name in self.plan.continuous], dtype=np.int64)
+        """indices of components in continuous time, in the order in which they are stepped"""
+        self.place = np.full(len(names), -1)
+        """of each component among those, -1 of one that is sampled"""
+        self.place[self.continuous] = np.arange(len(self.continuous))
+        self.points = {
+            i: Grid(Fraction(0), exact_nanoseconds(system.components[names[i]].step or 0.0))
+            for i in sorted(self.continuous.tolist())
+        }
+        """of the components in continuous time, by their indices"""
+        self.sender = np.array([names.index(x.sender) for x in system.connections], dtype=np.int64)
+        self.receiver = np.array([names.index(x.receiver) for x in system.connections], dtype=np.int64)
+        """components at the ends of the connections"""
+        self.foresees = bool(system.computers or system.networks) or any(
+            each.sampling is not None and is_foreseen(each.sampling) for each in system.components.values()
+        )
+        """whether the scheduler finds the instants of any component or connection"""
+        self.pace = _pace(system)
+        """from one instant to the next [ns], about"""
+        self._changes = [
+            (Grid(Fraction(0), exact_nanoseconds(source.period)), [names.index(end.split(".")[0]) for end in source.to])
+            for source in system.sources.values()
+            if source.period is not None
+        ]
+        self._kept: OrderedDict[tuple[int, int], Instants] = OrderedDict()
+
+    def regular(self, begin: int, end: int) -> Instants:
+        """Points, changes of sources, the start, and the end, to which everybody is stepped: from `begin` to before
+        `end` [ns].
+        """
+        if (begin, end) in self._kept:
+            self._kept.move_to_end((begin, end))
+            return self._kept[begin, end]
+        found = Collected(len(self.continuous))
+        for component, grid in self.points.items():
+            found.add(grid.between(grid.index_from(begin), grid.index_from(end)), self.place[component])
+        if begin == 0:
+            found.add(np.zeros(1, dtype=np.int64))
+        for grid, receivers in self._changes:  # the value of the start is that of initialisation
+            times = grid.between(max(grid.index_from(begin), 1), max(grid.index_from(end), 1))
+            for receiver in receivers:
+                found.add(times, self.place[receiver])
+        if end > self.stop:
+            found.add(np.full(len(self.continuous), self.stop), np.arange(len(self.continuous)))
+            found.add(np.full(1, self.stop))
+        self._kept[begin, end] = instants = found.instants()
+        while len(self._kept) > _KEPT:
+            self._kept.popitem(last=False)
+        return instants
+
+
+def _expect_no_longer(system: System) -> None:
+    """Raise `UsageError` for a time beyond `LONGEST`."""
+    times = {"stop_time": system.stop_time}
+    times |= {f"components.{name}.step": component.step or 0.0 for name, component in system.components.items()}
+    times |= {f"sources.{name}.period": source.period or 0.0 for name, source in system.sources.items()}
+    for name, component in system.components.items():
+        if component.sampling is not None:
+            _expect_jitter_within_period(name, component.sampling)
+            for key in ("period", "offset"):
+                place = f"components.{name}.sampling.{key}"
+                times[place] = getattr(component.sampling, key) / component.sampling.clock_ratio
+    for x in system.connections:
+        times |= {f"connections.{x.name}.{key}": highest(getattr(x, key)) for key in ("delay", "delay_jitter")}
+    for task in placed_tasks(system.computers):
+        ratio = task.computer.clock_ratio
+        if task.task.period is not None:
+            require_less(f"{task.place}.jitter", task.task.jitter, task.task.period / ratio)
+        times |= {f"{task.place}.{key}": (getattr(task.task, key) or 0.0) / ratio for key in ("period", "offset")}
+        times |= {f"{task.place}.execution": highest(task.task.execution), f"{task.place}.deadline": task.task.due}
+        times[f"computers.{task.computer_name}.switch"] = task.computer.switch
+    for of in placed_messages(system.networks):
+        if of.message.period is not None:
+            require_less(f"{of.place}.jitter", of.message.jitter, of.message.period)
+        times |= {f"{of.place}.{key}": getattr(of.message, key) or 0.0 for key in ("period", "offset", "deadline")}
+        times[f"{of.place}.bytes"] = frame_nanoseconds(of.network, of.message, ERROR_BITS) / NANOSECONDS
+        times[f"networks.{of.network_name}.latency"] = of.network.latency
+    for place, time in times.items():
+        if time >= LONGEST / NANOSECONDS:
+            raise UsageError(f"{place} = {time:g} s: expected less than {LONGEST / NANOSECONDS:.4g} s")
+    over = carried(system)
+    for x in system.connections:
+        sampling = system.components[x.receiver].sampling
+        if sampling is None or system.components[x.sender].sampling is not None:
+            continue
+        period, late = sampling.period / sampling.clock_ratio, highest(x.delay) + highest(x.delay_jitter)
+        if x.name in over:
+            continue
+        if late > MOST_AHEAD * period:
+            raise UsageError(
+                f"connections.{x.name}.delay: is measured {late:g} s before a sample of "
+                f"{x.receiver}, every {period:g} s: expected at most {MOST_AHEAD} samples"
+            )
+
+
+def _expect_jitter_within_period(name: str, sampling: Sampling) -> None:
+    try:
+        sampling.expect_jitter_within_period()
+    except UsageError as error:
+        raise UsageError(f"components.{name}.sampling.{error}") from error
+
+
+def _expect_moves(system: System, fixed: Mapping[str, FixedStep]) -> None:
+    """Raise `UsageError` for a component of fixed steps that a task or a network meets between two of its points."""
+    tasks, over = tasks_of(system), carried(system)
+    for x in system.connections:
+        places = [of.place for of in (tasks.get(x.sender), tasks.get(x.receiver), over.get(x.name)) if of is not None]
+        for name in (x.sender, x.receiver):
+            if places and name in fixed and not fixed[name].moves:
+                raise UsageError(
+                    f"{places[0]}: components.{name} takes steps of {seconds(fixed[name].grid[1])} s only: expected "
+                    'align = "next" there'
+                )
+
+
+def _pace(system: System) -> float:
+    """From one instant to the next [ns], about."""
+    periods = [component.step for component in system.components.values()]
+    periods += [source.period for source in system.sources.values()]
+    rates = [1.0 / float(exact_nanoseconds(period)) for period in periods if period is not None]
+    for component in system.components.values():
+        if component.sampling is not None:
+            instants = 2.0 if is_foreseen(component.sampling) else 1.0  # it samples, and it writes
+            period = float(exact_nanoseconds(component.sampling.period))
+            rates.append(instants * component.sampling.clock_ratio / period)
+    by_connection = carried(system)
+    periods = [by_connection[x.name].message.period for x in system.connections if x.name in by_connection]
+    rates += [1.0 / float(exact_nanoseconds(period)) for period in periods if period is not None]
+    if not rates:
+        return float(nanoseconds(system.stop_time))
+    return 1.0 / sum(rates)
