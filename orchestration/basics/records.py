@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from pydantic_core import CoreSchema
 
 Class = TypeVar("Class", bound=type)
+Made = TypeVar("Made")
 
 
 class _Scalar:
@@ -101,6 +102,15 @@ def _fill(record: Any, cls: type, unnamed: Sequence[Any], given: Mapping[str, An
     from pydantic_core import ArgsKwargs
 
     validated(cls).__pydantic_validator__.validate_python(ArgsKwargs(tuple(unnamed), dict(given)), self_instance=record)
+
+
+def like(record: Made, **values: Any) -> Made:
+    """A record with other values that are as right as its own: nothing is checked again, which takes a run of a study
+    half a millisecond.
+    """
+    made = object.__new__(type(record))
+    vars(made).update({field.name: getattr(record, field.name) for field in dataclasses.fields(record)} | values)  # type: ignore[arg-type]
+    return made
 
 
 def called(words: str) -> Callable[[Class], Class]:

@@ -118,16 +118,16 @@ class Store:
                 self._connection.execute("DELETE FROM design")
                 self._insert("design", ((place.index, place.key, json.dumps(place.settings)) for place in design))
 
-    def missing(self, *, failed_too: bool = False) -> list[int]:
-        """The places of the design whose runs have no row, or a failed one; of equal runs the first."""
+    def missing(self, *, failed_too: bool = False) -> dict[int, str]:
+        """The places of the design whose runs have no row, or a failed one, and their keys; of equal runs the first."""
         self.expect_whole()
         with _explained(self.path):
             found = self._connection.execute(
-                "SELECT min(design_index) FROM design LEFT JOIN runs USING (key) "
+                "SELECT min(design_index), key FROM design LEFT JOIN runs USING (key) "
                 "WHERE status IS NULL OR (? AND status = 'failed') GROUP BY key ORDER BY 1",
                 (failed_too,),
             )
-            return [index for (index,) in found]
+            return dict(found)
 
     def lacking(self) -> dict[str, int]:
         """The keys of the runs of the design that have no row, and how many of its places each has."""

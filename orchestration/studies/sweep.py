@@ -94,8 +94,8 @@ def sweep(
             if announce is not None and engine == "auto":
                 announce(str(how))
             flown_with = with_python_twins(files) if how.in_lanes else files
-            task_of = partial(_task, study, files, files.starts_of(study.origin), time_limit)
-            tasks = (task_of(index, how.engine) for index in missing)
+            task_of = partial(_task, study, files.starts_of(study.origin), time_limit)
+            tasks = (task_of(index, key, how.engine) for index, key in missing.items())
             lanes: dict[str, Row] = {}
             try:
                 with _workers(Inputs.of(flown_with), workers, dask) as fly:
@@ -194,32 +194,31 @@ class _Counted:
 
 def _task(
     study: Study,
-    files: Files,
     starts: Mapping[str, float],
     time_limit: float | None,
     index: int,
+    key: str,
     engine: Engine | None,
 ) -> RunTask:
-    system = study.system(index, starts)
     return RunTask(
-        index=index, key=run_key(system, files, study.metrics), settings=dict(study.points[index]), system=system,
+        index=index, key=key, settings=dict(study.points[index]), system=study.system(index, starts),
         keep_signals=study.keeps_signals(index), metrics=study.metrics, engine=engine, time_limit=time_limit,
     )  # fmt: skip
 
 
-def _missing(opened: store.Store, study: Study, retry_failed: bool) -> list[int]:
-    """The places of the design that are to be flown: without a row, or without signals that are to be kept."""
+def _missing(opened: store.Store, study: Study, retry_failed: bool) -> dict[int, str]:
+    """The places of the design that are to be flown, with their keys: without a row, or without signals to be kept."""
     missing = opened.missing(failed_too=retry_failed)
     if not study.keep_signals:
         return missing
-    lacking = [
-        row["design_index"]
+    lacking = {
+        row["design_index"]: row["key"]
         for row in opened.rows()
         if study.keeps_signals(row["design_index"])
         and row["status"] == "done"
         and not _signals_path(opened, row["key"]).is_file()
-    ]
-    return sorted({*missing, *lacking})
+    }
+    return dict(sorted({**missing, **lacking}.items()))
 
 
 def _signals_path(opened: store.Store, key: str) -> Path:

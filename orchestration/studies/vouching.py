@@ -34,13 +34,15 @@ def with_python_twins(files: Files) -> Files:
     return replace(files, fmus={**files.fmus, **paths})
 
 
-def vouched(lanes: Mapping[str, Row], files: Files, task_of: Callable[[int], RunTask], fly: Fly) -> Agreement | None:
+def vouched(
+    lanes: Mapping[str, Row], files: Files, task_of: Callable[[int, str], RunTask], fly: Fly
+) -> Agreement | None:
     """How a sample of the runs that were flown in lanes compares with other ways to fly them; None if there were none.
 
-    `lanes` are their rows by key; `task_of` makes the task of a run by its index. `fly` has the `files`, which are
-    those `with_python_twins`.
+    `lanes` are their rows by key; `task_of` makes the task of a run by its index and key. `fly` has the `files`, which
+    are those `with_python_twins`.
     """
-    chosen = [task_of(lanes[key].index) for key in sorted(sample(lanes))]
+    chosen = [task_of(lanes[key].index, key) for key in sorted(sample(lanes))]
     if not chosen:
         return None
     begun = [_begun(task) for task in chosen if _has_twins(task.system, files)]

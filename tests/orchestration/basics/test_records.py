@@ -7,6 +7,7 @@ import pytest
 
 from orchestration.basics.attribute_docs import attribute_docs
 from orchestration.basics.errors import UsageError
+from orchestration.basics.records import like
 from orchestration.basics.typed_tables import docs_of_keys, fields_of, parsed
 from orchestration.quadrotor.timing import TIMING_KEYS
 from orchestration.studies.axes import Axis
@@ -81,3 +82,11 @@ def test_a_key_has_one_name_and_no_schema_has_another() -> None:
     with pytest.raises(UsageError, match=r"^design_seed: no such key; expected one of method, samples, seed"):
         parsed({"design_seed": 3}, DesignTable)
     assert parsed({"seed": 3}, DesignTable).design_seed == 3
+
+
+def test_a_record_like_another_is_what_a_new_one_would_be() -> None:
+    first = System(stop_time=1.0, components={"a": Component(fmu="a.fmu", step=0.1)})
+    assert first.fmus == {"a": "a.fmu"}  # found from its values, and kept
+    moved = like(first, components={"a": like(first.components["a"], fmu="b.fmu")})
+    assert moved == System(stop_time=1.0, components={"a": Component(fmu="b.fmu", step=0.1)})
+    assert moved.fmus == {"a": "b.fmu"}

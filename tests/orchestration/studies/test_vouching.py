@@ -36,8 +36,8 @@ def agreement(chosen: Study, error: Error) -> Agreement | None:
         metrics = {"x": 1.0 + error(task, chunk)}
         return Row(index=task.index, key=task.key, settings={}, seed=0, metrics=metrics, message=None, duration=0.0)
 
-    def task(index: int) -> RunTask:
-        return RunTask(index=index, key=str(index), settings={}, system=chosen.system(index, {}), keep_signals=False)
+    def task(index: int, key: str) -> RunTask:
+        return RunTask(index=index, key=key, settings={}, system=chosen.system(index, {}), keep_signals=False)
 
     def fly(tasks: Iterable[RunTask | Chunk]) -> Generator[list[Outcome], None, None]:
         for each in tasks:
@@ -45,7 +45,7 @@ def agreement(chosen: Study, error: Error) -> Agreement | None:
                 assert files.fmus.keys() >= {*one.system.fmus.values()}
                 yield [Outcome(row=row(one, isinstance(each, Chunk)))]
 
-    return vouched({str(i): row(task(i), True) for i in range(2)}, files, task, fly)
+    return vouched({str(i): row(task(i, str(i)), True) for i in range(2)}, files, task, fly)
 
 
 def in_python(task: RunTask) -> bool:
