@@ -15,6 +15,11 @@ def main() -> None:
     never comes here.
     """
     one_thread()
+    if sys.argv[1:] == ["--version"]:  # which scripts ask, and which needs no command line
+        from orchestration.command.version import own
+
+        print(own())
+        return
     try:
         from orchestration.command import cli
     except Exception as error:

@@ -1,19 +1,29 @@
 """What `--version` says."""
 
-import platform
 from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING
 
-from orchestration.command.answer import Answer
+if TYPE_CHECKING:
+    from orchestration.command.answer import Answer
 
 BESIDE = ("numpy", "fmpy", "pythonfmu", "pyarrow", "matplotlib", "scipy", "pandas", "dask")
 """Packages by which numbers, files and figures are made"""
 
 
-def versions(*, everything: bool) -> Answer:
+def own() -> str:
+    """The line with this package's version."""
+    return f"quadcosim {_version('quadcosim')}"
+
+
+def versions(*, everything: bool) -> "Answer":
     """This package's version, or everything's that a report of an error should name."""
+    from orchestration.command.answer import Answer  # not before: `own` does without
+
     found = {"quadcosim": _version("quadcosim")}
-    lines = [f"quadcosim {found['quadcosim']}"]
+    lines = [own()]
     if everything:
+        import platform
+
         found |= {"python": platform.python_version(), "platform": platform.platform()}
         found |= {name: _version(name) for name in BESIDE}
         lines = [f"{name:<10}  {value}" for name, value in found.items()]

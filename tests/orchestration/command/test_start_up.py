@@ -42,3 +42,7 @@ def test_processes_that_fly_load_what_flies_alone() -> None:
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     unused = {"pydantic", "orchestration.requests.request", "orchestration.engines.batch.batch"}
     assert not (LARGE | unused) & set(json.loads(found))
+
+
+def test_the_version_is_said_without_a_command_line() -> None:
+    assert not (LARGE | {"numpy", "pydantic", "typer"}) & loaded("--version")
