@@ -31,6 +31,7 @@ from orchestration.studies.store import open_for_writing, store_path
 from orchestration.studies.study import Study
 from quadcosim import UsageError
 from tests.orchestration.studies.common import OBJECTIVES, axis, row, short, study, sweep
+from tests.pictures import expect_picture
 
 PERIODS = axis("timing.period", 0.01, 0.02, 0.03, 0.04)
 WORDS = ("settled", "bounded")
@@ -58,15 +59,6 @@ def invented(folder: Path, chosen: Study) -> Study:
         store.describe({name: json.dumps(value) for name, value in about.items()})
         store.add(rows)
     return chosen
-
-
-def expect_picture(path: Path) -> None:
-    """Expect a PNG with more on it than its background."""
-    import matplotlib.image
-
-    pixels = matplotlib.image.imread(path)
-    assert min(pixels.shape[:2]) > 100
-    assert len(np.unique(pixels.reshape(-1, pixels.shape[2]), axis=0)) > 10
 
 
 def table(number: int = 5) -> pd.DataFrame:

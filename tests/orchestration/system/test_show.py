@@ -3,14 +3,13 @@
 import json
 from pathlib import Path
 
-import matplotlib.image
-import numpy as np
 import pytest
 
 from orchestration.figures import diagram
 from orchestration.system.description import as_text, seconds
 from orchestration.system.system_file import load_system
 from tests.commands import Main
+from tests.pictures import expect_picture
 
 SYSTEM = """
 stop_time = 5.0
@@ -129,8 +128,7 @@ def test_nothing_in_the_figure_lies_over_something_else(file: Path) -> None:
 def test_the_figure_is_written_where_it_is_asked_for(file: Path, main: Main) -> None:
     out = file.parent / "new" / "figure.png"
     assert main("show", file, "--out", out).stderr == f"{out}\n"
-    pixels = matplotlib.image.imread(out)
-    assert len(np.unique(pixels.reshape(-1, pixels.shape[2]), axis=0)) > 10
+    expect_picture(out)
     refused = main("show", file, "--out", file.parent / "figure.docx", code=2).stderr
     assert refused.startswith(f"quadcosim: --out {file.parent / 'figure.docx'}: expected a figure ending in one of")
 
