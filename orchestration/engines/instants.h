@@ -349,6 +349,18 @@ INLINED void count_steps(Loop *l, Lanes lanes) {
     memcpy(l->steps, &steps, sizeof steps);
 }
 
+/* A component in continuous time reaches the instant; the lanes in which it has. */
+INLINED Lanes
+move(Loop *l, int64_t index, Lanes lanes, q_real begin, q_real length, int64_t until, const Instant *now) {
+    pass_on_each(l, &l->components[index].ahead, lanes, now);
+    if (!(lanes &= l->alive)) return 0;
+    step(l, index, lanes, begin, length, until, now);
+    if (!(lanes &= l->alive)) return 0;
+    count_steps(l, lanes);
+    read_outputs(l, index, lanes, now);
+    return lanes;
+}
+
 /* Components in continuous time reach the instant; divergence is noticed before any value is passed on. */
 static void step_continuous(Loop *l, Rows *stepped, const Instant *now) {
     Lanes moved = 0;
@@ -365,14 +377,7 @@ static void step_continuous(Loop *l, Rows *stepped, const Instant *now) {
             track->now[index] = until = time;
             lanes |= some;
         }
-        if (!lanes) continue;
-        pass_on_each(l, &l->components[index].ahead, lanes, now);
-        if (!(lanes &= l->alive)) continue;
-        step(l, index, lanes, begin, length, until, now);
-        if (!(lanes &= l->alive)) continue;
-        count_steps(l, lanes);
-        read_outputs(l, index, lanes, now);
-        moved |= lanes;
+        if (lanes) moved |= move(l, index, lanes, begin, length, until, now);
     }
     if (moved & l->alive) look(l, moved & l->alive, now);
 }
@@ -418,17 +423,21 @@ static void sample_each(Loop *l, Rows *samples, const Instant *now) {
         while (samples->tracks) sample(l, l->sampled.items[next_rank(l, samples)], samples, now);
 }
 
-/* What components in continuous time hold over the step that begins now. */
+/* What a component in continuous time holds over the step that begins now. */
+static void hold(Loop *l, int64_t index, Lanes lanes, const Instant *now) {
+    const Component *c = &l->components[index];
+    extrapolate_each(l, &c->held, lanes, now);
+    pass_on_each(l, &c->behind, lanes, now);
+    if (lanes & l->alive) feed(l, c, lanes & l->alive, now);
+}
+
 static void settle(Loop *l, Rows *stepped, const Instant *now) {
     while (stepped->tracks) {
         int64_t index = l->continuous.items[next_rank(l, stepped)];
-        const Component *c = &l->components[index];
         Lanes lanes = 0;
         TRACKS(track, stepped->tracks)
             if (turn_of(stepped, track - l->tracks, index, 1)) lanes |= track->lanes & l->alive;
-        extrapolate_each(l, &c->held, lanes, now);
-        pass_on_each(l, &c->behind, lanes, now);
-        if (lanes & l->alive) feed(l, c, lanes & l->alive, now);
+        hold(l, index, lanes, now);
     }
 }
 

@@ -54,6 +54,9 @@ typedef struct { /* what happens from one time to another, as orchestration/sche
 
 enum { WINDOW = 64 }; /* instants of a span that are put in order at a time, few enough for the processor's caches */
 
+/* What happens at an instant, as a sum: nothing but a step of the only component in continuous time is 0. */
+enum { MORE = 1, SAMPLES = 2, START = 4 };
+
 /* -- values of FMUs ------------------------------------------------------------------------------------------------ */
 
 typedef struct { /* one call that moves values of one type between an FMU and a buffer */
@@ -155,6 +158,7 @@ typedef struct { /* runs that share a schedule */
     Span span;     /* from which the schedule is filled */
     int64_t *room; /* for it */
     const int64_t *said; /* of each instant of the schedule, which regular one it is; of another, ~ which own one */
+    const int64_t *kinds;
     const double *seen[L], *given[L]; /* sources as objectives see them, and as inputs get them, at regular instants */
     const double *seen_own[L], *given_own[L]; /* and at own ones */
     int64_t one_for_all, unused; /* whether these are the same for all lanes */

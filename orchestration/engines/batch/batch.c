@@ -140,39 +140,55 @@ static int64_t next_time(const Span *span) {
     return regular < own ? regular : own;
 }
 
-/* Where rows of a time, which are next in a table, begin; its place moves behind them. */
-#define BEGIN(table, time_of_row) \
-    (schedule->table##_at = table##_at, schedule->table = span->table, table##_at[n] = span->table##_at); \
-    while (span->table##_at < span->table##_count && span->time_of_row == time) span->table##_at++
+/* When the next of something happens that is not regular. */
+static int64_t next_more(const Span *span) {
+    int64_t time = time_in(&span->own);
+#define EARLIEST(table, time_of_row) \
+    if (span->table##_at < span->table##_count && span->time_of_row < time) time = span->time_of_row
+    EARLIEST(posted, posted[span->posted_at].sent);
+    EARLIEST(measured, measured[span->measured_at].sent);
+    EARLIEST(arrivals, arrivals[span->arrivals_at].arrival);
+    EARLIEST(samples, sampled[span->samples_at]);
+    return time;
+}
 
 /* Fill the schedule of a track with the next instants of its span. */
 static void unroll(Loop *l, Track *track) {
-    Span *span = &track->span;
-    Schedule *schedule = &track->schedule;
-    int64_t count = l->continuous.count, *times = track->room, *said = times + WINDOW + 1;
-    int64_t *posted_at = said + WINDOW + 1, *measured_at = posted_at + WINDOW + 1, *arrivals_at = measured_at + WINDOW + 1;
-    int64_t *samples_at = arrivals_at + WINDOW + 1, *stepped_at = samples_at + WINDOW + 1, *stepped = stepped_at + WINDOW + 1;
-    int64_t n = 0, steps = 0, time;
-    for (; n < WINDOW && (time = next_time(span)) < INT64_MAX; n++) {
-        const Instants *regular = time_in(&span->regular) == time ? &span->regular : NULL;
-        const Instants *own = time_in(&span->own) == time ? &span->own : NULL;
-        times[n] = time, said[n] = regular ? regular->at : ~own->at, stepped_at[n] = steps;
+    enum { TIMES, SAID, KINDS, STEPPED_AT, POSTED_AT, MEASURED_AT, ARRIVALS_AT, SAMPLES_AT, STEPPED };
+    Span *s = &track->span;
+    int64_t count = l->continuous.count, more = next_more(s), n = 0, steps = 0, time;
+    int64_t(*room)[WINDOW + 1] = (void *)track->room, *stepped = room[STEPPED];
+    for (; n <= WINDOW; n++) {
+        time = next_time(s);
+        room[TIMES][n] = time < INT64_MAX ? time : s->end, room[STEPPED_AT][n] = steps;
+        room[POSTED_AT][n] = s->posted_at, room[MEASURED_AT][n] = s->measured_at;
+        room[ARRIVALS_AT][n] = s->arrivals_at, room[SAMPLES_AT][n] = s->samples_at;
+        if (n == WINDOW || time == INT64_MAX) break;
+        const Instants *regular = time_in(&s->regular) == time ? &s->regular : NULL;
+        const Instants *own = time == more && time_in(&s->own) == time ? &s->own : NULL;
+        room[SAID][n] = regular ? regular->at : ~own->at;
         for (int64_t i = 0; i < count; i++)
             if ((regular && regular->stepped[regular->at * count + i]) || (own && own->stepped[own->at * count + i]))
                 stepped[steps++] = l->continuous.items[i];
-        span->regular.at += regular != NULL, span->own.at += own != NULL;
-        BEGIN(posted, posted[span->posted_at].sent);
-        BEGIN(measured, measured[span->measured_at].sent);
-        BEGIN(arrivals, arrivals[span->arrivals_at].arrival);
-        BEGIN(samples, sampled[span->samples_at]);
+        room[KINDS][n] = MORE * (time == more || count != 1 || steps == room[STEPPED_AT][n] || l->some_by_themselves);
+        if (!time) room[KINDS][n] |= MORE | START;
+        s->regular.at += regular != NULL;
+        if (time < more) continue;
+        s->own.at += own != NULL;
+        while (s->posted_at < s->posted_count && s->posted[s->posted_at].sent == time) s->posted_at++;
+        while (s->measured_at < s->measured_count && s->measured[s->measured_at].sent == time) s->measured_at++;
+        while (s->arrivals_at < s->arrivals_count && s->arrivals[s->arrivals_at].arrival == time) s->arrivals_at++;
+        while (s->samples_at < s->samples_count && s->sampled[s->samples_at] == time) s->samples_at++;
+        if (s->samples_at > room[SAMPLES_AT][n]) room[KINDS][n] |= SAMPLES;
+        more = next_more(s);
     }
-    time = next_time(span);
-    times[n] = time < INT64_MAX ? time : span->end, stepped_at[n] = steps;
-    posted_at[n] = span->posted_at, measured_at[n] = span->measured_at;
-    arrivals_at[n] = span->arrivals_at, samples_at[n] = span->samples_at;
-    schedule->times = times, schedule->stepped_at = stepped_at, schedule->stepped = stepped;
-    schedule->exchanged = span->exchanged;
-    track->said = said, track->at = 0, track->count = n;
+    track->schedule = (Schedule){
+        .times = room[TIMES], .stepped_at = room[STEPPED_AT], .stepped = stepped, .posted_at = room[POSTED_AT],
+        .measured_at = room[MEASURED_AT], .arrivals_at = room[ARRIVALS_AT], .samples_at = room[SAMPLES_AT],
+        .posted = s->posted, .measured = s->measured, .arrivals = s->arrivals, .samples = s->samples,
+        .exchanged = s->exchanged,
+    };
+    track->said = room[SAID], track->kinds = room[KINDS], track->at = 0, track->count = n;
 }
 
 /* -- a run --------------------------------------------------------------------------------------------------------- */
@@ -214,51 +230,73 @@ static void record(Loop *l, const Instant *now, Lanes lanes) {
     }
 }
 
-/* Through one instant of some tracks; those that set out do so together. */
-static void pass_and_sum_up(Loop *l, Instant *now, Lanes tracks) {
-    memset(now->marks, 0, CHANNELS * sizeof *now->marks);
+/* Through an instant at which nothing happens in some tracks but that the only component in continuous time is stepped:
+   as `reach` and `pass` have it, without looking for anything else. */
+static void only_step(Loop *l, Instant *now, Lanes tracks) {
+    int64_t index = l->continuous.items[0], until = 0;
+    double t[L] = {0}, begin[L] = {0}, length[L] = {0};
+    q_real ends, begins, lengths;
+    now->tracks = tracks, now->lanes = 0;
+    TRACKS(track, tracks) {
+        int64_t time = until = time_of(track), before = track->now[index];
+        track->now[index] = time, now->lanes |= track->lanes & l->alive;
+        EACH(lane, track->lanes & l->alive)
+            now->time[lane] = time, t[lane] = (double)time, begin[lane] = (double)before,
+            length[lane] = (double)(time - before);
+    }
+    memcpy(&ends, t, sizeof t), memcpy(&begins, begin, sizeof begin), memcpy(&lengths, length, sizeof length);
+    now->t = q_select(mask_of(now->lanes), ends / NANOSECONDS, now->t);
+    hear(l, now);
+    Lanes moved = move(l, index, now->lanes, begins / NANOSECONDS, lengths / NANOSECONDS, until, now);
+    if (moved & l->alive) look(l, moved & l->alive, now);
+    if (l->settles) hold(l, index, now->lanes & l->alive, now);
+}
+
+static void reach_and_pass(Loop *l, Instant *now, Lanes tracks, int first) {
     reach(l, now, tracks);
     hear(l, now);
-    int first = now->time[__builtin_ctzll(now->lanes)] == 0;
     if (first) look(l, now->lanes, now);
     pass(l, now);
-    Lanes lanes = now->lanes & l->alive;
-    if (!lanes) return;
-    if (!(first ? begin_row(l, now, mask_of(lanes)) : next_row(l, now, mask_of(lanes)))) l->no_memory = 1;
-    if (l->record_limit) record(l, now, lanes);
 }
 
-static int samples_next(const Track *track) {
-    const int64_t *at = track->schedule.samples_at + track->at;
-    return at[1] > at[0];
-}
-
-/* Pass through the windows that the tracks have. Tracks that sample next wait for one another, since what a sample
-   costs does not grow with the lanes that take part. */
+/* Pass through the windows that the tracks have. Tracks that set out do so together; those that sample next wait for one
+   another, since what a sample costs does not grow with the lanes that take part. */
 EXPORT int run(Loop *l) {
-    Lanes marks[CHANNELS];
+    Lanes marks[CHANNELS], come = ((Lanes)1 << (l->track_count - 1) << 1) - 1; /* to another instant */
+    Lanes going = 0, with_more = 0, sampling = 0, setting_out = 0;
     Instant now = {.marks = marks};
     constants(l);
     for (;;) {
-        Lanes going = 0, sampling = 0, setting_out = 0;
-        for (int64_t i = 0; i < l->track_count; i++) {
-            Track *track = &l->tracks[i];
+        going &= ~come, with_more &= ~come, sampling &= ~come, setting_out &= ~come;
+        TRACKS(track, come) {
+            int64_t number = track - l->tracks;
             if (!(track->lanes & l->alive)) continue;
             if (track->at == track->count) unroll(l, track);
             if (!track->count) {
                 if (track->last_window) continue;
-                l->track = i;
+                l->track = number;
                 return NEXT_WINDOW;
             }
-            going |= (Lanes)1 << i;
-            setting_out |= (Lanes)(time_of(track) == 0) << i;
-            sampling |= (Lanes)samples_next(track) << i;
+            int64_t kind = track->kinds[track->at];
+            going |= (Lanes)1 << number;
+            if (!kind) continue;
+            with_more |= (Lanes)1 << number;
+            sampling |= (Lanes)((kind & SAMPLES) != 0) << number;
+            setting_out |= (Lanes)((kind & START) != 0) << number;
         }
         if (!going) return AT_END;
-        Lanes moving = setting_out ? setting_out : going & ~sampling ? going & ~sampling : going;
-        pass_and_sum_up(l, &now, moving);
+        come = setting_out ? setting_out : going & ~sampling ? going & ~sampling : going;
+        memset(marks, 0, sizeof marks);
+        if (come & with_more) reach_and_pass(l, &now, come, setting_out != 0);
+        else only_step(l, &now, come);
+        Lanes lanes = now.lanes & l->alive;
+        if (lanes) {
+            if (!(setting_out ? begin_row(l, &now, mask_of(lanes)) : next_row(l, &now, mask_of(lanes))))
+                return NO_MEMORY;
+            if (l->record_limit) record(l, &now, lanes);
+        }
         if (l->no_memory) return NO_MEMORY;
-        TRACKS(track, moving) track->at++;
+        TRACKS(track, come) track->at++;
     }
 }
 

@@ -115,7 +115,7 @@ class Batch:
         self._ratios = [self._array(1) for _ in kernels]
         self._begins: list[Floats] = [np.zeros(self._lanes) for _ in kernels]
         self._components = (c.Component * len(kernels))(*map(self._component, range(len(kernels))))
-        size = 7 * (c.WINDOW + 1) + c.WINDOW * len(shape.wires.continuous)
+        size = 8 * (c.WINDOW + 1) + c.WINDOW * len(shape.wires.continuous)
         self._rooms: Integers = np.zeros((self._lanes, size), dtype=np.int64)
         self._tracks = (c.Track * self._lanes)(*(c.Track(room=address(room)) for room in self._rooms))
         seen, fed = sum(map(len, shape.seen.values())), sum(len(s.to) for s in shape.system.sources.values())
