@@ -21,6 +21,7 @@ from orchestration.computers.parts import (
     LATER,
     NOTED,
     Carrier,
+    Constant,
     Leg,
     Link,
     Message,
@@ -106,8 +107,10 @@ class CompiledScheduler:
             "links": parts.links,
         }
         self._tables = {name: np.array(rows, dtype=np.int64) for name, rows in tables.items()}
-        self._streams = parts.streams
-        self._numbers = np.zeros((len(parts.streams), AT_ONCE), dtype=np.int64)
+        values = [stream.value if isinstance(stream, Constant) else 0 for stream in parts.streams]
+        self._streams = [None if isinstance(stream, Constant) else stream for stream in parts.streams]
+        """None: its numbers stay"""
+        self._numbers = np.repeat(np.array(values, dtype=np.int64), AT_ONCE).reshape(-1, AT_ONCE)
         self._notes = np.zeros((_ROOM, COLUMNS), dtype=np.int64)
         self._noted: list[Integers] = []
         self._failure: BaseException | None = None
@@ -151,7 +154,9 @@ class CompiledScheduler:
     def _draw_for_c(self, stream: int) -> None:
         """More numbers of a stream; no exception goes through C."""
         try:
-            self._numbers[stream] = self._streams[stream](AT_ONCE)
+            drawn = self._streams[stream]
+            if drawn is not None:
+                self._numbers[stream] = drawn(AT_ONCE)
         except BaseException as error:
             self._failure = error
             self._numbers[stream] = LATER // 2  # nothing comes any more

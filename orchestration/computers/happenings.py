@@ -41,10 +41,9 @@ class Happenings:
         """`names` are those of all tasks, then of all messages; those `without` are left out."""
         self.names = tuple(names)
         self._is_told = np.array([name not in without for name in names], dtype=np.bool_)
-        self._deadlines = np.array([task.deadline for task in parts.tasks], dtype=np.int64)
         self._last_leg = np.array([len(message.legs) - 1 for message in parts.messages], dtype=np.int64)
-        self._waiting: Integers = np.zeros((0, 3), dtype=np.int64)
-        """Jobs that may still be late: deadline, task, number"""
+        self._deadlines = _Deadlines(np.array([task.deadline for task in parts.tasks], dtype=np.int64))
+        self._tasks = len(parts.tasks)
 
     def before(self, time: int, notes: Integers) -> Integers:
         """What happens before `time` [ns], as a table of `Events` in order; `notes` are those since the last time.
@@ -52,29 +51,56 @@ class Happenings:
         What is missed comes after all else that happens at the deadline.
         """
         what, whose = notes[:, 1], notes[:, 2]
-        kind, owner = _KIND[what], np.where(what < QUEUED, whose, len(self._deadlines) + whose)
+        of_messages = what >= QUEUED
+        kind, owner = _KIND[what], whose + self._tasks * of_messages
         said = (kind != NONE) & self._is_told[owner]
         passed = np.flatnonzero(what == PASSED)
         said[passed] &= notes[passed, 4] == self._last_leg[whose[passed]]
-        happened = np.column_stack([notes[:, 0], kind, owner, notes[:, 3]])[said]
-        found = np.concatenate([happened, self._missed(time, notes[(what < QUEUED) & said])])
+        told, jobs = np.flatnonzero(said), np.flatnonzero(said & ~of_messages)
+        found = _table(notes[told, 0], kind[told], owner[told], notes[told, 3])
+        missed = self._deadlines.missed_before(time, notes.take(jobs, axis=0))
+        if not len(missed):
+            return found
+        found = np.concatenate([found, missed])
         in_order: Integers = found[np.argsort(found[:, 0], kind="stable")]
         return in_order
 
-    def _missed(self, time: int, notes: Integers) -> Integers:
-        """The deadlines before `time` at which jobs are not done."""
-        what = notes[:, 1]
-        new, done = notes[(what == RELEASED) | (what == SKIPPED)], notes[what == FINISHED]
-        due = np.column_stack([new[:, 4] + self._deadlines[new[:, 2]], new[:, 2:4]])
-        waiting = np.concatenate([self._waiting, due])
-        deadline, ended = waiting[:, 0], np.full(len(waiting), LATER, dtype=np.int64)
-        keys, wanted = (table @ (1, len(self._deadlines)) for table in (waiting[:, 1:], done[:, 2:4]))
-        order = np.argsort(keys)
-        places = np.searchsorted(keys, wanted, sorter=order)
-        known = places < len(keys)  # those that are late have been told of
-        places = order[places[known]]
-        same = keys[places] == wanted[known]
-        ended[places[same]] = done[known, 0][same]
-        self._waiting = waiting[(ended == LATER) & (deadline >= time)]
-        missed = waiting[(ended > deadline) & (deadline < time)]
-        return np.insert(missed, 1, _MISSED, axis=1)
+
+class _Deadlines:
+    """Of the jobs that may still be late: those of each task one after the other, without gaps."""
+
+    def __init__(self, deadlines: Integers) -> None:
+        """`deadlines` are those of the tasks, from the nominal release on."""
+        self._of_tasks = deadlines
+        self._first, self._counts = np.zeros((2, len(deadlines)), dtype=np.int64)
+        self._due = self._ended = np.zeros(0, dtype=np.int64)
+
+    def missed_before(self, time: int, notes: Integers) -> Integers:
+        """The deadlines before `time` [ns] at which jobs are not done, as a table of `Events` in order of the tasks."""
+        what, task = notes[:, 1], notes[:, 2]
+        new = np.flatnonzero((what == RELEASED) | (what == SKIPPED))
+        counts = self._counts + np.bincount(task[new], minlength=len(self._counts))
+        start = np.cumsum(counts) - counts
+        places = (start - self._first)[task] + notes[:, 3]
+        due, ended = np.full((2, int(counts.sum())), LATER, dtype=np.int64)
+        shifts = start - (np.cumsum(self._counts) - self._counts)
+        before = np.arange(len(self._due)) + np.repeat(shifts, self._counts)
+        due[before], ended[before] = self._due, self._ended
+        due[places[new]] = notes[new, 4] + self._of_tasks[task[new]]
+        done = np.flatnonzero((what == FINISHED) & (places >= start[task]))  # of those that are late has been told
+        ended[places[done]] = notes[done, 0]
+        past = due < time
+        late = np.flatnonzero(past & (ended > due))
+        owners = np.repeat(np.arange(len(counts)), counts)
+        missed = _table(due[late], _MISSED, owners[late], (self._first - start)[owners[late]] + late)
+        gone = np.bincount(owners[past], minlength=len(counts))
+        self._first, self._counts = self._first + gone, counts - gone
+        self._due, self._ended = due[~past], ended[~past]
+        return missed
+
+
+def _table(*columns: Integers | int) -> Integers:
+    found = np.empty((len(columns[0]), len(columns)), dtype=np.int64)  # type: ignore[arg-type]
+    for i, column in enumerate(columns):
+        found[:, i] = column
+    return found

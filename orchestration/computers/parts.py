@@ -51,6 +51,8 @@ class Task(NamedTuple):
     """the stream of how late they are"""
     execution: int
     """the stream of what its jobs take"""
+    is_heard: int = 1
+    """whether anybody is told of its samples"""
 
 
 class Carrier(NamedTuple):
@@ -140,6 +142,12 @@ COLUMNS = 5
 NOTED = frozenset(range(KINDS))
 
 
-def constant(value: int) -> Stream:
-    """The same number each time."""
-    return lambda count: np.full(count, value, dtype=np.int64)
+@dataclass(frozen=True)
+class Constant:
+    """The stream of a number that is the same each time."""
+
+    value: int
+
+    def __call__(self, count: int) -> Integers:
+        """As `Stream`."""
+        return np.full(count, self.value, dtype=np.int64)

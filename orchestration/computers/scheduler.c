@@ -227,7 +227,7 @@ static void sample(Scheduler *s, int64_t i, Job *job, int64_t now) {
     int64_t time = TASK(i, READS_AT_RELEASE) ? job->released : now;
     job->sample = task->samples++;
     task->sampled_at = time > task->sampled_at + 1 ? time : task->sampled_at + 1;
-    note(s, now, SAMPLED, i, job->number, task->sampled_at);
+    if (TASK(i, IS_HEARD)) note(s, now, SAMPLED, i, job->number, task->sampled_at);
 }
 
 static void set_deadline(Scheduler *s, int64_t i, int64_t now) {
@@ -423,18 +423,30 @@ static void arrive(Scheduler *s, int64_t now) {
     }
 }
 
-static void pass(Scheduler *s, int64_t now) {
+/* Goes through an instant; when the next one is, at the earliest: what was due may have been put off. */
+static int64_t pass(Scheduler *s, int64_t now) {
+    int64_t next;
     do {
         do {
             end(s, now);
             meet_deadlines(s, now);
             arrive(s, now);
-            if (s->no_memory) return;
-        } while (least(s->due, s->due_count) == now);
-        if (now == s->g.stop) return;
-        EACH(p, PROCESSORS) if (s->processors[p].changed) choose(s, p, now);
-    } while (least(s->due, s->due_count) == now);
-    EACH(k, LINKS) if (s->links[k].changed) choose_frame(s, k, now);
+            if (s->no_memory) return now;
+            next = least(s->due, s->due_count);
+        } while (next == now);
+        if (now == s->g.stop) return next;
+        EACH(p, PROCESSORS) {
+            if (!s->processors[p].changed) continue;
+            choose(s, p, now);
+            next = s->busy[p] < next ? s->busy[p] : next;
+        }
+    } while (next == now);
+    EACH(k, LINKS) {
+        if (!s->links[k].changed) continue;
+        choose_frame(s, k, now);
+        next = s->line[k] < next ? s->line[k] : next;
+    }
+    return next;
 }
 
 /* -- for Python ---------------------------------------------------------------------------------------------------- */
@@ -503,8 +515,8 @@ EXPORTED int64_t scheduler_reached(Scheduler *s) {
 
 /* Passes through all instants before a time, up to the end; how many notes are left to be taken, -1 without memory. */
 EXPORTED int64_t scheduler_run(Scheduler *s, int64_t until) {
-    int64_t last = until - 1 < s->g.stop ? until - 1 : s->g.stop, now;
-    while ((now = least(s->due, s->due_count)) <= last && !s->no_memory) pass(s, now);
+    int64_t last = until - 1 < s->g.stop ? until - 1 : s->g.stop, now = least(s->due, s->due_count);
+    while (now <= last && !s->no_memory) now = pass(s, now);
     int64_t noted = s->g.noted;
     s->g.noted = 0;
     return s->no_memory ? -1 : noted;

@@ -203,11 +203,9 @@ class Scheduler:
 
     def run(self, until: int) -> None:
         """Go through all instants before `until` [ns], up to the end."""
-        due, last = self._due, min(until - 1, self._stop)
-        if not due:
-            return
-        while (now := min(due)) <= last:
-            self._pass(now)
+        last, now = min(until - 1, self._stop), min(self._due, default=LATER)
+        while now <= last:
+            now = self._pass(now)
 
     def taken(self) -> Integers:
         """The notes since they were taken last, a row each: time, what, whose, which, a number more."""
@@ -221,23 +219,26 @@ class Scheduler:
 
     # -- an instant ------------------------------------------------------------------------------------------------
 
-    def _pass(self, now: int) -> None:
-        due = self._due
-        while True:
-            while min(due) == now:
+    def _pass(self, now: int) -> int:
+        """Go through an instant; when the next one is, at the earliest: what was due may have been put off."""
+        due, then = self._due, now
+        while then == now:
+            while then == now:
                 self._end(now)
                 self._meet_deadlines(now)
                 self._arrive(now)
+                then = min(due)
             if now == self._stop:
-                return
+                return then
             for p, processor in enumerate(self._processors):
                 if processor.changed:
                     self._choose(p, processor, now)
-            if min(due) > now:
-                break
+                    then = min(then, due[self._busy + p])
         for k, link in enumerate(self._links):
             if link.changed:
                 self._choose_frame(k, link, now)
+                then = min(then, due[self._line + k])
+        return then
 
     def _end(self, now: int) -> None:
         due = self._due
@@ -327,7 +328,8 @@ class Scheduler:
         time = job.released if task.part.reads_at_release else now
         job.sample, task.samples = task.samples, task.samples + 1
         task.sampled_at = max(time, task.sampled_at + 1)
-        self._note(now, SAMPLED, i, job.number, task.sampled_at)
+        if task.part.is_heard:
+            self._note(now, SAMPLED, i, job.number, task.sampled_at)
 
     def _set_deadline(self, i: int, now: int) -> None:
         task, due = self._tasks[i], LATER

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orchestration.basics.simulator import Floats, Integers
+from orchestration.computers.parts import Constant
 from orchestration.system.distribution import Distribution, Varying
 from orchestration.system.times import NANOSECONDS, nanoseconds
 
@@ -31,8 +32,7 @@ def times(of: Varying, stream: Stream) -> Lateness:
     Raises `UsageError` for a trace that cannot be read.
     """
     if not isinstance(of, Distribution):
-        constant = nanoseconds(of)
-        return lambda count: np.full(count, constant, dtype=np.int64)
+        return Constant(nanoseconds(of))
     if of.order == "as recorded":
         return in_order(_whole(of.table()))
     draw, value = stream().random, times_from(of)

@@ -123,13 +123,15 @@ class Foreseen:
         notes = self._scheduler.taken()
         if not len(notes):
             return
-        what = np.ascontiguousarray(notes[:, 1])
-        kinds = {kind: notes[what == kind] for kind in (SAMPLED, SENT, ARRIVES)}
+        what, whose = np.ascontiguousarray(notes[:, 1:3].T)
+
+        def of(kind: int, who: int) -> Integers:
+            return notes.take(np.flatnonzero((what == kind) & (whose == who)), axis=0)
+
         for name, task in self._tasks.items():
-            found = kinds[SAMPLED]
-            self.samples[name].hear(found[found[:, 2] == task, 4])
+            self.samples[name].hear(of(SAMPLED, task)[:, 4])
         for i, messages in enumerate(self.messages.values()):
-            messages.hear(*(kinds[kind][kinds[kind][:, 2] == i] for kind in (SENT, ARRIVES)))
+            messages.hear(of(SENT, i), of(ARRIVES, i))
 
     def further(self) -> None:
         """Find out more, as something before the time that was asked for is not known yet."""

@@ -37,7 +37,7 @@ class Happened:
     def __init__(self, system: System) -> None:
         connections = tuple(x.name for x in system.connections)
         self._on_computers = _OnComputers(system) if system.computers or system.networks else None
-        self._shift = np.array([0, 0, len(connections), 0])
+        self._first = len(connections)
         self._names = connections if self._on_computers is None else (*connections, *self._on_computers.names)
         self._kept: Integers = np.zeros((0, 4), dtype=np.int64)
 
@@ -48,7 +48,8 @@ class Happened:
         """
         if self._on_computers is not None:
             found = self._on_computers.up_to(time)
-            self._kept = np.concatenate([self._kept, found + self._shift])
+            found[:, 2] += self._first
+            self._kept = np.concatenate([self._kept, found]) if len(self._kept) else found
             events = np.concatenate([self._kept, events])
         return Events(self._names, _in_order(events))
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from orchestration.basics.simulator import Booleans
+from orchestration.computers.parts import Constant
 from orchestration.schedule.drawing import Lateness, Stream, in_order, index_from, times
 from orchestration.schedule.streams import cut_normal
 from orchestration.system.distribution import Distribution, Varying
@@ -21,7 +22,7 @@ def lateness(jitter: Varying, spread: str, stream: Stream) -> Lateness:
         return times(jitter, stream)
     largest = nanoseconds(jitter)
     if largest == 0:
-        return lambda count: np.zeros(count, dtype=np.int64)
+        return Constant(0)
     draw = stream().random
     if spread == "normal":
         return lambda count: np.array([math.floor(cut_normal(u) * largest) for u in draw(count).tolist()], np.int64)

@@ -20,6 +20,7 @@ from orchestration.computers.parts import (
     QUEUE,
     SKIP,
     Carrier,
+    Constant,
     Leg,
     Link,
     Message,
@@ -27,14 +28,14 @@ from orchestration.computers.parts import (
     Processor,
     Stream,
     Task,
-    constant,
 )
 from orchestration.computers.results import Timeline
 from orchestration.computers.timeline import NEEDED, Names, timeline
 from orchestration.schedule.drawing import times
-from orchestration.schedule.message_times import lateness, losses
+from orchestration.schedule.message_times import Losses, lateness, losses
 from orchestration.schedule.streams import ARRIVALS, DELAY, DELAY_JITTER, ERROR, EXECUTION, JITTER, LOSS, Streams
 from orchestration.system.computers import Arrivals
+from orchestration.system.distribution import Varying
 from orchestration.system.frames import ERROR_BITS, frame_nanoseconds
 from orchestration.system.model import SamplingOnArrival, System, TaskSampling
 from orchestration.system.placement import (
@@ -66,7 +67,7 @@ class Resources:
         self._streams: list[Stream] = []
         self._links: list[Link] = []
         self._link_names: list[str] = []
-        self._zero = self._stream(constant(0))
+        self._zero = self._stream(Constant(0))
         placed, self._over = [*placed_tasks(system.computers)], [*placed_messages(system.networks)]
         released = released_by(system)
         self.tasks = {each.task.component: i for i, each in enumerate(placed) if each.task.component is not None}
@@ -145,6 +146,7 @@ class Resources:
             nominal=nominal,
             late=late,
             execution=self._stream(times(task.execution, self._generator(of.place, EXECUTION))),
+            is_heard=task.component is not None,
         )
 
     def _task_alone(self, name: str, processor: int) -> Task:
@@ -185,8 +187,8 @@ class Resources:
         return Carrier(
             sender=self.tasks.get(x.sender, NONE),
             message=message,
-            late=self._stream(lambda count: delay(count) + late(count)),
-            lost=self._stream(lambda count: lost(count).astype(np.int64)),
+            late=self._sum(delay, late),
+            lost=self._share(x.loss, lost),
             releases=releases,
         )
 
@@ -204,7 +206,7 @@ class Resources:
             pause=nanoseconds(network.latency),
             nominal=nominal,
             late=self._stream(lateness(message.jitter, "uniform", self._generator(of.place, JITTER))),
-            corrupted=self._stream(lambda count: corrupted(count).astype(np.int64)),
+            corrupted=self._share(network.error, corrupted),
             carrier=self.carriers.get(message.connection or "", NONE),
         )
 
@@ -237,6 +239,17 @@ class Resources:
     def _stream(self, stream: Stream) -> int:
         self._streams.append(stream)
         return len(self._streams) - 1
+
+    def _sum(self, one: Stream, other: Stream) -> int:
+        if isinstance(one, Constant) and isinstance(other, Constant):
+            return self._stream(Constant(one.value + other.value))
+        return self._stream(lambda count: one(count) + other(count))
+
+    def _share(self, probability: Varying, drawn: Losses) -> int:
+        """1 with a probability, else 0."""
+        if probability == 0.0:
+            return self._zero
+        return self._stream(lambda count: drawn(count).astype(np.int64))
 
     def _generator(self, owner: str, cause: str) -> Callable[[], np.random.Generator]:
         return partial(self._streams_of.of, owner, cause)

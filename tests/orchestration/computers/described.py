@@ -11,6 +11,7 @@ from orchestration.computers.parts import (
     NONE,
     QUEUE,
     Carrier,
+    Constant,
     Leg,
     Link,
     Message,
@@ -18,7 +19,6 @@ from orchestration.computers.parts import (
     Processor,
     Stream,
     Task,
-    constant,
 )
 from orchestration.computers.results import Timeline
 from orchestration.computers.scheduler import Scheduler
@@ -52,7 +52,7 @@ class Described:
         self.streams: list[Stream] = []
 
     def stream(self, stream: Stream | int) -> int:
-        self.streams.append(constant(stream) if isinstance(stream, int) else stream)
+        self.streams.append(Constant(stream) if isinstance(stream, int) else stream)
         return len(self.streams) - 1
 
     def processor(self, policy: int = FIXED_PRIORITY, *, preemptive: bool = True, switch: int = 0) -> int:
