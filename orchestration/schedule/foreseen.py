@@ -115,9 +115,10 @@ class Foreseen:
         return self._reached > self._stop
 
     def to(self, time: int) -> None:
-        """Find out what happens before `time` [ns]."""
+        """Find out what happens before `time` [ns], and somewhat later: of what begins before it, how it ends."""
         if time <= self._reached:
             return
+        time += max((time - self._reached) // 16, _FURTHER)
         self._reached = LATER if self._scheduler.reached == LATER else time
         self._scheduler.run(time)
         notes = self._scheduler.taken()
@@ -135,4 +136,4 @@ class Foreseen:
 
     def further(self) -> None:
         """Find out more, as something before the time that was asked for is not known yet."""
-        self.to(min(self._reached + max(self._reached // 4, _FURTHER), self._stop + 1))
+        self.to(self._reached + max(self._reached // 4, _FURTHER))
