@@ -63,10 +63,13 @@ double q_llvm_sqrt(double) __asm__("llvm.sqrt.f64") __attribute__((const));
 #undef Q_HARDWARE_SQRT /* no doubles in hardware: the compiler would call libm */
 #endif
 
+/* Only where they are needed: they are long, and most of what a compiler has to read for one lane. */
+#if QUADCOSIM_LANES > 1 || !defined(Q_HARDWARE_SQRT)
 #if defined(__SSE2__) || defined(_M_X64)
 #include <immintrin.h>
 #elif defined(__aarch64__)
 #include <arm_neon.h>
+#endif
 #endif
 
 /* Digit by digit, for a machine without the instruction. */
