@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
+from collections import Counter
 from collections.abc import Container, Iterable, Mapping
 from typing import ClassVar
 
@@ -34,6 +35,8 @@ _WIDE_COMPARED = {
     "ne": ("equal", False, True),
 }
 """Of each comparison, by which it is done, whether the other way round, and whether it is the contrary"""
+_LONGEST_PART = 60
+"""of an expression that stands within another, in characters"""
 _FORMATS = {"g": "general", "e": "exponential", "f": "fixed"}
 ERRORS = ("FmuError", "DivergenceError", "ZeroDivisionError", "OverflowError", "ValueError")
 """What a function may end with; the place here, from 1 on, is what it returns."""
@@ -71,6 +74,8 @@ class FunctionWriter:
         for name in function.names:
             self.parameters.append(_unused(f"p_{identifier(name)}", self.parameters))
         self.used = used_by(each_of(function.body), self._named)
+        self.uses = Counter(id(arg) for symbol in self.used.values() for arg in symbol.args)
+        self.uses.update(id(symbol) for each in each_of(function.body) for symbol in self._named(each))
         self.gives: dict[int, set[tuple[str, int]]] = {}
 
     def text(self) -> str:
@@ -154,9 +159,8 @@ class FunctionWriter:
         """The variable of what a statement gives its value; declared where the function begins."""
         if id(symbol) not in self.pinned:
             name = self.pinned[id(symbol)] = self._name("y")
-            self.declared.append(
-                f"{c_type(symbol)} {name} = {'q_known(0)' if symbol.kind == 'bool' else 'q_all(0.0)'};"
-            )
+            unknown = "q_known(0)" if symbol.kind == "bool" else self.zero
+            self.declared.append(f"{c_type(symbol)} {name} = {unknown};")
         return self.pinned[id(symbol)]
 
     # -- values ----------------------------------------------------------------------------------------------
@@ -175,7 +179,12 @@ class FunctionWriter:
                 return self._pin(symbol)
             raise TraceError(f"{self.function.name}: {symbol.op} {symbol.data} is used outside of its loop")
         for waiting in _unknown_below(symbol, self._is_known):
-            self.scopes[-1][id(waiting)] = self._define(waiting, self._expression(waiting))
+            text = self._expression(waiting)
+            is_part = waiting is not symbol and self.uses[id(waiting)] == 1 and waiting.kind == "real"
+            if is_part and len(text) <= _LONGEST_PART:
+                self.scopes[-1][id(waiting)] = f"({text})"
+            else:
+                self.scopes[-1][id(waiting)] = self._define(waiting, text)
         return self.scopes[-1][id(symbol)]
 
     def _is_known(self, symbol: Symbol) -> bool:
@@ -183,14 +192,21 @@ class FunctionWriter:
 
     def _real(self, symbol: Symbol) -> str:
         if symbol.kind == "bool" and symbol.op == "constant":
-            return f"q_all({value_of(symbol)!r})"
+            return self._everywhere(f"{value_of(symbol)!r}")
         name = self.value(symbol)
-        return f"q_select({name}, q_all(1.0), q_all(0.0))" if symbol.kind == "bool" else name
+        return f"q_select({name}, {self._everywhere('1.0')}, {self.zero})" if symbol.kind == "bool" else name
 
     def _lanes(self, symbol: Symbol) -> str:
         """A value as the argument of a function: a constant in all lanes."""
         text = self._real(symbol)
-        return f"q_all({text.strip('()')})" if symbol.op == "constant" and text.strip("(-")[0].isdigit() else text
+        is_number = symbol.op == "constant" and symbol.kind != "bool" and text.strip("(-")[0].isdigit()
+        return self._everywhere(text) if is_number else text
+
+    zero: ClassVar[str] = "0.0"
+
+    def _everywhere(self, number: str) -> str:
+        """A known number where a variable could be."""
+        return number
 
     def _as(self, kind: Kind, symbol: Symbol) -> str:
         """A value as what is of a kind is set to it."""
@@ -344,8 +360,7 @@ class FunctionWriter:
         call: Call = each.data
         given = [self._as(p.kind, symbol) for symbol, p in zip(each.symbols, call.function.parameters)]
         results = [self._name("r")] if call.function.results else []
-        zeros = ", ".join(["q_all(0.0)"] * call.function.results)
-        self.declared += [f"q_real {name}[{call.function.results}] = {{{zeros}}};" for name in results]
+        self.declared += [f"q_real {name}[{call.function.results}] = {{{self.zero}}};" for name in results]
         status = self._name("status")
         self._called(each, [*given, *results], status)
         for symbol in self._coming_of(each):
@@ -388,7 +403,7 @@ class FunctionWriter:
             states.append(self._name("s"))
             self._line(f"{c_type(start)} {states[-1]} = {self._as(start.kind, start)};")
         last, index = self.value(count), self._name("i")
-        self._line(f"for (q_real {index} = q_all(0.0); {self._goes_on(index, last)}; {index} = {index} + 1.0) {{")
+        self._line(f"for (q_real {index} = {self.zero}; {self._goes_on(index, last)}; {index} = {index} + 1.0) {{")
         self.scopes.append({})
         for symbol in needed.values():
             if symbol.op == "index" and symbol.data == depth:

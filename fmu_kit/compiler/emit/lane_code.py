@@ -48,6 +48,11 @@ class LaneWriter(FunctionWriter):
     def _named(self, each: Statement) -> tuple[Symbol, ...]:
         return () if each.op == "raise" or _is_silent((each,)) else each.symbols
 
+    zero: ClassVar[str] = "q_all(0.0)"
+
+    def _everywhere(self, number: str) -> str:
+        return f"q_all({number.strip('()')})"
+
     # -- lanes -----------------------------------------------------------------------------------------------
 
     def _takes_out(self, block: Block) -> bool:
