@@ -13,6 +13,7 @@ from fmu_kit.compiler.trace.tree import (
     Path,
     Snapshot,
     children,
+    copied,
     difference,
     is_number,
     leaves,
@@ -104,7 +105,7 @@ class Memory:
         everything = {"self": self.attributes(), "arguments": roots}
         holders: dict[Path, int] = {}
         _note_holders(everything, (), holders)
-        return mapped(everything, lambda _, leaf: leaf), holders
+        return copied(everything), holders
 
     def install(self, view: Any, holders: dict[Path, int], roots: Any) -> None:
         """Hold what a view says: in the objects that are there, where all paths left the same ones."""
@@ -138,6 +139,8 @@ class Memory:
                 kind = _KINDS[self.slave.variables[reference].type]
             found = self.places[name] = Place(name, kind, reference)
             self.first_kinds[name] = kind
+        if found.kind == symbol.kind:
+            return found
         if reference is None:
             found = self.places[name] = Place(name, common_kind(node("load", (), found.kind), symbol), None)
         elif (found.kind, symbol.kind) in (

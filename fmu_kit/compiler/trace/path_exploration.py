@@ -33,7 +33,16 @@ from fmu_kit.compiler.trace.symbols import (
     token,
     truth,
 )
-from fmu_kit.compiler.trace.tree import difference, expect_no_twins, expect_unchanged, is_number, leaves, mapped, shape
+from fmu_kit.compiler.trace.tree import (
+    bare_leaves,
+    difference,
+    expect_no_twins,
+    expect_unchanged,
+    is_number,
+    leaves,
+    mapped,
+    shape,
+)
 from fmu_kit.errors import DivergenceError, FmuError
 from fmu_kit.failure import is_of_a_model
 
@@ -284,7 +293,7 @@ class Explorer:
             memory.written, memory.version = dict(leaf.written), leaf.version
             exit_view, value = memory.attributes(), leaf.value
             expect_no_twins(exit_view)
-            results = [lifted(leaf) for _, leaf in leaves(value) if is_number(leaf)]
+            results = [lifted(leaf) for leaf in bare_leaves(value) if is_number(leaf)]
             block = (*block, *memory.flushed(), statement("return", results))
         held.restore()
         memory.written, memory.version = written, version
@@ -410,7 +419,7 @@ class _Merge:
         if shape(a) != shape(b):
             found = difference(a, b, self.memory.name_in_view)
             raise TraceError(f"{what} differs in more than numbers between two paths: {found}")
-        others = iter([leaf for _, leaf in leaves(b)])
+        others = iter(list(bare_leaves(b)))
 
         def either(_: Any, leaf: Any) -> Any:
             other = next(others)
@@ -441,7 +450,7 @@ def _numbered(name: str) -> Iterator[str]:
 
 def _kept(value: Any) -> Any:
     """A value whose whole numbers can be kept, where there are larger ones in it."""
-    if any(isinstance(leaf, Symbol) and leaf.kind == "wide" for _, leaf in leaves(value)):
+    if any(isinstance(leaf, Symbol) and leaf.kind == "wide" for leaf in bare_leaves(value)):
         return mapped(value, lambda _, leaf: at_rest(leaf) if isinstance(leaf, Symbol) else leaf)
     return value
 

@@ -17,14 +17,16 @@ from fmu_kit.compiler.trace.symbols import Symbol, TraceError
 Path = tuple[Any, ...]
 USUAL_LEAVES = frozenset({Symbol, float, int, bool, str, bytes, type(None)})
 """Classes, of most of what is held: to be looked for before anything is called"""
+_NUMBERS = frozenset({Symbol, float, int, bool})
 _LEAVES = (*USUAL_LEAVES, type, enum.Enum)
 _OPAQUE = (set, bytearray, array.array, collections.deque, random.Random, Iterator)
 _DEEPEST = 12
+_NONE: dict[str, Any] = {}
 
 
 def is_number(value: Any) -> bool:
     """Whether a leaf is a number, known or not."""
-    return isinstance(value, Symbol | float | int) and not isinstance(value, enum.Enum)
+    return type(value) in _NUMBERS or (isinstance(value, Symbol | float | int) and not isinstance(value, enum.Enum))
 
 
 def children(value: Any) -> list[tuple[Any, Any]]:
@@ -36,7 +38,8 @@ def children(value: Any) -> list[tuple[Any, Any]]:
     if form == "leaf":
         return []
     if form == "object":
-        return [(name, getattr(value, name)) for name in attributes(value) if hasattr(value, name)]
+        held = [(name, getattr(value, name)) for name in _slots(type(value)) if hasattr(value, name)]  # type: ignore[arg-type]
+        return held + [each for each in getattr(value, "__dict__", _NONE).items() if each[0][:2] != "__"]
     if form == "dict":
         return list(value.items())
     if form == "opaque":
@@ -90,6 +93,18 @@ def leaves(value: Any) -> list[tuple[Path, Any]]:
     return found
 
 
+def bare_leaves(value: Any) -> Iterator[Any]:
+    """Every leaf in a value, in the order of `leaves`."""
+    inside = children(value)
+    if not inside:
+        yield value
+    for _, child in inside:
+        if type(child) in USUAL_LEAVES:
+            yield child
+        else:
+            yield from bare_leaves(child)
+
+
 def shape(value: Any) -> Any:
     """What a value is apart from its numbers: two of one shape can be merged."""
     if is_number(value):
@@ -129,16 +144,29 @@ def mapped(value: Any, change: Callable[[Path, Any], Any], path: Path = ()) -> A
         (key, change((*path, key), child) if type(child) in USUAL_LEAVES else mapped(child, change, (*path, key)))
         for key, child in inside
     ]
+    return _rebuilt(value, new)
+
+
+def _rebuilt(value: Any, new: list[tuple[Any, Any]]) -> Any:
+    """A value of the same class that holds something else."""
     if isinstance(value, list):
         return [child for _, child in new]
     if isinstance(value, tuple):
         return type(value)(*(child for _, child in new)) if hasattr(value, "_fields") else tuple(c for _, c in new)
     if isinstance(value, dict):
         return dict(new)
-    copied = copy.copy(value)
+    made = copy.copy(value)
     for key, child in new:
-        object.__setattr__(copied, key, child)
-    return copied
+        object.__setattr__(made, key, child)
+    return made
+
+
+def copied(value: Any) -> Any:
+    """A copy of a value, down to its leaves."""
+    inside = children(value)
+    if not inside:
+        return value
+    return _rebuilt(value, [(key, child if type(child) in USUAL_LEAVES else copied(child)) for key, child in inside])
 
 
 def mutable_objects(value: Any, found: dict[int, Any]) -> None:
