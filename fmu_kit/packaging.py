@@ -13,6 +13,7 @@ import hashlib
 import importlib
 import importlib.metadata
 import inspect
+import json
 import os
 import posixpath
 import re
@@ -43,6 +44,8 @@ ICONS = {2: "model.png", 3: "terminalsAndIcons/icon.png"}
 NATIVE_TABLES = "sources/tables.h"
 """Of an FMU without Python inside: the file of its sources that has the GUID."""
 SOURCE_HASH_FILE = "resources/source_hash.txt"
+VARIANT_FILE = "resources/variant.json"
+"""Of a slave with values that are fixed: that slave, and the values."""
 _STAMP = (1980, 1, 1, 0, 0, 0)
 
 _LICENCES = {
@@ -113,6 +116,24 @@ def read_source_hash(fmu: Path) -> str | None:
         return None
 
 
+def origin(target: Target, digest: str) -> dict[str, bytes]:
+    """What an FMU says of where it comes from, by the place there: the hash of its sources; of what it is a variant."""
+    files = {SOURCE_HASH_FILE: digest.encode()}
+    if target.variant is not None:
+        files[VARIANT_FILE] = json.dumps([f"{target.module}:{target.model}", target.variant.text]).encode()
+    return files
+
+
+def read_variant(fmu: Path) -> tuple[str, Variant] | None:
+    """Of which slave, as `module:Class`, an .fmu is which variant; None if it is none of ours or not readable."""
+    try:
+        with zipfile.ZipFile(fmu) as archive:
+            slave, text = json.loads(archive.read(VARIANT_FILE))
+            return str(slave), Variant.parse(text)
+    except (OSError, KeyError, TypeError, ValueError, AttributeError, zipfile.BadZipFile):
+        return None
+
+
 def build(target: Target, folder: Path) -> Path:
     """Write `folder`/Model.fmu, replacing it in one go, and return its path."""
     sources = bundled_sources(target)
@@ -123,7 +144,7 @@ def build(target: Target, folder: Path) -> Path:
     files[f"resources/{name}/__init__.py"] = b""
     files[f"resources/{entry}.py"] = _entry(name, target).encode()
     files["resources/slavemodule.txt"] = entry.encode()
-    files[SOURCE_HASH_FILE] = digest.encode()
+    files |= origin(target, digest)
     files |= _with_loader(unchanged_files(target), target.name)
     making = Making(
         needs=documentation.IN_PYTHON,

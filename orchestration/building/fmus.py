@@ -15,7 +15,7 @@ from fmu_kit import packaging
 from fmu_kit.bundle import PackagingError, Target
 from fmu_kit.compiler.pack import freshness
 from fmu_kit.discovery import slave_beside, slaves_in
-from fmu_kit.packaging import read_source_hash
+from fmu_kit.packaging import read_source_hash, read_variant
 from fmu_kit.variants import Variant
 from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.building import consent
@@ -48,12 +48,15 @@ class Packing:
     """the module that is run to pack, and its first arguments"""
     source_hash: Callable[[Target], str]
 
+    def base_of(self, path: Path) -> Path | None:
+        """The folder beside whose modules an FMU is that is made this way; None if it is in no such place."""
+        depth = len(Path(self.folder).parts)
+        return path.parents[depth] if path.parts[-1 - depth : -1] == Path(self.folder).parts else None
+
     def slave_of(self, path: Path) -> Target | None:
         """The slave that an FMU is made of this way: it is in the folder, and a module beside that defines it."""
-        depth = len(Path(self.folder).parts)
-        if path.parts[-1 - depth : -1] != Path(self.folder).parts:
-            return None
-        return _told(slave_beside, path.parents[depth] / path.name)
+        folder = self.base_of(path)
+        return None if folder is None else _told(slave_beside, folder / path.name)
 
 
 IN_PYTHON = Packing(folder="", command=("fmu_kit.packaging",), source_hash=packaging.source_hash)
@@ -71,9 +74,10 @@ PACKINGS = (NATIVE_FMI_3, NATIVE, IN_PYTHON)
 def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
     """The .fmu for the name of one of this project's FMUs, or for a path; built first if need be.
 
-    A path's FMU is built where a module beside it defines a slave of that name, unless it carries the hash of these
-    sources or is none of ours; if somebody has to agree to that, `UsageError` says how. Raises `UsageError` naming the
-    valid names if there is none; `announce` hears of a build.
+    A path's FMU is built where a module beside it defines a slave of that name, or that of which it is a variant,
+    unless it carries the hash of these sources or is none of ours; if somebody has to agree to that, `UsageError` says
+    how. Raises `UsageError` naming the valid names if there is none; `announce` hears of a build, and of a variant
+    elsewhere that is older than the sources of this project.
     """
     for packing in PACKINGS:
         name = fmu.rpartition("/")[2]
@@ -86,8 +90,11 @@ def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
     path = Path(fmu)
     if path.suffix == ".fmu":
         packing, target = _slave_of(path)
+        if target is None:
+            packing, target = _variant_at(path, announce)
         if target is not None and _is_old(path, target, packing):
-            consent.expect(path, path.parents[len(Path(packing.folder).parts)])
+            if target.root is not None:
+                consent.expect(path, path.parents[len(Path(packing.folder).parts)])
             _announce_build(path, announce)
             build_slaves([target], path.parent, announce, packing=packing)
         if path.is_file():
@@ -158,6 +165,30 @@ def _slave_of(path: Path) -> tuple[Packing, Target | None]:
         target = packing.slave_of(path)
         if target is not None:
             return packing, target
+    return IN_PYTHON, None
+
+
+def _variant_at(path: Path, announce: Callable[[str], None] | None) -> tuple[Packing, Target | None]:
+    """The slave that an FMU is a variant of, and how it is built; None if it is not where such FMUs are built.
+
+    Then it is left as it is, and `announce` hears if the slave is one of this project's and has changed.
+    """
+    kept = read_variant(path)
+    if kept is None or path.stem != kept[1].name:
+        return IN_PYTHON, None
+    slave, variant = kept
+    own = replace(Target.parse(slave), variant=variant) if slave in MODELS.values() else None
+    for packing in PACKINGS:
+        folder = packing.base_of(path)
+        if folder is None:
+            continue
+        if own is not None and folder.resolve() == default_folder().resolve():
+            return packing, own
+        beside = _told(slave_beside, folder / f"{slave.rpartition(':')[2]}.fmu")
+        if beside is not None and f"{beside.module}:{beside.model}" == slave:
+            return packing, replace(beside, variant=variant)
+    if own is not None and announce is not None and all(_is_old(path, own, packing) for packing in PACKINGS):
+        announce(f"{path} was built of other sources than today's: expected quadcosim build --name {own.name} again")
     return IN_PYTHON, None
 
 

@@ -40,9 +40,9 @@ from fmu_kit.documentation import Making
 from fmu_kit.model_description import GUID_PLACEHOLDER
 from fmu_kit.packaging import (
     NATIVE_TABLES,
-    SOURCE_HASH_FILE,
     described,
     licences_and_icon,
+    origin,
     put_guid,
     slave_class,
     written,
@@ -91,7 +91,7 @@ def build(
     files |= standard.beside(slave_class(target), standard.main)
     files |= {f"documentation/{_PYTHON}/{path}": text.encode() for path, text in _python_sources(target).items()}
     files |= licences_and_icon(target, version)
-    files[SOURCE_HASH_FILE] = source_hash(target, version).encode()
+    files |= origin(target, source_hash(target, version))
     making = Making(
         version=version,
         needs=_NEEDS,

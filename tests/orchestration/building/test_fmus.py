@@ -2,11 +2,13 @@
 
 import os
 import sys
+import zipfile
 from pathlib import Path
 
 import platformdirs
 import pytest
 
+from fmu_kit.packaging import SOURCE_HASH_FILE, read_source_hash, write_archive
 from orchestration.building import fmus
 from orchestration.building.models import MODELS
 from orchestration.fmi.fmi2 import Fmi2Instance
@@ -198,6 +200,56 @@ def test_without_python_inside_it_is_built_into_a_folder_beside_the_slave(
 def test_somebody_elses_fmu_is_left_as_it_is_beside_a_slave_of_its_name(lamp: Path) -> None:
     (lamp / "Lamp.fmu").write_bytes(b"of another tool")
     assert fmus.locate(str(lamp / "Lamp.fmu")).read_bytes() == b"of another tool"
+
+
+@pytest.mark.parametrize("packing", [fmus.IN_PYTHON, fmus.NATIVE, fmus.NATIVE_FMI_3], ids=lambda each: each.folder)
+def test_a_variant_is_built_again_with_its_values_when_its_sources_change(packing: fmus.Packing, lamp: Path) -> None:
+    law = (lamp / "lamp.py").read_text(encoding="utf-8").replace("import Input,", "import Input, Parameter,")
+    law = law.replace("VOLTS *", "self.share * VOLTS *").replace(
+        "    switch", '    share = Parameter("of it", "1", start=1.0)\n    switch'
+    )
+    (lamp / "lamp.py").write_text(law, encoding="utf-8")
+    (slave,) = fmus.slaves_of(lamp)
+    folder = lamp / packing.folder
+    (path,) = fmus.build_slaves([fmus.with_fixed(slave, "Dim", {"share": 0.5})], folder, packing=packing)
+    heard: list[str] = []
+    assert fmus.locate(str(path), heard.append) == path
+    assert heard == []
+    before = read_source_hash(path)
+    (lamp / "voltage.py").write_text("VOLTS = 24.0\n", encoding="utf-8")
+    for _ in range(2):
+        assert fmus.locate(str(path), heard.append) == path
+    assert heard == [f"building {path}"]
+    assert read_source_hash(path) != before
+    assert (read_model(path).variables["share"].is_constant, read_model(path).variables["share"].start) == (True, "0.5")
+
+
+def with_another_hash(path: Path) -> bytes:
+    """An FMU as if it were of other sources; its new content."""
+    with zipfile.ZipFile(path) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    write_archive(path, {**files, SOURCE_HASH_FILE: b"of others"}, first="modelDescription.xml")
+    return path.read_bytes()
+
+
+def test_a_variant_of_this_projects_is_built_again_in_its_folder_and_elsewhere_only_said_to_be_old(
+    project: Path, tmp_path: Path
+) -> None:
+    (slave,) = fmus.slaves_named("QuadrotorPlant")
+    target = fmus.with_fixed(slave, "Heavy", {"mass": 2.0})
+    own, elsewhere = fmus.build_slaves([target], with_fmus_folder(project)) + fmus.build_slaves([target], tmp_path)
+    built, heard = own.read_bytes(), list[str]()
+    fmus.locate(str(elsewhere), heard.append)
+    assert heard == []
+    old = with_another_hash(elsewhere)
+    own.write_bytes(old)
+    fmus.locate(str(own), heard.append)
+    fmus.locate(str(elsewhere), heard.append)
+    assert heard == [
+        f"building {own}",
+        f"{elsewhere} was built of other sources than today's: expected quadcosim build --name Heavy again",
+    ]
+    assert (own.read_bytes(), elsewhere.read_bytes()) == (built, old)
 
 
 def test_a_slave_that_cannot_be_built_is_an_error_of_one_line(lamp: Path) -> None:
