@@ -90,16 +90,15 @@ class FlightLayout:
         return tuple(panel for panel in panels if all(line.column in known for line in panel.lines))
 
     def scene(self, columns: Collection[str], system: System | None) -> Scene | None:
-        """The vehicle, and what it follows, in north-east-down."""
+        """The vehicle, and what it follows."""
         given = {} if system is None else system.components["plant"].parameters
-        if given.get("frame") in ("enu", Frame.ENU) or given.get("frame_index") == Frame.ENU:
-            return None
         return Scene(
             position=(PLACE[0], PLACE[1], PLACE[2]),
             quaternion=(ATTITUDE[0], ATTITUDE[1], ATTITUDE[2], ATTITUDE[3]),
             reference=(POSITION_REFERENCE[0], POSITION_REFERENCE[1], POSITION_REFERENCE[2]) if _aims(columns) else None,
             desired=(DESIRED[0], DESIRED[1], DESIRED[2], DESIRED[3]) if {*DESIRED} <= {*columns} else None,
             thrust=THRUST if THRUST in columns else None,
+            is_enu=given.get("frame") in ("enu", Frame.ENU) or given.get("frame_index") == Frame.ENU,
         )
 
 

@@ -39,7 +39,7 @@ class Panel:
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """The columns of what moves in space: z down, quaternions (x, y, z, w) from body to space."""
+    """The columns of what moves in space: quaternions (x, y, z, w) from body to space."""
 
     position: tuple[str, str, str]
     quaternion: tuple[str, str, str, str]
@@ -48,7 +48,9 @@ class Scene:
     desired: tuple[str, str, str, str] | None
     """the attitude that it should have"""
     thrust: str | None
-    """along the body's -z [N]"""
+    """upwards as the vehicle has it [N]"""
+    is_enu: bool = False
+    """whether they are east-north-up and of a body forward-left-up, which the page turns; else north-east-down"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -35,6 +35,7 @@ function signalsOf(run) {
     });
     run.signals = { time: numbersOf(run.track.time), columns, layout, bars: barsOf(run) };
     addAngles(run.signals);
+    run.signals.space = inSpace(run.signals);
   }
   return run.signals;
 }
@@ -58,6 +59,23 @@ function addAnglesOf(signals, quaternion, suffix) {
   signals.columns[`roll${suffix}`] = degrees((a, b, c, d) => Math.atan2(2 * (d * a + b * c), 1 - 2 * (a * a + b * b)));
   signals.columns[`pitch${suffix}`] = degrees((a, b, c, d) => Math.asin(Math.max(-1, Math.min(1, 2 * (d * b - c * a)))));
   signals.columns[`yaw${suffix}`] = degrees((a, b, c, d) => Math.atan2(2 * (d * c + a * b), 1 - 2 * (b * b + c * c)));
+}
+
+/** The columns of what moves in space, north-east-down: of other axes they are turned, as fmu_kit/frames.py does. */
+function inSpace({ layout, columns }) {
+  const told = layout.scene;
+  if (!told || !told.is_enu) return told;
+  const half = Math.SQRT1_2;
+  const attitude = ([x, y, z, w]) => [half * (x + y), half * (x - y), half * (w - z), half * (w + z)];
+  const turned = (names, turn) => names && names.map((name, k) => {
+    const parts = names.map((one) => columns[one]);
+    columns[`${name} turned`] = Float64Array.from(parts[0], (_, i) => turn(parts.map((values) => values[i]))[k]);
+    return `${name} turned`;
+  });
+  const place = ([east, north, up]) => [north, east, -up];
+  const { position, reference, quaternion, desired } = told;
+  const turns = { position: turned(position, place), reference: turned(reference, place), quaternion: turned(quaternion, attitude), desired: turned(desired, attitude) };
+  return { ...told, ...turns };
 }
 
 /** The last place whose time is not after t. */

@@ -166,7 +166,7 @@ let pending = 0;
 function showSignals() {
   const signals = signalsOf(player.run);
   const beside = player.beside === player.run ? null : signalsOf(player.beside);
-  const flies = Boolean(signals && signals.layout.scene);
+  const flies = Boolean(signals && signals.space);
   byId("replay").hidden = !flies;
   byId("player").hidden = !signals;
   byId("signals").hidden = !signals;
@@ -195,7 +195,7 @@ function nameScene(beside) {
     item.append(text);
     return item;
   };
-  const { reference, desired, thrust } = player.run.signals.layout.scene;
+  const { reference, desired, thrust } = player.run.signals.space;
   const sign = desired ? "outlined: now" : "◇ now";
   byId("scene-key").replaceChildren(line("flown", "", "flown"), ...(reference ? [line("wanted", "6 4", `reference, ${sign}`)] : []), ...(thrust ? [line("thrust", "", "thrust")] : []), ...(beside ? [line("beside", "", player.beside.name)] : []));
 }
@@ -276,7 +276,7 @@ function setTime(t) {
   controlsOf.time.value = player.t;
   controlsOf.time.setAttribute("aria-valuetext", `${player.t.toFixed(2)} s`);
   controlsOf.clock.textContent = `${player.t.toFixed(2)} s`;
-  if (signals.layout.scene) {
+  if (signals.space) {
     drawScene();
     byId("readout").textContent = readout(signals);
   }
@@ -289,11 +289,10 @@ function fixed(value, digits) {
 }
 
 function readout(signals) {
-  const { position } = signals.layout.scene;
+  const { position, thrust, is_enu: isEnu } = signals.layout.scene;
   const place = position.map((name) => fixed(valueAt(signals, name, player.t), 3)).join(", ");
   const angles = ["roll", "pitch", "yaw"].map((name) => `${name} ${fixed(valueAt(signals, name, player.t), 1)}°`).join(", ");
   const error = "position error" in signals.columns ? `, ${Number(valueAt(signals, "position error", player.t).toPrecision(3))} m from the reference` : "";
-  const { thrust } = signals.layout.scene;
   const force = thrust ? `; thrust ${fixed(valueAt(signals, thrust, player.t), 2)} N` : "";
-  return `north, east, down ${place} m${error}; ${angles}${force}`;
+  return `${isEnu ? "east, north, up" : "north, east, down"} ${place} m${error}; ${angles}${force}`;
 }

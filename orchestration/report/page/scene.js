@@ -63,7 +63,7 @@ function zoomByWheel(event) {
 
 /** Show these runs, the first as the one that is replayed. */
 function showInScene(tracks) {
-  scene.tracks = tracks.filter((signals) => signals && signals.layout.scene);
+  scene.tracks = tracks.filter((signals) => signals && signals.space);
   scene.box = boxOf(scene.tracks);
   drawScene();
 }
@@ -79,8 +79,8 @@ function boxOf(tracks) {
       high[i] = Math.max(high[i], value);
     }
   };
-  for (const { layout, columns } of tracks) {
-    const { position, reference } = layout.scene;
+  for (const { space, columns } of tracks) {
+    const { position, reference } = space;
     for (let i = 0; i < 3; i += 1) {
       take(columns[position[i]], i, 30);
       if (reference) take(columns[reference[i]], i, Infinity);
@@ -93,8 +93,8 @@ function boxOf(tracks) {
 }
 
 /** Some points of a path and its reference that lie in the box. */
-function sampled({ layout, columns, time }, low, high) {
-  const { position, reference } = layout.scene;
+function sampled({ space, columns, time }, low, high) {
+  const { position, reference } = space;
   const step = Math.max(1, Math.floor(time.length / 150));
   return [position, reference].filter(Boolean).flatMap((names) => {
     const found = [];
@@ -213,7 +213,7 @@ function stroke(context, project, points) {
 }
 
 function drawFlight(context, project, signals, isBeside) {
-  const { position, reference, quaternion, desired, thrust } = signals.layout.scene;
+  const { position, reference, quaternion, desired, thrust } = signals.space;
   const t = Math.min(scene.t, signals.time[signals.time.length - 1]);
   const until = placeAt(signals.time, t);
   const color = paint(isBeside ? "beside" : "flown");
@@ -245,7 +245,7 @@ function mostOf(signals, name) {
 
 /** Where it was in the last seconds: thicker towards now. */
 function drawTrail(context, project, signals, t, color) {
-  const { position } = signals.layout.scene;
+  const { position } = signals.space;
   const places = [];
   for (let k = 0; k <= TRAIL.parts; k += 1) {
     const then = t - TRAIL.seconds * (1 - k / TRAIL.parts);

@@ -1,15 +1,23 @@
 """The page in a browser: what is drawn, what keys and clicks do, and that nothing is asked of a network."""
 
 import dataclasses
+import io
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
 
+from fmu_kit.algebra import Quaternion
+from fmu_kit.frames import attitude
+from orchestration.basics.simulator import Floats
 from orchestration.comparison.file import load_comparison
 from orchestration.comparison.run import compare
+from orchestration.flight.layout import ATTITUDE, DESIRED, PLACE
+from orchestration.quadrotor.wiring import POSITION_REFERENCE
 from orchestration.report.writing import report
 from orchestration.runs.simulation import run
 from orchestration.studies.study import Study
@@ -200,6 +208,36 @@ def test_the_replay_shows_thrust_and_the_attitude_that_the_vehicle_should_have(o
     assert "; thrust " in of_runs.inner_text("#readout")
     lines = of_runs.evaluate("document.getElementById('time-plot').data.map((each) => each.hovertemplate)")
     assert any("yaw of the reference" in line for line in lines)
+
+
+def turned(signals: Mapping[str, Floats]) -> dict[str, Floats]:
+    """A flight that was told east-north-up, told north-east-down."""
+    found = dict(signals)
+    for names in (PLACE, POSITION_REFERENCE):
+        x, y, z = (signals[name] for name in names)
+        found |= zip(names, (y, x, -z))
+    for names in (ATTITUDE, DESIRED):
+        told = [Quaternion.from_xyzw(*each) for each in zip(*(signals[name] for name in names))]
+        found |= zip(names, np.array([[*q.vector, q.scalar] for q in (attitude(True, q) for q in told)]).T)
+    return found
+
+
+def test_a_flight_in_other_axes_is_turned_for_the_replay_and_told_as_it_was(show: Show, tmp_path: Path) -> None:
+    flown = run(scenario().with_changes(parameters={"plant.frame": "enu", "controller.frame": "enu"}))
+    twin = dataclasses.replace(flown, system=changed(flown.system, {"components.plant.parameters.frame": "ned"}))
+    vars(twin)["signals"] = turned(flown.signals)
+    pictures = []
+    for name, result in {"flown": flown, "twin": twin}.items():
+        page = show(report(result, out=tmp_path / f"{name}.html"))
+        if result is flown:
+            place = ", ".join(f"{flown.signals[name][0]:.3f}" for name in PLACE)
+            assert page.inner_text("#readout").startswith(f"east, north, up {place} m, ")
+        picture = Image.open(io.BytesIO(page.locator("#scene").screenshot()))
+        pictures.append(np.asarray(picture.convert("L"), float))
+        page.close()
+    one, other = pictures
+    assert np.mean(np.abs(one - one.mean()) > 40.0) > 0.005, "there is something to be seen"
+    assert np.mean(np.abs(one - other) > 8.0) < 1e-4
 
 
 def test_hovering_over_a_plot_says_the_value_with_its_unit(of_runs: Any) -> None:
