@@ -11,6 +11,7 @@ from orchestration.basics.terminal import say
 from orchestration.command import registry as registering
 from orchestration.command.answer import Answer
 from orchestration.command.flags import FlightFlags, Timing, flies, request_from
+from orchestration.command.linearise import linearise
 
 if TYPE_CHECKING:
     from orchestration.system.request import Request
@@ -140,5 +141,5 @@ def _number(value: float | None, unit: str) -> str:
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command to the command line."""
-    registering.add(app, registering.STUDY, margin)
+    """Add what is asked of linear theory to the command line."""
+    registering.add(app, registering.STUDY, margin, linearise)

@@ -1,6 +1,7 @@
 """Loops cut open about their operating points: against theory, closed again, and what is refused."""
 
 import dataclasses
+import json
 import math
 import sys
 from typing import Any
@@ -14,8 +15,10 @@ from orchestration.stability.monodromy import growth_of_loop
 from orchestration.stability.state_space import reduced
 from orchestration.system.model import System
 from orchestration.system.paths import changed
+from orchestration.system.system_file import load_system
 from quadcosim import Linearised, QuadcosimError, Scenario, StateSpace, Timing, UsageError, linearise
-from tests.examples.common import example
+from tests.commands import Main
+from tests.examples.common import EXAMPLES, example
 from tests.orchestration.studies.test_systems import DELAY, PERIOD
 
 
@@ -135,3 +138,15 @@ def test_without_python_control_one_line_names_the_extra(monkeypatch: pytest.Mon
         QuadcosimError, match=r"^control is not installed; this needs: pip install 'quadcosim\[control\]"
     ):
         empty.to_control()
+
+
+def test_the_command_writes_the_matrices_that_python_has(main: Main) -> None:
+    file = EXAMPLES / "double_integrator" / "system.toml"
+    loop, document = linearise(load_system(file)), json.loads(main("linearise", file, "--json").stdout)
+    assert document["name"] == loop.name
+    for half, found in (("component", loop.component), ("rest", loop.rest)):
+        written = document[half]
+        assert {name: written[name] for name in "ABCD"} == {name: getattr(found, name).tolist() for name in "ABCD"}
+        assert (written["dt"], written["inputs"], written["outputs"]) == (found.dt, [*found.inputs], [*found.outputs])
+    lines = main("linearise", file).stdout.splitlines()
+    assert lines[1].endswith(f"{len(loop.rest.A)} states, every {loop.rest.dt:g} s")
