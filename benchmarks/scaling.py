@@ -110,7 +110,7 @@ def main() -> None:
     parser.add_argument("--figure", type=Path, help="where to draw it")
     file = parser.parse_args().figure
     made = {"components, in loops of two": loops, "connections between two components": messages}
-    figure = Figure(figsize=(6.0, 4.0), layout="constrained", dpi=100)
+    figure = Figure(figsize=(6.0, 4.0), layout="constrained", dpi=200)
     axes = figure.subplots()
     for what, make in made.items():
         found = costs([make(size) for size in SIZES])
