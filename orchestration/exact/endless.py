@@ -69,7 +69,7 @@ def radii_of(systems: Sequence[System], models: Mapping[str, Model]) -> list[flo
     loops, found = Loops(models), list[float | None]()
     for system in systems:
         try:
-            found.append(loops.solved(system, agree=AGREE).loop.radius)
+            found.append(loops.radius(system, agree=AGREE))
         except QuadcosimError:
             found.append(None)
     return found

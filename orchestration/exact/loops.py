@@ -145,7 +145,19 @@ class Loops:
                 )
         return Linear(parts=parts, how=how, accuracy=accuracy, wanted=wanted, noise=noise, start=start)
 
-    def solved(self, system: System, *, agree: float = AGREE) -> Solved:
+    def radius(self, system: System, *, agree: float) -> float:
+        """The mean-square radius alone, as `solved` has it."""
+        system = changed(system, system.operating_point)
+        linear = self.linear(system)
+
+        def answer(clock: Clockwork) -> tuple[float, Floats]:
+            radius = JumpLinear(*clock.stages()).radius
+            return radius, np.array([radius])
+
+        effects = self._effects(system, linear, ())
+        return self._finest(self._timing(system, linear, effects), effects, answer, agree).found[0]
+
+    def solved(self, system: System) -> Solved:
         """A system by finer and finer rules, until they agree; raises `UsageError` where there is too much of it."""
         system = changed(system, system.operating_point)
         linear = self.linear(system)
@@ -157,7 +169,7 @@ class Loops:
             return loop, np.array([loop.radius, *costs])
 
         effects = self._effects(system, linear, used)
-        finest = self._finest(self._timing(system, linear, effects), effects, answer, agree)
+        finest = self._finest(self._timing(system, linear, effects), effects, answer, AGREE)
         (loop, (_, *costs)) = finest.found
         means = None
         if loop.radius < 1.0:

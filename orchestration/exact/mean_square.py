@@ -40,7 +40,7 @@ def mean_square_limit(varied: Varied, span: Range, models: Mapping[str, Model]) 
 
 def _first(system: System, paths: Sequence[str], span: Range, loops: Loops) -> MeanSquareLimit:
     def fails(value: float) -> bool:
-        return loops.solved(changed(system, dict.fromkeys(paths, value)), agree=AGREE).loop.radius >= 1.0
+        return loops.radius(changed(system, dict.fromkeys(paths, value)), agree=AGREE) >= 1.0
 
     bracket = first_failure(fails, span.values(), FINER * span.tolerance)
     if bracket is None:

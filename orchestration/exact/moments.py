@@ -15,7 +15,7 @@ import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Booleans, Floats
-from orchestration.exact.krylov import Map, largest, solved
+from orchestration.exact.krylov import SIZE, Map, largest, solved
 from orchestration.exact.pieces import Piece
 
 LARGEST = 100_000
@@ -189,8 +189,12 @@ def _summed(turn: Floats, added: Floats) -> Floats:
 
 
 def _radius(turned: Map, basis: _Symmetric) -> float:
-    if basis.count > DENSE:
-        return largest(turned, basis.numbers([np.eye(n) for n in basis.sizes]))
+    if basis.count > SIZE:
+        try:
+            return largest(turned, basis.numbers([np.eye(n) for n in basis.sizes]))
+        except UsageError:
+            if basis.count > DENSE:
+                raise
     return _spectral_radius(np.array([turned(unit) for unit in np.eye(basis.count)]).reshape(basis.count, basis.count))
 
 

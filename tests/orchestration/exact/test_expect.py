@@ -89,7 +89,7 @@ def test_objectives_may_be_made_of_means_and_of_signals_that_no_connection_carri
     assert both > 2.0 * speed > 0.0
     assert found.objectives["inner"] is not None
     assert found.reasons == {
-        "third": "third: servo.angle ** 3: expected a polynomial of signals of degree two at most",
+        "third": "servo.angle ** 3: expected a polynomial of signals of degree two at most",
         "late": "depends on time: expected signals alone, whose mean stays",
     }
 
