@@ -1,6 +1,7 @@
 """Libraries that the C compiler of this machine makes of C files: made once, and kept in the user's cache."""
 
 import contextlib
+import functools
 import hashlib
 import os
 import platform
@@ -38,8 +39,16 @@ def _place(folder: str, sources: Mapping[str, bytes], how: Any) -> Path:
 
     cc = Path(shutil.which("cc") or "").resolve()
     compiler = (str(cc), cc.stat().st_size, cc.stat().st_mtime_ns)
-    content = hashlib.sha256(repr((sorted(sources.items()), how, compiler, platform.machine())).encode())
+    content = hashlib.sha256(repr((sorted(sources.items()), how, compiler, _processor())).encode())
     return Path(platformdirs.user_cache_dir("quadcosim")) / folder / f"{content.hexdigest()}.so"
+
+
+@functools.cache
+def _processor() -> tuple[str, ...]:
+    """What this machine's processor can do: machines of a cluster share a cache, and differ in their instructions."""
+    about = Path("/proc/cpuinfo")
+    lines = about.read_text().splitlines() if about.is_file() else [platform.processor()]
+    return platform.machine(), *sorted({line for line in lines if line.lower().startswith(("flags", "features"))})
 
 
 def _keep(path: Path, content: bytes) -> None:

@@ -36,7 +36,7 @@ def test_what_was_compiled_is_kept_and_found_by_its_content(cache: Path) -> None
 
 
 @pytest.mark.usefixtures("cache")
-def test_another_source_another_option_and_another_compiler_are_another_library(
+def test_another_source_option_compiler_or_processor_is_another_library(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     compiler = Compiler()
@@ -45,6 +45,8 @@ def test_another_source_another_option_and_another_compiler_are_another_library(
     (tmp_path / "cc").touch()
     monkeypatch.setattr("shutil.which", lambda name: str(tmp_path / name))
     assert libraries.content("made", SOURCES, "-O2", compiler) == b"library 4"
+    monkeypatch.setattr(libraries, "_processor", lambda: ("x86_64", "flags : fpu"))
+    assert libraries.content("made", SOURCES, "-O2", compiler) == b"library 5"
 
 
 def test_where_nothing_can_be_kept_it_is_compiled_each_time(cache: Path) -> None:

@@ -5,6 +5,7 @@ import hashlib
 import itertools
 import math
 import operator
+import platform
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -15,7 +16,7 @@ import pytest
 from elftools.elf.elffile import ELFFile
 
 from tests.fmu_kit.compiler.accuracy import STATED, Samples, arguments, largest_error
-from tests.fmu_kit.compiler.compiled import Floats, compiled, library, processor, results
+from tests.fmu_kit.compiler.compiled import HEADERS, Floats, compiled, compiler, library, processor, results
 
 SAMPLES = 700  # of each set of arguments
 HASH = "e55b276ac5433a03"  # of all results of hash.c
@@ -182,6 +183,17 @@ def test_the_bits_are_the_same_from_every_compiler_in_any_lane_on_every_machine(
     command = [*([emulator] if emulator else []), str(program)]
     lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert hashlib.sha256(lines.encode()).hexdigest()[:16] == HASH, lines
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="options of x86-64")
+@pytest.mark.parametrize(
+    ("flag", "refused"),
+    [("-mavx512fp16", ""), ("-mfpmath=387", "arithmetic in double precision"), ("-ffast-math", "without -ffast-math")],
+)
+def test_what_computes_double_otherwise_is_refused_and_half_precision_is_not(flag: str, refused: str) -> None:
+    command = [compiler("gcc"), flag, "-fsyntax-only", "-x", "c", str(HEADERS / "lanes.h")]
+    found = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (found.returncode == 0, refused in found.stderr) == (not refused, True)
 
 
 @pytest.mark.parametrize("flag", ["-O0", "-O2"])
