@@ -73,29 +73,33 @@ class _Deadlines:
         """`deadlines` are those of the tasks, from the nominal release on."""
         self._of_tasks = deadlines
         self._first, self._counts = np.zeros((2, len(deadlines)), dtype=np.int64)
-        self._due = self._ended = np.zeros(0, dtype=np.int64)
+        self._due = self._ended = self._told = np.zeros(0, dtype=np.int64)
 
     def missed_before(self, time: int, notes: Integers) -> Integers:
-        """The deadlines before `time` [ns] at which jobs are not done, as a table of `Events` in order of the tasks."""
+        """The deadlines before `time` [ns] at which jobs are not done, as a table of `Events` in order of the tasks.
+
+        A job that is released behind its deadline, by its jitter, is late when it is released.
+        """
         what, task = notes[:, 1], notes[:, 2]
         new = np.flatnonzero((what == RELEASED) | (what == SKIPPED))
         counts = self._counts + np.bincount(task[new], minlength=len(self._counts))
         start = np.cumsum(counts) - counts
         places = (start - self._first)[task] + notes[:, 3]
-        due, ended = np.full((2, int(counts.sum())), LATER, dtype=np.int64)
+        due, ended, told = np.full((3, int(counts.sum())), LATER, dtype=np.int64)
         shifts = start - (np.cumsum(self._counts) - self._counts)
         before = np.arange(len(self._due)) + np.repeat(shifts, self._counts)
-        due[before], ended[before] = self._due, self._ended
+        due[before], ended[before], told[before] = self._due, self._ended, self._told
         due[places[new]] = notes[new, 4] + self._of_tasks[task[new]]
+        told[places[new]] = np.maximum(due[places[new]], notes[new, 0])
         done = np.flatnonzero((what == FINISHED) & (places >= start[task]))  # of those that are late has been told
         ended[places[done]] = notes[done, 0]
-        past = due < time
+        past = told < time
         late = np.flatnonzero(past & (ended > due))
         owners = np.repeat(np.arange(len(counts)), counts)
-        missed = _table(due[late], _MISSED, owners[late], (self._first - start)[owners[late]] + late)
+        missed = _table(told[late], _MISSED, owners[late], (self._first - start)[owners[late]] + late)
         gone = np.bincount(owners[past], minlength=len(counts))
         self._first, self._counts = self._first + gone, counts - gone
-        self._due, self._ended = due[~past], ended[~past]
+        self._due, self._ended, self._told = due[~past], ended[~past], told[~past]
         return missed
 
 

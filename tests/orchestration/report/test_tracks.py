@@ -1,5 +1,6 @@
 """Thinned signals keep what a reader looks for: peaks, and what is held between rows."""
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -89,10 +90,10 @@ def test_runs_that_are_alike_share_a_layout() -> None:
 
 
 @pytest.mark.parametrize("given", [{"frame": "enu"}, {"frame_index": 2}])
-def test_axes_that_the_page_does_not_know_have_panels_and_no_replay(given: dict[str, Any]) -> None:
+def test_a_flight_told_east_north_up_is_replayed_as_such_and_its_angles_are_left_out(given: dict[str, Any]) -> None:
     turned = changed(quadrotor(), {f"components.plant.parameters.{name}": value for name, value in given.items()})
     columns = [*flight(), POSITION_ERROR]
     known, other = (layout_of(system, columns, {}) for system in (quadrotor(), turned))
     assert known.scene is not None
-    assert other.scene is None
+    assert other.scene == dataclasses.replace(known.scene, is_enu=True)
     assert {panel.title for panel in known.panels} - {panel.title for panel in other.panels} == {"attitude"}

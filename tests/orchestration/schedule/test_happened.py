@@ -44,12 +44,22 @@ def test_what_is_told_is_what_became_of_each_job_and_frame(system: System) -> No
 
     for name, jobs in timeline.jobs.items():
         assert told("finished", name) == {int(k): int(jobs.ended[k]) for k in np.flatnonzero(jobs.done)}
-        assert told("missed", name) == {int(k): int(jobs.deadline[k]) for k in np.flatnonzero(jobs.missed)}
+        late = np.maximum(jobs.deadline, jobs.released)
+        assert told("missed", name) == {int(k): int(late[k]) for k in np.flatnonzero(jobs.missed)}
         begun = dict(enumerate(jobs.released.tolist()))
         assert told("released", name) | told("skipped", name) == begun
     for name, frames in timeline.frames.items():
         assert told("queued", name) == dict(enumerate(frames.queued.tolist()))
         assert told("transmitted", name) == {int(k): int(frames.ended[k]) for k in np.flatnonzero(frames.done)}
+
+
+def test_a_job_released_behind_its_deadline_is_missed_when_it_is_released() -> None:
+    task = Task(period=0.1, offset=0.03, jitter=0.025, deadline=0.001, execution=0.0)
+    happened = Happened(System(stop_time=0.1, seed=0, computers={"one": Computer(tasks={"late": task})}))
+    assert not list(happened.with_messages(NO_MESSAGES, 35_000_000))
+    events = list(happened.with_messages(NO_MESSAGES, 100_000_000))
+    assert [event.kind for event in events] == ["released", "started", "finished", "missed"]
+    assert len({event.time for event in events}) == 1
 
 
 def test_of_a_starved_task_only_what_is_not_late_yet_is_kept_in_mind() -> None:
