@@ -102,7 +102,7 @@ def keys_at(shape: Any, place: Sequence[Any]) -> list[str]:
         shape, one_of_many = _table_in(fields_of(shape)[part].annotation)
         if one_of_many:
             next(parts)
-    return [*fields_of(shape), *getattr(shape, "SHORTHANDS", ())]
+    return [*fields_of(shape), *getattr(getattr(shape, "declared_by", shape), "SHORTHANDS", ())]
 
 
 def _table_in(hint: Any) -> tuple[Any, bool]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from orchestration.basics.attribute_docs import Said, attribute_docs
+from orchestration.basics.documents import toml_of
 from orchestration.basics.errors import UsageError
 from orchestration.command import completion
 from orchestration.command.build_flag import builds
@@ -16,7 +17,7 @@ from orchestration.system.choices import Clock, Hold, Order, Spread
 
 if TYPE_CHECKING:
     from orchestration.quadrotor.scenario import Scenario
-    from orchestration.system.model import Parameter, System
+    from orchestration.system.model import System
     from orchestration.system.request import Request
 
 TIMING, EFFECTS, MODEL = "Timing", "Disturbances of the loop", "Model"
@@ -66,13 +67,13 @@ class FlightFlags:
     order: Annotated[str | None, _of_timing("order", panel=TIMING, words=Order)] = None
     hold: Annotated[str | None, _of_timing("hold", panel=TIMING, words=Hold)] = None
     clock: Annotated[str | None, _of_timing("clock", panel=TIMING, words=Clock)] = None
-    delay: Annotated[float | None, _of_timing("delay")] = None
-    delay_jitter: Annotated[float | None, _of_timing("delay_jitter")] = None
-    jitter: Annotated[float | None, _of_timing("jitter")] = None
+    delay: Annotated[str | None, _of_timing("delay", metavar="SECONDS|TABLE")] = None
+    delay_jitter: Annotated[str | None, _of_timing("delay_jitter", metavar="SECONDS|TABLE")] = None
+    jitter: Annotated[str | None, _of_timing("jitter", metavar="SECONDS|TABLE")] = None
     jitter_distribution: Annotated[str | None, _of_timing("jitter_distribution", words=Spread)] = None
-    measurement_loss: Annotated[float | None, _of_timing("measurement_loss", metavar="P")] = None
-    command_loss: Annotated[float | None, _of_timing("command_loss", metavar="P")] = None
-    loss: Annotated[float | None, _option("--loss", panel=EFFECTS, metavar="P", text="Both losses at once.")] = None
+    measurement_loss: Annotated[str | None, _of_timing("measurement_loss", metavar="P|TABLE")] = None
+    command_loss: Annotated[str | None, _of_timing("command_loss", metavar="P|TABLE")] = None
+    loss: Annotated[str | None, _option("--loss", panel=EFFECTS, metavar="P|TABLE", text="Both losses at once.")] = None
     burst_length: Annotated[float | None, _of_timing("burst_length", metavar="N")] = None
     clock_ratio: Annotated[float | None, _of_timing("clock_ratio", metavar="R")] = None
     noise: Annotated[list[str] | None, _of_timing("noise", metavar="NAME=SIGMA", repeated=True)] = None
@@ -161,10 +162,9 @@ class FlightFlags:
 
         timing: dict[str, Any] = {} if self.preset is None else preset_timing(self.preset)
         single = (key for key in TIMING_KEYS if key not in _BY_MEASUREMENT)
-        timing |= {key: getattr(self, key) for key in single if getattr(self, key) is not None}
-        if self.loss is not None:
-            timing.setdefault("measurement_loss", self.loss)
-            timing.setdefault("command_loss", self.loss)
+        timing |= {key: value for key in single if (value := self._of_timing(key)) is not None}
+        if (loss := self._of_timing("loss")) is not None:
+            timing = {"measurement_loss": loss, "command_loss": loss, **timing}
         for name in _BY_MEASUREMENT:
             given = getattr(self, name)
             if given:
@@ -187,6 +187,18 @@ class FlightFlags:
             plant, controller = self.plant or changed.plant.fmu, self.controller or changed.controller.fmu
             changed = changed.with_fmus(plant=plant, controller=controller)
         return native_twins(changed) if self.native else changed
+
+    def _of_timing(self, key: str) -> Any:
+        """The value of a flag; of one that may be drawn a number, or the text of the table that says how."""
+        from orchestration.quadrotor.timing import Timing
+        from orchestration.system.distribution import AS_TABLE
+        from orchestration.system.distribution_table import is_table, may_vary
+
+        given = getattr(self, key)
+        if given is None or is_table(given) or not (key == "loss" or key in may_vary(Timing)):
+            return given
+        expected = f"a number, or a table that says how it is distributed, {AS_TABLE}"
+        return _number(f"--{key.replace('_', '-')}", given, expected)
 
     def applied_to_system(self, system: "System") -> "System":
         """`system` with what was given; raises `UsageError` for flags that are for the quadrotor only."""
@@ -240,7 +252,7 @@ def request_from(path: Path | None, flags: FlightFlags, timing: Path | None = No
     return flags.applied_to(request) if isinstance(request, Scenario) else flags.applied_to_system(request)
 
 
-def assigned(flag: str, given: list[str] | None) -> "dict[str, Parameter]":
+def assigned(flag: str, given: list[str] | None) -> dict[str, Any]:
     """The values of a flag that may be repeated, by name; raises `UsageError` for what is no NAME=VALUE."""
     return {key: _value(text) for key, text in _pairs(flag, given or [])}
 
@@ -258,15 +270,17 @@ def _pairs(flag: str, given: list[str]) -> list[tuple[str, str]]:
     return pairs
 
 
-def _number(place: str, text: str) -> float:
+def _number(place: str, text: str, expected: str = "a number") -> float:
     try:
         return float(text)
     except ValueError:
-        raise UsageError(f"{place} {text}: expected a number") from None
+        raise UsageError(f"{place} {text}: expected {expected}") from None
 
 
-def _value(text: str) -> "Parameter":
-    """What somebody means: true or false, a number, else a text; what is in quotes is a text in any case."""
+def _value(text: str) -> Any:
+    """What somebody means: true or false, a number, an array, else a text; what is in quotes is a text in any case."""
+    if text.startswith("["):
+        return toml_of(f"value = {text}", text)["value"]
     if text.lower() in ("true", "false"):
         return text.lower() == "true"
     if len(text) > 1 and text[0] == text[-1] == '"':

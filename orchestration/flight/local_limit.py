@@ -12,6 +12,7 @@ from orchestration.quadrotor.scenario import Scenario
 from orchestration.requests.ranges import Varied
 from orchestration.stability.known_loops import Local
 from orchestration.stability.local_limit import about_rest
+from orchestration.system.distribution import lowest
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.request import Request
@@ -68,7 +69,7 @@ def radius(loop: HoverLoop, scenario: Scenario, of: str, value: float) -> float:
     """The spectral radius of `scenario` about hover with another period or delay [s]."""
     timing = scenario.timing
     period = (value if of == "period" else timing.period) / timing.clock_ratio
-    delay = (value if of == "delay" else timing.delay) + (period if timing.order == "jacobi" else 0.0)
+    delay = (value if of == "delay" else lowest(timing.delay)) + (period if timing.order == "jacobi" else 0.0)
     return loop.spectral_radius(period, delay)
 
 

@@ -7,6 +7,7 @@ from orchestration.flight.hover_loop import HoverLoop
 from orchestration.flight.local_limit import local_limit
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.stability.delay_bounds import SampledLoop, breaking_jitter, certain_jitter
+from orchestration.system.distribution import lowest
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,7 +16,7 @@ class Margin:
 
     period: float
     delay: float
-    """that every command has"""
+    """that every command has, the least where it varies"""
     delay_limit: float | None
     """the largest constant delay, exactly; None: none that is looked for is too much, or the least is"""
     certain_jitter: float
@@ -33,13 +34,13 @@ def margin_of(scenario: Scenario) -> Margin:
         raise UsageError("margin: expected hold zero and order gauss-seidel; the bounds are for no other")
     hover = HoverLoop.of(scenario)
     A, B, F = hover.continuous()
-    period = timing.period / timing.clock_ratio
-    loop = SampledLoop(A=A, B=B, F=F, period=period, delay=timing.delay)
+    period, delay = timing.period / timing.clock_ratio, lowest(timing.delay)
+    loop = SampledLoop(A=A, B=B, F=F, period=period, delay=delay)
     limit = local_limit(hover, scenario, "delay")
-    broken = None if limit is None else breaking_jitter(loop, max(limit - timing.delay, 0.0) + period)
+    broken = None if limit is None else breaking_jitter(loop, max(limit - delay, 0.0) + period)
     return Margin(
         period=period,
-        delay=timing.delay,
+        delay=delay,
         delay_limit=limit,
         certain_jitter=certain_jitter(loop),
         breaking_jitter=None if broken is None else broken[0],

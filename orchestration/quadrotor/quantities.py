@@ -4,12 +4,13 @@ import math
 
 from orchestration.basics.bisection import Range
 from orchestration.quadrotor.timing import Timing
+from orchestration.system.distribution import highest
 
 
 def range_of(timing: Timing, of: str) -> Range | None:
     """The range of `period`, `delay`, `jitter` or `loss`, all else of `timing` as it is; None for another name."""
     if of == "period":
-        shortest = timing.jitter * timing.clock_ratio
+        shortest = highest(timing.jitter) * timing.clock_ratio
         before = tuple(value for value in (0.001, 0.002, 0.003, 0.004) if value > shortest)
         first = 0.005 * (math.floor(shortest / 0.005) + 1)
         return Range(before=before, first=first, step=0.005, last=0.5, tolerance=0.0005)

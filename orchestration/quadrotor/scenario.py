@@ -34,9 +34,13 @@ from orchestration.quadrotor.wiring import (
     RIGID_BODY,
 )
 from orchestration.results.quantities import setting
+from orchestration.system.description import varying
+from orchestration.system.distribution import Distribution
+from orchestration.system.distribution_table import meant_in
 from orchestration.system.model import Parameter, System
 from orchestration.system.paths import changed
 from orchestration.system.requirements import is_finite
+from orchestration.system.written import in_toml
 
 
 @record()
@@ -120,6 +124,8 @@ class Scenario:
     ) -> "Scenario":
         """This scenario with other timing keys, parameters (`controller.NAME`, `plant.NAME` and so on) or fields.
 
+        What is drawn may be the table that a file has, or its text.
+
         A dictionary for `plant`, `controller`, `reference` or `disturbance` has parameters: `plant={"mass": 1.2}`.
 
         Raises `UsageError` for a key that does not exist.
@@ -131,7 +137,8 @@ class Scenario:
         parameters = {**of_tables, **(parameters or {})}
         changed = dataclasses.replace(self, **fields)
         if timing:
-            changed = dataclasses.replace(changed, timing=dataclasses.replace(self.timing, **dict(timing)))
+            meant = meant_in(self.timing, "timing.", timing)
+            changed = dataclasses.replace(changed, timing=dataclasses.replace(self.timing, **meant))
         for name, value in parameters.items():
             side, _, parameter = name.partition(".")
             if side not in SIDES or not parameter:
@@ -232,7 +239,8 @@ class Scenario:
         for key in ("period", "delay"):
             if value := getattr(timing, key):
                 named = setting(f"timing.{key}", [value])
-                parts.append(f"{named.name} {named.said(value)}")
+                said = varying(value) if isinstance(value, Distribution) else named.said(value)
+                parts.append(f"{named.name} {said}")
         if timing.order != "gauss-seidel":
             parts.append("Jacobi")
         return ", ".join(parts)
@@ -278,11 +286,8 @@ class Scenario:
         import tomli_w
 
         resolved = self.resolved()
-        timing = {
-            key: value
-            for key, value in dataclasses.asdict(self.timing).items()
-            if value is not None and value != {}
-        }  # fmt: skip
+        said = ((f.name, in_toml(getattr(self.timing, f.name))) for f in dataclasses.fields(self.timing))
+        timing = {key: value for key, value in said if value is not None and value != {}}
         tables: dict[str, Any] = {
             "stop_time": self.stop_time,
             "seed": self.seed,

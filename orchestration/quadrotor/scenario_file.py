@@ -13,10 +13,13 @@ from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.vehicle import load_vehicle
 from orchestration.quadrotor.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
+from orchestration.system.distribution_table import DistributionTable, with_distributions
 from orchestration.system.parameters import parameters_in
 
+TimingTable = table_of(Timing, within=[DistributionTable])
 ScenarioFile = table_of(
     Scenario,
+    within=[TimingTable],
     vehicle=(str | None, None),
     controller=(dict[str, Any], {}),
     plant=(dict[str, Any], {}),
@@ -50,7 +53,7 @@ def scenario_from_tables(tables: dict[str, Any], folder: Path) -> Scenario:
         vehicle=None if file.vehicle is None else load_vehicle(file.vehicle, folder),
         controller=_choice("controller", file.controller, DEFAULT_CONTROLLER, folder),
         plant=_choice("plant", file.plant, DEFAULT_PLANT, folder),
-        timing=file.timing,
+        timing=Timing(**with_distributions("timing.", file.timing, folder)),
         reference=_signal("reference", file.reference, ReferenceChoice, folder),
         disturbance=_signal("disturbance", file.disturbance, DisturbanceChoice, folder),
         record=file.record,

@@ -6,14 +6,21 @@ from typing import ClassVar
 from orchestration.basics.errors import shown
 from orchestration.basics.records import record
 from orchestration.system.choices import Clock, Hold, Order, Spread
+from orchestration.system.distribution import (
+    Varying,
+    highest,
+    lowest,
+    reads_file,
+    require_losses,
+    require_spread,
+    require_varying,
+)
 from orchestration.system.requirements import (
     is_finite,
     require,
-    require_bursts,
     require_not_negative,
     require_own_clock,
     require_positive,
-    require_share,
 )
 from orchestration.system.times import is_at_least
 
@@ -43,18 +50,20 @@ class Timing:
     """What the plant gets between arrivals: the last command (zero), or the line through the last two (first)."""
     clock: Clock = "master"
     """Who decides when the controller samples: the master, or the FMU by its own sample_period."""
-    delay: float = 0.0
-    """The time d from a sample to the application of its command [s]; it may exceed the period."""
-    delay_jitter: float = 0.0
-    """The largest random addition J_d to the delay [s], drawn for each command."""
-    jitter: float = 0.0
-    """The largest lateness J of a sampling instant [s], drawn for each; it is less than the period."""
+    delay: Varying = 0.0
+    """The time d from a sample to the application of its command [s], or how it is distributed; it may exceed the
+    period."""
+    delay_jitter: Varying = 0.0
+    """The largest random addition J_d to the delay [s], drawn for each command, or how it is itself distributed."""
+    jitter: Varying = 0.0
+    """The largest lateness J of a sampling instant [s], drawn for each, or how it is itself distributed; it is less
+    than the period."""
     jitter_distribution: Spread = "uniform"
     """How both are drawn over [0, J]; normal is centred at J/2 with standard deviation J/6, cut to the range."""
-    measurement_loss: float = 0.0
-    """The probability that a measurement is lost."""
-    command_loss: float = 0.0
-    """The probability that a command is lost."""
+    measurement_loss: Varying = 0.0
+    """The probability that a measurement is lost, or a trace of 0 and 1, 1 for one that is lost."""
+    command_loss: Varying = 0.0
+    """The probability that a command is lost, or likewise."""
     burst_length: float | None = None
     """The mean number of losses in a row (Gilbert-Elliott); without it, losses are independent."""
     clock_ratio: float = 1.0
@@ -70,14 +79,17 @@ class Timing:
         for name, ratio in (("period", self.clock_ratio), ("plant_interval", 1.0)):
             value = getattr(self, name)
             require(is_at_least(value, ratio), _PLACE + name, value, "at least a nanosecond")
-        require_not_negative(self, "offset", "delay", "delay_jitter", "jitter", place=_PLACE)
-        require_share(self, "measurement_loss", "command_loss", place=_PLACE)
+        require_not_negative(self, "offset", place=_PLACE)
+        require_varying(self, "delay", "delay_jitter", "jitter", place=_PLACE)
+        require_spread(self.jitter_distribution, self.jitter, self.delay_jitter, place=_PLACE)
+        require_losses(self, self.burst_length, "measurement_loss", "command_loss", place=_PLACE)
         for what in ("noise", "quantisation"):
             for variable, value in getattr(self, what).items():
                 require(is_finite(value) and value >= 0.0, f"{_PLACE}{what} of {variable}", value, "zero or positive")
         longest = self.period / self.clock_ratio
-        require(self.jitter < longest, f"{_PLACE}jitter", self.jitter, f"less than the period of {longest:g} s")
-        require_bursts(self, self.burst_length, "measurement_loss", "command_loss", place=_PLACE)
+        if not reads_file(self.jitter):
+            most = highest(self.jitter)
+            require(most < longest, f"{_PLACE}jitter", most, f"less than the period of {longest:g} s")
         if self.clock == "fmu":
             require_own_clock(self, _PLACE)
 
@@ -88,8 +100,8 @@ class Timing:
             return (f"timing.offset = {shown(self.offset)}: {end}, so the controller never samples",)
         if (self.offset + self.period) / self.clock_ratio >= stop_time:
             return (f"timing.period = {shown(self.period)}: {end}, so the controller samples only once",)
-        if self.delay >= stop_time:
-            return (f"timing.delay = {shown(self.delay)}: {end}, so no command arrives",)
+        if (least := lowest(self.delay)) >= stop_time:
+            return (f"timing.delay = {shown(least)}: {end}, so no command arrives",)
         return ()
 
 

@@ -16,6 +16,7 @@ from orchestration.results.own_metrics import OwnMetric
 from orchestration.studies.axes import Axis, Method, Points, Value
 from orchestration.studies.linked_settings import LinkedSettings
 from orchestration.studies.store import is_column
+from orchestration.system.distribution_table import is_table, trace_in
 from orchestration.system.model import System
 from orchestration.system.paths import changed, names_table, value_at
 from orchestration.system.request import Request, in_its_own_words, system_meant
@@ -150,8 +151,14 @@ class Study:
         return files_of(
             self.origin,
             fmus_too=[native_twin(value) if self.native else value for path, value in values if names_fmu(path)],
-            tables_too=[value for path, value in values if names_table(path)],
+            tables_too=[value for path, value in values if names_table(path)] + _traces(values),
         )
+
+
+def _traces(values: Iterable[tuple[str, str]]) -> list[str]:
+    """The files of what is drawn that values say."""
+    found = (trace_in(value) for path, value in values if is_table(value) and ".parameters." not in path)
+    return [file for file in found if file is not None]
 
 
 _KEPT = 2**14

@@ -12,6 +12,7 @@ from orchestration.basics.typed_tables import parsed, table_of
 from orchestration.requests.request import load_request, request_from_tables
 from orchestration.studies.axes import Axis, Scale, Value, span
 from orchestration.studies.study import Study, names_fmu
+from orchestration.system.distribution_table import as_text
 from orchestration.system.paths import names_table
 from orchestration.system.request import ControlLoop, Request
 
@@ -26,8 +27,8 @@ class AxisTable:
     """The paths that get its value; without `sets` and `multiplies`, the name is the path."""
     multiplies: list[str] | None = None
     """The paths whose value in the base is multiplied by it."""
-    values: list[Value] | None = None
-    """The values, one by one."""
+    values: list[Value | dict[str, Any]] | None = None
+    """The values, one by one; a table is how something is distributed."""
     start: float | None = None
     """The first value of a range."""
     stop: float | None = None
@@ -165,9 +166,10 @@ def axis_of(table: AxisTable, folder: Path) -> Axis:
     )
 
 
-def _values(given: list[Value], targets: tuple[str, ...], folder: Path) -> tuple[Value, ...]:
-    """Listed values; paths of FMUs and tables are relative to the study file."""
+def _values(given: list[Value | dict[str, Any]], targets: tuple[str, ...], folder: Path) -> tuple[Value, ...]:
+    """Listed values; paths are relative to the study file, what is drawn is the text of its table."""
     are_paths = all(names_fmu(target) or names_table(target) or target.endswith(".fmu") for target in targets)
+    plain = [as_text(value, folder) if isinstance(value, dict) else value for value in given]
     return tuple(
-        str(folder / str(value)) if are_paths and str(value).endswith((".fmu", ".csv")) else value for value in given
+        str(folder / str(value)) if are_paths and str(value).endswith((".fmu", ".csv")) else value for value in plain
     )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from orchestration.basics.records import record
 from orchestration.system.choices import TraceOrder
-from orchestration.system.requirements import is_finite, require
+from orchestration.system.requirements import is_finite, require, require_bursts, require_share
 
 if TYPE_CHECKING:
     from orchestration.basics.simulator import Floats
@@ -138,6 +138,7 @@ KINDS = ("uniform", "normal", "values", "file")
 
 Varying: TypeAlias = float | Distribution
 """A number, or what it is drawn from"""
+AS_TABLE = "as {uniform = [0.001, 0.004]}"
 
 
 def lowest(of: Varying) -> float:
@@ -170,12 +171,17 @@ def content(of: Varying) -> Hashable:
     return (of, None if of.file is None else _state(of.file)) if isinstance(of, Distribution) else of
 
 
-def require_varying(of: object, *names: str) -> None:
+def require_varying(of: object, *names: str, place: str = "") -> None:
     """The fields `names` are numbers that are finite and not below 0, or are drawn."""
     for name in names:
         value = getattr(of, name)
         fits = isinstance(value, Distribution) or (is_finite(value) and value >= 0.0)
-        require(fits, name, value, "zero or a positive number")
+        require(
+            fits,
+            place + name,
+            value,
+            f"zero or a positive number, or a table that says how it is distributed, {AS_TABLE}",
+        )
 
 
 def reads_file(of: Varying) -> bool:
@@ -183,19 +189,26 @@ def reads_file(of: Varying) -> bool:
     return isinstance(of, Distribution) and of.file is not None
 
 
-def require_spread(of: object, jitter: Varying, spread: str) -> None:
+def require_spread(spread: str, *jitters: Varying, place: str = "") -> None:
     """How a lateness is drawn is said once: by its distribution, or by words beside its largest value."""
-    fits = spread == "uniform" or not isinstance(jitter, Distribution)
-    require(fits, "jitter_distribution", spread, "none beside a jitter that says its distribution itself")
+    fits = spread == "uniform" or not any(isinstance(jitter, Distribution) for jitter in jitters)
+    require(fits, f"{place}jitter_distribution", spread, "none beside a jitter that says its distribution itself")
 
 
-def require_losses(losses: Distribution, burst_length: float | None) -> None:
-    """Losses that are no probability are values of 0 and 1, one by one."""
-    is_table = losses.values is not None or losses.file is not None
-    require(is_table, "loss", "a formula", "a probability, or values or a file of 0 and 1")
-    require(burst_length is None, "burst_length", burst_length, "none beside a loss that is no probability")
-    for value in losses.values or ():
-        require(value in (0.0, 1.0), "loss.values", value, "0 or 1")
+def require_losses(of: object, burst_length: float | None, *names: str, place: str = "") -> None:
+    """The fields `names` are probabilities that can come in such bursts, or values of 0 and 1, one by one."""
+    for name in names:
+        losses = getattr(of, name)
+        if not isinstance(losses, Distribution):
+            require_share(of, name, place=place)
+            require_bursts(of, burst_length, name, place=place)
+            continue
+        is_table = losses.values is not None or losses.file is not None
+        require(is_table, place + name, "a formula", "a probability, or values or a file of 0 and 1")
+        none = "none beside a loss that is no probability"
+        require(burst_length is None, f"{place}burst_length", burst_length, none)
+        for value in losses.values or ():
+            require(value in (0.0, 1.0), f"{place}{name}.values", value, "0 or 1")
 
 
 Of = TypeVar("Of")

@@ -13,7 +13,6 @@ from orchestration.signals import WINDS
 from orchestration.system.choices import Align, Clock, Hold, Interpolation, Order, Spread
 from orchestration.system.computers import Computer, Network
 from orchestration.system.distribution import (
-    Distribution,
     Varying,
     highest,
     is_random,
@@ -32,11 +31,9 @@ from orchestration.system.placement import (
 from orchestration.system.requirements import (
     is_finite,
     require,
-    require_bursts,
     require_not_negative,
     require_own_clock,
     require_positive,
-    require_share,
 )
 from orchestration.system.times import is_at_least
 from orchestration.system.written import tables_of
@@ -67,7 +64,7 @@ class Sampling:
         require_positive(self, "period", "clock_ratio")
         require_not_negative(self, "offset")
         require_varying(self, "jitter")
-        require_spread(self, self.jitter, self.jitter_distribution)
+        require_spread(self.jitter_distribution, self.jitter)
         require(is_at_least(self.period, self.clock_ratio), "period", self.period, "at least a nanosecond")
         if not reads_file(self.jitter):
             self.expect_jitter_within_period()
@@ -202,12 +199,8 @@ class Connection:
 
     def __post_init__(self) -> None:
         require_varying(self, "delay", "delay_jitter")
-        require_spread(self, self.delay_jitter, self.jitter_distribution)
-        if isinstance(self.loss, Distribution):
-            require_losses(self.loss, self.burst_length)
-        else:
-            require_share(self, "loss")
-            require_bursts(self, self.burst_length, "loss")
+        require_spread(self.jitter_distribution, self.delay_jitter)
+        require_losses(self, self.burst_length, "loss")
         for what, values in (("noise", self.noise), ("quantisation", self.quantisation)):
             for name, value in values.items():
                 require(is_finite(value) and value >= 0.0, f"{what} of {name}", value, "zero or positive")

@@ -26,7 +26,8 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
 
     Paths are such as `components.tank.step`, `components.controller.sampling.period`, `connections.valve.delay`,
     `components.controller.parameters.maxlevel`, `sources.wind.noise`, `computers.autopilot.tasks.telemetry.execution`,
-    `networks.bus.messages.status.period`, `stop_time`. Where only a whole number can be, 1.0 is 1.
+    `networks.bus.messages.status.period`, `stop_time`. Where only a whole number can be, 1.0 is 1; where a number may
+    be drawn, a table or the text of one says how, as `{uniform = [0.001, 0.004]}`.
 
     Raises `UsageError` for a path that does not exist, naming what does, or a value that cannot be.
     """
@@ -241,6 +242,10 @@ def for_each(start: Iterable[str], value: Any) -> Any:
 
 
 def _replaced(place: str, of: Any, keys: Mapping[str, Any]) -> Any:
+    if any(isinstance(value, (str, Mapping)) for value in keys.values()):
+        from orchestration.system.distribution_table import meant_in  # with it comes what reads files
+
+        keys = meant_in(of, f"{place}.", keys)
     try:
         return dataclasses.replace(of, **dict(keys))
     except UsageError as error:

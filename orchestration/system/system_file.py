@@ -9,7 +9,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.basics.typed_tables import fields_of, parsed, table_of
 from orchestration.system.choices import Order
 from orchestration.system.computers import Arrivals, Computer, Message, Network, Task
-from orchestration.system.distribution import Distribution
+from orchestration.system.distribution_table import DistributionTable, with_distributions
 from orchestration.system.model import (
     Component,
     Connection,
@@ -24,8 +24,6 @@ from orchestration.system.paths import changed, for_each
 from orchestration.system.requirements import require
 
 Made = TypeVar("Made")
-
-DistributionTable = table_of(Distribution, file=(str | None, None))
 
 
 class SamplingTable(table_of(Sampling, within=[DistributionTable], period=(float | None, None))):  # type: ignore[misc]
@@ -131,7 +129,7 @@ def _component(name: str, table: Any, folder: Path) -> Component:
 
 
 def _sampling(place: str, table: Any, folder: Path) -> Sampling:
-    keys = {key: value for key, value in _with_distributions(place, table, folder).items() if value is not None}
+    keys = {key: value for key, value in with_distributions(f"{place}.", table, folder).items() if value is not None}
     if table.on is None:
         return _made(place, Sampling, keys)
     require(table.period is None, f"{place}.period", table.period, "none beside on: messages say when it runs")
@@ -152,12 +150,12 @@ def _network(name: str, table: Any, folder: Path) -> Network:
 
 def _with_arrivals(place: str, kind: type[Made], table: Any, folder: Path) -> Made:
     arrivals = table.arrivals and _made(f"{place}.arrivals", Arrivals, table.arrivals.model_dump())
-    return _made(place, kind, _with_distributions(place, table, folder) | {"arrivals": arrivals})
+    return _made(place, kind, with_distributions(f"{place}.", table, folder) | {"arrivals": arrivals})
 
 
 def _connection(index: int, table: Any, order: Order, folder: Path) -> Connection:
     name = table.name if table.name is not None else str(index)
-    keys = _with_distributions(f"connections.{name}", table, folder) | {"name": name}
+    keys = with_distributions(f"connections.{name}.", table, folder) | {"name": name}
     keys["order"] = table.order or order
     keys["stated"] = bool({"scale", "offset"} & table.model_fields_set)
     for what in ("noise", "quantisation"):
@@ -166,17 +164,6 @@ def _connection(index: int, table: Any, order: Order, folder: Path) -> Connectio
             if isinstance(value, bool) or not isinstance(value, (int, float)):
                 raise UsageError(f"connections.{keys['name']}.{what}.{variable} = {value!r}: expected a number")
     return _made(f"connections.{keys['name']}", Connection, keys)
-
-
-def _with_distributions(place: str, table: Any, folder: Path) -> dict[str, Any]:
-    """The keys of a table, those that are drawn as what they are drawn from."""
-    keys: dict[str, Any] = table.model_dump()
-    for key in keys:
-        drawn = getattr(table, key)
-        if isinstance(drawn, DistributionTable):
-            file = None if drawn.file is None else folder / drawn.file
-            keys[key] = _made(f"{place}.{key}", Distribution, {**keys[key], "file": file})
-    return keys
 
 
 def _source(name: str, table: Any, folder: Path) -> Source:

@@ -48,12 +48,14 @@ def _without_defaults(of: Any, keep: tuple[str, ...] = ()) -> dict[str, Any]:
     for field in dataclasses.fields(of):
         value = getattr(of, field.name)
         if field.name in keep or (value is not None and value != field.default and value != {}):
-            is_table = dataclasses.is_dataclass(value)
-            result[field.name] = _without_defaults(value) if is_table else _plain(value)
+            result[field.name] = in_toml(value)
     return result
 
 
-def _plain(value: Any) -> Any:
+def in_toml(value: Any) -> Any:
+    """A value as TOML has it: what is drawn as the table that says it, paths so that the file may lie anywhere."""
+    if dataclasses.is_dataclass(value):
+        return _without_defaults(value)
     if isinstance(value, Path):
         return str(value.absolute())
     if isinstance(value, tuple):

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 import quadcosim
 from orchestration.basics.documents import read_toml
+from orchestration.command.flags import FlightFlags
 from orchestration.quadrotor.timing import TIMING_KEYS
-from quadcosim import FmuChoice, Record, ReferenceChoice, Scenario, Timing, UsageError, load_scenario
+from quadcosim import Distribution, FmuChoice, Record, ReferenceChoice, Scenario, Timing, UsageError, load_scenario
 from tests.orchestration.quadrotor.strategies import timings
 
 
@@ -353,3 +354,36 @@ def test_a_preset_in_a_file_is_the_timing_of_that_stack_below_what_the_file_says
     file.write_text('[timing]\npreset = "crazyflie"\ndelay = 0.0\n')
     timing = load_scenario(file).timing
     assert (timing.period, timing.delay) == (0.002, 0.0)
+
+
+DRAWN = """[timing]
+delay = { uniform = [0.001, 0.004] }
+jitter = { normal = [0.001, 0.0005], range = [0.0, 0.002] }
+command_loss = { file = "trace.csv", column = "lost", order = "as recorded" }
+"""
+
+
+def test_what_is_drawn_is_written_as_in_a_system_file_and_is_the_same_there(tmp_path: Path) -> None:
+    scenario = loaded(tmp_path / "s.toml", DRAWN)
+    command, sampling = scenario.as_system().connections[1], scenario.as_system().components["controller"].sampling
+    assert command.delay == Distribution(uniform=(0.001, 0.004))
+    assert command.loss == Distribution(file=tmp_path / "trace.csv", column="lost", order="as recorded")
+    assert sampling is not None
+    assert sampling.jitter == scenario.timing.jitter == Distribution(normal=(0.001, 0.0005), range=(0.0, 0.002))
+    assert loaded(tmp_path / "again.toml", scenario.to_toml()) == scenario
+    assert scenario.headline() == "UnifiedController, period 10 ms, delay 1 ms to 4 ms uniform"
+    assert FlightFlags(delay="{uniform=[0.001,0.004]}", seed=1).applied_to(Scenario()).timing.delay == command.delay
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("delay = { unifrm = [0, 1] }", "timing.delay.unifrm: no such key; expected one of uniform, normal,"),
+        ("delay = { uniform = [1, 0] }", "timing.delay.uniform = [1.0, 0.0]: expected two numbers"),
+        ("loss = { uniform = [0, 1] }", "timing.measurement_loss = a formula: expected a probability, or values"),
+        ("jitter = { uniform = [0, 0.01] }", "timing.jitter = 0.01: expected less than the period of 0.01 s"),
+        ("period = { uniform = [0, 0.01] }", "timing.period = "),
+    ],
+)
+def test_what_cannot_be_drawn_so_is_refused_where_it_stands(file: Path, text: str, said: str) -> None:
+    assert refusal(file, f"[timing]\n{text}").startswith(said)

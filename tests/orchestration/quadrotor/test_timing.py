@@ -20,6 +20,7 @@ from orchestration.quadrotor.translation import quadrotor
 from orchestration.schedule import cursor
 from orchestration.schedule.cursor import INSTANTS, Cursor
 from orchestration.schedule.streams import Streams
+from orchestration.system.distribution import highest
 from orchestration.system.times import Grid, nanoseconds
 from quadcosim import Scenario
 from tests.orchestration.quadrotor import stubs
@@ -163,7 +164,7 @@ def test_a_fast_clock_samples_when_its_own_time_says_so() -> None:
 @given(cases())
 def test_a_sample_is_late_by_between_nothing_and_the_jitter(case: Case) -> None:
     for sample in samples_of(case):
-        assert 0 <= sample.time - nominal(case.timing, sample.k) <= nanoseconds(case.timing.jitter)
+        assert 0 <= sample.time - nominal(case.timing, sample.k) <= nanoseconds(highest(case.timing.jitter))
 
 
 @given(cases())
@@ -175,19 +176,19 @@ def test_arrivals_are_in_order_of_sending(case: Case) -> None:
 @given(cases(delay_jitter=0.0, jitter=0.0, order="gauss-seidel"))
 def test_a_gauss_seidel_command_arrives_a_delay_after_its_sample(case: Case) -> None:
     for sample in samples_of(case):
-        assert sample.arrival in (None, sample.time + nanoseconds(case.timing.delay))
+        assert sample.arrival in (None, sample.time + nanoseconds(highest(case.timing.delay)))
 
 
 @given(cases(delay_jitter=0.0, order="jacobi"))
 def test_a_jacobi_command_arrives_a_delay_after_the_next_sample(case: Case) -> None:
     for sample in samples_of(case):
         assert sample.sent == sample.next_time
-        assert sample.arrival in (None, sample.next_time + nanoseconds(case.timing.delay))
+        assert sample.arrival in (None, sample.next_time + nanoseconds(highest(case.timing.delay)))
 
 
 @given(cases())
 def test_a_command_is_late_by_the_delay_and_its_jitter_or_waits_for_the_one_before(case: Case) -> None:
-    delay, jitter, last = nanoseconds(case.timing.delay), nanoseconds(case.timing.delay_jitter), 0
+    delay, jitter, last = nanoseconds(highest(case.timing.delay)), nanoseconds(highest(case.timing.delay_jitter)), 0
     for sample in samples_of(case):
         if sample.arrival is not None:
             own = range(sample.sent + delay, sample.sent + delay + jitter + 1)

@@ -7,6 +7,7 @@ import pytest
 from orchestration.quadrotor.timing import TIMING_KEYS
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
+from orchestration.system.distribution import Distribution
 from orchestration.system.model import System
 from quadcosim import Scenario, UsageError
 from tests.orchestration.studies.common import GRID, at, one_line, starts
@@ -98,6 +99,17 @@ def test_what_is_no_number_cannot_be_multiplied(tmp_path: Path) -> None:
 def test_loss_sets_both_losses(tmp_path: Path) -> None:
     system = flown(tmp_path, '[[axes]]\nname = "loss"\nsets = ["timing.loss"]\nvalues = [0.25]\n')
     assert [x.loss for x in system.connections] == [0.25, 0.25]
+
+
+def test_an_axis_has_tables_of_what_is_drawn_with_their_traces(tmp_path: Path) -> None:
+    (tmp_path / "trace.csv").write_text("delay\n0.001\n0.002\n")
+    tables = '{ uniform = [0, 0.002] }, { file = "trace.csv", column = "delay" }'
+    study = load(tmp_path, f'[[axes]]\nname = "timing.delay"\nvalues = [{tables}]\n')
+    trace = Distribution(file=tmp_path / "trace.csv", column="delay")
+    found = [study.system(index, starts()).connections[1].delay for index in range(2)]
+    assert found == [Distribution(uniform=(0.0, 0.002)), trace]
+    assert study.points[0] == {"timing.delay": "{uniform = [0, 0.002]}"}
+    assert study.files().tables[str(trace.file)] == trace.file
 
 
 def test_noise_of_one_measurement_leaves_that_of_others(tmp_path: Path) -> None:

@@ -6,6 +6,9 @@ import pytest
 
 from orchestration.basics.errors import UsageError
 from orchestration.quadrotor.translation import quadrotor
+from orchestration.system.computers import Computer, Task
+from orchestration.system.distribution import Distribution
+from orchestration.system.model import System
 from orchestration.system.paths import changed, value_at
 
 CHANGES = {
@@ -26,6 +29,46 @@ def test_what_is_changed_at_a_path_is_there_and_nothing_else_has_changed(path: s
     assert value_at(system, path) == value != value_at(quadrotor(), path)
     others = [other for other in CHANGES if other != path]
     assert [value_at(system, other) for other in others] == [value_at(quadrotor(), other) for other in others]
+
+
+DRAWN = Distribution(uniform=(0.0, 0.002))
+
+
+@pytest.mark.parametrize("written", ["{uniform=[0.0,0.002]}", {"uniform": [0.0, 0.002]}, DRAWN])
+@pytest.mark.parametrize("path", ["connections.command.delay", "components.controller.sampling.jitter"])
+def test_what_may_be_drawn_is_given_as_the_table_of_a_file_or_its_text(path: str, written: object) -> None:
+    assert value_at(changed(quadrotor(), {path: written}), path) == DRAWN
+
+
+def test_the_execution_time_of_a_task_is_drawn_likewise() -> None:
+    load = System(stop_time=1.0, computers={"c": Computer(tasks={"t": Task(period=0.01)})})
+    path = "computers.c.tasks.t.execution"
+    assert value_at(changed(load, {path: "{uniform=[0.0,0.002]}"}), path) == DRAWN
+
+
+@pytest.mark.parametrize(
+    ("path", "written", "line"),
+    [
+        ("connections.command.delay", "{unifrm=[0,1]}", "connections.command.delay.unifrm: no such key; expected one"),
+        (
+            "connections.command.delay",
+            "{uniform=[1,0]}",
+            "connections.command.delay.uniform = [1.0, 0.0]: expected two",
+        ),
+        ("connections.command.delay", "{uniform=[0,", "connections.command.delay = {uniform=[0,: expected TOML: "),
+        (
+            "connections.command.delay",
+            "late",
+            "connections.command.delay = late: expected zero or a positive number, or",
+        ),
+        ("components.plant.step", "{uniform=[0,1]}", "components.plant.step = {uniform=[0,1]}: expected a positive"),
+    ],
+)
+def test_a_table_that_cannot_be_is_refused_in_one_line_with_its_path(path: str, written: str, line: str) -> None:
+    with pytest.raises(UsageError) as refused:
+        changed(quadrotor(), {path: written})
+    assert str(refused.value).startswith(line)
+    assert str(refused.value).isprintable()
 
 
 def test_several_changes_are_all_made_at_once() -> None:
