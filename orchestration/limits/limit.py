@@ -23,7 +23,7 @@ from orchestration.results import html
 from orchestration.results.criterion import edge, judged
 from orchestration.stability.known_loops import Local
 from orchestration.stability.local_limit import local_limits
-from orchestration.system.chance import is_random
+from orchestration.system.chance import has_random_timing, is_random
 from orchestration.system.request import Request, in_its_own_words, system_meant
 from orchestration.workers.choice import alone
 from orchestration.workers.executors import RunEvaluator
@@ -125,7 +125,7 @@ def find(
     random = is_random(varied.at(span.last))
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
     local = _local(varied, span, files)
-    mean_square = _mean_square(varied, span, files) if random else MeanSquareLimit()
+    mean_square = _mean_square(varied, span, files, local) if random else MeanSquareLimit()
     with of_share(progress, "longest search") as hear, RunEvaluator(files, workers, how.engine) as pool:
         tell = announce or (lambda line: None)
         if engine == "auto":
@@ -177,7 +177,10 @@ def _local(varied: Varied, span: Range, files: Files) -> Local:
         return Local(reason=f"no local limit: {error}")
 
 
-def _mean_square(varied: Varied, span: Range, files: Files) -> MeanSquareLimit:
+def _mean_square(varied: Varied, span: Range, files: Files, local: Local) -> MeanSquareLimit:
+    """Noise alone is added to a loop that it does not change: means of squares then have no end where errors grow."""
+    if local.limit is not None and not has_random_timing(varied.at(span.last)):
+        return MeanSquareLimit(limit=local.limit)
     try:
         return computed(files.fmus.values(), mean_square_limit, varied, span, files.models_of(varied.system))
     except LostError as error:

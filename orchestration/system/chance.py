@@ -7,8 +7,16 @@ from orchestration.system.model import System
 def is_random(system: System) -> bool:
     """Whether seeds make a difference to its runs."""
     return (
-        any(one.sampling is not None and one.sampling.is_random for one in system.components.values())
-        or any(x.is_random or any(x.noise.values()) for x in system.connections)
+        has_random_timing(system)
+        or any(any(x.noise.values()) for x in system.connections)
         or any(source.is_random and source.noise != 0.0 for source in system.sources.values())
+    )
+
+
+def has_random_timing(system: System) -> bool:
+    """Whether seeds make a difference to when its components are stepped and what arrives."""
+    return (
+        any(one.sampling is not None and one.sampling.is_random for one in system.components.values())
+        or any(x.is_random for x in system.connections)
         or placement.is_random(system)
     )

@@ -147,6 +147,23 @@ def test_a_limit_of_a_loop_without_chance_has_no_mean_square_limit() -> None:
     assert "square" not in found.note
 
 
+def test_where_noise_alone_is_random_the_mean_square_limit_is_the_local_one() -> None:
+    system = example("minimum_variance", {"stop_time": 5.0})
+    system = dataclasses.replace(
+        system, operating_point={"components.controller.parameters.gain": 3.0 - math.sqrt(3.0)}
+    )
+    found = limit(
+        system, "connections.command.delay", first=0.0, last=0.9, tolerance=1e-4, progress=None, announce=None
+    )
+    assert found.mean_square_limit is not None
+    assert found.mean_square_limit == found.local_limit
+    below, above = (
+        expected("minimum_variance", connections__command__delay=found.mean_square_limit + apart).mean_square_radius
+        for apart in (-2e-4, 2e-4)
+    )
+    assert below < 1.0 < above
+
+
 NO_END = "variance, effort: without a finite expectation"
 
 
