@@ -1,12 +1,19 @@
 /* What happens at an instant, as instants.py has it, to the bit, in L lanes: lane l of every vector is run l. Runs of one
    timing are a track: they share a schedule and pass through it together.
 
-   It is compiled twice, for FMUs that are called (loop.c, one lane) and for kernels (batch.c). These say how values are
-   set, stepped and read, what is noted, and what is looked at: the functions that are only declared here. A lane that
-   is not alive any more takes part in nothing. */
+   It is compiled for FMUs that are called (loop.c, one lane) and for kernels (batch.c). These say how values are set,
+   stepped and read, what is noted, and what is looked at: the functions that are only declared here. A lane that is not
+   alive any more takes part in nothing.
+
+   Kernels are in lanes of vector registers, or in threads: with QUADCOSIM_THREADS each thread is one lane, LANE, of
+   memory that has L of them, and computes with single numbers. */
 
 #define NANOSECONDS 1e9
+#ifdef QUADCOSIM_THREADS
+#define EVERY ((Lanes)1 << LANE)
+#else
 #define EVERY (L == 64 ? ~(uint64_t)0 : (((uint64_t)1 << (L & 63)) - 1))
+#endif
 
 typedef struct { /* of tracks that have any, rows of a table that begin with an index */
     Lanes tracks;
@@ -40,12 +47,15 @@ static void note(Loop *l, int kind, const Messages *m, const Instant *now);
 
 /* -- lanes --------------------------------------------------------------------------------------------------------- */
 
-#if L == 1
+#ifdef QUADCOSIM_THREADS
+Q_ONE q_mask mask_of(Lanes lanes) { return lanes != 0; }
+Q_ONE Lanes lanes_of(q_mask mask) { return (Lanes)(mask != 0) << LANE; }
+#define EACH(lane, lanes) for (int lane = LANE, once_ = (lanes) != 0; once_; once_ = 0)
+#elif L == 1
 Q_ONE q_bits bits_of(Lanes lanes) { return -lanes; }
 Q_ONE q_mask mask_of(Lanes lanes) { return (q_mask)lanes; }
 Q_ONE Lanes lanes_of(q_mask mask) { return (Lanes)(mask != 0); }
 #define EACH(lane, lanes) for (int lane = 0, once_ = (lanes) != 0; once_; once_ = 0)
-#define TRACKS(track, some) for (Track *track = (some) ? l->tracks : NULL; track; track = NULL)
 #else
 static const q_bits lane_bits = LANE_BITS;
 
@@ -67,14 +77,31 @@ Q_ONE Lanes lanes_of(q_mask mask) {
 #define EACH(lane, lanes) \
     for (Lanes left_ = (lanes); left_; left_ &= left_ - 1) \
         for (int lane = __builtin_ctzll(left_), once_ = 1; once_; once_ = 0)
+#endif
+
+#if defined(QUADCOSIM_THREADS) || L == 1
+#define TRACKS(track, some) for (Track *track = (some) ? l->tracks : NULL; track; track = NULL)
+#else
 #define TRACKS(track, some) \
     for (Lanes tracks_ = (some); tracks_; tracks_ &= tracks_ - 1) \
         for (Track *track = &l->tracks[__builtin_ctzll(tracks_)], *end_ = track + 1; track < end_; track++)
 #endif
 
+/* What lanes have at a place of a memory; `in_lanes` of an array that need not be aligned as memories are. */
+#ifdef QUADCOSIM_THREADS
+#define AT(memory, place) ((memory)[(place) * L + LANE])
+#define READ(memory, place) AT(memory, place)
+Q_ONE q_real in_lanes(const double *values) { return values[LANE]; }
+#else
 typedef q_real Place __attribute__((may_alias));
 #define AT(memory, place) (*(Place *)((memory) + (place) * L))
 #define READ(memory, place) (*(const Place *)((memory) + (place) * L))
+Q_ONE q_real in_lanes(const double *values) {
+    q_real x;
+    memcpy(&x, values, sizeof x);
+    return x;
+}
+#endif
 
 static void end_some(Loop *l, Lanes lanes, int64_t outcome, int64_t component, const Instant *now) {
     EACH(lane, lanes & l->alive)
@@ -343,10 +370,14 @@ INLINED const int64_t *turn_of(Rows *rows, int64_t track, int64_t index, int64_t
 }
 
 INLINED void count_steps(Loop *l, Lanes lanes) {
+#ifdef QUADCOSIM_THREADS
+    EACH(lane, lanes) l->steps[lane]++;
+#else
     q_bits steps;
     memcpy(&steps, l->steps, sizeof steps);
     steps -= bits_of(lanes); /* all bits are -1 */
     memcpy(l->steps, &steps, sizeof steps);
+#endif
 }
 
 /* A component in continuous time reaches the instant; the lanes in which it has. */

@@ -1,10 +1,15 @@
 /* The loop of runs of kernels in lanes: what a run comes to is summed up row by row by expressions.h, which is written
-   for the system. What happens at an instant is in instants.h. */
+   for the system. What happens at an instant is in instants.h.
+
+   The lanes are those of vector registers, or threads with QUADCOSIM_THREADS: then threads.h says how a component is
+   stepped and how a thread waits for others, and nothing can be allocated. */
 
 #include "lanes.h"
 #include "mathematics.h"
 
+#ifndef QUADCOSIM_THREADS
 #include <stdlib.h>
+#endif
 
 #include "sizes.h"
 #include "structures.h"
@@ -12,19 +17,11 @@
 #include "instants.h"
 
 typedef Loop Batch; /* as expressions.h calls it */
-typedef void Step(double *, const uint64_t *, const double *, const double *, int32_t *);
 
-EXPORT const Size sizes[] = {SIZES, {0}};
+static int make_room_to_keep(Kept *kept);
 
 static int keep(Kept *kept, q_real value) {
-    if (kept->count == kept->capacity) {
-        int64_t capacity = kept->capacity ? 2 * kept->capacity : 1024;
-        double *values = aligned_alloc(64, (size_t)capacity * sizeof(q_real));
-        if (!values) return 0;
-        if (kept->values) memcpy(values, kept->values, (size_t)kept->count * sizeof(q_real));
-        free(kept->values);
-        kept->values = values, kept->capacity = capacity;
-    }
+    if (kept->count == kept->capacity && !make_room_to_keep(kept)) return 0;
     AT(kept->values, kept->count++) = value;
     return 1;
 }
@@ -41,21 +38,6 @@ Q_ONE q_real highest(q_real a, q_real b) { return q_select(q_gt(a, b) | q_isnan(
 #include "expressions.h"
 
 /* -- what an instant asks for -------------------------------------------------------------------------------------- */
-
-static int make_room(Channel *c, int lane) {
-    int64_t capacity = c->capacity ? 2 * c->capacity : 4;
-    size_t bytes = (size_t)(capacity * c->size) * sizeof(q_real);
-    double *flight = aligned_alloc(64, bytes);
-    if (!flight) return 0;
-    for (int each = 0; each < L; each++)
-        for (int64_t k = c->first[each]; k < c->last[each]; k++)
-            for (int64_t i = 0; i < c->size; i++)
-                flight[((k & (capacity - 1)) * c->size + i) * L + each] =
-                    c->flight[((k & (c->capacity - 1)) * c->size + i) * L + each];
-    free(c->flight);
-    c->flight = flight, c->capacity = capacity;
-    return 1;
-}
 
 /* Set the receiver's inputs; a value that it cannot be set to is for the FMU itself to refuse. */
 static void set(Loop *l, Channel *c, Lanes lanes, const double *value, const Instant *now) {
@@ -78,17 +60,11 @@ static void set(Loop *l, Channel *c, Lanes lanes, const double *value, const Ins
     if (q_any(wrong)) end_some(l, lanes_of(wrong), REFUSED, 0, now);
 }
 
+static Lanes failed_steps(Loop *l, int64_t index, Lanes lanes, q_real begin, q_real length);
+
 static void step(Loop *l, int64_t index, Lanes lanes, q_real begin, q_real length, int64_t until, const Instant *now) {
-    const Component *c = &l->components[index];
-    q_bits active = bits_of(lanes);
-    int32_t any = 0;
-    ((Step *)c->step)(c->memory, (const uint64_t *)&active, (const double *)&begin, (const double *)&length, l->status);
-    for (int lane = 0; lane < L; lane++) any |= l->status[lane];
-    if (!any) return;
-    Lanes failed = 0;
-    EACH(lane, lanes) failed |= (Lanes)(l->status[lane] != 0) << lane;
-    end_some(l, failed, FAILED, index, now);
-    memset(l->status, 0, L * sizeof *l->status);
+    Lanes failed = failed_steps(l, index, lanes, begin, length);
+    if (failed) end_some(l, failed, FAILED, index, now);
 }
 
 /* Nothing that is not finite is passed on. */
@@ -157,7 +133,7 @@ static void unroll(Loop *l, Track *track) {
     enum { TIMES, SAID, KINDS, STEPPED_AT, POSTED_AT, MEASURED_AT, ARRIVALS_AT, SAMPLES_AT, STEPPED };
     Span *s = &track->span;
     int64_t count = l->continuous.count, more = next_more(s), n = 0, steps = 0, time;
-    int64_t(*room)[WINDOW + 1] = (void *)track->room, *stepped = room[STEPPED];
+    int64_t(*room)[WINDOW + 1] = (int64_t(*)[WINDOW + 1])track->room, *stepped = room[STEPPED];
     for (; n <= WINDOW; n++) {
         time = next_time(s);
         room[TIMES][n] = time < INT64_MAX ? time : s->end, room[STEPPED_AT][n] = steps;
@@ -185,8 +161,8 @@ static void unroll(Loop *l, Track *track) {
     track->schedule = (Schedule){
         .times = room[TIMES], .stepped_at = room[STEPPED_AT], .stepped = stepped, .posted_at = room[POSTED_AT],
         .measured_at = room[MEASURED_AT], .arrivals_at = room[ARRIVALS_AT], .samples_at = room[SAMPLES_AT],
-        .posted = s->posted, .measured = s->measured, .arrivals = s->arrivals, .samples = s->samples,
-        .exchanged = s->exchanged,
+        .posted = s->posted, .measured = s->measured, .arrivals = s->arrivals, .exchanged = s->exchanged,
+        .samples = s->samples,
     };
     track->said = room[SAID], track->kinds = room[KINDS], track->at = 0, track->count = n;
 }
@@ -225,7 +201,7 @@ static void record(Loop *l, const Instant *now, Lanes lanes) {
     EACH(lane, lanes) {
         if (l->record_counts[lane] == l->record_limit) continue;
         double *into = l->records[lane] + l->record_counts[lane]++ * (l->recorded_count + 1);
-        *into++ = now->t[lane];
+        *into++ = q_lane(now->t, lane);
         for (int64_t i = 0; i < l->recorded_count; i++) into[i] = l->recorded[i][lane];
     }
 }
@@ -235,7 +211,6 @@ static void record(Loop *l, const Instant *now, Lanes lanes) {
 static void only_step(Loop *l, Instant *now, Lanes tracks) {
     int64_t index = l->continuous.items[0], until = 0;
     double t[L] = {0}, begin[L] = {0}, length[L] = {0};
-    q_real ends, begins, lengths;
     now->tracks = tracks, now->lanes = 0;
     TRACKS(track, tracks) {
         int64_t time = until = time_of(track), before = track->now[index];
@@ -244,10 +219,10 @@ static void only_step(Loop *l, Instant *now, Lanes tracks) {
             now->time[lane] = time, t[lane] = (double)time, begin[lane] = (double)before,
             length[lane] = (double)(time - before);
     }
-    memcpy(&ends, t, sizeof t), memcpy(&begins, begin, sizeof begin), memcpy(&lengths, length, sizeof length);
-    now->t = q_select(mask_of(now->lanes), ends / NANOSECONDS, now->t);
+    q_real from = in_lanes(begin) / NANOSECONDS, by = in_lanes(length) / NANOSECONDS;
+    now->t = q_select(mask_of(now->lanes), in_lanes(t) / NANOSECONDS, now->t);
     hear(l, now);
-    Lanes moved = move(l, index, now->lanes, begins / NANOSECONDS, lengths / NANOSECONDS, until, now);
+    Lanes moved = move(l, index, now->lanes, from, by, until, now);
     if (moved & l->alive) look(l, moved & l->alive, now);
     if (l->settles) hold(l, index, now->lanes & l->alive, now);
 }
@@ -258,6 +233,8 @@ static void reach_and_pass(Loop *l, Instant *now, Lanes tracks, int first) {
     if (first) look(l, now->lanes, now);
     pass(l, now);
 }
+
+static Lanes in_turn(Lanes going, Lanes sampling);
 
 /* Pass through the windows that the tracks have. Tracks that set out do so together; those that sample next wait for one
    another, since what a sample costs does not grow with the lanes that take part. */
@@ -285,7 +262,8 @@ EXPORT int run(Loop *l) {
             setting_out |= (Lanes)((kind & START) != 0) << number;
         }
         if (!going) return AT_END;
-        come = setting_out ? setting_out : going & ~sampling ? going & ~sampling : going;
+        come = setting_out ? setting_out : in_turn(going, sampling);
+        if (!come) continue;
         memset(marks, 0, sizeof marks);
         if (come & with_more) reach_and_pass(l, &now, come, setting_out != 0);
         else only_step(l, &now, come);
@@ -298,6 +276,54 @@ EXPORT int run(Loop *l) {
         if (l->no_memory) return NO_MEMORY;
         TRACKS(track, come) track->at++;
     }
+}
+
+#ifndef QUADCOSIM_THREADS
+
+/* -- in lanes of vector registers ---------------------------------------------------------------------------------- */
+
+EXPORT const Size sizes[] = {SIZES, {0}};
+
+typedef void Step(double *, const uint64_t *, const double *, const double *, int32_t *);
+
+static Lanes failed_steps(Loop *l, int64_t index, Lanes lanes, q_real begin, q_real length) {
+    const Component *c = &l->components[index];
+    q_bits active = bits_of(lanes);
+    int32_t any = 0;
+    ((Step *)c->step)(c->memory, (const uint64_t *)&active, (const double *)&begin, (const double *)&length, l->status);
+    for (int lane = 0; lane < L; lane++) any |= l->status[lane];
+    if (!any) return 0;
+    Lanes failed = 0;
+    EACH(lane, lanes) failed |= (Lanes)(l->status[lane] != 0) << lane;
+    memset(l->status, 0, L * sizeof *l->status);
+    return failed;
+}
+
+static Lanes in_turn(Lanes going, Lanes sampling) { return going & ~sampling ? going & ~sampling : going; }
+
+static int make_room_to_keep(Kept *kept) {
+    int64_t capacity = kept->capacity ? 2 * kept->capacity : 1024;
+    double *values = aligned_alloc(64, (size_t)capacity * sizeof(q_real));
+    if (!values) return 0;
+    if (kept->values) memcpy(values, kept->values, (size_t)kept->count * sizeof(q_real));
+    free(kept->values);
+    kept->values = values, kept->capacity = capacity;
+    return 1;
+}
+
+static int make_room(Channel *c, int lane) {
+    int64_t capacity = c->capacity ? 2 * c->capacity : 4;
+    size_t bytes = (size_t)(capacity * c->size) * sizeof(q_real);
+    double *flight = aligned_alloc(64, bytes);
+    if (!flight) return 0;
+    for (int each = 0; each < L; each++)
+        for (int64_t k = c->first[each]; k < c->last[each]; k++)
+            for (int64_t i = 0; i < c->size; i++)
+                flight[((k & (capacity - 1)) * c->size + i) * L + each] =
+                    c->flight[((k & (c->capacity - 1)) * c->size + i) * L + each];
+    free(c->flight);
+    c->flight = flight, c->capacity = capacity;
+    return 1;
 }
 
 /* How often a value that was kept grows, and ends above a floor. */
@@ -323,3 +349,5 @@ EXPORT void free_all(Loop *l) {
     for (int64_t i = 0; i < KEPT; i++) free(l->kept[i].values);
     for (int64_t i = 0; i < l->channel_count; i++) free(l->channels[i].flight);
 }
+
+#endif

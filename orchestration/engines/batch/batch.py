@@ -2,7 +2,7 @@
 
 import ctypes
 from collections import OrderedDict
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 from orchestration.basics.errors import QuadcosimError
 from orchestration.basics.simulator import Booleans, Floats, Integers
 from orchestration.engines import initial
+from orchestration.engines.batch.memory import Memory
 from orchestration.engines.batch.shape import Ends, Shape, changes_of, ends_of
 from orchestration.engines.job_numbers import job_numbers
 from orchestration.engines.sources import Values
@@ -54,8 +55,12 @@ class BatchResult:
     """rows of what was to be recorded, with the time [s] first, of each run; none if nothing was"""
 
 
+Going = Generator[None, Sequence[int], BatchResult]
+"""Runs that somebody else goes on with, as `Batch.going` says"""
+
+
 @dataclass(kw_only=True)
-class _Run:
+class Run:
     """What one lane has of its own while it flies."""
 
     system: System
@@ -72,7 +77,7 @@ class _Run:
 
 
 @dataclass(kw_only=True)
-class _Track:
+class Track:
     """Runs that share a schedule."""
 
     lanes: list[int]
@@ -88,14 +93,14 @@ class _Track:
 class Batch:
     """Memory for the runs of a shape, used for one group of them after the other."""
 
-    def __init__(self, shape: Shape, schedules: ScheduleCache) -> None:
+    def __init__(self, shape: Shape, schedules: ScheduleCache, memory: Memory | None = None) -> None:
         self._shape, self._schedules, self._lanes = shape, schedules, shape.lanes
+        self._memory = Memory() if memory is None else memory
         self._library = shape.library
         self._said: OrderedDict[Hashable, tuple[Floats, Floats]] = OrderedDict()
         self._own = NOTHING
         self._jobs_of: tuple[System, Mapping[str, float]] | None = None
         self._written = shape.written
-        self._kept_arrays: list[Any] = []
         owners = [source.trajectory for source in shape.system.sources.values() if source.trajectory is not None]
         self._trajectories = {owner: self._trajectory_parameters(owner) for owner in owners}
         self._starts = {
@@ -111,20 +116,22 @@ class Batch:
         self._c = c = structures(self._lanes)
         connections = shape.system.connections
         self._of_channels = [self._arrays_of(len(x.start)) for x in connections]
-        self._channels = (c.Channel * max(1, len(connections)))(*map(self._channel, range(len(connections))))
+        self._channels = self._structures(c.Channel, map(self._channel, range(len(connections))))
         self._ratios = [self._array(1) for _ in kernels]
         self._begins: list[Floats] = [np.zeros(self._lanes) for _ in kernels]
-        self._components = (c.Component * len(kernels))(*map(self._component, range(len(kernels))))
+        self._components = self._structures(c.Component, map(self._component, range(len(kernels))))
         size = 8 * (c.WINDOW + 1) + c.WINDOW * len(shape.wires.continuous)
-        self._rooms: Integers = np.zeros((self._lanes, size), dtype=np.int64)
-        self._tracks = (c.Track * self._lanes)(*(c.Track(room=address(room)) for room in self._rooms))
+        self._rooms = self._memory.integers(self._lanes, size)
+        self._tracks = self._structures(c.Track, (c.Track(room=address(room)) for room in self._rooms))
         seen, fed = sum(map(len, shape.seen.values())), sum(len(s.to) for s in shape.system.sources.values())
         self._given_count = fed if shape.fed_changes else 0
         self._state = self._array(len(self._written.states))
         self._numbers = self._array(len(shape.numbers) + 1 + len(shape.inner))
+        self._floor, self._grown = self._array(1), self._array(1)
         self._status = np.zeros(self._lanes, dtype=np.int32)
-        self._kept = (c.Kept * max(1, len(self._written.folds.kept)))()
-        self._batch: Any = c.Loop(
+        self._rows: Floats | None = None
+        self._kept = self._memory.structures(c.Kept, len(self._written.folds.kept))
+        (self._batch,) = self._structures(c.Loop, [c.Loop(
             components=ctypes.addressof(self._components), channels=ctypes.addressof(self._channels),
             channel_count=len(connections),
             some_by_themselves=any(map(shape.wires.is_by_itself, shape.names)),
@@ -135,11 +142,11 @@ class Batch:
             state=address(self._state), constants=address(self._array(len(self._written.folds.writer.constants))),
             numbers=address(self._numbers), kept=ctypes.addressof(self._kept),
             status=address(self._status),
-        )  # fmt: skip
+        )])  # fmt: skip
 
     def __del__(self) -> None:
         if hasattr(self, "_batch"):
-            self._library.free_all(ctypes.addressof(self._batch))
+            self._library.free_all(self.address)
 
     # -- a group of runs -------------------------------------------------------------------------------------------
 
@@ -154,12 +161,39 @@ class Batch:
 
         `own` are parameters of each run on top of those of its system.
         """
+        going = self.going(systems, timings, record, own)
+        next(going)
+        while True:
+            code = self._library.run(self.address)
+            if code == self._c.NO_MEMORY:
+                raise QuadcosimError("a batch of runs: expected memory for the messages that are on their way")
+            try:
+                going.send([self._batch.track] if code == self._c.NEXT_WINDOW else [])
+            except StopIteration as end:
+                result: BatchResult = end.value
+                return result
+
+    def going(
+        self,
+        systems: Sequence[System],
+        timings: Sequence[Timing],
+        record: Sequence[str] | None = None,
+        own: Columns = NOTHING,
+    ) -> Going:
+        """The same, by somebody else: who goes on with the runs each time that this waits, and then says which tracks
+        ask for their next window.
+        """
         self._own = own
         found: dict[Call, Floats] = {}
         for _ in range(self._shape.passes):
-            result = self._once(systems, timings, found, record)
+            result = yield from self._once(systems, timings, found, record)
             found = dict(result.reductions)
         return result
+
+    @property
+    def address(self) -> int:
+        """Where C finds what it goes on with."""
+        return ctypes.addressof(self._batch)
 
     def _once(
         self,
@@ -167,14 +201,10 @@ class Batch:
         timings: Sequence[Timing],
         known: Mapping[Call, Floats],
         record: Sequence[str] | None,
-    ) -> BatchResult:
+    ) -> Going:
         batch, count = self._batch, len(systems)
         runs = [self._run(lane, system) for lane, system in enumerate(systems)]
-        self._library.clear(ctypes.addressof(batch))
-        self._state[:] = np.array(self._written.states)[:, None]
-        batch.doubtful = 0
-        for name in ("outcome", "outcome_component", "outcome_time", "steps", "record_counts"):
-            getattr(batch, name)[:] = [0] * self._lanes
+        self._clear()
         batch.alive, batch.no_memory = (1 << count) - 1, 0
         courses = {
             timing: self._schedules.of(id(self._shape), timing, systems[timings.index(timing)])
@@ -187,21 +217,28 @@ class Batch:
             batch.alive &= ~(1 << lane)
         tracks = self._tracks_of(runs, timings, courses)
         recorded = self._record(record, tracks)
-        self._pass(runs, tracks)
+        yield from self._pass(runs, tracks)
         return self._result(systems, recorded)
 
-    def _pass(self, runs: Sequence[_Run], tracks: Sequence[_Track]) -> None:
+    def _clear(self) -> None:
+        """Nothing has happened yet."""
+        self._library.clear(self.address)
+        self._state[:] = np.array(self._written.states)[:, None]
+        self._batch.doubtful = 0
+        for name in ("outcome", "outcome_component", "outcome_time", "steps", "record_counts"):
+            getattr(self._batch, name)[:] = [0] * self._lanes
+
+    def _pass(self, runs: Sequence[Run], tracks: Sequence[Track]) -> Generator[None, Sequence[int], None]:
         batch = self._batch
         batch.track_count = len(tracks)
         for i, track in enumerate(tracks):
             into = self._tracks[i]
-            into.now, into.lanes = address(track.now), sum(1 << lane for lane in track.lanes)
+            into.now, into.lanes = self._memory.passing(track.now), sum(1 << lane for lane in track.lanes)
             into.stop, into.one_for_all = nanoseconds(runs[track.lanes[0]].system.stop_time), track.alike
             self._next_span(i, track, runs)
-        while (code := self._library.run(ctypes.addressof(batch))) == self._c.NEXT_WINDOW:
-            self._next_span(batch.track, tracks[batch.track], runs)
-        if code == self._c.NO_MEMORY:
-            raise QuadcosimError("a batch of runs: expected memory for the messages that are on their way")
+        while waiting := (yield):
+            for i in waiting:
+                self._next_span(i, tracks[i], runs)
 
     def _result(self, systems: Sequence[System], recorded: Sequence[Floats]) -> BatchResult:
         batch, count = self._batch, len(systems)
@@ -225,20 +262,21 @@ class Batch:
     def _growth(self, call: Call, own: Call, values: Mapping[Call, Floats]) -> Floats:
         from orchestration.engines.batch.combining import combined
 
-        folds, batch = self._written.folds, self._batch
+        folds = self._written.folds
         count = len(next(iter(values.values())))
         numbers = dict(zip((*self._shape.numbers, STOP_TIME), self._numbers[:, :count]))
         floor, none = combined(call.arguments[1], values, numbers, count)
-        floors, found = self._array(1), self._array(1)
-        floors[0, :count] = np.where(none, np.nan, floor)
-        self._library.grown(ctypes.addressof(batch), folds.kept[own], address(floors), address(found))
+        self._floor[0, :count] = np.where(none, np.nan, floor)
+        self._library.grown(self.address, folds.kept[own], address(self._floor), address(self._grown))
         steps = self._state[folds.steps[own], :count]
-        share: Floats = np.where((steps > 0) & ~none, found[0, :count] / np.where(steps > 0, steps, np.nan), np.nan)
+        share: Floats = np.where(
+            (steps > 0) & ~none, self._grown[0, :count] / np.where(steps > 0, steps, np.nan), np.nan
+        )
         return share
 
     # -- values at the start ---------------------------------------------------------------------------------------
 
-    def _run(self, lane: int, system: System) -> _Run:
+    def _run(self, lane: int, system: System) -> Run:
         shape = self._shape
         streams = Streams(system.seed, system.streams)
         parameters = self.parameters(lane, system)
@@ -250,7 +288,7 @@ class Batch:
         }
         given = [at_work[name] for name, source in system.sources.items() if source.to]
         seen = [at_work[name] for name in shape.seen]
-        return _Run(
+        return Run(
             system=system, streams=streams, numbers=parameters, seen=seen, given=given,
             said=self._sources_of(system, parameters), noise=noisy,
         )  # fmt: skip
@@ -328,7 +366,7 @@ class Batch:
             for i, call in enumerate(shape.inner):
                 self._numbers[len(shape.numbers) + 1 + i, lane] = known[call][lane] if known else 0.0
 
-    def _initialise(self, runs: Sequence[_Run]) -> Booleans:
+    def _initialise(self, runs: Sequence[Run]) -> Booleans:
         """The first exchange, as `Master` does it; lanes in which it fails."""
         shape, wrong = self._shape, np.zeros(self._lanes, dtype=np.bool_)
         for lane, run in enumerate(runs):
@@ -396,19 +434,19 @@ class Batch:
     # -- schedules -------------------------------------------------------------------------------------------------
 
     def _tracks_of(
-        self, runs: Sequence[_Run], timings: Sequence[Timing], courses: Mapping[Timing, Course]
-    ) -> list[_Track]:
+        self, runs: Sequence[Run], timings: Sequence[Timing], courses: Mapping[Timing, Course]
+    ) -> list[Track]:
         found: dict[Timing, list[int]] = {}
         for lane, timing in enumerate(timings):
             found.setdefault(timing, []).append(lane)
         return [
-            _Track(
-                lanes=lanes, spans=courses[timing].spans, ahead=next(courses[timing].spans, None),
-                now=np.zeros(len(self._shape.names), dtype=np.int64),
-                alike=len({runs[lane].said for lane in lanes}) == 1,
-            )
+            self._track(lanes, courses[timing].spans, alike=len({runs[lane].said for lane in lanes}) == 1)
             for timing, lanes in found.items()
-        ]  # fmt: skip
+        ]
+
+    def _track(self, lanes: list[int], spans: Iterator[Span], *, alike: bool) -> Track:
+        now = np.zeros(len(self._shape.names), dtype=np.int64)
+        return Track(lanes=lanes, spans=spans, ahead=next(spans, None), now=now, alike=alike)
 
     def _sources_of(self, system: System, numbers: Mapping[str, float]) -> Hashable:
         """What the values of the sources of a run follow from, where it is not the structure."""
@@ -420,7 +458,7 @@ class Batch:
                 found.append(tuple(numbers[each] for each in self._trajectories[source.trajectory]))
         return tuple(map(repr, found))
 
-    def _next_span(self, number: int, track: _Track, runs: Sequence[_Run]) -> None:
+    def _next_span(self, number: int, track: Track, runs: Sequence[Run]) -> None:
         """Give the next span of a track to C."""
         into = self._tracks[number]
         span = track.span = track.ahead
@@ -429,27 +467,25 @@ class Batch:
         into.last_window = track.ahead is None
         if span is None:
             return
-        of = self._c.Span(end=span.end)
+        of, there = self._c.Span(end=span.end), self._memory.passing
         for name in ("regular", "own"):
             instants = getattr(span, name)
-            places = self._c.Instants(
-                times=address(instants.times), stepped=address(instants.stepped), count=len(instants)
-            )
+            places = self._c.Instants(times=there(instants.times), stepped=there(instants.stepped), count=len(instants))
             setattr(of, name, places)
         for name in ("posted", "measured", "arrivals", "samples"):
-            setattr(of, name, address(getattr(span, name)))
+            setattr(of, name, there(getattr(span, name)))
             setattr(of, f"{name}_count", len(getattr(span, name)))
-        of.exchanged, of.sampled = address(span.exchanged), address(span.sampled)
+        of.exchanged, of.sampled = there(span.exchanged), there(span.sampled)
         into.span = of
         for lane in track.lanes[:1] if track.alike else track.lanes:
             run = runs[lane]
             regular, own = (self._values_at(run, instants) for instants in (span.regular, span.own))
             run.arrays = [*regular, *own]
-            into.seen[lane], into.given[lane], into.seen_own[lane], into.given_own[lane] = map(address, run.arrays)
+            into.seen[lane], into.given[lane], into.seen_own[lane], into.given_own[lane] = map(there, run.arrays)
         for lane in track.lanes:
             self._draw_noise(lane, runs[lane], span)
 
-    def _values_at(self, run: _Run, instants: Instants) -> tuple[Floats, Floats]:
+    def _values_at(self, run: Run, instants: Instants) -> tuple[Floats, Floats]:
         """What sources say at some instants; what many runs have in common is found once."""
         key = instants, run.said
         if key not in self._said:
@@ -463,14 +499,14 @@ class Batch:
         self._said.move_to_end(key)
         return self._said[key]
 
-    def _draw_noise(self, lane: int, run: _Run, span: Span) -> None:
+    def _draw_noise(self, lane: int, run: Run, span: Span) -> None:
         for i, stream in run.noise.items():
             count = span.count_of(i, self._shape.wires.table(i))
             noise = stream.standard_normal((count, len(self._ends[i].start)))
             run.arrays.append(noise)
-            self._channels[i].noise[lane] = address(noise)
+            self._channels[i].noise[lane] = self._memory.passing(noise)
 
-    def _record(self, columns: Sequence[str] | None, tracks: Sequence[_Track]) -> list[Floats]:
+    def _record(self, columns: Sequence[str] | None, tracks: Sequence[Track]) -> list[Floats]:
         """Room for the rows of some columns; None: no rows are kept."""
         batch = self._batch
         batch.recorded_count, batch.record_limit = len(columns or ()), 0 if columns is None else MOST_ROWS
@@ -480,25 +516,28 @@ class Batch:
         self._recorded = np.array(
             [address(self.memories[i]) + 8 * self._lanes * place for i, place in places], dtype=np.int64
         )
-        batch.recorded = address(self._recorded)
-        rows = [np.empty((MOST_ROWS, len(columns) + 1)) for _ in range(sum(len(track.lanes) for track in tracks))]
+        batch.recorded = self._memory.passing(self._recorded)
+        if self._rows is None or self._rows.shape[2] != len(columns) + 1:
+            self._rows = self._memory.numbers(self._lanes, MOST_ROWS, len(columns) + 1)
+        rows = self._rows[: sum(len(track.lanes) for track in tracks)]
         for lane, table in enumerate(rows):
             batch.records[lane] = address(table)
-        return rows
+        return [*rows]
 
     # -- how it is made --------------------------------------------------------------------------------------------
 
     def _array(self, count: int) -> Floats:
-        """A number for each of so many, in each lane, where vector registers like it."""
-        whole = np.zeros(max(count, 1) * self._lanes + 8)
-        first = (-whole.ctypes.data // 8) % 8
-        self._kept_arrays.append(whole)
-        return whole[first : first + max(count, 1) * self._lanes].reshape(-1, self._lanes)[: max(count, 1)]
+        """A number for each of so many, in each lane."""
+        return self._memory.numbers(max(count, 1), self._lanes)
+
+    def _structures(self, kind: Any, given: Iterable[Any]) -> Any:
+        values = [*given]
+        found = self._memory.structures(kind, len(values))
+        found[: len(values)] = values
+        return found
 
     def _indices(self, indices: Sequence[int]) -> Any:
-        array = np.array(indices, dtype=np.int64)
-        self._kept_arrays.append(array)
-        return self._c.List(items=address(array), count=len(array))
+        return self._c.List(items=self._memory.lasting(np.array(indices, dtype=np.int64)), count=len(indices))
 
     def _arrays_of(self, size: int) -> dict[str, Floats]:
         found = {name: self._array(size) for name in ("sigma", "quantum", "value")}
@@ -507,28 +546,27 @@ class Batch:
     def _channel(self, i: int) -> Any:
         x, ends, arrays = self._shape.system.connections[i], self._ends[i], self._of_channels[i]
         sigma, quantum = changes_of(x)
-        names, converts = self._shape.names, x.converts
+        names, converts, lasting = self._shape.names, x.converts, self._memory.lasting
         return self._c.Channel(
             sender=address(self.memories[names.index(x.sender)]),
             into=self._c.Inputs(
-                memory=address(self.memories[names.index(x.receiver)]), places=address(ends.end),
-                kinds=address(ends.kinds), low=address(ends.low), high=address(ends.high),
+                memory=address(self.memories[names.index(x.receiver)]), places=lasting(ends.end),
+                kinds=lasting(ends.kinds), low=lasting(ends.low), high=lasting(ends.high),
                 plain=not converts and x.hold == "zero",
                 as_they_are=not converts and x.hold == "zero" and not ends.kinds.any(),
             ),
-            places=address(ends.start), size=len(ends.start), noisy=bool(sigma.any()), rounds=bool(quantum.any()),
+            places=lasting(ends.start), size=len(ends.start), noisy=bool(sigma.any()), rounds=bool(quantum.any()),
             converts=converts, extrapolates=x.hold == "first", read_ahead=i in self._shape.wires.plan.read_ahead,
             **{name: address(arrays[name]) for name in ("sigma", "quantum", "scale", "offset", "value", "applied")},
         )  # fmt: skip
 
     def _component(self, index: int) -> Any:
         shape, name = self._shape, self._shape.names[index]
-        into, places = shape.wires.into(name), shape.connected(name)
+        into, places, lasting = shape.wires.into(name), shape.connected(name), self._memory.lasting
         changing = shape.fed[name] if shape.fed_changes else []
-        fed = (self._c.Fed * max(1, len(changing)))(*(self._c.Fed(source=s, place=p) for s, p in changing))
-        self._kept_arrays += [places, fed]
+        fed = self._structures(self._c.Fed, (self._c.Fed(source=s, place=p) for s, p in changing))
         return self._c.Component(
-            step=shape.kernels[name].step, memory=address(self.memories[index]), places=address(places),
+            step=shape.kernels[name].step, memory=address(self.memories[index]), places=lasting(places),
             connected=len(places), fed=ctypes.addressof(fed), fed_count=len(changing), held=self._indices(into.held),
             ahead=self._indices(into.ahead), behind=self._indices(into.behind), ratio=address(self._ratios[index]),
             by_itself=shape.wires.is_by_itself(name), rank=shape.wires.rank(index),

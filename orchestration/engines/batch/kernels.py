@@ -47,17 +47,22 @@ class Kernel:
 
 def component(name: str, model: Model, lanes: int) -> Kernel:
     """The FMU of a component in lanes; raises `UsageError` naming it for one that has none."""
-    sources = _sources_of(model.path, model.path.stat().st_mtime_ns)
+    return _compiled(tuple(sorted(sources_of(name, model).items())), lanes)
+
+
+def sources_of(name: str, model: Model) -> Mapping[str, bytes]:
+    """The sources of a component for lanes, by name; raises `UsageError` naming it for an FMU that has none."""
+    sources = _sources_in(model.path, model.path.stat().st_mtime_ns)
     if MAIN not in sources or model.version != 2:
         raise UsageError(
             f"components.{name}: {model.path.name}: expected a native FMU of this project's kit, as quadcosim build "
             "--native makes them, to be one of many at once"
         )
-    return _compiled(tuple(sorted(sources.items())), lanes)
+    return sources
 
 
 @functools.lru_cache(maxsize=64)
-def _sources_of(path: Path, changed: int) -> Mapping[str, bytes]:
+def _sources_in(path: Path, changed: int) -> Mapping[str, bytes]:
     with zipfile.ZipFile(path) as archive:
         names = [name for name in archive.namelist() if name.startswith(_SOURCES) and not name.endswith("/")]
         return {name.removeprefix(_SOURCES): archive.read(name) for name in names}

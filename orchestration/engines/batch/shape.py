@@ -196,8 +196,8 @@ class Shape:
         )
 
     @cached_property
-    def library(self) -> Any:
-        """What flies them."""
+    def texts(self) -> Mapping[str, str]:
+        """What is written for it of what flies it, by the names that batch.c includes."""
         bits = ", ".join(f"1ull << {lane}" for lane in range(self.lanes))
         sizes = {  # rounded up, so that systems that come to the same are flown by the same
             "COMPONENTS": -8 * (-len(self.names) // 8), "CHANNELS": -8 * (-len(self.system.connections) // 8) or 8,
@@ -205,7 +205,12 @@ class Shape:
             "LANE_BITS": f"{{{bits}}}",
         }  # fmt: skip
         lines = "".join(f"#define {name} {value}\n" for name, value in sizes.items())
-        return batch(lines, self.written.text, self.lanes)
+        return {"sizes.h": lines, "expressions.h": self.written.text}
+
+    @cached_property
+    def library(self) -> Any:
+        """What flies them in lanes of vector registers."""
+        return batch(self.texts["sizes.h"], self.texts["expressions.h"], self.lanes)
 
     @cached_property
     def _wanted(self) -> set[str]:

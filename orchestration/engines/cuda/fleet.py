@@ -1,0 +1,143 @@
+"""Many batches of one shape on a GPU: each of their lanes in a thread."""
+
+import ctypes
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from orchestration.basics.simulator import Floats
+from orchestration.engines.batch.batch import Batch, BatchResult, Columns, Going, Run, Track
+from orchestration.engines.batch.shape import Shape
+from orchestration.engines.cuda.compiler import compiled
+from orchestration.engines.cuda.driver import Gpu
+from orchestration.engines.cuda.memory import SharedMemory
+from orchestration.engines.cuda.program import program
+from orchestration.engines.structures import address
+from orchestration.expressions.syntax import Call
+from orchestration.schedule.schedule_cache import Course, ScheduleCache, Timing
+from orchestration.system.model import System
+
+_MESSAGES, _VALUES = 16, 1024
+"""On their way over a connection, and kept of an expression: what there is room for at first"""
+
+Group = tuple[Sequence[System], Sequence[Timing], Columns]
+"""Runs of a batch, as `Batch.run` takes them"""
+
+
+class Fleet:
+    """Flies groups of runs of a shape, all at once."""
+
+    def __init__(self, shape: Shape, schedules: ScheduleCache, gpu: Gpu) -> None:
+        self._shape, self._schedules, self._gpu = shape, schedules, gpu
+        self._fly = gpu.kernel(compiled(program(shape), gpu.architecture), "fly")
+        self._memory = SharedMemory(gpu)
+        self._batches: list[_Threads] = []
+
+    def run(self, groups: Sequence[Group], record: Sequence[str] | None = None) -> list[tuple[Batch, BatchResult]]:
+        """The groups in their order, each with the batch that has flown it."""
+        while len(self._batches) < len(groups):
+            self._batches.append(_Threads(self._shape, self._schedules, self._memory))
+        found: dict[int, BatchResult] = {}
+        going: dict[int, Going] = {}
+        begin = [*range(len(groups))]
+        while begin or going:
+            for i in begin:
+                systems, timings, own = groups[i]
+                going[i] = self._batches[i].going(systems, timings, record, own)
+                next(going[i])
+            self._go_on([self._batches[i] for i in going])
+            begin = [i for i in going if self._batches[i].makes_room()]
+            for i in sorted({*going} - {*begin}):
+                try:
+                    going[i].send(self._batches[i].waiting())
+                except StopIteration as end:
+                    found[i] = end.value
+                    del going[i]
+        self._memory.forget()
+        return [(self._batches[i], found[i]) for i in range(len(groups))]
+
+    def _go_on(self, batches: Sequence["_Threads"]) -> None:
+        addresses = np.array([batch.address for batch in batches], dtype=np.int64)
+        self._gpu.launch(self._fly, len(batches) * self._shape.lanes, self._memory.passing(addresses), len(batches))
+
+
+class _Threads(Batch):
+    """A batch whose lanes go on by themselves: each has a track, and values that it keeps, of its own."""
+
+    def __init__(self, shape: Shape, schedules: ScheduleCache, memory: SharedMemory) -> None:
+        super().__init__(shape, schedules, memory)
+        self._kept_count = len(self._written.folds.kept)
+        self._kept = memory.structures(self._c.Kept, self._kept_count * self._lanes)
+        self._batch.kept = ctypes.addressof(self._kept)
+        self._values: dict[int, Floats] = {}
+        """that are kept of an expression, shape (rows, lanes)"""
+        for i in range(self._kept_count):
+            self._make_room_to_keep(i, _VALUES)
+        for channel in self._channels:
+            self._make_room(channel, _MESSAGES)
+
+    def __del__(self) -> None:
+        """What there is room for belongs to the memory."""
+
+    def waiting(self) -> list[int]:
+        """The tracks that ask for their next window."""
+        batch = self._batch
+        return [
+            lane
+            for lane in range(self._lanes)
+            if batch.alive >> lane & 1 and batch.returned[lane] == self._c.NEXT_WINDOW
+        ]
+
+    def makes_room(self) -> bool:
+        """Whether there was too little room for some lane: there is twice as much now, to begin again."""
+        if self._c.NO_MEMORY not in self._batch.returned[:]:
+            return False
+        for i, values in self._values.items():
+            self._make_room_to_keep(i, 2 * len(values))
+        for channel in self._channels:
+            self._make_room(channel, 2 * channel.capacity)
+        return True
+
+    def _make_room_to_keep(self, i: int, count: int) -> None:
+        values = self._values[i] = self._array(count)
+        for lane in range(self._lanes):
+            kept = self._kept[lane * self._kept_count + i]
+            kept.values, kept.capacity = address(values), count
+
+    def _make_room(self, channel: Any, count: int) -> None:
+        channel.flight, channel.capacity = address(self._array(count * channel.size)), count
+
+    def _result(self, systems: Sequence[System], recorded: Sequence[Floats]) -> BatchResult:
+        """Its rows are no longer in memory that is given back."""
+        result = super()._result(systems, recorded)
+        return replace(result, signals=[rows.copy() for rows in result.signals])
+
+    # -- what is each lane's own -------------------------------------------------------------------------------------
+
+    def _clear(self) -> None:
+        super()._clear()
+        self._batch.returned[:] = [self._c.AT_END] * self._lanes
+        for kept in self._kept:
+            kept.count = 0
+
+    def _tracks_of(
+        self, runs: Sequence[Run], timings: Sequence[Timing], courses: Mapping[Timing, Course]
+    ) -> list[Track]:
+        found: dict[int, Track] = {}
+        for timing, course in courses.items():
+            lanes = [lane for lane, own in enumerate(timings) if own == timing]
+            for lane, spans in zip(lanes, itertools.tee(course.spans, len(lanes))):
+                found[lane] = self._track([lane], spans, alike=True)
+        return [found[lane] for lane in sorted(found)]
+
+    def _growth(self, call: Call, own: Call, values: Mapping[Call, Floats]) -> Floats:
+        """A lane may have kept fewer values than others; what is not a number does not grow."""
+        i = self._written.folds.kept[own]
+        kept = self._kept[i :: self._kept_count]
+        for lane, each in enumerate(kept):
+            self._values[i][each.count :, lane] = np.nan
+        self._kept[i].count = max(each.count for each in kept)
+        return super()._growth(call, own, values)

@@ -1,0 +1,27 @@
+"""A processor that plays a GPU: its driver, and the text of CUDA compiled as C++."""
+
+import hashlib
+import subprocess
+from pathlib import Path
+
+from fmu_kit.compiler.pack.c_compiler import compiled_here
+
+DRIVER = "gpu.so"
+HERE = Path(__file__).parent
+_CPP = ("-x", "c++", "-std=gnu++20", "-O0", "-ffp-contract=off", "-fPIC", "-shared", "-include", "processor.h")
+
+
+def make_driver(folder: Path) -> None:
+    """Put the library that stands for the driver into a folder."""
+    sources = {"gpu.c": (HERE / "gpu.c").read_bytes()}
+    (folder / DRIVER).write_bytes(compiled_here(sources, "gpu.c", options=("-fvisibility=default",)))
+
+
+def played(text: str, folder: Path) -> bytes:
+    """In place of what a GPU loads, where what the processor runs is."""
+    path = folder / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.so"
+    if not path.exists():
+        source = path.with_suffix(".cu")
+        source.write_text(text, encoding="utf-8")
+        subprocess.run(["cc", *_CPP, "-I", str(HERE), str(source), "-o", str(path)], check=True)
+    return str(path).encode() + b"\0"
