@@ -1,0 +1,51 @@
+"""Boxes, many at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from orchestration.basics.simulator import Floats
+
+
+@dataclass(frozen=True, kw_only=True)
+class Boxes:
+    """Both arrays have the shape (coordinates, boxes)."""
+
+    centre: Floats
+    radius: Floats
+
+    def __len__(self) -> int:
+        return int(self.centre.shape[1])
+
+    def __getitem__(self, which: object) -> Boxes:
+        return Boxes(centre=self.centre[:, which], radius=self.radius[:, which])  # type: ignore[index]
+
+    def and_(self, *others: Boxes) -> Boxes:
+        """All of them."""
+        every = (self, *others)
+        centre, radius = ([getattr(each, name) for each in every] for name in ("centre", "radius"))
+        return Boxes(centre=np.concatenate(centre, axis=1), radius=np.concatenate(radius, axis=1))
+
+    def halved(self, along: Floats) -> tuple[Boxes, Boxes]:
+        """Both halves of each, along one coordinate of each."""
+        which = (along, np.arange(len(self)))
+        radius, below, above = self.radius.copy(), self.centre.copy(), self.centre.copy()
+        radius[which] /= 2
+        below[which] -= radius[which]
+        above[which] += radius[which]
+        return Boxes(centre=below, radius=radius), Boxes(centre=above, radius=radius)
+
+
+def outside(inner: float, size: int) -> Boxes:
+    """Boxes that cover the |y| ≤ 1.001 with a first coordinate above 0, but for where no coordinate is above `inner`."""
+    layers, edge = [], 1.001
+    while edge > inner:
+        radius = edge / 4
+        steps = [np.array([1.0, 3.0]), *[np.array([-3.0, -1.0, 1.0, 3.0])] * (size - 1)]
+        centre = radius * np.stack(np.meshgrid(*steps, indexing="ij")).reshape(size, -1)
+        centre = centre[:, np.abs(centre).max(axis=0) > edge / 2]
+        layers.append(Boxes(centre=centre, radius=np.full_like(centre, radius)))
+        edge /= 2
+    return layers[-1].and_(*layers[-2::-1])
