@@ -3,12 +3,11 @@
 import ctypes
 import functools
 import weakref
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
 from orchestration.basics.errors import QuadcosimError
@@ -20,6 +19,7 @@ from orchestration.computers.parts import (
     COLUMNS,
     LATER,
     NOTED,
+    STAYS,
     Carrier,
     Constant,
     Leg,
@@ -27,6 +27,7 @@ from orchestration.computers.parts import (
     Message,
     Parts,
     Processor,
+    Stream,
     Task,
 )
 from orchestration.computers.scheduler import Scheduler
@@ -94,38 +95,24 @@ class CompiledScheduler:
 
     def __init__(self, parts: Parts, noted: Collection[int] = NOTED) -> None:
         self._library = _library()
-        legs = [(m, place, place == len(of.legs) - 1, *leg) for m, of in enumerate(parts.messages)
-                for place, leg in enumerate(of.legs)]  # fmt: skip
-        ends = np.cumsum([0, *(len(each.releases) for each in parts.carriers)])
-        tables = {
-            "processors": parts.processors,
-            "tasks": parts.tasks,
-            "carriers": [(*each._replace(releases=ends[i]), ends[i + 1]) for i, each in enumerate(parts.carriers)],
-            "releases": [i for each in parts.carriers for i in each.releases],
-            "messages": [each._replace(legs=0) for each in parts.messages],  # type: ignore[arg-type]
-            "legs": legs,
-            "links": parts.links,
-        }
-        self._tables = {name: np.array(rows, dtype=np.int64) for name, rows in tables.items()}
-        values = [stream.value if isinstance(stream, Constant) else 0 for stream in parts.streams]
-        self._streams = [None if isinstance(stream, Constant) else stream for stream in parts.streams]
-        """None: its numbers stay"""
-        self._numbers = np.repeat(np.array(values, dtype=np.int64), AT_ONCE).reshape(-1, AT_ONCE)
-        self._notes = np.zeros((_ROOM, COLUMNS), dtype=np.int64)
-        self._noted: list[Integers] = []
-        self._failure: BaseException | None = None
-        self._kept: list[npt.NDArray[Any]] = [
-            self._numbers.ctypes.data + self._numbers.strides[0] * np.arange(len(parts.streams)),
-            np.full(len(parts.streams), AT_ONCE, dtype=np.int64),
-            np.array([kind in noted for kind in range(len(NOTED))], dtype=np.uint8),
-        ]
-        self._draw, self._take = _DRAW(self._draw_for_c), _TAKE(self._take_for_c)
+        self._tables = tables = _tables(
+            tuple(parts.processors),
+            tuple(parts.tasks),
+            tuple(parts.carriers),
+            tuple(parts.messages),
+            tuple(parts.links),
+        )
+        self._numbers, self._notes = _Numbers(parts.streams), _Notes()
+        self._kept = np.array([kind in noted for kind in range(len(NOTED))], dtype=np.uint8)
+        self._draw, self._take = _DRAW(self._numbers.draw), _TAKE(self._notes.take)
         given = _Given(
             stop=parts.stop,
             counts=tuple(len(tables[name.lower()]) for name in _KINDS),
             **{name: table.ctypes.data for name, table in self._tables.items()},
-            **{name: array.ctypes.data for name, array in zip(("numbers", "used", "kept"), self._kept)},
-            notes=self._notes.ctypes.data,
+            numbers=self._numbers.rows.ctypes.data,
+            used=self._numbers.used.ctypes.data,
+            kept=self._kept.ctypes.data,
+            notes=self._notes.room.ctypes.data,
             room=_ROOM,
             draw=self._draw,
             take=self._take,
@@ -143,32 +130,83 @@ class CompiledScheduler:
         """As by the one in Python."""
         noted = int(self._library.scheduler_run(self._made, until))
         self._expect(noted >= 0)
-        self._take_for_c(noted)
+        self._notes.take(noted)
 
     def taken(self) -> Integers:
         """As of the one in Python."""
-        found = np.concatenate([self._notes[:0], *self._noted])
+        return self._notes.taken()
+
+    def _expect(self, has_memory: bool) -> None:
+        if self._numbers.failure is not None:
+            raise self._numbers.failure
+        if not has_memory:
+            raise MemoryError("no memory for the jobs and frames that wait")
+
+
+class _Numbers:
+    """Streams as C reads them: a row of each, and how many of it are used.
+
+    It knows nothing of the scheduler that holds it, so that both go as soon as nobody has them.
+    """
+
+    def __init__(self, streams: Sequence[Stream]) -> None:
+        self._streams = streams
+        self._table = np.empty((len(streams), AT_ONCE), dtype=np.int64)
+        self.rows = self._table.ctypes.data + self._table.strides[0] * np.arange(len(streams))
+        self.used = np.full(len(streams), AT_ONCE, dtype=np.int64)
+        for i, stream in enumerate(streams):
+            if isinstance(stream, Constant):
+                self._table[i, 0], self.used[i] = stream.value, STAYS
+        self.failure: BaseException | None = None
+
+    def draw(self, stream: int) -> None:
+        """More numbers of a stream; no exception goes through C."""
+        try:
+            self._table[stream] = self._streams[stream](AT_ONCE)
+        except BaseException as error:
+            self.failure = error
+            self._table[stream] = LATER // 2  # nothing comes any more
+
+
+class _Notes:
+    """Notes from C, likewise."""
+
+    def __init__(self) -> None:
+        self.room = np.empty((_ROOM, COLUMNS), dtype=np.int64)
+        self._noted: list[Integers] = []
+
+    def take(self, noted: int) -> None:
+        """Those that C has made."""
+        self._noted.append(self.room[:noted].copy())
+
+    def taken(self) -> Integers:
+        """All since they were taken last."""
+        found = np.concatenate([self.room[:0], *self._noted])
         self._noted.clear()
         return found
 
-    def _draw_for_c(self, stream: int) -> None:
-        """More numbers of a stream; no exception goes through C."""
-        try:
-            drawn = self._streams[stream]
-            if drawn is not None:
-                self._numbers[stream] = drawn(AT_ONCE)
-        except BaseException as error:
-            self._failure = error
-            self._numbers[stream] = LATER // 2  # nothing comes any more
 
-    def _take_for_c(self, noted: int) -> None:
-        self._noted.append(self._notes[:noted].copy())
-
-    def _expect(self, has_memory: bool) -> None:
-        if self._failure is not None:
-            raise self._failure
-        if not has_memory:
-            raise MemoryError("no memory for the jobs and frames that wait")
+@functools.lru_cache(8)
+def _tables(
+    processors: tuple[Processor, ...], tasks: tuple[Task, ...], carriers: tuple[Carrier, ...],
+    messages: tuple[Message, ...], links: tuple[Link, ...],
+) -> dict[str, Integers]:  # fmt: skip
+    """The tables of parts, which are the same in many runs, by their names."""
+    ends = np.cumsum([0, *(len(each.releases) for each in carriers)])
+    tables = {
+        "processors": processors,
+        "tasks": tasks,
+        "carriers": [(*each._replace(releases=ends[i]), ends[i + 1]) for i, each in enumerate(carriers)],
+        "releases": [i for each in carriers for i in each.releases],
+        "messages": [each._replace(legs=0) for each in messages],  # type: ignore[arg-type]
+        "legs": [
+            (m, place, place == len(of.legs) - 1, *leg)
+            for m, of in enumerate(messages)
+            for place, leg in enumerate(of.legs)
+        ],
+        "links": links,
+    }
+    return {name: np.array(rows, dtype=np.int64) for name, rows in tables.items()}
 
 
 @functools.cache

@@ -19,6 +19,8 @@ Stream: TypeAlias = Callable[[int], Integers]
 """The next so many numbers: times [ns], or 0 and 1"""
 AT_ONCE = 512
 """Numbers that are drawn at once"""
+STAYS = -1
+"""In place of how many numbers of a stream are used: it has one, for good"""
 
 FIXED_PRIORITY, EARLIEST_DEADLINE, FIRST_COME = range(3)
 QUEUE, SKIP, ABORT = range(3)

@@ -52,7 +52,7 @@ typedef struct {
     int64_t counts[PART_KINDS];
     const int64_t *processors, *tasks, *carriers, *releases, *messages, *legs, *links;
     int64_t **numbers; /* of each stream, AT_ONCE of them */
-    int64_t *used;     /* how many of these are */
+    int64_t *used;     /* how many of these are, or STAYS */
     int64_t *notes, room, noted;
     const uint8_t *kept; /* which kinds of notes are */
     void (*draw)(int64_t stream);
@@ -80,25 +80,33 @@ static void *head(const Queue *q) { return at(q, 0); }
 
 static void drop(Queue *q) { q->first++, q->count--; }
 
-static void push(Scheduler *s, Queue *q, const void *item) {
-    if (q->count == q->capacity) {
-        int64_t capacity = q->capacity ? 2 * q->capacity : 8;
-        char *items = malloc((size_t)(capacity * q->size));
-        if (!items) {
-            s->no_memory = 1;
-            return;
-        }
-        for (int64_t i = 0; i < q->count; i++) memcpy(items + i * q->size, at(q, i), (size_t)q->size);
-        free(q->items);
-        q->items = items, q->capacity = capacity, q->first = 0;
+static void grow(Scheduler *s, Queue *q) {
+    int64_t capacity = q->capacity ? 2 * q->capacity : 8;
+    char *items = malloc((size_t)(capacity * q->size));
+    if (!items) {
+        s->no_memory = 1;
+        return;
     }
-    q->count++;
-    memcpy(at(q, q->count - 1), item, (size_t)q->size);
+    for (int64_t i = 0; i < q->count; i++) memcpy(items + i * q->size, at(q, i), (size_t)q->size);
+    free(q->items);
+    q->items = items, q->capacity = capacity, q->first = 0;
 }
 
+#define PUSH(s, q, item)                                                  \
+    do {                                                                  \
+        if ((q)->count == (q)->capacity) grow(s, q);                      \
+        if ((q)->count < (q)->capacity) {                                 \
+            (q)->count++;                                                 \
+            memcpy(at(q, (q)->count - 1), item, sizeof *(item));          \
+        }                                                                 \
+    } while (0)
+
 static int64_t number(Scheduler *s, int64_t stream) {
-    if (s->g.used[stream] == AT_ONCE) s->g.draw(stream), s->g.used[stream] = 0;
-    return s->g.numbers[stream][s->g.used[stream]++];
+    int64_t used = s->g.used[stream];
+    if (used == STAYS) return s->g.numbers[stream][0];
+    if (used == AT_ONCE) s->g.draw(stream), used = 0;
+    s->g.used[stream] = used + 1;
+    return s->g.numbers[stream][used];
 }
 
 static void note(Scheduler *s, int64_t now, int64_t kind, int64_t whose, int64_t which, int64_t more) {
@@ -137,7 +145,7 @@ static void draw_slot(Scheduler *s, int64_t k) {
 
 static void queue_frame(Scheduler *s, int64_t j, Frame *frame, int64_t now) {
     frame->queued = now;
-    push(s, &s->legs[j].frames, frame);
+    PUSH(s, &s->legs[j].frames, frame);
     s->links[LEG(j, LINK)].changed = 1;
 }
 
@@ -154,7 +162,7 @@ static void receive(Scheduler *s, int64_t c, int64_t sample, int64_t late, int64
     if (own > carrier->last_arrival) carrier->last_arrival = own;
     note(s, now, ARRIVES, c, sample, carrier->last_arrival);
     if (CARRIER(c, RELEASES_END) > CARRIER(c, RELEASES)) {
-        push(s, &carrier->pending, &carrier->last_arrival);
+        PUSH(s, &carrier->pending, &carrier->last_arrival);
         if (!s->no_memory) s->arrival[c] = *(int64_t *)head(&carrier->pending);
     }
 }
@@ -206,7 +214,7 @@ static void pass_on(Scheduler *s, LinkState *link, int64_t now) {
     note(s, now, PASSED, m, frame.number, LEG(j, PLACE));
     if (!LEG(j, IS_LAST)) {
         frame.coming = now + MESSAGE(m, PAUSE);
-        push(s, &s->legs[j + 1].coming, &frame);
+        PUSH(s, &s->legs[j + 1].coming, &frame);
         if (!s->no_memory) s->hop[j + 1] = ((Frame *)head(&s->legs[j + 1].coming))->coming;
     } else if (MESSAGE(m, CARRIER) != NONE)
         receive(s, MESSAGE(m, CARRIER), frame.sample, frame.late, frame.lost, now);
@@ -247,7 +255,7 @@ static void let_go(Scheduler *s, int64_t i, int64_t nominal, int64_t now) {
         return;
     }
     Job job = {which, nominal, now, nominal + TASK(i, DEADLINE), execution, NONE, 0};
-    push(s, &task->jobs, &job);
+    PUSH(s, &task->jobs, &job);
     if (s->no_memory) return;
     note(s, now, RELEASED, i, which, nominal);
     if (TASK(i, READS_AT_RELEASE) && TASK(i, OVERRUN) != ABORT)
@@ -269,7 +277,7 @@ static void finish(Scheduler *s, ProcessorState *processor, int64_t now) {
     processor->running = NONE, processor->at_work = 0;
     note(s, now, FINISHED, i, job.number, 0);
     if (TASK(i, WRITES_AT_DEADLINE) && now <= job.deadline)
-        push(s, &task->unwritten, &job);
+        PUSH(s, &task->unwritten, &job);
     else
         write_outputs(s, i, &job, now);
     if (TASK(i, WRITES_AT_DEADLINE) || TASK(i, OVERRUN) == ABORT) set_deadline(s, i, now);

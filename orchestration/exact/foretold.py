@@ -45,8 +45,8 @@ class Course:
     """What the scheduler does up to a time."""
 
     def __init__(self, system: System, stop: int) -> None:
-        self.resources = Resources(system, Streams(system.seed, system.streams), stop)
-        at_work = scheduler(self.resources.parts)
+        self.resources = Resources(system, stop)
+        at_work = scheduler(self.resources.of_run(Streams(system.seed, system.streams)))
         at_work.run(LATER)
         self.notes = at_work.taken()
         self.places = [each.place for each in placed_tasks(system.computers)]

@@ -43,7 +43,7 @@ def times_from(of: Distribution) -> Callable[[Floats], Integers]:
     """What makes times [ns] of numbers u from [0, 1), one of each, the larger the larger they are but for a table."""
     if of.uniform is not None:
         least, most = map(nanoseconds, of.uniform)
-        return lambda u: least + np.floor(u * (most - least)).astype(np.int64)
+        return lambda u: least + (u * (most - least)).astype(np.int64)
     if of.normal is not None:
         return _cut_normal(of)
     values, index = _whole(of.table()), index_from(of)

@@ -6,13 +6,10 @@ import numpy as np
 
 from orchestration.basics.simulator import Integers
 from orchestration.computers.compiled import scheduler
-from orchestration.computers.parts import ARRIVES, LATER, SAMPLED, SENT
+from orchestration.computers.parts import ARRIVES, KINDS, LATER, SAMPLED, SENT
 from orchestration.schedule.resources import Resources
 from orchestration.schedule.streams import Streams
-from orchestration.system.computers import Task
 from orchestration.system.model import System
-from orchestration.system.placement import placed_tasks
-from orchestration.system.times import nanoseconds
 
 NEVER = 2**60
 """[ns] of what does not come before the end"""
@@ -32,8 +29,10 @@ class Messages:
 
     def hear(self, sent: Integers, arriving: Integers) -> None:
         """Notes of when some were sent and what became of them, and of when some arrive."""
-        rows = np.column_stack([sent[:, 0], sent[:, 4], np.full(len(sent), _UNKNOWN)])
-        self._rows = np.concatenate([self._rows, rows])
+        known = len(self._rows)
+        rows = np.empty((known + len(sent), 3), dtype=np.int64)
+        rows[:known], rows[known:, :2], rows[known:, 2] = self._rows, sent[:, ::4], _UNKNOWN
+        self._rows = rows
         self._rows[arriving[:, 3] - self._first, 2] = arriving[:, 4]
 
     def known(self, over: bool) -> int:
@@ -84,19 +83,11 @@ class Samples:
         return times, then
 
 
-def _decides_late(task: Task) -> bool:
-    """Whether it is open up to the deadline if what was read at a release will be computed with."""
-    return task.read == "release" and task.overrun == "abort"
-
-
 class Foreseen:
     """The scheduler of a system at work."""
 
-    def __init__(self, system: System, streams: Streams, ahead: int) -> None:
-        """What is measured is measured up to so many nanoseconds `ahead` of its sample, which may be after the end."""
-        open_for = [nanoseconds(each.task.due) for each in placed_tasks(system.computers) if _decides_late(each.task)]
-        resources = Resources(system, streams, nanoseconds(system.stop_time) + ahead + max(open_for, default=0))
-        self._scheduler = scheduler(resources.parts, (SAMPLED, SENT, ARRIVES))
+    def __init__(self, system: System, resources: Resources, streams: Streams) -> None:
+        self._scheduler = scheduler(resources.of_run(streams), (SAMPLED, SENT, ARRIVES))
         self._tasks, self._stop = resources.tasks, resources.parts.stop
         self._reached = 0
         self.messages = {name: Messages() for name in resources.carriers}
@@ -124,10 +115,10 @@ class Foreseen:
         notes = self._scheduler.taken()
         if not len(notes):
             return
-        what, whose = np.ascontiguousarray(notes[:, 1:3].T)
+        which = KINDS * notes[:, 2] + notes[:, 1]
 
         def of(kind: int, who: int) -> Integers:
-            return notes.take(np.flatnonzero((what == kind) & (whose == who)), axis=0)
+            return notes.take(np.flatnonzero(which == KINDS * who + kind), axis=0)
 
         for name, task in self._tasks.items():
             self.samples[name].hear(of(SAMPLED, task)[:, 4])

@@ -3,12 +3,14 @@
 from collections import OrderedDict
 from collections.abc import Mapping
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.schedule.fixed_step import FixedStep, seconds
 from orchestration.schedule.plan import Plan
+from orchestration.schedule.resources import Resources
 from orchestration.schedule.spans import Collected, Instants
 from orchestration.system.computers import require_less
 from orchestration.system.distribution import highest
@@ -67,6 +69,19 @@ class Frame:
             if source.period is not None
         ]
         self._kept: OrderedDict[tuple[int, int], Instants] = OrderedDict()
+
+    @cached_property
+    def resources(self) -> Resources:
+        """What the scheduler takes of the computers and networks, up to where it has to know what becomes of them.
+
+        What is measured is measured ahead of its sample, which may be after the end; and what a job has read at its
+        release may be open up to its deadline.
+        """
+        measured = (self.system.connections[i] for i in self.plan.measured)
+        ahead = (nanoseconds(highest(x.delay)) + nanoseconds(highest(x.delay_jitter)) for x in measured)
+        tasks = (each.task for each in placed_tasks(self.system.computers))
+        open_for = (nanoseconds(task.due) for task in tasks if task.read == "release" and task.overrun == "abort")
+        return Resources(self.system, self.stop + max(ahead, default=0) + max(open_for, default=0))
 
     def regular(self, begin: int, end: int) -> Instants:
         """Points, changes of sources, the start, and the end, to which everybody is stepped: from `begin` to before

@@ -19,8 +19,9 @@ class _OnComputers:
     """What happens to the tasks and frames of a system, as far as it was asked for."""
 
     def __init__(self, system: System) -> None:
-        resources = Resources(system, Streams(system.seed, system.streams), nanoseconds(system.stop_time))
-        self._scheduler, self._happenings = scheduler(resources.parts, NEEDED), resources.happenings()
+        resources = Resources(system, nanoseconds(system.stop_time))
+        parts = resources.of_run(Streams(system.seed, system.streams))
+        self._scheduler, self._happenings = scheduler(parts, NEEDED), resources.happenings()
         self.names = self._happenings.names
         self.reached = -1
 

@@ -1,9 +1,14 @@
-"""The computers and networks of a system, as the scheduler takes them: whole numbers, and streams of them."""
+"""The computers and networks of a system, as the scheduler takes them: whole numbers, and streams of them.
+
+All but the streams is the same in all runs of a timing, and made once for them.
+"""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from fractions import Fraction
-from functools import partial
+from functools import lru_cache, partial
+from typing import TypeAlias
 
 import numpy as np
 
@@ -32,10 +37,10 @@ from orchestration.computers.parts import (
 from orchestration.computers.results import Timeline
 from orchestration.computers.timeline import NEEDED, Names, timeline
 from orchestration.schedule.drawing import times
-from orchestration.schedule.message_times import Losses, lateness, losses
+from orchestration.schedule.message_times import lateness, losses
 from orchestration.schedule.streams import ARRIVALS, DELAY, DELAY_JITTER, ERROR, EXECUTION, JITTER, LOSS, Streams
 from orchestration.system.computers import Arrivals
-from orchestration.system.distribution import Varying
+from orchestration.system.distribution import Distribution, Varying, spreads
 from orchestration.system.frames import ERROR_BITS, frame_nanoseconds
 from orchestration.system.model import SamplingOnArrival, System, TaskSampling
 from orchestration.system.placement import (
@@ -57,14 +62,17 @@ _POLICIES = {
 _OVERRUNS = {"queue": QUEUE, "skip": SKIP, "abort": ABORT}
 _NO_DEADLINE = LATER // 2
 
+OfRun: TypeAlias = Callable[[Streams], Stream]
+"""Gives a stream of numbers of a run from the generators of that run"""
+
 
 class Resources:
     """Parts, with their names and with what they are of the system."""
 
-    def __init__(self, system: System, streams: Streams, stop: int) -> None:
+    def __init__(self, system: System, stop: int) -> None:
         """Up to `stop` [ns]."""
-        self._system, self._streams_of, self._stop = system, streams, stop
-        self._streams: list[Stream] = []
+        self._system, self._stop = system, stop
+        self._streams: list[Constant | OfRun] = []
         self._links: list[Link] = []
         self._link_names: list[str] = []
         self._zero = self._stream(Constant(0))
@@ -96,19 +104,20 @@ class Resources:
         ]
         self.parts = Parts(
             stop=self._stop,
-            processors=[*processors, *(Processor(FIRST_COME, False, 0) for _ in self._alone)],
-            tasks=[
+            processors=(*processors, *(Processor(FIRST_COME, False, 0) for _ in self._alone)),
+            tasks=(
                 *map(self._task, placed),
                 *(self._task_alone(name, len(processors) + i) for i, name in enumerate(self._alone)),
-            ],
-            carriers=[
+            ),
+            carriers=tuple(
                 self._carrier(name, messages.get(name, NONE), self._indices(released.get(name, ())))
                 for name in self.carriers
-            ],
-            messages=[self._message(each) for each in self._over],
-            links=self._links,
-            streams=self._streams,
+            ),
+            messages=tuple(self._message(each) for each in self._over),
+            links=tuple(self._links),
+            streams=(),
         )
+        """without the streams, which are of a run"""
         self._names = Names(
             processors=[*system.computers, *self._alone],
             tasks=[*(f"{each.computer_name}.{each.name}" for each in placed), *self._alone],
@@ -116,13 +125,19 @@ class Resources:
             links=self._link_names,
         )
 
-    def timeline(self) -> Timeline:
-        """What becomes of all computers and networks up to the end."""
-        at_work = scheduler(self.parts, NEEDED)
+    def of_run(self, streams: Streams) -> Parts:
+        """What a scheduler takes of a run with these streams."""
+        drawn = [each if isinstance(each, Constant) else each(streams) for each in self._streams]
+        return replace(self.parts, streams=drawn)
+
+    def timeline(self, streams: Streams) -> Timeline:
+        """What becomes of all computers and networks up to the end in a run with these streams."""
+        parts = self.of_run(streams)
+        at_work = scheduler(parts, NEEDED)
         at_work.run(LATER)
         dues = [each.message.due for each in self._over]
         deadlines = [LATER if due is None else nanoseconds(due) for due in dues]
-        return timeline(self.parts, self._names, deadlines, at_work.taken(), without=self._alone)
+        return timeline(parts, self._names, deadlines, at_work.taken(), without=self._alone)
 
     def happenings(self) -> Happenings:
         """What makes events of the notes of a scheduler of these parts."""
@@ -135,7 +150,6 @@ class Resources:
         nominal = NONE
         if task.on is None:
             nominal = self._instants(of.place, task.offset, task.period, task.arrivals, ratio)
-        late = self._stream(lateness(task.jitter, "uniform", self._generator(of.place, JITTER)))
         return Task(
             processor=list(self._system.computers).index(of.computer_name),
             priority=task.priority,
@@ -144,8 +158,8 @@ class Resources:
             reads_at_release=task.read == "release",
             writes_at_deadline=task.write == "deadline",
             nominal=nominal,
-            late=late,
-            execution=self._stream(times(task.execution, self._generator(of.place, EXECUTION))),
+            late=self._late(task.jitter, "uniform", of.place),
+            execution=self._times(task.execution, of.place, EXECUTION),
             is_heard=task.component is not None,
         )
 
@@ -157,8 +171,7 @@ class Resources:
         if not isinstance(sampling, SamplingOnArrival):
             place = f"components.{name}"
             nominal = self._instants(place, sampling.offset, sampling.period, None, ratio)
-            generator = self._generator(place, JITTER)
-            late = self._stream(lateness(sampling.jitter, sampling.jitter_distribution, generator))
+            late = self._late(sampling.jitter, sampling.jitter_distribution, place)
         return Task(
             processor=processor,
             priority=1,
@@ -181,14 +194,20 @@ class Resources:
     def _carrier(self, name: str, message: int, releases: tuple[int, ...]) -> Carrier:
         x = next(x for x in self._system.connections if x.name == name)
         owner = f"connections.{name}"
-        delay = times(x.delay, self._generator(owner, DELAY))
-        late = lateness(x.delay_jitter, x.jitter_distribution, self._generator(owner, DELAY_JITTER))
-        lost = losses(x.loss, x.burst_length, self._generator(owner, LOSS))
+
+        def late(streams: Streams) -> Stream:
+            delay = times(x.delay, partial(streams.of, owner, DELAY))
+            more = lateness(x.delay_jitter, x.jitter_distribution, partial(streams.of, owner, DELAY_JITTER))
+            return lambda count: delay(count) + more(count)
+
+        is_late = (
+            spreads(x.delay_jitter) or isinstance(x.delay, Distribution) or isinstance(x.delay_jitter, Distribution)
+        )
         return Carrier(
             sender=self.tasks.get(x.sender, NONE),
             message=message,
-            late=self._sum(delay, late),
-            lost=self._share(x.loss, lost),
+            late=self._stream(late) if is_late else self._times(x.delay, owner, DELAY),
+            lost=self._losses(x.loss, x.burst_length, owner, LOSS),
             releases=releases,
         )
 
@@ -197,7 +216,6 @@ class Resources:
         nominal = NONE
         if message.period is not None or message.arrivals is not None:
             nominal = self._instants(of.place, message.offset, message.period, message.arrivals, Fraction(1))
-        corrupted = losses(network.error, None, self._generator(of.place, ERROR))
         is_can = network.kind in ("can", "can-fd")
         ranked = {"ethernet": message.priority}
         return Message(
@@ -205,8 +223,8 @@ class Resources:
             legs=self._legs(of),
             pause=nanoseconds(network.latency),
             nominal=nominal,
-            late=self._stream(lateness(message.jitter, "uniform", self._generator(of.place, JITTER))),
-            corrupted=self._share(network.error, corrupted),
+            late=self._late(message.jitter, "uniform", of.place),
+            corrupted=self._losses(network.error, None, of.place, ERROR),
             carrier=self.carriers.get(message.connection or "", NONE),
         )
 
@@ -229,59 +247,81 @@ class Resources:
             if slots:
                 lengths = [exact_nanoseconds(each) for each in slots]
                 grids = [Grid(sum(lengths[:i], Fraction(0)), sum(lengths, Fraction(0))) for i in range(len(lengths))]
-                begins = self._stream(_one_after_the_other(grids, self._stop))
+                begins = self._stream(_InTurn(grids, self._stop).of_run)
             self._link_names.append(name)
             self._links.append(Link(slots=len(slots), begins=begins))
         return self._link_names.index(name)
 
     # -- numbers ---------------------------------------------------------------------------------------------------
 
-    def _stream(self, stream: Stream) -> int:
+    def _stream(self, stream: Constant | OfRun) -> int:
         self._streams.append(stream)
         return len(self._streams) - 1
 
-    def _sum(self, one: Stream, other: Stream) -> int:
-        if isinstance(one, Constant) and isinstance(other, Constant):
-            return self._stream(Constant(one.value + other.value))
-        return self._stream(lambda count: one(count) + other(count))
+    def _times(self, of: Varying, owner: str, cause: str) -> int:
+        if not isinstance(of, Distribution):
+            return self._stream(Constant(nanoseconds(of))) if of else self._zero
+        return self._stream(lambda streams: times(of, partial(streams.of, owner, cause)))
 
-    def _share(self, probability: Varying, drawn: Losses) -> int:
+    def _late(self, jitter: Varying, spread: str, owner: str) -> int:
+        if jitter == 0.0:
+            return self._zero
+        return self._stream(lambda streams: lateness(jitter, spread, partial(streams.of, owner, JITTER)))
+
+    def _losses(self, probability: Varying, burst_length: float | None, owner: str, cause: str) -> int:
         """1 with a probability, else 0."""
         if probability == 0.0:
             return self._zero
-        return self._stream(lambda count: drawn(count).astype(np.int64))
 
-    def _generator(self, owner: str, cause: str) -> Callable[[], np.random.Generator]:
-        return partial(self._streams_of.of, owner, cause)
+        def lost(streams: Streams) -> Stream:
+            drawn = losses(probability, burst_length, partial(streams.of, owner, cause))
+            return lambda count: drawn(count).astype(np.int64)
+
+        return self._stream(lost)
 
     def _instants(
         self, place: str, offset: float, period: float | None, arrivals: Arrivals | None, ratio: Fraction
     ) -> int:
         start = exact_nanoseconds(offset) / ratio
         if arrivals is not None:
-            return self._stream(_by_chance(round(start), arrivals.poisson, self._streams_of.of(place, ARRIVALS)))
+            rate, begin = arrivals.poisson, round(start)
+            return self._stream(lambda streams: _by_chance(begin, rate, streams.of(place, ARRIVALS)))
         assert period is not None
-        return self._stream(_one_after_the_other([Grid(start, exact_nanoseconds(period) / ratio)], self._stop))
+        return self._stream(_InTurn([Grid(start, exact_nanoseconds(period) / ratio)], self._stop).of_run)
 
 
-def _one_after_the_other(grids: list[Grid], stop: int) -> Stream:
+class _InTurn:
     """The first instant of each grid, the second of each, and so on; LATER in place of those past the end."""
-    first, many = 0, len(grids)
-    lasts = [grid.index_from(stop) for grid in grids]
 
-    def drawn(count: int) -> Integers:
-        nonlocal first
-        first += count
-        found = np.full(count, LATER, dtype=np.int64)
-        for i, grid in enumerate(grids):
-            k = -(-(first - count - i) // many)  # of the grid's first instant among these
-            places = found[k * many + i - (first - count) :: many]
-            end = min(k + len(places), lasts[i] + 1)
+    def __init__(self, grids: Sequence[Grid], stop: int) -> None:
+        self._grids, self._lasts = grids, [grid.index_from(stop) for grid in grids]
+        self._kept = lru_cache(_KEPT)(self._between)
+
+    def of_run(self, _streams: Streams) -> Stream:
+        """They are the same in each run."""
+        first = 0
+
+        def following(count: int) -> Integers:
+            nonlocal first
+            first += count
+            return self._kept(first - count, count)
+
+        return following
+
+    def _between(self, first: int, count: int) -> Integers:
+        found, many = np.full(count, LATER, dtype=np.int64), len(self._grids)
+        for i, grid in enumerate(self._grids):
+            k = -(-(first - i) // many)  # of the grid's first instant among these
+            places = found[k * many + i - first :: many]
+            end = min(k + len(places), self._lasts[i] + 1)
             if end > k:
                 places[: end - k] = grid.between(k, end)
+        found.flags.writeable = False
         return found
 
-    return drawn
+
+_KEPT = 64
+"""Times that some instants of a grid are asked for in a run; those of longer ones are found anew"""
 
 
 def _by_chance(start: int, rate: float, generator: np.random.Generator) -> Stream:
@@ -302,4 +342,4 @@ def _by_chance(start: int, rate: float, generator: np.random.Generator) -> Strea
 
 def timeline_of(system: System) -> Timeline:
     """What becomes of the tasks and messages of a system up to its end."""
-    return Resources(system, Streams(system.seed, system.streams), nanoseconds(system.stop_time)).timeline()
+    return Resources(system, nanoseconds(system.stop_time)).timeline(Streams(system.seed, system.streams))

@@ -54,8 +54,7 @@ class Timetable:
         for i, x in enumerate(self._connections):
             stepped = self._fixed.get(x.sender if i in self._plan.measured else x.receiver)
             self._links.append(Link(i, x, streams, stepped, self._refused))
-        ahead = max((self._links[i].longest for i in self._plan.measured), default=0)
-        self._foreseen = Foreseen(frame.system, streams, ahead) if frame.foresees else None
+        self._foreseen = Foreseen(frame.system, frame.resources, streams) if frame.foresees else None
         self._tasks = [self._timed(name, streams) for name in self._plan.sampled]
         self.first_samples = {
             name: task.first for name, task in zip(self._plan.sampled, self._tasks) if task.first < self.stop

@@ -19,7 +19,7 @@ from tests.orchestration.fmi.small import needs_compiler
 
 
 def parts_of(system):
-    return Resources(system, Streams(system.seed), nanoseconds(system.stop_time)).parts
+    return Resources(system, nanoseconds(system.stop_time)).of_run(Streams(system.seed))
 
 
 @needs_compiler
