@@ -21,9 +21,11 @@ from orchestration.system.computers import Computer, Message, Network, Task
 from orchestration.system.distribution import Distribution
 from orchestration.system.model import Component, Connection, Criterion, Sampling, System
 from orchestration.system.paths import changed
+from orchestration.system.times import nanoseconds
 from tests.native import assert_the_same
 from tests.orchestration.engines.batch.lanes import assert_the_same_signals, in_lanes, shape_of
 from tests.orchestration.engines.moving import moving
+from tests.orchestration.engines.random_systems import TRACE
 from tests.orchestration.engines.systems_on_computers import systems_on_computers
 from tests.orchestration.engines.test_compiled import (
     ENGINES,
@@ -106,6 +108,26 @@ def test_a_constant_time_of_execution_flies_the_bits_of_a_delay(fmu: Path, kept:
     by_task = loop(fmu, Component(fmu="stub"), computers=on_a_computer(period=0.02, execution=0.003))
     found, expected = both(by_task, load=kept.load), both(by_delay, load=kept.load)
     assert found.rows.tobytes() == expected.rows.tobytes()
+
+
+def test_a_trace_of_execution_is_taken_row_by_row_and_anew_by_all_engines_and_beyond_a_pause(
+    fmu: Path, kept: Kept
+) -> None:
+    """Row k is of release k, also where that makes no job."""
+    taken = Distribution(file=TRACE, column="delay", order="as recorded")
+    control = Task(component="controller", period=0.02, execution=taken, overrun="skip")
+    what = loop(fmu, Component(fmu="stub"), computers={"one": Computer(tasks={"control": control})})
+    rows, ends = [nanoseconds(each) for each in taken.table().tolist()], [0]
+    for k in range(50):
+        if (release := 20_000_000 * k) >= ends[-1]:
+            ends.append(release + rows[k % len(rows)])
+    assert 2 * len(rows) < len(ends) - 1 < 50
+    assert [event.time for event in both(what, load=kept.load).events if event.kind == "arrived"] == [
+        time for time in ends[1:] if time < 1_000_000_000
+    ]
+    alone, shape = ran(what, "compiled", load=kept.load), shape_of(what)
+    assert_the_same_signals(shape, in_lanes(shape, [what]), 0, alone)
+    expect_that_a_pause_changes_nothing(what, 0.43, ("python", "compiled"), 5, kept.load)
 
 
 def test_what_objectives_say_of_jobs_is_the_same_in_lanes_and_of_each_run_its_own(fmu: Path, kept: Kept) -> None:
