@@ -31,7 +31,9 @@ typedef struct {
     int64_t time[L];
     Rows stepped, samples; /* of components, in the order of ranks */
     Rows arrivals, posted, measured;
-    Lanes *marks; /* of kernels: lanes in which a message of a connection has values of now */
+    /* of kernels */
+    Lanes *marks; /* lanes in which a message of a connection has values of now */
+    int still;    /* whether all that is held is what it was */
 } Instant;
 
 static void set(Loop *l, Channel *c, Lanes lanes, const double *value, const Instant *now);

@@ -199,6 +199,7 @@ typedef struct {
     const void *environment;
     /* of kernels */
     int64_t track; /* whose next window is asked for */
+    int64_t stays; /* whether all that is held stays what it is where nothing but a step happens */
     int64_t seen_count, given_count;
     double *seen, *given, *state, *constants, *numbers;
     Lanes doubtful; /* in which a value was not a number */

@@ -211,7 +211,7 @@ static void record(Loop *l, const Instant *now, Lanes lanes) {
 static void only_step(Loop *l, Instant *now, Lanes tracks) {
     int64_t index = l->continuous.items[0], until = 0;
     double t[L] = {0}, begin[L] = {0}, length[L] = {0};
-    now->tracks = tracks, now->lanes = 0;
+    now->tracks = tracks, now->lanes = 0, now->still = l->stays;
     TRACKS(track, tracks) {
         int64_t time = until = time_of(track), before = track->now[index];
         track->now[index] = time, now->lanes |= track->lanes & l->alive;
@@ -229,6 +229,7 @@ static void only_step(Loop *l, Instant *now, Lanes tracks) {
 
 static void reach_and_pass(Loop *l, Instant *now, Lanes tracks, int first) {
     reach(l, now, tracks);
+    now->still = 0;
     hear(l, now);
     if (first) look(l, now->lanes, now);
     pass(l, now);

@@ -129,13 +129,15 @@ class Batch:
         self._numbers = self._array(len(shape.numbers) + 1 + len(shape.inner))
         self._floor, self._grown = self._array(1), self._array(1)
         self._status = np.zeros(self._lanes, dtype=np.int32)
+        settles = any(x.held.count or x.behind.count or x.fed_count for x in self._components)
+        stays = not (settles or any(x.ahead.count for x in self._components))  # a source that jumps is fed
         self._rows: Floats | None = None
         self._kept = self._memory.structures(c.Kept, len(self._written.folds.kept))
         (self._batch,) = self._structures(c.Loop, [c.Loop(
             components=ctypes.addressof(self._components), channels=ctypes.addressof(self._channels),
             channel_count=len(connections),
             some_by_themselves=any(map(shape.wires.is_by_itself, shape.names)),
-            settles=any(x.held.count or x.behind.count or x.fed_count for x in self._components),
+            settles=settles, stays=stays,
             continuous=self._indices(shape.wires.continuous), sampled=self._indices(shape.wires.sampled),
             tracks=ctypes.addressof(self._tracks), seen_count=seen, given_count=self._given_count,
             seen=address(self._array(seen)), given=address(self._array(self._given_count)),

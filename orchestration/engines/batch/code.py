@@ -52,7 +52,8 @@ def written(
         marks = f"now->marks[{connections.index(connection)}]"
         sampled += [f"if ({marks}) {{", f"const q_mask some = m & mask_of({marks});"]
         sampled += [*each.section.lines, *each.always, "}"]
-    kept = [f"{state} = q_select(m, {value}, {state});" for state, value in writer.remembered().items()]
+    held = [*folds.held.always, *writer.remembered(writer.held), "}"]
+    changed = ["if (!now->still) {", *writer.held.lines]
     constants = [f"AT(b->constants, {slot}) = {writer.value(node, 'row', writer.once)};"
                  for node, slot in writer.constants.items()]  # fmt: skip
     used = sorted({leaf.code.partition("(")[2].partition(",")[0] for leaf in leaves.values() if "SIGNAL" in leaf.code})
@@ -61,16 +62,19 @@ def written(
     unused = [*(f"(void)memory{i};" for i in used), "(void)constants_;", "(void)t;"]
     here = [*known, "double *const state = b->state;", "const q_real t = now->t;",
             "q_mask doubtful = q_known(0);", *unused]  # fmt: skip
-    done = [*kept, "if (q_any(doubtful)) b->doubtful |= lanes_of(doubtful);", "return 1;"]
+    done = [*writer.remembered(writer.now), "if (q_any(doubtful)) b->doubtful |= lanes_of(doubtful);", "return 1;"]
     step = [f"const q_real dt = q_select(m, t - {time}, q_all(0.0));"]
     return Written(
         text="\n".join([
             *_function("void constants(Batch *b)", [*writer.once.lines, *constants]),
             *_function("q_mask holds(const Batch *b, q_real t)", [*known, *unused, *watched.lines, f"return {over};"]),
-            *_row("begin_row", [*here, *rows.section.lines, *rows.first, *rows.always, *sampled, *after.first, *done]),
+            *_row("begin_row", [
+                *here, *rows.section.lines, *rows.first, *rows.always, *changed, *folds.held.first, *held, *sampled,
+                *after.first, *done,
+            ]),
             *_row("next_row", [
-                *here, *rows.section.lines, *step, *writer.step.lines, *rows.next, *rows.always, *sampled, *after.next,
-                *done,
+                *here, *rows.section.lines, *step, *writer.step.lines, *rows.next, *rows.always, *changed,
+                *folds.held.next, *held, *sampled, *after.next, *done,
             ]),
         ]),
         folds=folds,

@@ -21,7 +21,9 @@ Value: TypeAlias = Callable[[Floats, Floats], Floats]
 
 @dataclass(kw_only=True)
 class Rows:
-    """What is done at the rows of one kind: all, or those at which messages of a connection arrive."""
+    """What is done at the rows of one kind: all, those at which messages of a connection arrive, or at which something
+    that is held may have changed.
+    """
 
     section: Section
     mask: str
@@ -40,6 +42,7 @@ class Folds:
         self.writer = writer
         self.rows: dict[str | None, Rows] = {None: Rows(section=writer.now, mask="m")}
         """by connection; None: all"""
+        self.held = Rows(section=writer.held, mask="m")
         self.values: dict[Call, Value] = {}
         self.kept: dict[Call, int] = {}
         """of growth_share, where its values are kept"""
@@ -54,6 +57,8 @@ class Folds:
         if connection not in self.rows:
             self.rows[connection] = Rows(section=Section(f"s{len(self.rows)}_", self.writer.now), mask="some")
         rows = self.rows[connection]
+        if connection is None and call.function != "growth_share" and self.writer.is_held(*call.arguments):
+            rows = self.held  # at other rows it would be the same again
         if connection is None and self.writer.kinds(node) <= {"number"}:
             raise UsageError(f"{call.function} of a number; expected a signal")
         x = self.writer.value(node, "row", rows.section)
@@ -127,7 +132,7 @@ class _Fold:
             if self.call.function == "integral":
                 return lambda states, end: np.where(states[j] > 0, states[i], np.nan)
             return self._rooted(lambda states, end: states[i] / np.where(states[j] > 0, states[j], np.nan))
-        self.rows.next.append(f"{total} = {total} + {self._mean_of_step()} * dt;")
+        self.folds.rows[None].next.append(f"{total} = {total} + {self._mean_of_step()} * dt;")
         if self.call.function == "integral":
             return lambda states, end: states[i]
         return self._rooted(lambda states, end: states[i] / end)
@@ -182,7 +187,7 @@ class _Fold:
     def settling_time(self) -> Value:
         """From when on |x| stays within the band."""
         since, i = self._state(-1.0)
-        band = self.folds.writer.value(self.call.arguments[1], "row", self.folds.writer.now)
+        band = self.folds.writer.value(self.call.arguments[1], "row", self.rows.section)
         inside = f"q_le(q_fabs({self.x}), {band})"
         value = f"q_select({inside}, q_select(q_lt({since}, 0.0), t, {since}), q_all(-1.0))"
         self.rows.always.append(self._set(since, value))
@@ -199,6 +204,8 @@ class _Fold:
                 self._set(last, self.x),
             ]
             return lambda states, end: states[i]
+        if self.rows is self.folds.held:  # one that is not a number would stay none at other rows
+            self.rows.always.append(f"doubtful |= m & q_isnan({self.x} - {self.x});")
         before = self.folds.writer.before(self.node)
         step = f"q_fabs({self.x} - {before})"
         if self._is_mixed:

@@ -54,6 +54,8 @@ class ExpressionWriter:
         """what is the same in the whole run"""
         self.now = Section("x")
         """what is computed at every row"""
+        self.held = Section("h", self.now)
+        """what is computed at rows at which something that is held may have changed"""
         self.step = Section("e", self.now)
         """what is computed of the step that ends at a row"""
         self.states: list[float] = []
@@ -73,12 +75,21 @@ class ExpressionWriter:
         if node not in self._before:
             self.state()
             self._before[node] = len(self.states) - 1
-            self.value(node, "row", self.now)
+            self.value(node, "row", self._section_of(node))
         return f"STATE({self._before[node]})"
 
-    def remembered(self) -> dict[str, str]:
-        """What has been asked for by `before`: states, and the names of what they become."""
-        return {f"STATE({i})": self.value(node, "row", self.now) for node, i in self._before.items()}
+    def remembered(self, section: Section) -> list[str]:
+        """Lines by which what has been asked for by `before`, and is computed in a section, is kept."""
+        states = {f"STATE({i})": node for node, i in self._before.items() if self._section_of(node) is section}
+        values = {state: self.value(node, "row", section) for state, node in states.items()}
+        return [f"{state} = q_select(m, {value}, {state});" for state, value in values.items()]
+
+    def _section_of(self, node: Node) -> Section:
+        return self.held if self.is_held(node) else self.now
+
+    def is_held(self, *nodes: Node) -> bool:
+        """Whether the values of expressions change only where something that is held does."""
+        return all(self.kinds(node) <= {"number", "held"} for node in nodes)
 
     def kinds(self, node: Node) -> set[Kind]:
         """What the values in an expression do from row to row."""

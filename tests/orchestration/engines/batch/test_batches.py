@@ -101,6 +101,21 @@ def test_every_function_over_every_kind_of_signal(fmu: Path, kept: Kept, tmp_pat
         assert_the_same_numbers(found.metrics, alone)
 
 
+def test_what_is_held_is_not_summed_up_anew_where_nothing_but_a_step_happens(fmu: Path, kept: Kept) -> None:
+    values = ("controller.y", "plant.u2y", "noise.u4z", "controller.z * noise.u4z - plant.u2y")
+    connections = tuple(replace(x, hold="zero") for x in LOOP.connections)
+    for to in ("controller.u4z", "plant.u4z"):
+        first = replace(
+            of(replace(LOOP, connections=connections, stop_time=0.5), fmu),
+            sources={"noise": Source(noise=0.01, period=0.007, to=(to,))},
+            objectives={f"{f.partition('(')[0]}_{i}": f.format(x) for i, x in enumerate(values) for f in F},
+        )
+        crowd = [replace(first, seed=seed) for seed in range(3)]
+        for what, found in zip(crowd, Batches().run(crowd)):
+            assert found is not None
+            assert_the_same_numbers(found.metrics, ran(what, "compiled", load=kept.load).metrics)
+
+
 CONDITIONS = ("plant.y > 0.9", "norm(plant.y, controller.y) >= 1.2 and time > 0.1", "plant.y < -5")
 
 
