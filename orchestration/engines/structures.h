@@ -54,8 +54,6 @@ typedef struct { /* what happens from one time to another, as orchestration/sche
     int64_t end;                                             /* [ns] of the instant after these */
 } Span;
 
-enum { WINDOW = 64 }; /* instants of a span that are put in order at a time, few enough for the processor's caches */
-
 /* What happens at an instant, as a sum: nothing but a step of the only component in continuous time is 0. */
 enum { MORE = 1, SAMPLES = 2, START = 4 };
 
@@ -157,10 +155,11 @@ typedef struct { /* runs that share a schedule */
     int64_t stop; /* [ns] */
     int64_t *now; /* [ns] of each component in continuous time */
     /* of kernels */
-    Span span;     /* from which the schedule is filled */
-    int64_t *room; /* for it */
-    const int64_t *said; /* of each instant of the schedule, which regular one it is; of another, ~ which own one */
-    const int64_t *kinds;
+    Span span; /* of which the schedule has the next instant */
+    int64_t times[2], stepped_at[2], posted_at[2], measured_at[2], arrivals_at[2], samples_at[2]; /* its tables */
+    int64_t *moving;
+    int64_t said; /* which regular instant it is; of another, ~ which own one */
+    int64_t kind, more; /* [ns] when more than a step happens after it */
     const double *seen[L], *given[L]; /* sources as objectives see them, and as inputs get them, at regular instants */
     const double *seen_own[L], *given_own[L]; /* and at own ones */
     int64_t one_for_all, unused; /* whether these are the same for all lanes */

@@ -128,43 +128,41 @@ static int64_t next_more(const Span *span) {
     return time;
 }
 
-/* Fill the schedule of a track with the next instants of its span. */
-static void unroll(Loop *l, Track *track) {
-    enum { TIMES, SAID, KINDS, STEPPED_AT, POSTED_AT, MEASURED_AT, ARRIVALS_AT, SAMPLES_AT, STEPPED };
+/* Put the next instant of a track's span into its schedule, if there is one. */
+static void advance(Loop *l, Track *track) {
     Span *s = &track->span;
-    int64_t count = l->continuous.count, more = next_more(s), n = 0, steps = 0, time;
-    int64_t(*room)[WINDOW + 1] = (int64_t(*)[WINDOW + 1])track->room, *stepped = room[STEPPED];
-    for (; n <= WINDOW; n++) {
-        time = next_time(s);
-        room[TIMES][n] = time < INT64_MAX ? time : s->end, room[STEPPED_AT][n] = steps;
-        room[POSTED_AT][n] = s->posted_at, room[MEASURED_AT][n] = s->measured_at;
-        room[ARRIVALS_AT][n] = s->arrivals_at, room[SAMPLES_AT][n] = s->samples_at;
-        if (n == WINDOW || time == INT64_MAX) break;
-        const Instants *regular = time_in(&s->regular) == time ? &s->regular : NULL;
-        const Instants *own = time == more && time_in(&s->own) == time ? &s->own : NULL;
-        room[SAID][n] = regular ? regular->at : ~own->at;
-        for (int64_t i = 0; i < count; i++)
-            if ((regular && regular->stepped[regular->at * count + i]) || (own && own->stepped[own->at * count + i]))
-                stepped[steps++] = l->continuous.items[i];
-        room[KINDS][n] = MORE * (time == more || count != 1 || steps == room[STEPPED_AT][n] || l->some_by_themselves);
-        if (!time) room[KINDS][n] |= MORE | START;
-        s->regular.at += regular != NULL;
-        if (time < more) continue;
-        s->own.at += own != NULL;
-        while (s->posted_at < s->posted_count && s->posted[s->posted_at].sent == time) s->posted_at++;
-        while (s->measured_at < s->measured_count && s->measured[s->measured_at].sent == time) s->measured_at++;
-        while (s->arrivals_at < s->arrivals_count && s->arrivals[s->arrivals_at].arrival == time) s->arrivals_at++;
-        while (s->samples_at < s->samples_count && s->sampled[s->samples_at] == time) s->samples_at++;
-        if (s->samples_at > room[SAMPLES_AT][n]) room[KINDS][n] |= SAMPLES;
-        more = next_more(s);
+    Instants *regular = &s->regular, *own = &s->own;
+    int64_t count = l->continuous.count, one_moves = count == 1 && !l->some_by_themselves, moving = 0;
+    if (time_in(regular) < track->more && one_moves && regular->stepped[regular->at]) { /* as most of them */
+        track->times[0] = time_in(regular), track->said = regular->at++, track->kind = 0, track->count = 1;
+        return;
     }
+    int64_t time = next_time(s);
+    if (time == INT64_MAX) return;
+    int more = next_more(s) == time, is_regular = time_in(regular) == time, is_own = time_in(own) == time;
+    for (int64_t i = 0; i < count; i++)
+        if ((is_regular && regular->stepped[regular->at * count + i]) || (is_own && own->stepped[own->at * count + i]))
+            track->moving[moving++] = l->continuous.items[i];
+    track->said = is_regular ? regular->at : ~own->at;
+    regular->at += is_regular, own->at += is_own;
+#define THOSE_OF(table, time_of_row) \
+    track->table##_at[0] = s->table##_at; \
+    while (s->table##_at < s->table##_count && s->time_of_row == time) s->table##_at++; \
+    track->table##_at[1] = s->table##_at
+    THOSE_OF(posted, posted[s->posted_at].sent);
+    THOSE_OF(measured, measured[s->measured_at].sent);
+    THOSE_OF(arrivals, arrivals[s->arrivals_at].arrival);
+    THOSE_OF(samples, sampled[s->samples_at]);
+    int64_t next = next_time(s), sampling = track->samples_at[0] < track->samples_at[1];
+    track->times[0] = time, track->times[1] = next < INT64_MAX ? next : s->end, track->stepped_at[1] = moving;
+    track->kind = MORE * (!time || more || !one_moves || !moving) + SAMPLES * sampling + START * !time;
+    track->more = next_more(s), track->at = 0, track->count = 1;
     track->schedule = (Schedule){
-        .times = room[TIMES], .stepped_at = room[STEPPED_AT], .stepped = stepped, .posted_at = room[POSTED_AT],
-        .measured_at = room[MEASURED_AT], .arrivals_at = room[ARRIVALS_AT], .samples_at = room[SAMPLES_AT],
-        .posted = s->posted, .measured = s->measured, .arrivals = s->arrivals, .exchanged = s->exchanged,
-        .samples = s->samples,
+        .times = track->times, .stepped_at = track->stepped_at, .stepped = track->moving,
+        .posted_at = track->posted_at, .measured_at = track->measured_at, .arrivals_at = track->arrivals_at,
+        .samples_at = track->samples_at, .posted = s->posted, .measured = s->measured, .arrivals = s->arrivals,
+        .exchanged = s->exchanged, .samples = s->samples,
     };
-    track->said = room[SAID], track->kinds = room[KINDS], track->at = 0, track->count = n;
 }
 
 /* -- a run --------------------------------------------------------------------------------------------------------- */
@@ -177,7 +175,7 @@ static const double *said(const double *const *regular, const double *const *own
 static void hear(Loop *l, const Instant *now) {
     TRACKS(track, now->tracks) {
         Lanes lanes = track->lanes & l->alive;
-        int64_t row = track->said[track->at];
+        int64_t row = track->said;
         if (track->one_for_all) {
             int lane = __builtin_ctzll(track->lanes);
             q_mask mask = mask_of(lanes);
@@ -227,6 +225,15 @@ static void only_step(Loop *l, Instant *now, Lanes tracks) {
     if (l->settles) hold(l, index, now->lanes & l->alive, now);
 }
 
+/* The same as a schedule has it, for those that pass beside others in which more happens. */
+static void lay_out_step(Loop *l, Lanes tracks) {
+    TRACKS(track, tracks) {
+        int64_t *const tables[] = {track->posted_at, track->measured_at, track->arrivals_at, track->samples_at};
+        for (int i = 0; i < 4; i++) tables[i][1] = tables[i][0];
+        track->stepped_at[1] = 1, track->moving[0] = l->continuous.items[0];
+    }
+}
+
 static void reach_and_pass(Loop *l, Instant *now, Lanes tracks, int first) {
     reach(l, now, tracks);
     now->still = 0;
@@ -249,25 +256,27 @@ EXPORT int run(Loop *l) {
         TRACKS(track, come) {
             int64_t number = track - l->tracks;
             if (!(track->lanes & l->alive)) continue;
-            if (track->at == track->count) unroll(l, track);
+            if (!track->count) advance(l, track);
             if (!track->count) {
                 if (track->last_window) continue;
                 l->track = number;
                 return NEXT_WINDOW;
             }
-            int64_t kind = track->kinds[track->at];
             going |= (Lanes)1 << number;
-            if (!kind) continue;
+            if (!track->kind) continue;
             with_more |= (Lanes)1 << number;
-            sampling |= (Lanes)((kind & SAMPLES) != 0) << number;
-            setting_out |= (Lanes)((kind & START) != 0) << number;
+            sampling |= (Lanes)((track->kind & SAMPLES) != 0) << number;
+            setting_out |= (Lanes)((track->kind & START) != 0) << number;
         }
         if (!going) return AT_END;
         come = setting_out ? setting_out : in_turn(going, sampling);
         if (!come) continue;
         memset(marks, 0, sizeof marks);
-        if (come & with_more) reach_and_pass(l, &now, come, setting_out != 0);
-        else only_step(l, &now, come);
+        if (come & with_more) {
+            lay_out_step(l, come & ~with_more);
+            reach_and_pass(l, &now, come, setting_out != 0);
+        } else
+            only_step(l, &now, come);
         Lanes lanes = now.lanes & l->alive;
         if (lanes) {
             if (!(setting_out ? begin_row(l, &now, mask_of(lanes)) : next_row(l, &now, mask_of(lanes))))
@@ -275,7 +284,7 @@ EXPORT int run(Loop *l) {
             if (l->record_limit) record(l, &now, lanes);
         }
         if (l->no_memory) return NO_MEMORY;
-        TRACKS(track, come) track->at++;
+        TRACKS(track, come) track->count = 0;
     }
 }
 

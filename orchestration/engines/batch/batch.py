@@ -120,9 +120,8 @@ class Batch:
         self._ratios = [self._array(1) for _ in kernels]
         self._begins: list[Floats] = [np.zeros(self._lanes) for _ in kernels]
         self._components = self._structures(c.Component, map(self._component, range(len(kernels))))
-        size = 8 * (c.WINDOW + 1) + c.WINDOW * len(shape.wires.continuous)
-        self._rooms = self._memory.integers(self._lanes, size)
-        self._tracks = self._structures(c.Track, (c.Track(room=address(room)) for room in self._rooms))
+        self._moving = self._memory.integers(self._lanes, max(1, len(shape.wires.continuous)))
+        self._tracks = self._structures(c.Track, (c.Track(moving=address(each)) for each in self._moving))
         seen, fed = sum(map(len, shape.seen.values())), sum(len(s.to) for s in shape.system.sources.values())
         self._given_count = fed if shape.fed_changes else 0
         self._state = self._array(len(self._written.states))
@@ -464,7 +463,7 @@ class Batch:
         """Give the next span of a track to C."""
         into = self._tracks[number]
         span = track.span = track.ahead
-        into.at, into.count = 0, 0
+        into.count, into.more = 0, 0
         track.ahead = None if span is None else next(track.spans, None)
         into.last_window = track.ahead is None
         if span is None:
