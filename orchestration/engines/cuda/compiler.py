@@ -88,7 +88,7 @@ def image(text: str, architecture: str) -> Image:
         log = _told(library.nvrtcGetProgramLogSize, library.nvrtcGetProgramLog, program).rstrip(b"\0").decode()
         if failed:
             first = next((line for line in log.splitlines() if "error" in line), log)
-            raise QuadcosimError(f"CUDA of {architecture}: {first}")
+            raise QuadcosimError(f"CUDA for {architecture}: {first}")
         content = _told(library.nvrtcGetCUBINSize, library.nvrtcGetCUBIN, program)
     finally:
         library.nvrtcDestroyProgram(ctypes.byref(program))
@@ -123,7 +123,7 @@ def _library() -> Any:
     folders = [] if found is None else [Path(each) for each in found.submodule_search_locations or ()]
     path = next((path for folder in folders for path in sorted(folder.glob("lib/libnvrtc.so.*"))), None)
     if path is None:
-        raise QuadcosimError('no compiler for GPUs: pip install "quadcosim[cuda]"')
+        raise QuadcosimError("NVRTC is not installed; this needs: pip install 'quadcosim[cuda]'")
     library = ctypes.CDLL(str(path))
     library.nvrtcGetErrorString.restype = ctypes.c_char_p
     return library

@@ -14,7 +14,7 @@ from orchestration.engines.batch.shape import Shape
 from orchestration.engines.cuda.compiler import compiled
 from orchestration.engines.cuda.driver import Gpu
 from orchestration.engines.cuda.memory import SharedMemory
-from orchestration.engines.cuda.program import program
+from orchestration.engines.cuda.program import Code, Known, program
 from orchestration.engines.structures import address
 from orchestration.expressions.syntax import Call
 from orchestration.schedule.schedule_cache import Course, ScheduleCache, Timing
@@ -32,7 +32,8 @@ class Fleet:
 
     def __init__(self, shape: Shape, schedules: ScheduleCache, gpu: Gpu) -> None:
         self._shape, self._schedules, self._gpu = shape, schedules, gpu
-        self._fly = gpu.kernel(compiled(program(shape), gpu.architecture), "fly")
+        self._codes = {name: Code.of(name, model) for name, model in shape.models.items()}
+        self._known: Mapping[str, Known] | None = None
         self._memory = SharedMemory(gpu)
         self._batches: list[_Threads] = []
 
@@ -48,7 +49,10 @@ class Fleet:
                 systems, timings, own = groups[i]
                 going[i] = self._batches[i].going(systems, timings, record, own)
                 next(going[i])
-            self._go_on([self._batches[i] for i in going])
+            flying = [self._batches[i] for i in going if self._batches[i].flying]
+            if flying:
+                self._expect_known(flying)
+                self._go_on(flying)
             begin = [i for i in going if self._batches[i].makes_room()]
             for i in sorted({*going} - {*begin}):
                 try:
@@ -59,9 +63,33 @@ class Fleet:
         self._memory.forget()
         return [(self._batches[i], found[i]) for i in range(len(groups))]
 
+    def _expect_known(self, batches: Sequence["_Threads"]) -> None:
+        """Have what flies them know no other numbers than those that are the same in all runs, now and before."""
+        found = {
+            name: _the_same(code, np.hstack([batch.begins_with(i) for batch in batches]))
+            for i, (name, code) in enumerate(self._codes.items())
+        }
+        if self._known is not None:
+            found = {
+                name: {place: x for place, x in known.items() if found[name].get(place, np.nan).hex() == x.hex()}
+                for name, known in self._known.items()
+            }
+        if found != self._known:
+            self._known = found
+            text = program(self._shape, self._codes, found)
+            self._fly = self._gpu.kernel(compiled(text, self._gpu.architecture), "fly")
+
     def _go_on(self, batches: Sequence["_Threads"]) -> None:
         addresses = np.array([batch.address for batch in batches], dtype=np.int64)
         self._gpu.launch(self._fly, len(batches) * self._shape.lanes, self._memory.passing(addresses), len(batches))
+
+
+def _the_same(code: Code, memory: Floats) -> Known:
+    """What is the same in all runs, of numbers that may be known."""
+    numbers = memory[[*code.constant.values()]]
+    bits = numbers.view(np.int64)
+    alike = (bits == bits[:, :1]).all(axis=1) & np.isfinite(numbers).all(axis=1)
+    return {name: float(row[0]) for name, row, same in zip(code.constant, numbers, alike) if same}
 
 
 class _Threads(Batch):
@@ -84,12 +112,16 @@ class _Threads(Batch):
 
     def waiting(self) -> list[int]:
         """The tracks that ask for their next window."""
-        batch = self._batch
-        return [
-            lane
-            for lane in range(self._lanes)
-            if batch.alive >> lane & 1 and batch.returned[lane] == self._c.NEXT_WINDOW
-        ]
+        return [lane for lane in self.flying if self._batch.returned[lane] == self._c.NEXT_WINDOW]
+
+    @property
+    def flying(self) -> list[int]:
+        """The lanes that go on."""
+        return [lane for lane in range(self._lanes) if self._batch.alive >> lane & 1]
+
+    def begins_with(self, component: int) -> Floats:
+        """The memory of a component in the runs that go on."""
+        return self.memories[component][:, self.flying]
 
     def makes_room(self) -> bool:
         """Whether there was too little room for some lane: there is twice as much now, to begin again."""

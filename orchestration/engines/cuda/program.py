@@ -3,6 +3,7 @@
 import ctypes
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
@@ -10,14 +11,19 @@ from fmu_kit.compiler.runtime import FOLDER
 from orchestration.basics.errors import UsageError
 from orchestration.engines.batch.kernels import FILES, sources_of
 from orchestration.engines.batch.shape import Shape
-from orchestration.engines.structures import shared
+from orchestration.engines.structures import constants, shared
 from orchestration.fmi.model import Model
+
+Known = Mapping[str, float]
+"""Places of a component's memory that hold one number in all runs, by their names in C"""
 
 _OF_KIT = ("lanes.h", "mathematics.h", "integers.h")
 _OWN = ("flights.cu", "threads.h", "component.h")
 _INCLUDE = re.compile(r'(?m)^#include "(.+)"\n')
 _LITERAL = re.compile(r"\((q_\w+|[A-Z]\w+)\)\{")
 """A structure of known values, as C has it: C++ has no parentheses there"""
+_STRAIGHT = re.compile(r"static q_mask (\w+)\([^)]*\)\n\{\n.*?\n\}\n(?=\s*#define STRAIGHT_STEP \1\n)", re.DOTALL)
+_READ, _STORED = re.compile(r"v\[(\w+)\]"), re.compile(r"v\[(\w+)\] = ")
 _LINE = """
 extern "C" __global__ void line(q_place *v, q_real t, q_real h, int *through) {
     through[threadIdx.x] = component::STRAIGHT_STEP(v + threadIdx.x, 1, t, h);
@@ -25,18 +31,57 @@ extern "C" __global__ void line(q_place *v, q_real t, q_real h, int *through) {
 """
 
 
-def program(shape: Shape) -> str:
-    """What flies runs of a shape; raises `UsageError` naming a component of another kit than this one."""
+@dataclass(frozen=True)
+class Code:
+    """A component as C over lanes."""
+
+    places: str
+    functions: str
+    constant: Mapping[str, int] = field(default_factory=dict)
+    """Places that its straight line reads, and neither it nor what other components send changes: by name"""
+
+    @classmethod
+    def of(cls, name: str, model: Model) -> "Code":
+        """That of an FMU; raises `UsageError` naming one of another kit than this."""
+        sources = sources_of(name, model)
+        if any(sources.get(header) != (FOLDER / header).read_bytes() for header in _OF_KIT):
+            raise UsageError(
+                f"components.{name}: {model.path.name}: expected a native FMU built by this version, to be one of many "
+                "in threads of a GPU"
+            )
+        places, functions = (sources[each].decode() for each in ("places.h", "lane_functions.h"))
+        straight = _STRAIGHT.search(functions)
+        if straight is None:
+            return cls(places, functions)
+        inputs = {variable.reference for variable in model.variables.values() if variable.causality == "input"}
+        read = {*_READ.findall(straight[0])} - {*_STORED.findall(straight[0])}
+        there = {each: place for each, place in constants(places).items() if each in read and place not in inputs}
+        return cls(places, functions, there)
+
+    def text(self, known: Known) -> str:
+        """With numbers that are known in its straight line; after a general step they are looked at."""
+
+        def number(found: re.Match[str]) -> str:
+            return f"({known[found[1]].hex()})" if found[1] in known else found[0]
+
+        functions = _STRAIGHT.sub(lambda straight: _READ.sub(number, straight[0]), self.functions)
+        same = " & ".join(f"(q_to_bits(v[{each}]) == q_to_bits({value.hex()}))" for each, value in known.items())
+        return f"{self.places}{functions}\nstatic int as_known(const q_place *v) {{ return {same or '(void)v, 1'}; }}\n"
+
+
+def program(shape: Shape, codes: Mapping[str, Code], known: Mapping[str, Known]) -> str:
+    """What flies runs of a shape, of whose components these places hold known numbers, by component."""
     written = {
         "components.h": "\n".join([
-            *(_in_space(f"component_{i}", _functions(name, model) + '#include "component.h"\n')
-              for i, (name, model) in enumerate(shape.models.items())),
+            *(_in_space(f"component_{i}", code.text(known[name]) + '#include "component.h"\n')
+              for i, (name, code) in enumerate(codes.items())),
             "static int step_of(int64_t index, q_place *v, q_real t, q_real h) {",
             "    switch (index) {",
-            *(f"    case {i}: return component_{i}::step(v, t, h);" for i in range(len(shape.models))),
+            *(f"    case {i}: return component_{i}::step(v, t, h);" for i in range(len(codes))),
             "    }",
             "    return -1;",
             "}",
+            "",
         ]),
         **shape.texts,
     }  # fmt: skip
@@ -47,25 +92,14 @@ def program(shape: Shape) -> str:
     return _of_threads(f'#include "flights.cu"\n{sizes}\n', shape.lanes, written)
 
 
-def line(name: str, model: Model, lanes: int) -> str:
+def line(code: Code, known: Known, lanes: int) -> str:
     """The straight line of a component's step alone, as a kernel: to see what it takes of a processor."""
-    text = f'#include "threads.h"\n#include "integers.h"\n{_in_space("component", _functions(name, model))}{_LINE}'
+    text = f'#include "threads.h"\n#include "integers.h"\n{_in_space("component", code.text(known))}{_LINE}'
     return _of_threads(text, lanes, {})
 
 
 def _in_space(name: str, text: str) -> str:
     return f"namespace {name} {{\n{text}}}\n"
-
-
-def _functions(name: str, model: Model) -> str:
-    """Those of a component over lanes, by the mathematics that all components have."""
-    sources = sources_of(name, model)
-    if any(sources.get(header) != (FOLDER / header).read_bytes() for header in _OF_KIT):
-        raise UsageError(
-            f"components.{name}: {model.path.name}: expected a native FMU built by this version, to be one of many in "
-            "threads of a GPU"
-        )
-    return (sources["places.h"] + sources["lane_functions.h"]).decode()
 
 
 def _of_threads(text: str, lanes: int, written: Mapping[str, str]) -> str:
