@@ -4,7 +4,7 @@ import dataclasses
 import itertools
 import json
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ import quadcosim
 from orchestration.basics.bisection import Range, first_failure
 from orchestration.basics.simulator import Floats
 from orchestration.basics.statistics import wilson
-from orchestration.exact.mean_square import mean_square_limit
+from orchestration.exact.mean_square import MeanSquareLimit
 from orchestration.flight import local_limit as local
 from orchestration.flight.hover_loop import COORDINATES, HoverLoop, hover_of
 from orchestration.flight.local_limit import local_limit
@@ -327,7 +327,7 @@ def test_the_lag_that_an_fmu_has_by_itself_is_in_the_loop(tmp_path: Path) -> Non
 @pytest.mark.parametrize(("exponent", "limit"), [(0.5, 0.0085), (0.99, 0.0801)])
 def test_at_the_edge_of_the_boundary_layer_the_exponent_matters(exponent: float, limit: float) -> None:
     scenario = scenario_of().with_changes(parameters={"controller.surface_exponent": exponent})
-    found = known(local_limits)(Varied(request=scenario, of="period"), range_of(scenario))
+    found = known_local_limits(Varied(request=scenario, of="period"), range_of(scenario))
     assert found.limit == theory()
     assert found.outside == pytest.approx(limit, abs=1e-4)
 
@@ -426,25 +426,21 @@ class StubPool:
 @pytest.fixture
 def stubbed(monkeypatch: pytest.MonkeyPatch) -> type[StubPool]:
     monkeypatch.setattr(limits, "RunEvaluator", StubPool)
-    monkeypatch.setattr(limits, "local_limits", known(local_limits))
-    monkeypatch.setattr(limits, "mean_square_limit", known(mean_square_limit))
+    monkeypatch.setattr(limits, "local_limits", known_local_limits)
+    monkeypatch.setattr(limits, "mean_square_limit", lambda *given: MeanSquareLimit(reason="not looked for"))
     monkeypatch.setattr(local, "about_rest", lambda at, span: Local(reason="not looked for"))
     return StubPool
 
 
-_KNOWN: dict[str, Any] = {}
+_KNOWN: dict[str, Local] = {}
 
 
-def known(theory: Callable[..., Any]) -> Callable[..., Any]:
-    """What linear theory says, once for the many tests with the same scenario."""
-
-    def found(varied: Varied, *given: Any) -> Any:
-        key = f"{theory.__name__} {varied.of} {varied.request}"
-        if key not in _KNOWN:
-            _KNOWN[key] = theory(varied, *given)
-        return _KNOWN[key]
-
-    return found
+def known_local_limits(varied: Varied, span: Range) -> Local:
+    """Those of linear theory, once for the many tests with the same scenario."""
+    key = f"{varied.of} {varied.request}"
+    if key not in _KNOWN:
+        _KNOWN[key] = local_limits(varied, span)
+    return _KNOWN[key]
 
 
 def unseeded(system: System) -> System:
