@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestration.building import fmus
-from orchestration.engines.batch.batch import Batch
+from orchestration.engines.batch.batch import Batch, Group
 from orchestration.engines.batch.batches import Batches
 from orchestration.engines.batch.kernels import lanes_here
 from orchestration.engines.batch.shape import Shape
@@ -84,9 +84,9 @@ def bare(shape: Shape, batch: Batch, period: float, stop_time: float) -> float:
 
 def flown(batch: Batch, runs: list[System]) -> float:
     """CPU time of a step of the plant [s], events and objectives on."""
-    timings = [timing(system) for system in runs]
+    group = Group(systems=runs, timings=[timing(system) for system in runs])
     begin = time.process_time()
-    result = batch.run(runs, timings)
+    result = batch.run(group)
     return (time.process_time() - begin) / float(result.steps.sum())
 
 

@@ -35,7 +35,7 @@ def all_cells(
     for each in summary.follows:
         say(f"follows {each}")
     if summary.agreement is not None:
-        say(f"engine batch: {summary.agreement}")
+        say(f"engine {summary.engine}: {summary.agreement}")
     say(f"one cell again, by its number in cells.csv: {again} K")
     if summary.failed:
         say(f"{summary.failed} runs failed: runs.csv shows why")

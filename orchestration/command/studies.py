@@ -30,9 +30,10 @@ StudyEngineFlag = Annotated[
     str,
     typer.Option(
         "--engine",
-        help="What flies; batch: native FMUs, several runs at once in a SIMD batch; auto: the fastest that can be had.",
-        metavar="auto|python|compiled|batch",
-        autocompletion=completion.among("auto", "python", "compiled", "batch"),
+        help="What flies; batch: native FMUs, several runs at once in a SIMD batch; cuda: the same on a GPU; "
+        "auto: the fastest that can be had without one.",
+        metavar="auto|python|compiled|batch|cuda",
+        autocompletion=completion.among("auto", "python", "compiled", "batch", "cuda"),
     ),
 ]
 
@@ -63,7 +64,7 @@ def sweep(
     failed = f", {summary.failed} failed (quadcosim export shows why; --retry-failed)" if summary.failed else ""
     lines = [f"{summary.path}: {summary.total} runs, {summary.flown} flown now{failed}"]
     if summary.agreement is not None:
-        lines.append(f"engine batch: {summary.agreement}")
+        lines.append(f"engine {summary.engine}: {summary.agreement}")
     for each in summary.follows:
         say(f"follows {each}")
     told = ("total", "flown", "failed", "path", "engine", "agreement", "follows")
@@ -85,7 +86,7 @@ def status(study: StudyFile, out: Out = None) -> Answer:
     """Show the progress of a study, also while it runs in another process."""
     from orchestration.studies.store import open_for_reading, store_path
     from orchestration.studies.study_file import load_study
-    from orchestration.studies.sweep import AGREEMENT, TOTAL, expect_current
+    from orchestration.studies.sweep import AGREEMENT, ENGINE, TOTAL, expect_current
     from orchestration.workers.batching import Agreement
 
     chosen = load_study(study)
@@ -99,7 +100,7 @@ def status(study: StudyFile, out: Out = None) -> Answer:
     agreement = Agreement.from_text(about[AGREEMENT]) if AGREEMENT in about else None
     lines = [f"{path}: {done + failed} of {total} runs, {failed} failed, {missing} missing"]
     if agreement is not None:
-        lines.append(f"engine batch: {agreement}")
+        lines.append(f"engine {about[ENGINE]}: {agreement}")
     numbers = {"total": total, "done": done, "failed": failed, "missing": missing}
     return Answer(document={"path": path, **numbers, "agreement": agreement}, lines=lines)
 

@@ -133,7 +133,7 @@ def cells_again(
     starts = files.starts_of(study.origin)
     systems = [study.system(i, starts) for i in chain(*runs)]
     with RunEvaluator(files, workers, how.engine) as pool:
-        flights = pool.fly_all(systems, in_lanes=how.in_lanes)
+        flights = pool.fly_all(systems, in_lanes=how.in_lanes, on_gpu=how.on_gpu)
     return results(comparison, frame_of(comparison, zip(chain(*runs), flights)))
 
 

@@ -68,10 +68,10 @@ def sweep(
     The store is in `folder`, default `results/NAME`: what is there is not flown again, so that a sweep may be
     stopped and called again. Runs are flown by `workers` processes of this machine, which need no guard of the main
     module and work from a notebook, or by those of a `dask` scheduler at that address. The engine `batch` flies them as
-    lanes of native FMUs, and some of them by the FMUs too, to compare; `auto` takes lanes where these can be had, else
-    native FMUs one at a time, else the FMUs as they are. A run that takes more than `time_limit` [s] of the
-    processor has failed, and says so. `progress` hears how many of how many are done, `announce` what flies and of runs
-    that failed; None for silence.
+    lanes of native FMUs, `cuda` as threads of a GPU, and some of them by the FMUs too, to compare; `auto` takes lanes
+    where these can be had, else native FMUs one at a time, else the FMUs as they are. A run that takes more than
+    `time_limit` [s] of the processor has failed, and says so. `progress` hears how many of how many are done,
+    `announce` what flies and of runs that failed; None for silence.
 
     Raises `UsageError`, before anything is flown, for a design with a run that cannot be, or if the store holds
     another study, saying what differs; `QuadcosimError` for what is not a run's own failure, without a row;
@@ -99,7 +99,7 @@ def sweep(
             lanes: dict[str, Row] = {}
             try:
                 with _workers(Inputs.of(flown_with), workers, dask) as fly:
-                    asked = chunks(tasks, len(missing), workers) if how.in_lanes else tasks
+                    asked = chunks(tasks, len(missing), workers, how.on_gpu) if how.in_lanes else tasks
                     with contextlib.closing(fly(asked)) as outcomes:
                         for some in outcomes:
                             _keep(some, opened)

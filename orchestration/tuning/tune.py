@@ -126,7 +126,7 @@ def _flown(
     if follows := followed(asked.origin, files.models_of(asked.origin)):
         announce(f"follows {follows}")
     with of_share(progress, "searching") as hear, RunEvaluator(files, workers, how.engine) as pool:
-        fly = functools.partial(pool.fly_all, in_lanes=how.in_lanes)
+        fly = functools.partial(pool.fly_all, in_lanes=how.in_lanes, on_gpu=how.on_gpu)
 
         def find(period: float, seed: int, heard: Callable[[float], None]) -> Found:
             return search(asked, period, seed, fly, pool.fly_all, heard)

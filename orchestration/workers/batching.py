@@ -20,13 +20,16 @@ TOLERATED = 1e-9
 """relative difference of a metric"""
 CHUNK, SORTED = 256, 4096
 """Runs of a chunk, at most, and runs that are put in order so that those of a chunk are alike"""
+ON_GPU = 2**15
+"""Runs of a chunk that are flown on a GPU, at most: it wants as many at once as it has threads"""
 
 
-def chunks(tasks: Iterable[RunTask], total: int, workers: int) -> Iterator[RunTask | Chunk]:
+def chunks(tasks: Iterable[RunTask], total: int, workers: int, on_gpu: bool = False) -> Iterator[RunTask | Chunk]:
     """Tasks in chunks, of which each of so many workers gets a few; those whose signals are kept by themselves."""
     size = max(lanes_here(), min(CHUNK, total // (4 * workers) // lanes_here() * lanes_here()))
+    size, order = (ON_GPU, ON_GPU) if on_gpu else (size, SORTED)
     waiting = iter(tasks)
-    while some := list(islice(waiting, SORTED)):
+    while some := list(islice(waiting, order)):
         yield from (task for task in some if task.keep_signals)
         places: dict[Any, int] = {}
         rest = [(task, (outline(task.system), timing(task.system))) for task in some if not task.keep_signals]
@@ -34,7 +37,7 @@ def chunks(tasks: Iterable[RunTask], total: int, workers: int) -> Iterator[RunTa
             places.setdefault(key, len(places))
         ordered = [task for task, _ in sorted(rest, key=lambda pair: places[pair[1]])]
         for first in range(0, len(ordered), size):
-            yield Chunk(tasks=tuple(ordered[first : first + size]))
+            yield Chunk(tasks=tuple(ordered[first : first + size]), on_gpu=on_gpu)
 
 
 def sample(keys: Iterable[str]) -> set[str]:
@@ -99,7 +102,7 @@ class Agreement:
         """Raise `QuadcosimError` naming run and metric if they differ by more than is tolerated."""
         if self.difference > TOLERATED:
             raise QuadcosimError(
-                f"run {self.index}: {self.metric} by the engine batch differs by {self.difference:.3g} "
+                f"run {self.index}: {self.metric} in lanes differs by {self.difference:.3g} "
                 f"from that by {by}; expected at most {TOLERATED:g}"
             )
         if self.python is not None:

@@ -8,12 +8,13 @@ from orchestration.basics.errors import QuadcosimError, UsageError, expected_nam
 from orchestration.building.fmus import native_twins
 from orchestration.building.inputs import Files, files_of
 from orchestration.engines.batch.shape import expect_lanes
+from orchestration.engines.cuda.fleet import expect_gpu
 from orchestration.engines.engine import Engine
 from orchestration.engines.wiring import checked
 from orchestration.system.model import System
 from orchestration.system.request import Twin, system_meant
 
-EngineChoice = Literal["auto", "python", "compiled", "batch"]
+EngineChoice = Literal["auto", "python", "compiled", "batch", "cuda"]
 """`auto`: `batch` where it can be had, else native FMUs one at a time, else the FMUs as they are"""
 
 
@@ -24,20 +25,24 @@ class Chosen:
     native: bool
     """whether by the native twins of the FMUs"""
     in_lanes: bool
-    """whether many at once, as lanes of a batch"""
+    """whether many at once, as lanes of batches"""
     engine: Engine | None
     """of runs that are flown one at a time; None: the fastest that each can have"""
     reason: str | None = None
     """why it is not the fastest, where that was to be taken"""
+    on_gpu: bool = False
+    """whether the lanes are threads of a GPU"""
 
     @property
     def name(self) -> str:
         """As `--engine` has it."""
-        return "batch" if self.in_lanes else self.engine or "compiled"
+        if self.in_lanes:
+            return "cuda" if self.on_gpu else "batch"
+        return self.engine or "compiled"
 
     def __str__(self) -> str:
         if self.in_lanes:
-            return "engine batch: native FMUs, many runs at once"
+            return f"engine {self.name}: native FMUs, many runs at once"
         what = "native FMUs" if self.native else "the FMUs as they are"
         return f"engine {self.name}: {what}, one run at a time" + (f" ({self.reason})" if self.reason else "")
 
@@ -56,16 +61,18 @@ def chosen(
     """How runs are flown by an engine, with `native` if that was asked for.
 
     `first` gives the first run, checked, and its files, by native twins or not; `apart` is why runs are no lanes,
-    whatever they are. Raises `UsageError` naming what
-    stands in the way of lanes if these were asked for.
+    whatever they are. Raises `UsageError` naming what stands in the way of lanes if these were asked for, and
+    `QuadcosimError` without a GPU if that was.
     """
     if engine in ("python", "compiled"):
         return Chosen(native=native, in_lanes=False, engine=engine)
-    if engine == "batch":
+    if engine in ("batch", "cuda"):
         if apart is not None:
-            raise UsageError(f"--engine batch: {apart}")
+            raise UsageError(f"--engine {engine}: {apart}")
+        if engine == "cuda":
+            expect_gpu()
         _expect_lanes(*first(True))
-        return Chosen(native=True, in_lanes=True, engine=None)
+        return Chosen(native=True, in_lanes=True, engine=None, on_gpu=engine == "cuda")
     try:
         system, files = first(True)
     except QuadcosimError as error:  # what is wrong with the request is said by whoever flies it

@@ -47,8 +47,9 @@ class RunEvaluator:
     def __exit__(self, *exception: object) -> None:
         self._stack.close()
 
-    def fly_all(self, systems: Sequence[System], *, in_lanes: bool = False) -> list[Any]:
-        """The metrics of all runs in their order, by native FMUs many at once if they are to fly `in_lanes`.
+    def fly_all(self, systems: Sequence[System], *, in_lanes: bool = False, on_gpu: bool = False) -> list[Any]:
+        """The metrics of all runs in their order, by native FMUs many at once if they are to fly `in_lanes`, `on_gpu`
+        or not.
 
         Raises `QuadcosimError` if a run fails.
         """
@@ -56,7 +57,7 @@ class RunEvaluator:
             return self.fly(systems, stop=lambda metrics: False)
         tasks = (self._task(i, system) for i, system in enumerate(systems))
         found: list[Any] = [None] * len(systems)
-        for future in [self._submit(some) for some in chunks(tasks, len(systems), self._workers)]:
+        for future in [self._submit(some) for some in chunks(tasks, len(systems), self._workers, on_gpu)]:
             for outcome in future.result():
                 found[outcome.row.index] = _metrics(outcome)
         return found

@@ -228,7 +228,7 @@ class Pool:
             if isinstance(task, Chunk):
                 systems = all_with_files([each.system for each in task.tasks], self._paths)
                 each = tuple(replace(one, system=system) for one, system in zip(task.tasks, systems))
-                return supervisor.fly_chunk(Chunk(tasks=each))
+                return supervisor.fly_chunk(replace(task, tasks=each))
             return [supervisor.fly(replace(task, system=with_files(task.system, self._paths)))]
         finally:
             self._idle.put(supervisor)

@@ -43,9 +43,11 @@ class RunTask:
 
 @dataclass(frozen=True, kw_only=True)
 class Chunk:
-    """Runs of a study that are flown as lanes of a batch; all of native FMUs, of none are signals kept."""
+    """Runs of a study that are flown as lanes of batches; all of native FMUs, of none are signals kept."""
 
     tasks: tuple[RunTask, ...]
+    on_gpu: bool = False
+    """whether the lanes are threads of a GPU"""
 
     @property
     def time_limit(self) -> float | None:
@@ -91,7 +93,8 @@ class Runner:
     def __init__(self, machine: str | None = None) -> None:
         self._instances = Instances()
         self._machine = machine
-        self._batches: Batches | None = None  # loads only where runs are flown in lanes
+        self._batches: dict[bool, Batches] = {}
+        """that load only where runs are flown in lanes: whether on a GPU"""
 
     def fly(self, task: RunTask) -> Outcome:
         """Fly one run; what is wrong with it is its row.
@@ -125,13 +128,13 @@ class Runner:
         Raises `WorkerEnvironmentError` for what is no run's own failure.
         """
         started = time.perf_counter()
-        if self._batches is None:
-            from orchestration.engines.batch.batches import Batches
+        from orchestration.engines.batch.batches import Batches
 
-            self._batches = Batches()
         _expect_files(chunk.tasks[0].system)
         try:
-            flown = self._batches.run([task.system for task in chunk.tasks])
+            if chunk.on_gpu not in self._batches:
+                self._batches[chunk.on_gpu] = Batches(on_gpu=chunk.on_gpu)
+            flown = self._batches[chunk.on_gpu].run([task.system for task in chunk.tasks])
         except (QuadcosimError, OSError, MemoryError) as error:
             raise WorkerEnvironmentError(str(error) or type(error).__name__) from error
         duration = (time.perf_counter() - started) / len(chunk.tasks)

@@ -55,6 +55,16 @@ class BatchResult:
     """rows of what was to be recorded, with the time [s] first, of each run; none if nothing was"""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Group:
+    """Runs that go together, at most as many as there are lanes."""
+
+    systems: Sequence[System]
+    timings: Sequence[Timing]
+    own: Columns = field(default_factory=lambda: NOTHING)
+    """parameters of each run on top of those of its system"""
+
+
 Going = Generator[None, Sequence[int], BatchResult]
 """Runs that somebody else goes on with, as `Batch.going` says"""
 
@@ -151,18 +161,14 @@ class Batch:
 
     # -- a group of runs -------------------------------------------------------------------------------------------
 
-    def run(
-        self,
-        systems: Sequence[System],
-        timings: Sequence[Timing],
-        record: Sequence[str] | None = None,
-        own: Columns = NOTHING,
-    ) -> BatchResult:
-        """Go through at most as many runs as there are lanes; `record` are columns that are kept of each row, with t.
+    def each(self, groups: Iterable[Group], record: Sequence[str] | None) -> Iterator[tuple["Batch", BatchResult]]:
+        """Groups of runs one after another, each with what has flown it: this."""
+        for group in groups:
+            yield self, self.run(group, record)
 
-        `own` are parameters of each run on top of those of its system.
-        """
-        going = self.going(systems, timings, record, own)
+    def run(self, group: Group, record: Sequence[str] | None = None) -> BatchResult:
+        """Go through some runs; `record` are columns that are kept of each row, with t."""
+        going = self.going(group, record)
         next(going)
         while True:
             code = self._library.run(self.address)
@@ -174,20 +180,14 @@ class Batch:
                 result: BatchResult = end.value
                 return result
 
-    def going(
-        self,
-        systems: Sequence[System],
-        timings: Sequence[Timing],
-        record: Sequence[str] | None = None,
-        own: Columns = NOTHING,
-    ) -> Going:
+    def going(self, group: Group, record: Sequence[str] | None = None) -> Going:
         """The same, by somebody else: who goes on with the runs each time that this waits, and then says which tracks
         ask for their next window.
         """
-        self._own = own
+        self._own = group.own
         found: dict[Call, Floats] = {}
         for _ in range(self._shape.passes):
-            result = yield from self._once(systems, timings, found, record)
+            result = yield from self._once(group.systems, group.timings, found, record)
             found = dict(result.reductions)
         return result
 

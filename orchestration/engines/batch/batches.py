@@ -1,16 +1,18 @@
 """Flies many systems as lanes of runs, and says of each what it came to, or that it is to be flown alone."""
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from orchestration.basics.simulator import Floats
-from orchestration.engines.batch.batch import NOTHING, Batch, BatchResult, Columns
+from orchestration.engines.batch.batch import NOTHING, Batch, BatchResult, Columns, Group
 from orchestration.engines.batch.combining import combined
 from orchestration.engines.batch.kernels import lanes_here
 from orchestration.engines.batch.shape import Shape, outline
+from orchestration.engines.cuda.driver import Gpu
+from orchestration.engines.cuda.fleet import Fleet
 from orchestration.engines.structures import structures
 from orchestration.engines.watch import watch
 from orchestration.engines.wiring import checked, source_values
@@ -32,6 +34,8 @@ class RunSummary:
     """what diverged"""
 
 
+Flying = Callable[[Sequence[Group], Sequence[str] | None], Iterator[tuple[Batch, BatchResult]]]
+"""What flies groups one after another, or many at once"""
 Landed = tuple[int, RunSummary | None, Floats]
 """The place of a run among those that were asked for, what it came to, its rows"""
 _NO_ROWS: Floats = np.zeros((0, 0))
@@ -40,10 +44,11 @@ _NO_ROWS: Floats = np.zeros((0, 0))
 class Batches:
     """The batches of this process, by the shape of what they run; their FMUs are files."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, on_gpu: bool = False) -> None:
         self._schedules = ScheduleCache()
         self._lanes = lanes_here()
-        self._batches: dict[Hashable, tuple[Shape, Batch]] = {}
+        self._gpu = Gpu() if on_gpu else None
+        self._shapes: dict[Hashable, tuple[Shape, Flying]] = {}
 
     def run(self, systems: Sequence[System]) -> list[RunSummary | None]:
         """What runs came to, in their order; None for one that is to be flown alone. Raises as `each`."""
@@ -66,24 +71,29 @@ class Batches:
         for place, system in enumerate(systems):
             shapes.setdefault(known[id(system)][0], []).append(place)
         for key, places in shapes.items():
-            shape, batch = self._batch(key, systems[places[0]])
+            shape, flown = self._flown(key, systems[places[0]])
             timings = {place: known[id(systems[place])][1] for place in places}
             several = {id(systems[place]): systems[place] for place in places}
             fed = {key: heard(system, shape.models) for key, system in several.items()}
-            for group in _groups(places, timings, self._lanes):
-                some = [fed[id(systems[i])] for i in group]
-                result = batch.run(
-                    some, [timings[i] for i in group], record, {name: values[group] for name, values in own.items()}
+            groups = [*_groups(places, timings, self._lanes)]
+            given = [
+                Group(
+                    systems=[fed[id(systems[i])] for i in group], timings=[timings[i] for i in group],
+                    own={name: values[group] for name, values in own.items()},
                 )
+                for group in groups
+            ]  # fmt: skip
+            for group, runs, (batch, result) in zip(groups, given, flown(given, record)):
                 rows = result.signals or [_NO_ROWS] * len(group)
-                yield from zip(group, [*_told(shape, batch, result, some)], rows)
+                yield from zip(group, [*_told(shape, batch, result, runs.systems)], rows)
 
-    def _batch(self, key: Hashable, system: System) -> tuple[Shape, Batch]:
-        if key not in self._batches:
+    def _flown(self, key: Hashable, system: System) -> tuple[Shape, Flying]:
+        if key not in self._shapes:
             models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
             shape = Shape(system=checked(system, models).system, models=models, lanes=self._lanes)
-            self._batches[key] = shape, Batch(shape, self._schedules)
-        return self._batches[key]
+            flies = Batch(shape, self._schedules) if self._gpu is None else Fleet(shape, self._schedules, self._gpu)
+            self._shapes[key] = shape, flies.each
+        return self._shapes[key]
 
 
 def _groups(indices: Sequence[int], timings: Mapping[int, Hashable], lanes: int) -> Iterator[list[int]]:

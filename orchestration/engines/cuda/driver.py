@@ -16,18 +16,19 @@ _MAJOR, _MINOR = 75, 76
 
 
 class Gpu:
-    """The first one there is; raises `QuadcosimError` without one, saying what was not found."""
+    """The first one there is; raises `QuadcosimError` without one, saying what was not found.
+
+    Work goes on in one thread of this process, the one that begins with it.
+    """
 
     def __init__(self) -> None:
         try:
             self._library: Any = ctypes.CDLL(LIBRARY)
         except OSError as error:
-            raise QuadcosimError(f"no driver of a GPU of NVIDIA: expected {LIBRARY}: {error}") from error
-        self._device, context = ctypes.c_int(), ctypes.c_void_p()
+            raise QuadcosimError(f"no driver of a GPU of NVIDIA: expected {LIBRARY}") from error
+        self._device, self._context = ctypes.c_int(), ctypes.c_void_p()
         self._call("cuInit", 0)
         self._call("cuDeviceGet", ctypes.byref(self._device), 0)
-        self._call("cuDevicePrimaryCtxRetain", ctypes.byref(context), self._device)
-        self._call("cuCtxSetCurrent", context)
 
     @cached_property
     def name(self) -> str:
@@ -47,6 +48,7 @@ class Gpu:
     def kernel(self, image: bytes, name: str) -> ctypes.c_void_p:
         """A kernel of what was compiled for it."""
         module, function = ctypes.c_void_p(), ctypes.c_void_p()
+        self._begin()
         self._call("cuModuleLoadData", ctypes.byref(module), image)
         self._call("cuModuleGetFunction", ctypes.byref(function), module, name.encode())
         return function
@@ -62,12 +64,19 @@ class Gpu:
     def allocate(self, size: int) -> int:
         """Memory that it shares with this process."""
         found = ctypes.c_uint64()
+        self._begin()
         self._call("cuMemAllocManaged", ctypes.byref(found), ctypes.c_size_t(size), _GLOBAL)
         return found.value
 
     def free(self, address: int) -> None:
         """Give memory back."""
         self._call("cuMemFree_v2", ctypes.c_uint64(address))
+
+    def _begin(self) -> None:
+        """It is made ready when there is work: that takes a while, and memory."""
+        if not self._context:
+            self._call("cuDevicePrimaryCtxRetain", ctypes.byref(self._context), self._device)
+            self._call("cuCtxSetCurrent", self._context)
 
     def _call(self, name: str, *arguments: Any) -> None:
         result = getattr(self._library, name)(*arguments)

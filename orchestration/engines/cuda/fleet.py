@@ -2,16 +2,17 @@
 
 import ctypes
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from orchestration.basics.errors import QuadcosimError
 from orchestration.basics.simulator import Floats
-from orchestration.engines.batch.batch import Batch, BatchResult, Columns, Going, Run, Track
+from orchestration.engines.batch.batch import Batch, BatchResult, Going, Group, Run, Track
 from orchestration.engines.batch.shape import Shape
-from orchestration.engines.cuda.compiler import compiled
+from orchestration.engines.cuda.compiler import compiled, expect_compiler
 from orchestration.engines.cuda.driver import Gpu
 from orchestration.engines.cuda.memory import SharedMemory
 from orchestration.engines.cuda.program import Code, Known, program
@@ -23,8 +24,17 @@ from orchestration.system.model import System
 _MESSAGES, _VALUES = 16, 1024
 """On their way over a connection, and kept of an expression: what there is room for at first"""
 
-Group = tuple[Sequence[System], Sequence[Timing], Columns]
-"""Runs of a batch, as `Batch.run` takes them"""
+_MOST = 2**12
+"""Groups at once"""
+
+
+def expect_gpu() -> None:
+    """Raise `QuadcosimError` if nothing can be flown on a GPU here, saying what is missing."""
+    try:
+        expect_compiler()
+        Gpu()
+    except QuadcosimError as error:
+        raise QuadcosimError(f"--engine cuda: {error}") from error
 
 
 class Fleet:
@@ -37,6 +47,11 @@ class Fleet:
         self._memory = SharedMemory(gpu)
         self._batches: list[_Threads] = []
 
+    def each(self, groups: Sequence[Group], record: Sequence[str] | None) -> Iterator[tuple[Batch, BatchResult]]:
+        """The same for any number of groups, as many as there is room for at once."""
+        for first in range(0, len(groups), _MOST):
+            yield from self.run(groups[first : first + _MOST], record)
+
     def run(self, groups: Sequence[Group], record: Sequence[str] | None = None) -> list[tuple[Batch, BatchResult]]:
         """The groups in their order, each with the batch that has flown it."""
         while len(self._batches) < len(groups):
@@ -46,8 +61,7 @@ class Fleet:
         begin = [*range(len(groups))]
         while begin or going:
             for i in begin:
-                systems, timings, own = groups[i]
-                going[i] = self._batches[i].going(systems, timings, record, own)
+                going[i] = self._batches[i].going(groups[i], record)
                 next(going[i])
             flying = [self._batches[i] for i in going if self._batches[i].flying]
             if flying:

@@ -103,7 +103,7 @@ def test_the_command_says_how_far_they_agree(tmp_path: Path, monkeypatch: pytest
 def test_a_difference_names_run_and_metric() -> None:
     found = Agreement.of([(3, {"a": 1.0, "b": None}, {"a": 1.0, "b": None}), (7, {"a": 2.0}, {"a": 2.0 + 1e-6})])
     assert (found.runs, found.metric, found.index) == (2, "a", 7)
-    with pytest.raises(QuadcosimError, match=r"run 7: a by the engine batch differs by 5e-07"):
+    with pytest.raises(QuadcosimError, match=r"run 7: a in lanes differs by 5e-07"):
         found.expect()
     with pytest.raises(QuadcosimError, match="run 1: outcome"):
         Agreement.of([(1, {"outcome": "good"}, {"outcome": "bad"})]).expect()

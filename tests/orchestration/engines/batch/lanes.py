@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from orchestration.building import fmus
-from orchestration.engines.batch.batch import Batch, BatchResult
+from orchestration.engines.batch.batch import Batch, BatchResult, Group
 from orchestration.engines.batch.kernels import lanes_here
 from orchestration.engines.batch.shape import Shape, outline
 from orchestration.engines.structures import structures
@@ -32,7 +32,12 @@ def shape_of(system: System) -> Shape:
 def in_lanes(shape: Shape, systems: Sequence[System]) -> BatchResult:
     """Systems of one shape flown at once, everything recorded."""
     assert len({outline(system) for system in systems}) == 1
-    return Batch(shape, ScheduleCache()).run(systems, [timing(system) for system in systems], shape.board.columns[1:])
+    return Batch(shape, ScheduleCache()).run(group_of(systems), shape.board.columns[1:])
+
+
+def group_of(systems: Sequence[System]) -> Group:
+    """As a batch takes them."""
+    return Group(systems=systems, timings=[timing(system) for system in systems])
 
 
 def assert_the_same_signals(shape: Shape, found: BatchResult, lane: int, alone: Result) -> None:

@@ -8,8 +8,8 @@ from orchestration.engines.cuda import compiler
 from orchestration.engines.cuda.compiler import image
 from orchestration.engines.cuda.program import Code, line
 from orchestration.quadrotor.scenario import Scenario
-from orchestration.schedule.schedule_cache import ScheduleCache, timing
-from tests.orchestration.engines.batch.lanes import located, shape_of
+from orchestration.schedule.schedule_cache import ScheduleCache
+from tests.orchestration.engines.batch.lanes import group_of, located, shape_of
 from tests.orchestration.fmi.small import needs_compiler
 
 MOST = {"plant": 168, "controller": 255}
@@ -24,7 +24,7 @@ def test_a_line_with_the_numbers_of_a_study_spills_nothing(component: str) -> No
     flight = located(Scenario(stop_time=0.1).as_system())
     shape = shape_of(flight)
     batch = Batch(shape, ScheduleCache())
-    next(batch.going([flight], [timing(flight)]))
+    next(batch.going(group_of([flight])))
     code = Code.of(component, shape.models[component])
     memory = batch.memories[shape.names.index(component)]
     known = {name: float(memory[place, 0]) for name, place in code.constant.items()}

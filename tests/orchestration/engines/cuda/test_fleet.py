@@ -6,23 +6,21 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.engines.batch import batch
-from orchestration.engines.batch.batch import NOTHING, Batch, BatchResult
+from orchestration.engines.batch.batch import Batch, BatchResult
 from orchestration.engines.batch.shape import Shape
-from orchestration.engines.cuda import driver, fleet
+from orchestration.engines.cuda import fleet
 from orchestration.engines.cuda.driver import Gpu
 from orchestration.engines.cuda.fleet import Fleet
 from orchestration.engines.structures import structures
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.schedule import schedule_cache
-from orchestration.schedule.schedule_cache import ScheduleCache, timing
+from orchestration.schedule.schedule_cache import ScheduleCache
 from orchestration.system.model import Criterion, System
 from orchestration.system.paths import changed
 from orchestration.system.system_file import load_system
-from tests.orchestration.engines.batch.lanes import located, shape_of
+from tests.orchestration.engines.batch.lanes import group_of, located, shape_of
 from tests.orchestration.engines.batch.test_batches import F
-from tests.orchestration.engines.cuda import playing
 from tests.orchestration.fmi.small import needs_compiler
 
 pytestmark = needs_compiler
@@ -36,32 +34,17 @@ NOISE = {"position": 0.01, "velocity": 0.02}
 LATE = Timing(jitter=0.004, delay=0.003, measurement_loss=0.2, command_loss=0.1, noise=NOISE)
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    there = tmp_path_factory.mktemp("processor")
-    playing.make_driver(there)
-    return there
-
-
-@pytest.fixture
-def gpu(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Gpu:
-    monkeypatch.setattr(driver, "LIBRARY", str(folder / playing.DRIVER))
-    monkeypatch.setattr(fleet, "compiled", lambda text, architecture: playing.played(text, folder))
-    monkeypatch.setattr(batch, "MOST_ROWS", 2**10)
-    return Gpu()
-
-
 def assert_the_same(
     flown: Fleet, shape: Shape, crowd: Sequence[System], *, count: int | None = None
 ) -> list[BatchResult]:
     """By threads and in lanes, in groups of `count`."""
     groups = [crowd[i : i + (count or len(crowd))] for i in range(0, len(crowd), count or len(crowd))]
-    given = [(group, [timing(system) for system in group], NOTHING) for group in groups]
+    given = [*map(group_of, groups)]
     columns = shape.board.columns[1:]
     threads = [found for _, found in flown.run(given, columns)]
     lanes = Batch(shape, ScheduleCache())
     for own, by_threads in zip(given, threads):
-        by_lanes = lanes.run(*own[:2], columns)
+        by_lanes = lanes.run(own, columns)
         for name in ("outcome", "time", "component", "steps", "doubtful"):
             assert getattr(by_threads, name).tolist() == getattr(by_lanes, name).tolist(), name
         whole = by_lanes.outcome == c.RUNNING  # what has ended before has no objectives

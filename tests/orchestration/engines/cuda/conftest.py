@@ -1,0 +1,23 @@
+from pathlib import Path
+
+import pytest
+
+from orchestration.engines.batch import batch
+from orchestration.engines.cuda import driver, fleet
+from orchestration.engines.cuda.driver import Gpu
+from tests.orchestration.engines.cuda import playing
+
+
+@pytest.fixture(scope="package")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    there = tmp_path_factory.mktemp("processor")
+    playing.make_driver(there)
+    return there
+
+
+@pytest.fixture
+def gpu(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Gpu:
+    monkeypatch.setattr(driver, "LIBRARY", str(folder / playing.DRIVER))
+    monkeypatch.setattr(fleet, "compiled", lambda text, architecture: playing.played(text, folder))
+    monkeypatch.setattr(batch, "MOST_ROWS", 2**10)
+    return Gpu()

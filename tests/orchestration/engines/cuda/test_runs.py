@@ -1,0 +1,50 @@
+"""A study is flown on a GPU, played by a processor, as it is in lanes; without one it is said what is missing."""
+
+from pathlib import Path
+
+import pytest
+
+from orchestration.basics.errors import QuadcosimError
+from orchestration.engines.cuda import driver, fleet
+from orchestration.engines.cuda.driver import Gpu
+from orchestration.workers.choice import chosen
+from orchestration.workers.pool import Supervisor
+from orchestration.workers.task import Chunk, Outcome, Runner, RunTask
+from tests.orchestration.fmi.small import needs_compiler
+from tests.orchestration.studies.common import axis, short, study, sweep
+from tests.orchestration.workers.test_choice import first
+
+pytestmark = needs_compiler
+
+
+def test_a_sweep_on_a_gpu_agrees_with_the_fmus(gpu: Gpu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    runner, on_gpu = Runner(), list[int]()
+
+    def fly_chunk(self: Supervisor, chunk: Chunk) -> list[Outcome]:
+        on_gpu.extend([len(chunk.tasks)] * chunk.on_gpu)
+        return runner.fly_chunk(chunk)
+
+    def fly(self: Supervisor, task: RunTask) -> Outcome:
+        return runner.fly(task)
+
+    monkeypatch.setattr(Supervisor, "fly_chunk", fly_chunk)  # in this process, which plays the GPU
+    monkeypatch.setattr(Supervisor, "fly", fly)
+    monkeypatch.setattr(fleet, "expect_compiler", lambda: None)
+    some = study(axis("timing.period", 0.01, 0.02), axis("plant.mass", 0.9, 1.0, 1.1), base=short())
+    summary = sweep(some, folder=tmp_path, engine="cuda")
+    assert (summary.engine, summary.flown, summary.failed, on_gpu) == ("cuda", 6, 0, [6])
+    assert summary.agreement is not None
+    assert summary.agreement.runs == 6
+    assert summary.agreement.difference < 1e-12
+
+
+def test_without_a_driver_it_is_said_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fleet, "expect_compiler", lambda: None)
+    monkeypatch.setattr(driver, "LIBRARY", "libno_gpu.so.1")
+    with pytest.raises(QuadcosimError, match=r"cuda: no driver of a GPU of NVIDIA: expected libno_gpu\.so\.1$"):
+        chosen("cuda", False, first)
+
+
+def test_what_the_driver_says_is_said(gpu: Gpu) -> None:
+    with pytest.raises(QuadcosimError, match=r"^cuModuleLoadData: not found \(500\)$"):
+        gpu.kernel(b"no image", "fly")
