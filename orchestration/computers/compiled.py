@@ -33,6 +33,8 @@ from orchestration.computers.parts import (
 from orchestration.computers.scheduler import Scheduler
 
 SOURCE = Path(__file__).with_name("scheduler.c")
+_NO_MEMORY = -1
+"""What C gives in place of a number of notes"""
 _ROOM = 4096
 """Notes that C keeps until Python takes them"""
 _TABLES: dict[str, tuple[str, ...]] = {
@@ -94,7 +96,7 @@ class CompiledScheduler:
     """The scheduler in C; raises `QuadcosimError` without a compiler."""
 
     def __init__(self, parts: Parts, noted: Collection[int] = NOTED) -> None:
-        self._library = _library()
+        self._library, self._parts = _library(), parts
         self._tables = tables = _tables(
             tuple(parts.processors),
             tuple(parts.tasks),
@@ -129,7 +131,9 @@ class CompiledScheduler:
     def run(self, until: int) -> None:
         """As by the one in Python."""
         noted = int(self._library.scheduler_run(self._made, until))
-        self._expect(noted >= 0)
+        self._expect(noted != _NO_MEMORY)
+        if noted < _NO_MEMORY:
+            raise self._parts.overfull(-2 - noted)
         self._notes.take(noted)
 
     def taken(self) -> Integers:

@@ -9,6 +9,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Integers
 
 NONE = -1
@@ -21,6 +22,9 @@ AT_ONCE = 512
 """Numbers that are drawn at once"""
 STAYS = -1
 """In place of how many numbers of a stream are used: it has one, for good"""
+
+MOST_WAITING = 2**20
+"""Jobs of a task, or frames of a message on a link, that may wait: 100 MB or less"""
 
 FIXED_PRIORITY, EARLIEST_DEADLINE, FIRST_COME = range(3)
 QUEUE, SKIP, ABORT = range(3)
@@ -123,6 +127,16 @@ class Parts:
     messages: Sequence[Message]
     links: Sequence[Link]
     streams: Sequence[Stream]
+    places: Sequence[str] = ()
+    """the paths of tasks, then of messages, for errors"""
+
+    def overfull(self, owner: int) -> UsageError:
+        """What is said of a task, or with a number after those of all tasks of a message, of which too many wait."""
+        place = self.places[owner] if owner < len(self.places) else str(owner)
+        if owner < len(self.tasks):
+            expected = "that it gets its processor as often, or overrun skip or abort"
+            return UsageError(f"{place}: more than {MOST_WAITING} of its jobs wait: expected {expected}")
+        return UsageError(f"{place}: more than {MOST_WAITING} of its frames wait: expected a network that carries them")
 
 
 # What is noted: rows of time, what, whose, which, and one number more.

@@ -70,6 +70,7 @@ typedef struct {
     int64_t *due, due_count;
     int64_t *busy, *line, *deadline, *arrival, *release, *instant, *hop, *slot; /* parts of due */
     int no_memory;
+    int64_t overfull; /* the task, or after all tasks the message, of which too many wait */
 } Scheduler;
 
 /* -- queues, numbers, notes ---------------------------------------------------------------------------------------- */
@@ -100,6 +101,12 @@ static void grow(Scheduler *s, Queue *q) {
             memcpy(at(q, (q)->count - 1), item, sizeof *(item));          \
         }                                                                 \
     } while (0)
+
+static int has_room(Scheduler *s, const Queue *q, int64_t owner) {
+    if (q->count < MOST_WAITING) return 1;
+    s->overfull = owner, s->no_memory = 1;
+    return 0;
+}
 
 static int64_t number(Scheduler *s, int64_t stream) {
     int64_t used = s->g.used[stream];
@@ -145,6 +152,7 @@ static void draw_slot(Scheduler *s, int64_t k) {
 
 static void queue_frame(Scheduler *s, int64_t j, Frame *frame, int64_t now) {
     frame->queued = now;
+    if (!has_room(s, &s->legs[j].frames, s->g.counts[TASKS] + LEG(j, MESSAGE))) return;
     PUSH(s, &s->legs[j].frames, frame);
     s->links[LEG(j, LINK)].changed = 1;
 }
@@ -255,6 +263,7 @@ static void let_go(Scheduler *s, int64_t i, int64_t nominal, int64_t now) {
         return;
     }
     Job job = {which, nominal, now, nominal + TASK(i, DEADLINE), execution, NONE, 0};
+    if (!has_room(s, &task->jobs, i)) return;
     PUSH(s, &task->jobs, &job);
     if (s->no_memory) return;
     note(s, now, RELEASED, i, which, nominal);
@@ -482,7 +491,7 @@ static void *zeros(Scheduler *s, int64_t count, size_t size) {
 EXPORTED Scheduler *scheduler_made(const Given *given) {
     Scheduler *s = calloc(1, sizeof(Scheduler));
     if (!s) return NULL;
-    s->g = *given;
+    s->g = *given, s->overfull = NONE;
     const int64_t *n = s->g.counts;
     s->due_count = n[PROCESSORS] + 2 * n[LINKS] + 2 * n[TASKS] + n[CARRIERS] + n[MESSAGES] + n[LEGS];
     s->tasks = zeros(s, n[TASKS], sizeof(TaskState)), s->processors = zeros(s, n[PROCESSORS], sizeof(ProcessorState));
@@ -521,11 +530,12 @@ EXPORTED int64_t scheduler_reached(Scheduler *s) {
     return due <= s->g.stop ? due : LATER;
 }
 
-/* Passes through all instants before a time, up to the end; how many notes are left to be taken, -1 without memory. */
+/* Passes through all instants before a time, up to the end; how many notes are left to be taken, -1 without memory, and
+   less where too many wait. */
 EXPORTED int64_t scheduler_run(Scheduler *s, int64_t until) {
     int64_t last = until - 1 < s->g.stop ? until - 1 : s->g.stop, now = least(s->due, s->due_count);
     while (now <= last && !s->no_memory) now = pass(s, now);
     int64_t noted = s->g.noted;
     s->g.noted = 0;
-    return s->no_memory ? -1 : noted;
+    return s->overfull != NONE ? -2 - s->overfull : s->no_memory ? -1 : noted;
 }

@@ -23,6 +23,7 @@ from orchestration.computers.parts import (
     FIXED_PRIORITY,
     INTERRUPTED,
     LATER,
+    MOST_WAITING,
     NONE,
     NOTED,
     PASSED,
@@ -315,6 +316,8 @@ class Scheduler:
             self._note(now, SKIPPED, i, number, nominal)
             return
         job = _Job(number, nominal, now, nominal + task.part.deadline, execution)
+        if len(task.jobs) == MOST_WAITING:
+            raise self._parts.overfull(i)
         task.jobs.append(job)
         self._note(now, RELEASED, i, number, nominal)
         if task.part.reads_at_release and task.part.overrun != ABORT:
@@ -489,6 +492,8 @@ class Scheduler:
     def _queue(self, j: int, frame: _Frame, now: int) -> None:
         leg = self._legs[j]
         frame.queued = now
+        if len(leg.frames) == MOST_WAITING:
+            raise self._parts.overfull(len(self._tasks) + leg.message)
         leg.frames.append(frame)
         self._links[leg.part.link].changed = True
 

@@ -116,7 +116,9 @@ class Resources:
             messages=tuple(self._message(each) for each in self._over),
             links=tuple(self._links),
             streams=(),
-        )
+            places=[*(each.place for each in placed), *(f"components.{name}" for name in self._alone),
+                    *(each.place for each in self._over)],
+        )  # fmt: skip
         """without the streams, which are of a run"""
         self._names = Names(
             processors=[*system.computers, *self._alone],

@@ -1,14 +1,19 @@
 """What becomes of tasks and messages of a system: kinds of networks, arrivals by chance, numbers from their streams."""
 
 import math
+import re
 
 import numpy as np
+import pytest
 
+from orchestration.basics.errors import UsageError
+from orchestration.computers.scheduler import Scheduler
 from orchestration.schedule.resources import timeline_of
 from orchestration.schedule.streams import Streams
 from orchestration.system.computers import Arrivals, Computer, Message, Network, Task
 from orchestration.system.distribution import Distribution
 from orchestration.system.model import System
+from tests.orchestration.fmi.small import needs_compiler
 
 MS = 1_000_000
 
@@ -90,3 +95,31 @@ def test_attempt_n_takes_number_n():
     assert frames["n.m"].attempts.tolist() == attempts
     durations = (frames["n.m"].ended - frames["n.m"].started)[:-1]
     assert durations.tolist() == [270_000 + (each - 1) * (135 + 31) * 2000 for each in attempts][:-1]
+
+
+STARVED = {"all": Task(period=0.001, execution=0.001), "none": Task(period=1e-8, priority=2, execution=0.001)}
+JAMMED = {"all": Message(period=0.001, bytes=1, identifier=0), "none": Message(period=1e-8, bytes=1, identifier=1)}
+
+
+@pytest.mark.parametrize("in_c", [pytest.param(True, marks=needs_compiler), False])
+@pytest.mark.parametrize(
+    ("system", "line"),
+    [
+        (
+            System(stop_time=1.0, computers={"c": Computer(tasks=STARVED)}),
+            "computers.c.tasks.none: more than 1048576 of its jobs wait: expected that it gets its processor",
+        ),
+        (
+            System(stop_time=1.0, networks={"n": Network(kind="can", bit_rate=6e4, messages=JAMMED)}),
+            "networks.n.messages.none: more than 1048576 of its frames wait: expected a network that carries them",
+        ),
+    ],
+)
+def test_what_waits_more_and_more_is_said_before_it_takes_all_memory(
+    monkeypatch: pytest.MonkeyPatch, system: System, line: str, in_c: bool
+) -> None:
+    if not in_c:
+        monkeypatch.setattr("orchestration.schedule.resources.scheduler", Scheduler)
+        monkeypatch.setattr("orchestration.computers.scheduler.MOST_WAITING", 100)
+    with pytest.raises(UsageError, match=f"^{re.escape(line)}"):
+        timeline_of(system)
