@@ -9,7 +9,6 @@ from orchestration.basics.extras import explained
 from orchestration.results import html
 from orchestration.studies.store import open_for_reading
 from orchestration.studies.study import Study
-from orchestration.studies.table import dataset, frame, units_in
 from orchestration.workers.batching import Agreement
 
 if TYPE_CHECKING:
@@ -70,6 +69,8 @@ class Swept:
     @explained
     def to_pandas(self) -> "pd.DataFrame":
         """A row for each run: axes, metrics, seed, status; units are in its `attrs["units"]`, by column."""
+        from orchestration.studies.table import frame, units_in
+
         table = frame(self.path)
         table.attrs["units"] = units_in(self.path)
         return table
@@ -77,4 +78,6 @@ class Swept:
     @explained
     def to_xarray(self) -> "xr.Dataset":
         """The metrics over the axes, with units as attributes; raises `UsageError` if some axis is sampled."""
+        from orchestration.studies.table import dataset
+
         return dataset(self.path)

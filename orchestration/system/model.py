@@ -491,9 +491,9 @@ class System:
         object.__setattr__(self, "components", components)
         _require_names("connections", (x.name for x in self.connections))
         _require_names("objectives", self.objectives)
+        causes = self._causes()
         for place, number in self.streams.items():
-            known = ", ".join(self._causes()) or "none"
-            require(place in self._causes(), "streams", place, f"one of {known}")
+            require(place in causes, "streams", place, f"one of {', '.join(causes) or 'none'}")
             require(number >= 0, f"streams.{place}", number, "a number from 0 on")
         for name in self.sources:
             require(name not in self.components, f"sources.{name}", name, "another name than a component's")
@@ -540,10 +540,10 @@ def _few(names: list[str], most: int = 6) -> list[str]:
 
 def _require_names(table: str, names: Iterable[str], without: str = "") -> None:
     """Names are parts of paths and of messages of one line."""
-    expected = "a name in printable characters" + (" without a dot" if without else "")
     for name in names:
-        fits = name.isprintable() and name == name.strip() != "" and not (without and without in name)
-        require(fits, table, name.encode("unicode_escape").decode(), expected)
+        if not (name.isprintable() and name == name.strip() != "" and not (without and without in name)):
+            expected = "a name in printable characters" + (" without a dot" if without else "")
+            require(False, table, name.encode("unicode_escape").decode(), expected)
 
 
 def expressions(system: System) -> list[tuple[str, str]]:

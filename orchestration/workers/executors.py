@@ -1,6 +1,5 @@
 """Runs tasks in worker processes, here or on a dask cluster, and yields the outcomes as they come."""
 
-import asyncio
 import atexit
 import concurrent.futures
 import re
@@ -115,6 +114,8 @@ def cluster(inputs: Inputs, address: str) -> Iterator[Fly]:
     Raises `QuadcosimError` if the scheduler cannot be reached or has no workers, or for what is not a run's own
     failure.
     """
+    import asyncio
+
     import distributed
 
     with ExitStack() as stack:
