@@ -1,6 +1,7 @@
 """A GPU of NVIDIA by its driver: memory that both sides find at the same addresses, kernels, and what starts them."""
 
 import ctypes
+import time
 from functools import cached_property
 from typing import Any
 
@@ -26,6 +27,8 @@ class Gpu:
             self._library: Any = ctypes.CDLL(LIBRARY)
         except OSError as error:
             raise QuadcosimError(f"no driver of a GPU of NVIDIA: expected {LIBRARY}") from error
+        self.busy = 0.0
+        """[s] that kernels have taken, from their start to their end"""
         self._device, self._context = ctypes.c_int(), ctypes.c_void_p()
         self._call("cuInit", 0)
         self._call("cuDeviceGet", ctypes.byref(self._device), 0)
@@ -58,8 +61,10 @@ class Gpu:
         given = [ctypes.c_int64(number) for number in numbers]
         addresses = (ctypes.c_void_p * len(given))(*map(ctypes.addressof, given))
         blocks = -(-threads // _THREADS)
+        begin = time.perf_counter()
         self._call("cuLaunchKernel", kernel, blocks, 1, 1, _THREADS, 1, 1, 0, None, addresses, None)
         self._call("cuCtxSynchronize")
+        self.busy += time.perf_counter() - begin
 
     def allocate(self, size: int) -> int:
         """Memory that it shares with this process."""

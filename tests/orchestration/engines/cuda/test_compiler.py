@@ -1,26 +1,43 @@
-"""What straight lines take of a GPU's processor, by the compiler that makes them for it: no GPU is needed."""
+"""What the text of CUDA takes of a GPU's processor, by the compiler for it: no GPU is needed."""
+
+from collections.abc import Mapping
+from pathlib import Path
 
 import pytest
 
 from orchestration.basics.errors import QuadcosimError
 from orchestration.engines.batch.batch import Batch
-from orchestration.engines.cuda import compiler
-from orchestration.engines.cuda.compiler import image
-from orchestration.engines.cuda.program import Code, line
+from orchestration.engines.cuda.compiler import Taken, image
+from orchestration.engines.cuda.program import Code, line, program
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.schedule.schedule_cache import ScheduleCache
+from orchestration.system.system_file import load_system
 from tests.orchestration.engines.batch.lanes import group_of, located, shape_of
 from tests.orchestration.fmi.small import needs_compiler
 
 MOST = {"plant": 168, "controller": 255}
-"""Registers of a thread: three blocks of 128 threads in the 65,536 of a processor, and as many as a thread may have"""
+"""Registers of a thread: of 65,536 in a processor, for 384 threads, and for 256, which have as many as there can be"""
+LOOP = 128
+"""And of the loop, without the steps of components: for 512"""
 ARCHITECTURE = "sm_90"
+EXAMPLE = Path(__file__).parents[4] / "examples" / "double_integrator" / "system.toml"
+
+
+@pytest.fixture(autouse=True)
+def _nvrtc() -> None:
+    pytest.importorskip("nvidia.cuda_nvrtc", reason="no NVRTC: pip install 'quadcosim[cuda]'")
+
+
+def assert_it_spills_nothing(taken: Mapping[str, Taken], kernel: str, most: int) -> None:
+    assert sum(each.spilled for each in taken.values()) == 0
+    registers = taken[kernel].registers
+    assert registers is not None
+    assert registers <= most
 
 
 @needs_compiler
 @pytest.mark.parametrize("component", MOST)
 def test_a_line_with_the_numbers_of_a_study_spills_nothing(component: str) -> None:
-    pytest.importorskip("nvidia.cuda_nvrtc", reason="no NVRTC: pip install 'quadcosim[cuda]'")
     flight = located(Scenario(stop_time=0.1).as_system())
     shape = shape_of(flight)
     batch = Batch(shape, ScheduleCache())
@@ -28,25 +45,18 @@ def test_a_line_with_the_numbers_of_a_study_spills_nothing(component: str) -> No
     code = Code.of(component, shape.models[component])
     memory = batch.memories[shape.names.index(component)]
     known = {name: float(memory[place, 0]) for name, place in code.constant.items()}
-    taken = image(line(code, known, shape.lanes), ARCHITECTURE).taken
-    assert sum(each.spilled for each in taken.values()) == 0
-    assert taken["line"].registers is not None
-    assert taken["line"].registers <= MOST[component]
+    made = image(line(code, known, shape.lanes), ARCHITECTURE)
+    assert_it_spills_nothing(made.taken, "line", MOST[component])
+
+
+@needs_compiler
+def test_the_loop_around_small_components_spills_nothing() -> None:
+    shape = shape_of(located(load_system(EXAMPLE)))
+    codes = {name: Code.of(name, model) for name, model in shape.models.items()}
+    made = image(program(shape, codes, {name: {} for name in codes}), ARCHITECTURE)
+    assert_it_spills_nothing(made.taken, "fly", LOOP)
 
 
 def test_what_is_wrong_with_a_text_is_said_in_a_line() -> None:
-    pytest.importorskip("nvidia.cuda_nvrtc", reason="no NVRTC: pip install 'quadcosim[cuda]'")
     with pytest.raises(QuadcosimError, match=r"^CUDA for sm_90: .*identifier \"x\" is undefined$"):
         image("static double y = x;", ARCHITECTURE)
-
-
-def test_without_a_compiler_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    compiler._library.cache_clear()
-    try:
-        with pytest.raises(
-            QuadcosimError, match=r"^NVRTC is not installed; this needs: pip install 'quadcosim\[cuda\]'$"
-        ):
-            compiler.expect_compiler()
-    finally:
-        compiler._library.cache_clear()

@@ -6,11 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from orchestration.basics.errors import QuadcosimError
+from orchestration.engines.batch import batch
 from orchestration.engines.batch.batch import Batch, BatchResult
 from orchestration.engines.batch.shape import Shape
 from orchestration.engines.cuda import fleet
 from orchestration.engines.cuda.driver import Gpu
-from orchestration.engines.cuda.fleet import Fleet
+from orchestration.engines.cuda.fleet import Fleet, expect_gpu
 from orchestration.engines.structures import structures
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
@@ -65,6 +67,18 @@ def test_flights_of_any_timing_that_end_in_any_way(gpu: Gpu, monkeypatch: pytest
     found = assert_the_same(Fleet(shape, ScheduleCache(), gpu), shape, crowd, count=shape.lanes)
     outcomes = [int(outcome) for each in found for outcome in each.outcome][shape.lanes :]
     assert outcomes == [c.DIVERGED, c.REFUSED, c.FAILED, c.RUNNING, c.RUNNING]
+
+
+def test_a_gpu_has_the_bits_of_lanes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(batch, "MOST_ROWS", 2**12)
+    try:
+        expect_gpu()
+    except QuadcosimError as error:
+        pytest.skip(str(error))
+    late = located(Scenario(timing=LATE, stop_time=1.0).as_system())
+    shape = shape_of(late)
+    crowd = [changed(late, {"seed": seed, MASS: 1.0 + seed / 1000}) for seed in range(40 * shape.lanes + 1)]
+    assert_the_same(Fleet(shape, ScheduleCache(), Gpu()), shape, crowd, count=shape.lanes)
 
 
 def test_connections_of_every_kind_and_every_function_with_numbers_that_are_known_no_longer(gpu: Gpu) -> None:

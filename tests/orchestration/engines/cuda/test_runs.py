@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from orchestration.basics.errors import QuadcosimError
-from orchestration.engines.cuda import driver, fleet
+from orchestration.engines.cuda import compiler, driver, fleet
 from orchestration.engines.cuda.driver import Gpu
 from orchestration.workers.choice import chosen
 from orchestration.workers.pool import Supervisor
@@ -48,3 +48,15 @@ def test_without_a_driver_it_is_said_what_is_missing(monkeypatch: pytest.MonkeyP
 def test_what_the_driver_says_is_said(gpu: Gpu) -> None:
     with pytest.raises(QuadcosimError, match=r"^cuModuleLoadData: not found \(500\)$"):
         gpu.kernel(b"no image", "fly")
+
+
+def test_without_a_compiler_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    compiler._library.cache_clear()
+    try:
+        with pytest.raises(
+            QuadcosimError, match=r"^NVRTC is not installed; this needs: pip install 'quadcosim\[cuda\]'$"
+        ):
+            compiler.expect_compiler()
+    finally:
+        compiler._library.cache_clear()

@@ -1,0 +1,75 @@
+"""What flights cost in threads of a GPU: `python -m benchmarks.cuda`; without one it says what is missing.
+
+Wall time of the GPU, the smallest of several repetitions, from the start of a kernel to its end: the flights are ready
+before, and what that takes of one core is told beside. First the smaller crowd is flown in lanes too: its flights have
+to be the same to the bit.
+"""
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from benchmarks.batch import CASES, X, systems
+from orchestration.basics.errors import QuadcosimError
+from orchestration.engines.batch.batch import Batch, BatchResult, Group
+from orchestration.engines.cuda.driver import Gpu
+from orchestration.engines.cuda.fleet import Fleet, expect_gpu
+from orchestration.schedule.schedule_cache import ScheduleCache, timing
+from orchestration.system.model import System
+from orchestration.system.paths import changed
+
+REPETITIONS = 3
+CROWDS = (2**12, 2**15)
+"""Flights at once"""
+STOP_TIME = 2.0
+"""[s]"""
+
+
+def groups(one: System, count: int, lanes: int) -> list[Group]:
+    """The flight from so many places."""
+    crowd = [changed(one, {X: place}) for place in np.linspace(0.0, 1.0, count).tolist()]
+    some = (crowd[i : i + lanes] for i in range(0, count, lanes))
+    return [Group(systems=each, timings=[timing(system) for system in each]) for each in some]
+
+
+def expect_same(by_threads: Sequence[BatchResult], in_lanes: Sequence[BatchResult]) -> None:
+    """Raise `AssertionError` for objectives that differ in a bit."""
+    for one, other in zip(by_threads, in_lanes, strict=True):
+        assert one.outcome.tolist() == other.outcome.tolist()
+        for call, values in other.reductions.items():
+            assert one.reductions[call].tobytes() == values.tobytes(), call
+
+
+def main() -> None:
+    """Print steps a second, by timing and number of flights."""
+    try:
+        expect_gpu()
+    except QuadcosimError as error:
+        print(f"not timed: {error}")
+        return
+    gpu = Gpu()
+    print(f"{gpu.name}, {gpu.architecture}; the smallest of {REPETITIONS}")
+    for case, (period, _) in CASES.items():
+        shape, (one, *_) = systems(period, STOP_TIME)
+        fleet = Fleet(shape, ScheduleCache(), gpu)
+        for count in CROWDS:
+            asked = groups(one, count, shape.lanes)
+            found = [result for _, result in fleet.run(asked)]
+            if count == CROWDS[0]:
+                expect_same(found, [result for _, result in Batch(shape, ScheduleCache()).each(asked, None)])
+            took = []
+            for _ in range(REPETITIONS):
+                begin, before = time.perf_counter(), gpu.busy
+                fleet.run(asked)
+                took.append((gpu.busy - before, time.perf_counter() - begin))
+            kernel, whole = min(took)
+            steps = sum(int(result.steps.sum()) for result in found)
+            print(
+                f"{case:<14} {count:6d} flights   {1e-6 * steps / kernel:8.1f} M steps/s   {kernel:6.3f} s, and "
+                f"{whole - kernel:5.1f} s of a core to make them ready and to sum them up"
+            )
+
+
+if __name__ == "__main__":
+    main()
