@@ -1,8 +1,9 @@
-"""What flights cost in threads of a GPU: `python -m benchmarks.cuda`; without one it says what is missing.
+"""What flights take of a GPU, and cost in its threads: `python -m benchmarks.cuda`; without one only the former.
 
-Wall time of the GPU, the smallest of several repetitions, from the start of a kernel to its end: the flights are ready
-before, and what that takes of one core is told beside. First the smaller crowd is flown in lanes too: its flights have
-to be the same to the bit.
+First what NVRTC says of the straight lines of plant and law, with and without the numbers of the paper's flight. Then
+wall time of the GPU, the smallest of several repetitions, from the start of a kernel to its end: the flights are ready
+before, and what that takes of one core is told beside. The smaller crowd is flown in lanes too: its flights have to be
+the same to the bit.
 """
 
 import time
@@ -13,8 +14,10 @@ import numpy as np
 from benchmarks.batch import CASES, X, systems
 from orchestration.basics.errors import QuadcosimError
 from orchestration.engines.batch.batch import Batch, BatchResult, Group
+from orchestration.engines.cuda.compiler import image
 from orchestration.engines.cuda.driver import Gpu
 from orchestration.engines.cuda.fleet import Fleet, expect_gpu
+from orchestration.engines.cuda.program import Code, line
 from orchestration.schedule.schedule_cache import ScheduleCache, timing
 from orchestration.system.model import System
 from orchestration.system.paths import changed
@@ -22,6 +25,8 @@ from orchestration.system.paths import changed
 REPETITIONS = 3
 CROWDS = (2**12, 2**15)
 """Flights at once"""
+ARCHITECTURE = "sm_90"
+"""Of which registers are told"""
 STOP_TIME = 2.0
 """[s]"""
 
@@ -41,8 +46,29 @@ def expect_same(by_threads: Sequence[BatchResult], in_lanes: Sequence[BatchResul
             assert one.reductions[call].tobytes() == values.tobytes(), call
 
 
+def taken(architecture: str) -> None:
+    """Print what straight lines take of a processor."""
+    shape, (one, *_) = systems(0.01, STOP_TIME)
+    batch = Batch(shape, ScheduleCache())
+    next(batch.going(Group(systems=[one], timings=[timing(one)])))
+    for (name, model), memory in zip(shape.models.items(), batch.memories):
+        code = Code.of(name, model)
+        numbers = {place: float(memory[i, 0]) for place, i in code.constant.items()}
+        for what, known in (("with none", {}), (f"with {len(numbers)}", numbers)):
+            found = image(line(code, known, shape.lanes), architecture).taken
+            spilled = sum(each.spilled for each in found.values())
+            print(
+                f"{architecture}, {name} {what} of its numbers known: {found['line'].registers} registers, {spilled} "
+                "bytes spilled"
+            )
+
+
 def main() -> None:
-    """Print steps a second, by timing and number of flights."""
+    """Print registers, then steps a second, by timing and number of flights."""
+    try:
+        taken(ARCHITECTURE)
+    except QuadcosimError as error:
+        print(error)
     try:
         expect_gpu()
     except QuadcosimError as error:
