@@ -37,6 +37,7 @@ from orchestration.computers.parts import (
 from orchestration.computers.results import Timeline
 from orchestration.computers.timeline import NEEDED, Names, timeline
 from orchestration.schedule.drawing import times
+from orchestration.schedule.longest import expect_no_longer
 from orchestration.schedule.message_times import lateness, losses
 from orchestration.schedule.streams import ARRIVALS, DELAY, DELAY_JITTER, ERROR, EXECUTION, JITTER, LOSS, Streams
 from orchestration.system.computers import Arrivals
@@ -343,5 +344,6 @@ def _by_chance(start: int, rate: float, generator: np.random.Generator) -> Strea
 
 
 def timeline_of(system: System) -> Timeline:
-    """What becomes of the tasks and messages of a system up to its end."""
+    """What becomes of the tasks and messages of a system up to its end; raises `UsageError` for times beyond all."""
+    expect_no_longer(system)
     return Resources(system, nanoseconds(system.stop_time)).timeline(Streams(system.seed, system.streams))

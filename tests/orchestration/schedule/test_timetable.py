@@ -8,7 +8,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.schedule import cursor
 from orchestration.schedule.cursor import Cursor
 from orchestration.schedule.fixed_step import FixedStep
-from orchestration.schedule.frame import LONGEST
+from orchestration.schedule.longest import LONGEST
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
 from orchestration.system.model import Source
