@@ -134,6 +134,7 @@ def _expect_key(path: str, table: str, system: System, name: str, key: str) -> N
         keys += ["noise", "quantisation", "noise.VARIABLE", "quantisation.VARIABLE"]
         known = key in keys or key.partition(".")[0] in ("noise", "quantisation")
     elif table in SHARED:
+        _expect_part(path, f"{table}.{name}", getattr(system, table)[name], key)
         keys, known = _keys_of_parts(getattr(system, table)[name], key)
     else:
         keys = [f.name for f in dataclasses.fields(Source)] + ["parameters.NAME"]
@@ -150,6 +151,17 @@ def _keys_of_stepping(component: Component) -> list[str]:
     if isinstance(component.sampling, SamplingOnArrival):
         return ["sampling.on", "sampling.clock_ratio"]
     return ["step"] if component.sampling is None else [f"sampling.{f.name}" for f in dataclasses.fields(Sampling)]
+
+
+def _expect_part(path: str, place: str, of: Computer | Network, key: str) -> None:
+    """Raise `UsageError` for a task or a message that there is not, naming those that there are."""
+    parts, _, rest = key.partition(".")
+    if not rest or parts != SHARED[place.partition(".")[0]][0]:
+        return
+    known, name = [*getattr(of, parts)], rest.partition(".")[0]
+    if name not in known:
+        listed = f"{place}.{parts}.NAME.KEY with NAME one of {', '.join(known) or '(there is none)'}"
+        raise UsageError(f"{path}: expected {listed}{did_you_mean(name, known)}")
 
 
 _WHOLE = (".priority", ".bytes", ".identifier", ".slot")

@@ -125,3 +125,11 @@ def test_a_range_and_the_command_line_mean_whole_seeds_and_files() -> None:
     file = {"sources.reference.trajectory": None, "sources.reference.file": "path.csv"}
     found = changed(quadrotor(), {"seed": 3.0, **file})
     assert (repr(found.seed), found.sources["reference"].file) == ("3", Path("path.csv"))
+
+
+def test_a_task_that_there_is_not_is_told_with_those_there_are() -> None:
+    load = System(stop_time=1.0, computers={"c": Computer(tasks={"radio": Task(period=0.01)})})
+    expected = "expected computers.c.tasks.NAME.KEY with NAME one of radio; did you mean radio?"
+    with pytest.raises(UsageError) as refused:
+        changed(load, {"computers.c.tasks.radi.period": 1.0})
+    assert str(refused.value) == f"computers.c.tasks.radi.period: {expected}"
