@@ -11,6 +11,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.basics.terminal import say
 from orchestration.command import registry as registering
 from orchestration.command.answer import Answer
+from orchestration.command.flags import assigned
 from orchestration.figures.names import FORMATS
 
 if TYPE_CHECKING:
@@ -38,6 +39,11 @@ def schedule(
         float | None, typer.Option("--from", help="Start of what is drawn, in seconds.", show_default=False)
     ] = None,
     end: Annotated[float | None, typer.Option("--to", help="End of what is drawn.", show_default=False)] = None,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="A value by its path, as computers.NAME.scheduling=V; may be repeated.",
+                     metavar="PATH=V", show_default=False),
+    ] = None,
 ) -> Answer:  # fmt: skip
     """Show who has the computers and networks of a system when: response times, missed deadlines, bounds of theory."""
     if until is not None and not 0.0 < until < float("inf"):
@@ -45,8 +51,11 @@ def schedule(
     if out is not None and out.suffix[1:] not in FORMATS:
         raise UsageError(f"--out {out}: expected a figure ending in one of {', '.join(FORMATS)}")
     from orchestration.runs import scheduling
+    from orchestration.system.paths import changed
+    from orchestration.system.request import system_meant
 
-    found = scheduling.schedule(system, until)
+    request = scheduling.asked_until(system, until)
+    found = scheduling.schedule(changed(system_meant(request), assigned("set", changes)))
     if out is not None:
         say(str(_drawn(found, out, start, end)))
     document = {

@@ -100,7 +100,7 @@ def usual_quantity(request: Request) -> str:
     components = system_meant(request).components.items()
     sampled = [(name, each.sampling) for name, each in components if each.sampling is not None]
     owners = [one.task if isinstance(one, TaskSampling) else f"components.{name}.sampling" for name, one in sampled]
-    paths = [f"{owner}.{PERIOD}" for owner in owners]
+    paths = [path for owner in owners if value_at(system_meant(request), path := f"{owner}.{PERIOD}") is not None]
     if len(paths) != 1:
         listed = f", one of {', '.join(paths)}" if paths else ""
         raise UsageError(f"--of: expected a path, as connections.NAME.delay{listed}")

@@ -51,7 +51,7 @@ def schedule(asked: Asked, until: float | None = None) -> Scheduled:
 
     Raises `UsageError` for a system without computers and networks.
     """
-    system = system_meant(_until(asked, until))
+    system = system_meant(asked_until(asked, until))
     if not (system.computers or system.networks):
         raise UsageError("computers: none, and no networks: expected at least one of them to schedule")
     timeline = timeline_of(system)
@@ -61,7 +61,7 @@ def schedule(asked: Asked, until: float | None = None) -> Scheduled:
     )
 
 
-def _until(asked: Asked, until: float | None) -> Request:
+def asked_until(asked: Asked, until: float | None) -> Request:
     """What is asked for, up to a time: a file that is only for this needs no end of its own."""
     if until is None:
         return asked_for(asked)

@@ -6,11 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from orchestration.basics.errors import UsageError
 from orchestration.computers.results import Timeline
 from orchestration.figures import gantt
 from orchestration.figures.run import Run, Window
 from orchestration.figures.style import SCREEN
 from orchestration.recording.recording import InMemory
+from orchestration.requests.ranges import usual_quantity
 from orchestration.system.model import System
 from orchestration.system.system_file import load_system
 from quadcosim import schedule
@@ -135,3 +137,16 @@ def test_a_chart_of_a_run_is_of_its_window() -> None:
     assert figure is not None
     assert {axes.get_xlim() for axes in figure.axes} == {(20.0, 40.0)}
     assert gantt.chart([run_of(of), run_of(of)], SCREEN) is None
+
+
+def test_values_of_the_system_are_changed_by_their_paths(main: Main, file: Path) -> None:
+    changes = ("--set", "computers.cpu.tasks.telemetry.execution=0.002", "--set", "computers.cpu.switch=0")
+    found = json.loads(main("schedule", file, "--until", "1", "--json", *changes).stdout)["tasks"]["cpu.telemetry"]
+    assert found["response"]["max"] == 0.003
+    line = main("schedule", file, "--until", "1", "--set", "computers.cpu.switch=1e300", code=2).stderr
+    assert line == "quadcosim: computers.cpu.switch = 1e+300 s: expected less than 1.153e+09 s\n"
+
+
+def test_the_period_of_a_task_that_messages_release_is_no_usual_quantity() -> None:
+    with pytest.raises(UsageError, match=r"of: expected a path, as connections\.NAME\.delay$"):
+        usual_quantity(load_system(EXAMPLES / "three_servos" / "can.toml"))
