@@ -491,7 +491,7 @@ BEHAVIOUR = (
         versions=(2,),
     ),
     Mutant(
-        name="step without end", rule="process", words=("limit of 8 s; a call does not return",), time_limit=8.0,
+        name="step without end", rule="process", words=("limit of 4 s; a call does not return",), time_limit=4.0,
         damage=source("plant_fmu/slave.py", _STEP, f"__import__('time').sleep(1e6)\n        {_STEP}"),
         versions=(2,),
     ),

@@ -268,15 +268,15 @@ def test_a_limited_child_that_is_no_longer_known_ends() -> None:
 
 def test_what_a_child_may_take_counts_from_when_it_is_allowed(child: Callable[..., Child]) -> None:
     one = child("import time\nfor seconds in parent: time.sleep(seconds); parent.say(seconds)", memory=1e6)
-    one.say(3.0)
-    assert one.hear() == 3.0
-    one.allow(2.0)
+    one.say(1.5)
+    assert one.hear() == 1.5
+    one.allow(1.0)
     one.say(0.0)
     assert one.hear() == 0.0
     one.say(600.0)
     with pytest.raises(Died) as death:
         one.hear()
-    assert death.value.ending.reached == "it takes more than the time limit of 2 s"
+    assert death.value.ending.reached == "it takes more than the time limit of 1 s"
 
 
 NESTED = """
