@@ -14,11 +14,11 @@ STOP = 600
 
 
 def task_set(random):
-    """Whole numbers: execution, period and offset of some tasks, at most as much as a processor can do."""
+    """Whole numbers: execution, period and offset of some tasks, half as much again as a processor can do at most."""
     count = int(random.integers(2, 7))
-    shares = random.dirichlet(np.ones(count)) * random.uniform(0.4, 1.0)
+    shares = random.dirichlet(np.ones(count)) * random.uniform(0.4, 1.5)
     periods = random.integers(4, 60, count)
-    executions = np.maximum((shares * periods).astype(int), 1)
+    executions = np.clip((shares * periods).astype(int), 1, periods)
     return [(int(c), int(t), int(random.integers(0, t))) for c, t in zip(executions, periods)]
 
 
