@@ -8,6 +8,9 @@ import numpy as np
 
 from orchestration.basics.simulator import Floats
 
+ALL = 1.001
+"""No coordinate of a y with |y| ≤ 1 is larger, whatever rounding adds to it."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Boxes:
@@ -39,8 +42,8 @@ class Boxes:
 
 
 def outside(inner: float, size: int) -> Boxes:
-    """Boxes that cover the |y| ≤ 1.001 with a first coordinate above 0, but for where no coordinate is above `inner`."""
-    layers, edge = [], 1.001
+    """Boxes that cover the |y| ≤ 1 with a first coordinate above 0 and some coordinate above `inner`."""
+    layers, edge = [Boxes(centre=np.zeros((size, 0)), radius=np.zeros((size, 0)))], ALL
     while edge > inner:
         radius = edge / 4
         steps = [np.array([1.0, 3.0]), *[np.array([-3.0, -1.0, 1.0, 3.0])] * (size - 1)]

@@ -76,7 +76,7 @@ def _forms(certificate: Certificate) -> dict[Node, arb_mat]:
         if not (form == form.T).all():
             raise NotProven(f"the form of mode {node[0]} and word {list(node[1])} is not symmetric")
         found[node] = arb_mat(form.tolist())
-        if not _is_positive(found[node]):
+        if not is_positive(found[node]):
             raise NotProven(f"the form of mode {node[0]} and word {list(node[1])} is not positive definite")
     return found
 
@@ -93,7 +93,7 @@ def _expect_fall(edge: tuple[Node, Node, int], forms: dict[Node, arb_mat], enclo
     start, end, label = edge
     for box, corners in enclosures.of(label):
         for M in corners:
-            if not _is_positive(forms[start] - M.transpose() * forms[end] * M):
+            if not is_positive(forms[start] - M.transpose() * forms[end] * M):
                 raise NotProven(f"the form does not fall for {_said(enclosures.letter_of(label), box)}")
 
 
@@ -190,7 +190,7 @@ def _widened(M: arb_mat, by: arb_mat) -> arb_mat:
     return arb_mat([[x + arb(0, y.abs_upper()) for x, y in zip(p, q)] for p, q in rows])
 
 
-def _is_positive(Q: arb_mat) -> bool:
+def is_positive(Q: arb_mat) -> bool:
     """Whether every symmetric matrix in `Q` is positive definite: its Cholesky factor exists, in intervals."""
     rows, lower = Q.tolist(), list[list[arb]]()
     for i, row in enumerate(rows):

@@ -1,18 +1,29 @@
 """The enclosures of a period hold what a period is; what is proved is right, and what is wrong is not proved."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from flint import arb, ctx
 
-from docs.lateral_basin.boxes import Boxes
+from controller_fmu.sliding_mode.law import Gains
+from docs.lateral_basin.__main__ import flown, main
+from docs.lateral_basin.boxes import ALL, Boxes, outside
 from docs.lateral_basin.centred import OPS, Centred
 from docs.lateral_basin.intervals import Intervals, OutOfReachError
-from docs.lateral_basin.period import Loop
+from docs.lateral_basin.kept import keep, kept
+from docs.lateral_basin.period import STATES, Loop
+from docs.lateral_basin.proof import Fall, NotProven, prove, refused_from, shown
+from docs.lateral_basin.search import found
 from fmu_kit.scalar import FLOAT
+from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
+from orchestration.certificates.checker import is_positive
 
+PERIODS = (0.01, 0.04)
+"""[s], of which the page has a proof"""
 SIZES = np.array([0.2, 0.5, 0.5, 8.0, 0.2, 0.5])[:, None]
 STEP, LEAST = 1e-3, 1e-11
 """Runge-Kutta steps, which the enclosures are held against, and what they may be wrong by"""
@@ -102,3 +113,102 @@ def test_a_mirrored_motion_is_the_mirror_of_the_motion() -> None:
     loop, mirror = Loop(period=0.01), np.array([-1.0, -1.0, -1.0, -1.0, 1.0, 1.0])[:, None]
     at = boxes(200, 0.0).centre
     assert loop.after(mirror * at) == pytest.approx(mirror * loop.after(at), rel=0.0, abs=1e-15)
+
+
+@pytest.mark.parametrize("period", PERIODS)
+def test_the_form_that_is_kept_falls_over_boxes_here_and_there(period: float) -> None:
+    """Some of those of which the proof is made; about rest, for all that the law may be there."""
+    fall, generator = Fall(Loop(period=period), kept(period)), np.random.default_rng(5)
+    direction = generator.standard_normal((6, 1500))
+    size = generator.uniform(0.02, 0.97, 1500)
+    centre = size * direction / np.linalg.norm(direction, axis=0)
+    assert (fall.over(Boxes(centre=centre, radius=np.full((6, 1), 0.005) * size)).anywhere.high < 0.0).all()
+    assert is_positive(-fall.matrix(0.004))
+
+
+@pytest.mark.parametrize("period", PERIODS)
+def test_flights_from_its_edge_come_to_rest_and_stay_in_it(period: float) -> None:
+    loop, R, direction = Loop(period=period), kept(period), np.random.default_rng(6).standard_normal((6, 500))
+    state = np.linalg.solve(R, direction / np.linalg.norm(direction, axis=0))
+    before = np.ones(500)
+    for _ in range(round(6.0 / period)):
+        state = loop.after(state)
+        after = ((R @ state) ** 2).sum(axis=0)
+        assert (after < before).all()
+        before = after
+    assert before.max() < 1e-4
+
+
+def test_a_small_ellipsoid_is_proved_at_once() -> None:
+    """There the law is nearly linear."""
+    assert prove(Loop(period=0.01), kept(0.01) / 0.003, 1) == 0
+
+
+@pytest.mark.parametrize("size", [0.3, 0.9])
+def test_boxes_are_halved_until_the_form_is_seen_to_fall(size: float) -> None:
+    """The law jumps in both of them."""
+    fall = Fall(Loop(period=0.01), kept(0.01))
+    box = Boxes(centre=size * np.array([[0.05, 0.4, 0.4, 0.4, 0.05, 0.4]]).T, radius=np.full((6, 1), 0.05 * size))
+    assert fall.over(box).anywhere.high > 0.0
+    assert 1 < shown(fall, box, 0.0, 20_000) < 20_000
+
+
+def test_what_is_not_so_is_not_proved() -> None:
+    loop, R = Loop(period=0.01), kept(0.01)
+    with pytest.raises(NotProven, match="the form rises from y = "):
+        prove(loop, R / 1.5, 100_000)
+    assert 1.0 < refused_from(loop, R) < 1.5
+    with pytest.raises(NotProven, match="the ellipsoid is too large: "):
+        prove(loop, R / 4.0, 100_000)
+    with pytest.raises(NotProven, match="1000 boxes do not show"):
+        prove(loop, R, 1000)
+    with pytest.raises(NotProven, match="the form rises from y = "):
+        prove(Loop(period=0.09), R / 0.01, 100_000)
+    with pytest.raises(NotProven, match="the form rises from y = "):
+        prove(replace(loop, gains=Gains(k_eta=-15.0)), R, 100_000)
+    with pytest.raises(NotProven, match="inverted"):
+        prove(loop, 1.0 + 1e-13 * R, 1)
+
+
+def test_boxes_cover_the_half_of_the_ellipsoid_but_for_the_inner_box() -> None:
+    covering, generator = outside(ALL / 8, 3), np.random.default_rng(7)
+    at = generator.uniform(-1.0, 1.0, (3, 2000))
+    at = at[:, (at[0] > 0.0) & (np.linalg.norm(at, axis=0) <= 1.0) & (np.abs(at).max(axis=0) > ALL / 8)]
+    away = np.abs(at[:, :, None] - covering.centre[:, None]) - covering.radius[:, None]
+    assert away.max(axis=0).min(axis=1).max() <= 0.0
+
+
+def test_halves_are_the_whole() -> None:
+    whole = Boxes(centre=np.array([[1.0], [2.0]]), radius=np.array([[0.5], [1.0]]))
+    below, above = whole.halved(np.array([1]))
+    assert (below.centre.ravel().tolist(), above.centre.ravel().tolist()) == ([1.0, 1.5], [1.0, 2.5])
+    assert below.radius.ravel().tolist() == above.radius.ravel().tolist() == [0.5, 0.5]
+
+
+def test_the_command_proves_what_was_kept(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    small = kept(0.01) / 0.001
+    monkeypatch.setattr("docs.lateral_basin.proof.LARGER", 1.1)
+    monkeypatch.setattr("docs.lateral_basin.kept.FILE", tmp_path / "ellipsoids.json")
+    keep(0.01, small)
+    assert (kept(0.01) == small).all()
+    main(["0.01"])
+    assert capsys.readouterr().out.startswith("0.01 s: y ")
+    with pytest.raises(UsageError, match="others are looked for"):
+        main(["0.5"])
+
+
+def test_flights_show_where_the_basin_ends_if_they_find_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("docs.lateral_basin.__main__.STARTS", 4)
+    monkeypatch.setattr("docs.lateral_basin.__main__.FLIGHT", 10.0)
+    assert np.isnan(flown(Loop(period=0.04))[STATES.index("φ")])
+    assert not np.isnan(flown(Loop(period=0.1))).any()
+
+
+def test_the_search_finds_an_ellipsoid_in_which_points_fall(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("docs.lateral_basin.search.POINTS", 200)
+    loop = Loop(period=0.01)
+    R = found(loop, 2)
+    at: Floats = np.linalg.inv(R) @ np.random.default_rng(8).standard_normal((6, 100)) / 6.0
+    assert (np.linalg.norm(R @ loop.after(at), axis=0) < np.linalg.norm(R @ at, axis=0)).all()

@@ -1,0 +1,184 @@
+"""That every start in an ellipsoid comes to rest: V(x) = |R x|² falls in each period from everywhere in V ≤ 1.
+
+Boxes are of y, with x = T y and T nearly the inverse of R, so that V is nearly |y|². Two things are proved:
+
+- In the inner box, where no coordinate of y is larger than some number, the change of V is yᵀ Q y, with Q within an
+  interval matrix, all of which is negative definite: V falls there by a share of itself.
+- In the rest of the ellipsoid V falls by more than `FALL`. Boxes of which that is not seen are halved.
+
+So V falls to 0, whatever jumps the law has. Motions to the left are those to the right seen in a mirror, so half of the
+boxes do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from contextlib import suppress
+
+import numpy as np
+from flint import arb, arb_mat
+
+from docs.lateral_basin.boxes import ALL, Boxes, outside
+from docs.lateral_basin.centred import Centred
+from docs.lateral_basin.intervals import Intervals, OutOfReachError
+from docs.lateral_basin.period import Loop
+from orchestration.basics.errors import QuadcosimError
+from orchestration.basics.simulator import Floats
+from orchestration.certificates.checker import is_positive
+
+HALVINGS = 9
+"""of the box about the ellipsoid, until the inner box is given up"""
+FALL = 1e-9
+"""of V in a period, at least: more than all that the constants of the equations are rounded by"""
+SMALLEST = 1e-5
+"""of y: boxes that are smaller are not halved any more"""
+AT_ONCE = 2048
+"""boxes in one evaluation"""
+SHORT = 0.1
+"""of the distance from 0: boxes that are as short along y or z are not halved for what the law does there"""
+LARGER = 2.0
+"""times as large an ellipsoid is looked at beside one that is proved"""
+JUMPING = (0, 4)
+"""the coordinates of y along which the law jumps: those of y and z"""
+
+
+class NotProven(QuadcosimError):
+    """The form does not fall, or not so that it is seen."""
+
+
+class Fall:
+    """Of V = |R x|² in a period of a loop."""
+
+    def __init__(self, loop: Loop, R: Floats) -> None:
+        self._loop, self._R, self._T = loop, R, np.linalg.inv(R)
+        if not np.abs(R @ self._T - np.eye(len(R))).max() < 1e-6:
+            raise NotProven("R is not a matrix that can be inverted")
+        self.edges: Floats = loop.gains.epsilon * np.diag(R)[list(JUMPING)]
+
+    def form(self, boxes: Boxes) -> Centred:
+        """V itself."""
+        state = self._state(boxes)
+        return _sum([v * v for v in (_weighted(row, state) for row in self._R)])
+
+    def over(self, boxes: Boxes) -> Centred:
+        """By how much V changes."""
+        v, dv = self._both(boxes)
+        return _sum([d * (2.0 * x + d) for x, d in zip(v, dv)])
+
+    def matrix(self, inner: float) -> arb_mat:
+        """Q: by how much V changes is yᵀ Q y, where no coordinate of y is larger than `inner`."""
+        around_zero = Boxes(centre=np.zeros((len(self._R), 1)), radius=np.full((len(self._R), 1), inner))
+        v, dv = (arb_mat([_balls(x.slopes) for x in numbers]) for numbers in self._both(around_zero))
+        return v.transpose() * dv + dv.transpose() * v + dv.transpose() * dv
+
+    def _state(self, boxes: Boxes) -> list[Centred]:
+        return [Centred.linear(row, boxes.centre, boxes.radius) for row in self._T]
+
+    def _both(self, boxes: Boxes) -> tuple[list[Centred], list[Centred]]:
+        state = self._state(boxes)
+        changes = self._loop.change(state)
+        return [_weighted(row, state) for row in self._R], [_weighted(row, changes) for row in self._R]
+
+
+def prove(loop: Loop, R: Floats, most: int) -> int:
+    """How many boxes it takes; raises `NotProven` where V rises, or where `most` boxes do not show that it falls."""
+    fall = Fall(loop, R)
+    _expect_no_rise_from_the_edge(fall, len(R))
+    inner = _inner(fall)
+    return shown(fall, outside(inner, len(R)), inner, most)
+
+
+def shown(fall: Fall, left: Boxes, inner: float, most: int) -> int:
+    """As `prove`, of what is in these boxes, in the ellipsoid and outside of the inner box."""
+    count = 0
+    while len(left):
+        boxes, left = left[-AT_ONCE:], left[:-AT_ONCE]
+        count += len(boxes)
+        boxes = boxes[fall.form(boxes).anywhere.low <= 1.0]
+        boxes = boxes[(np.abs(boxes.centre) + boxes.radius).max(axis=0) > inner]
+        if len(boxes):
+            left = left.and_(*_open(fall, boxes))
+        if count + len(left) > most:
+            raise NotProven(f"{most} boxes do not show that the form falls")
+    return count
+
+
+def refused_from(loop: Loop, R: Floats) -> float:
+    """How many times as large, in steps of a twentieth, the ellipsoid is refused at once; inf: not up to `LARGER`."""
+    for times in np.arange(1.05, LARGER, 0.05).tolist():
+        try:
+            _expect_no_rise_from_the_edge(Fall(loop, R / times), len(R))
+        except NotProven:
+            return float(times)
+    return math.inf
+
+
+def _expect_no_rise_from_the_edge(fall: Fall, size: int) -> None:
+    """From some points just inside of it: where the form rises at all, it mostly does there."""
+    at = np.random.default_rng(1).standard_normal((size, AT_ONCE))
+    edge = Boxes(centre=0.999 * at / np.linalg.norm(at, axis=0), radius=np.zeros_like(at))
+    try:
+        _expect_no_rise(fall, edge, fall.over(edge))
+    except OutOfReachError as error:
+        raise NotProven(f"the ellipsoid is too large: {error}") from None
+
+
+def _inner(fall: Fall) -> float:
+    """How large the inner box may be."""
+    for inner in (ALL * 0.5**i for i in range(HALVINGS)):
+        with suppress(OutOfReachError):
+            Q = fall.matrix(inner)
+            if is_positive(-Q - arb_mat((FALL * np.eye(Q.nrows())).tolist())):
+                return inner
+    raise NotProven(f"about rest, |y| ≤ {inner:.3g}, the form does not fall for all that the law may be there")
+
+
+def _open(fall: Fall, boxes: Boxes) -> Sequence[Boxes]:
+    """What is left to be shown, in smaller boxes."""
+    try:
+        change = fall.over(boxes)
+    except OutOfReachError:
+        return boxes.halved(np.argmax(boxes.radius, axis=0))
+    _expect_no_rise(fall, boxes, change)
+    wide = change.anywhere.high >= -FALL
+    boxes = boxes[wide]
+    if (boxes.radius.min(axis=0, initial=1.0) < SMALLEST).any():
+        raise NotProven(f"boxes of {SMALLEST:g} do not show that the form falls")
+    return boxes.halved(_longest(change.slopes[:, wide], change.values[1][wide], boxes, fall.edges))
+
+
+def _expect_no_rise(fall: Fall, boxes: Boxes, change: Centred) -> None:
+    """At the centres of boxes, if these are in the ellipsoid."""
+    rises = (change.values[1].low > 0.0) & (fall.form(boxes).values[1].high <= 1.0)
+    if rises.any():
+        raise NotProven(f"the form rises from y = {boxes.centre[:, rises][:, 0].round(3).tolist()}")
+
+
+def _longest(slopes: Intervals, centre: Intervals, boxes: Boxes, edges: Floats) -> Floats:
+    """Along which coordinate to halve: what the change of V varies most with.
+
+    If that is not what makes it uncertain, where the law jumps or bends sharply, unless boxes are short there already.
+    """
+    shares = slopes.size * boxes.radius
+    jumps = np.array(JUMPING)
+    relative = boxes.radius[jumps] / np.maximum(np.abs(boxes.centre[jumps]), edges[:, None])
+    by_jumps = (centre.high - centre.low > 2.0 * shares.sum(axis=0)) & (relative.max(axis=0) > SHORT)
+    found: Floats = np.where(by_jumps, jumps[relative.argmax(axis=0)], shares.argmax(axis=0))
+    return found
+
+
+def _weighted(weights: Floats, numbers: Sequence[Centred]) -> Centred:
+    return _sum([w * x for w, x in zip(weights.tolist(), numbers) if w])
+
+
+def _sum(numbers: Sequence[Centred]) -> Centred:
+    total = numbers[0]
+    for number in numbers[1:]:
+        total = total + number
+    return total
+
+
+def _balls(slopes: Intervals) -> list[arb]:
+    """Of the only box."""
+    return [arb(low).union(arb(high)) for low, high in zip(slopes.low[:, 0].tolist(), slopes.high[:, 0].tolist())]

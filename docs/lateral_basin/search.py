@@ -1,0 +1,95 @@
+"""Looks for a large ellipsoid in which V falls at points. What it finds is a guess: `proof` decides.
+
+The form is of two parts, of (y, vy, φ, p) and of (z, vz), which hover decouples. The first solves a Lyapunov equation
+of the linear loop, by weights that are looked for; the second is that in whose coordinates the vertical loop is a turn
+that shrinks. Sizes of both are looked for by flying a period from points.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import block_diag, solve_discrete_lyapunov
+from scipy.optimize import minimize
+
+from docs.lateral_basin.period import STATES, Loop
+from orchestration.basics.simulator import Floats
+
+POINTS = 3000
+"""directions"""
+DEPTHS = np.array([0.03, 0.06, 0.12, 0.25, 0.4, 0.55, 0.7, 0.8, 0.9, 1.0])
+"""of the points along each, as shares of the ellipsoid's"""
+STEEPEST = 1.0
+"""[rad], of roll in an ellipsoid that is looked at"""
+RATE = 0.5
+"""[1/s], at which V falls at least at every point"""
+WEIGHTS = np.log([1.0, 0.1, 0.1, 0.001])
+"""of y, vy, φ and p in the equation: where the search begins"""
+VERTICAL = np.log(0.5)
+"""size of the vertical part beside the lateral one: where the search begins"""
+
+
+def found(loop: Loop, evaluations: int) -> Floats:
+    """R of the ellipsoid |R x| ≤ 1 of largest volume that was found."""
+    directions = np.random.default_rng(1).standard_normal((6, POINTS))
+    directions /= np.linalg.norm(directions, axis=0)
+    jacobian = _jacobian(loop)
+
+    def sized(choice: Floats) -> Floats:
+        R = _shape(jacobian, choice)
+        return R / _level(loop, R, directions)
+
+    def cost(choice: Floats) -> float:
+        return float(np.linalg.slogdet(sized(choice))[1])
+
+    start = np.array([*(WEIGHTS[1:] - WEIGHTS[0]), VERTICAL])
+    simplex = np.vstack([start, start + np.diag([1.0, 1.0, 1.0, 0.5])])
+    settings = {"maxfev": evaluations, "initial_simplex": simplex, "xatol": 0.01, "fatol": 0.01}
+    best = minimize(cost, start, method="Nelder-Mead", options=settings).x
+    return sized(best)
+
+
+def _jacobian(loop: Loop) -> Floats:
+    """At hover, with k_s in the middle of what γ is from ε to 1 m."""
+    gains = loop.gains
+    middle = replace(gains, k_s=gains.k_s * (1.0 + gains.epsilon ** (gains.beta_t - 1.0)) / 2.0)
+    near = 1e-3 * gains.epsilon * np.eye(6)
+    linear = replace(loop, gains=middle)
+    found: Floats = (linear.after(near) - linear.after(-near)) / (2e-3 * gains.epsilon)
+    return found
+
+
+def _shape(jacobian: Floats, choice: Floats) -> Floats:
+    weights = np.exp(np.array([0.0, *choice[:-1]]))
+    lateral = solve_discrete_lyapunov(jacobian[:4, :4].T, np.diag(weights))
+    modes = np.linalg.inv(np.linalg.eig(jacobian[4:, 4:])[1])
+    vertical = (modes.conj().T @ modes).real
+    R: Floats = block_diag(_factor(lateral), np.exp(-choice[-1]) * _factor(vertical))
+    return R
+
+
+def _factor(P: Floats) -> Floats:
+    """Lower triangular R with Rᵀ R = P, but for its size, so that a box is as wide along y or z as its coordinate."""
+    R: Floats = np.linalg.cholesky(P[::-1, ::-1]).T[::-1, ::-1]
+    R = R / R[0, 0]
+    return R
+
+
+def _level(loop: Loop, R: Floats, directions: Floats) -> float:
+    """Up to which |R x| V falls at every point, by halving."""
+    T, low = np.linalg.inv(R), 0.0
+    high = STEEPEST / float(np.linalg.norm(T[STATES.index("φ")]))
+    for _ in range(9):
+        middle = (low + high) / 2.0
+        if _falls(loop, R, T @ (middle * directions)):
+            low = middle
+        else:
+            high = middle
+    return max(low, 1e-3 * high)
+
+
+def _falls(loop: Loop, R: Floats, edge: Floats) -> bool:
+    points = (DEPTHS[:, None, None] * edge).transpose(1, 0, 2).reshape(6, -1)
+    before, after = ((R @ x) ** 2 for x in (points, loop.after(points)))
+    return bool((after.sum(axis=0) < (1.0 - RATE * loop.period) * before.sum(axis=0)).all())
