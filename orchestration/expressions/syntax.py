@@ -6,7 +6,7 @@ import functools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from fmu_kit.syntax_trees import parsed_expression
 from orchestration.basics.errors import UsageError
@@ -45,28 +45,48 @@ class Name:
     text: str
 
 
+class _Deep:
+    """An expression with others in it, the key of many tables: its hash is found once."""
+
+    @functools.cached_property
+    def _hash(self) -> int:
+        return hash(tuple(vars(self).values()))
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __getstate__(self) -> dict[str, Any]:  # the hash of a text is another one in another process
+        return {name: value for name, value in vars(self).items() if name != "_hash"}
+
+
 @dataclass(frozen=True)
-class Operation:
+class Operation(_Deep):
     """An operator of `OPERATORS` with its operands; the sign of a number is `neg`."""
 
     sign: str
     operands: tuple["Node", ...]
 
+    __hash__ = _Deep.__hash__
+
 
 @dataclass(frozen=True)
-class Call:
+class Call(_Deep):
     """A function with its arguments."""
 
     function: str
     arguments: tuple["Node", ...]
 
+    __hash__ = _Deep.__hash__
+
 
 @dataclass(frozen=True)
-class Sampled:
+class Sampled(_Deep):
     """The values of an expression where messages of a connection arrived."""
 
     connection: str
     argument: "Node"
+
+    __hash__ = _Deep.__hash__
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """The grammar: what is part of the language, and that nothing else ever runs."""
 
 import math
+import pickle
 
 import pytest
 from hypothesis import given
@@ -105,3 +106,10 @@ def _flat(node):
     if isinstance(node, Call):
         return Call(node.function, tuple(map(_flat, node.arguments)))
     return node if not isinstance(node, Number) or not math.isnan(node.value) else Number(0.0)
+
+
+def test_the_hash_of_an_expression_is_not_taken_to_another_process_where_texts_have_others():
+    node = parse("max(norm(a, b))")
+    assert {node: 1}[parse("max(norm(a, b))")] == 1
+    there = pickle.loads(pickle.dumps(node))
+    assert (there, vars(there).keys()) == (node, {"function", "arguments"})
