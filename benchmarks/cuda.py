@@ -1,9 +1,9 @@
 """What flights take of a GPU, and cost in its threads: `python -m benchmarks.cuda`; without one only the former.
 
-First what NVRTC says of the straight lines of plant and law, with and without the numbers of the paper's flight. Then
-wall time of the GPU, the smallest of several repetitions, from the start of a kernel to its end: the flights are ready
-before, and what that takes of one core is told beside. The smaller crowd is flown in lanes too: its flights have to be
-the same to the bit.
+First what NVRTC says of the straight lines of plant and law, with and without the numbers of the paper's flight, and
+how long it takes for all of it. Then wall time of the GPU, the smallest of several repetitions, from the start of a
+kernel to its end: the flights are ready before, and what that takes of one core is told beside. The smaller crowd is
+flown in lanes too: its flights have to be the same to the bit.
 """
 
 import time
@@ -17,7 +17,7 @@ from orchestration.engines.batch.batch import Batch, BatchResult, Group
 from orchestration.engines.cuda.compiler import image
 from orchestration.engines.cuda.driver import Gpu
 from orchestration.engines.cuda.fleet import Fleet, expect_gpu
-from orchestration.engines.cuda.program import Code, line
+from orchestration.engines.cuda.program import Code, line, program
 from orchestration.schedule.schedule_cache import ScheduleCache, timing
 from orchestration.system.model import System
 from orchestration.system.paths import changed
@@ -51,16 +51,22 @@ def taken(architecture: str) -> None:
     shape, (one, *_) = systems(0.01, STOP_TIME)
     batch = Batch(shape, ScheduleCache())
     next(batch.going(Group(systems=[one], timings=[timing(one)])))
-    for (name, model), memory in zip(shape.models.items(), batch.memories):
-        code = Code.of(name, model)
-        numbers = {place: float(memory[i, 0]) for place, i in code.constant.items()}
-        for what, known in (("with none", {}), (f"with {len(numbers)}", numbers)):
+    codes = {name: Code.of(name, model) for name, model in shape.models.items()}
+    numbers = {
+        name: {place: float(memory[i, 0]) for place, i in code.constant.items()}
+        for (name, code), memory in zip(codes.items(), batch.memories)
+    }
+    for name, code in codes.items():
+        for what, known in (("with none", {}), (f"with {len(numbers[name])}", numbers[name])):
             found = image(line(code, known, shape.lanes), architecture).taken
             spilled = sum(each.spilled for each in found.values())
             print(
                 f"{architecture}, {name} {what} of its numbers known: {found['line'].registers} registers, {spilled} "
                 "bytes spilled"
             )
+    begin = time.process_time()
+    image(program(shape, codes, numbers), architecture)
+    print(f"{architecture}, all of a flight: compiled in {time.process_time() - begin:.0f} s of CPU")
 
 
 def main() -> None:

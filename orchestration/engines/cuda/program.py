@@ -23,6 +23,8 @@ _INCLUDE = re.compile(r'(?m)^#include "(.+)"\n')
 _LITERAL = re.compile(r"\((q_\w+|[A-Z]\w+)\)\{")
 """A structure of known values, as C has it: C++ has no parentheses there"""
 _STRAIGHT = re.compile(r"static q_mask (\w+)\([^)]*\)\n\{\n.*?\n\}\n(?=\s*#define STRAIGHT_STEP \1\n)", re.DOTALL)
+_METHOD = re.compile(r"static (?=q_mask (?!model_do_step)\w+\()")
+"""That is called; one that NVRTC puts wherever it is called takes it twice as long, and more registers"""
 _READ, _STORED = re.compile(r"v\[(\w+)\]"), re.compile(r"v\[(\w+)\] = ")
 _LINE = """
 extern "C" __global__ void line(q_place *v, q_real t, q_real h, int *through) {
@@ -65,6 +67,7 @@ class Code:
             return f"({known[found[1]].hex()})" if found[1] in known else found[0]
 
         functions = _STRAIGHT.sub(lambda straight: _READ.sub(number, straight[0]), self.functions)
+        functions = _METHOD.sub("static __noinline__ ", functions)
         same = " & ".join(f"(q_to_bits(v[{each}]) == q_to_bits({value.hex()}))" for each, value in known.items())
         return f"{self.places}{functions}\nstatic int as_known(const q_place *v) {{ return {same or '(void)v, 1'}; }}\n"
 

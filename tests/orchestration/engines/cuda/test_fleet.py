@@ -1,5 +1,6 @@
 """The text for a GPU, played by a processor thread after thread, has the bits of lanes of vector registers."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +14,9 @@ from orchestration.engines.batch.shape import Shape
 from orchestration.engines.cuda import fleet
 from orchestration.engines.cuda.driver import Gpu
 from orchestration.engines.cuda.fleet import Fleet, expect_gpu
+from orchestration.engines.cuda.program import Code
 from orchestration.engines.structures import structures
+from orchestration.fmi.model import Model
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.schedule import schedule_cache
@@ -93,3 +96,22 @@ def test_connections_of_every_kind_and_every_function_with_numbers_that_are_know
     crowd = [replace(cruise, seed=seed) for seed in (1, 2)]
     assert_the_same(flown, shape, crowd)
     assert_the_same(flown, shape, [changed(each, {"components.car.parameters.mass": 1500.0}) for each in crowd])
+
+
+def test_a_run_is_left_to_others_where_a_known_number_has_changed(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    read = Code.of
+    begin, line = re.compile(r"(static q_mask model_do_step\(.*\)\n\{\n)"), re.compile(r"#define STRAIGHT_STEP .*\n")
+
+    def changing(name: str, model: Model) -> Code:
+        code = read(name, model)
+        if name != "car":
+            return code
+        return replace(
+            code, functions=line.sub("", begin.sub(r"\1    v[AT_MASS] = v[AT_MASS] + 1.0;\n", code.functions))
+        )
+
+    monkeypatch.setattr(Code, "of", changing)
+    cruise = replace(located(load_system(EXAMPLE)), stop_time=1.0, objectives={}, criterion=Criterion())
+    shape = shape_of(cruise)
+    ((_, found),) = Fleet(shape, ScheduleCache(), gpu).run([group_of([cruise])])
+    assert (found.outcome.tolist(), found.component.tolist()) == ([c.FAILED], [shape.names.index("car")])
