@@ -33,6 +33,7 @@ from orchestration.computers.parts import (
 from orchestration.computers.scheduler import Scheduler
 
 SOURCE = Path(__file__).with_name("scheduler.c")
+_FASTER = ("-O3",)
 _NO_MEMORY = -1
 """What C gives in place of a number of notes"""
 _ROOM = 4096
@@ -185,7 +186,7 @@ class _Notes:
 
     def taken(self) -> Integers:
         """All since they were taken last."""
-        found = np.concatenate([self.room[:0], *self._noted])
+        found = self._noted[0] if len(self._noted) == 1 else np.concatenate([self.room[:0], *self._noted])
         self._noted.clear()
         return found
 
@@ -217,7 +218,9 @@ def _tables(
 def _library() -> Any:
     """scheduler.c as a library; raises `QuadcosimError` that says what stands in the way."""
     sources = {"scheduler.c": SOURCE.read_bytes(), "constants.h": _constants().encode()}
-    path = kept("scheduler", sources, OPTIONS, lambda: compiled_here(sources, "scheduler.c"))
+    path = kept(
+        "scheduler", sources, (*OPTIONS, *_FASTER), lambda: compiled_here(sources, "scheduler.c", options=_FASTER)
+    )
     try:
         library = ctypes.CDLL(str(path))
     except OSError as error:

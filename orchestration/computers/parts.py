@@ -18,7 +18,7 @@ LATER = 2**62
 
 Stream: TypeAlias = Callable[[int], Integers]
 """The next so many numbers: times [ns], or 0 and 1"""
-AT_ONCE = 512
+AT_ONCE = 1024
 """Numbers that are drawn at once"""
 STAYS = -1
 """In place of how many numbers of a stream are used: it has one, for good"""

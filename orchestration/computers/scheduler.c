@@ -69,6 +69,7 @@ typedef struct {
     MessageState *messages;
     int64_t *due, due_count;
     int64_t *busy, *line, *deadline, *arrival, *release, *instant, *hop, *slot; /* parts of due */
+    int heeds_deadlines; /* whether anything comes about at any */
     int no_memory;
     int64_t overfull; /* the task, or after all tasks the message, of which too many wait */
 } Scheduler;
@@ -446,7 +447,7 @@ static int64_t pass(Scheduler *s, int64_t now) {
     do {
         do {
             end(s, now);
-            meet_deadlines(s, now);
+            if (s->heeds_deadlines) meet_deadlines(s, now);
             arrive(s, now);
             if (s->no_memory) return now;
             next = least(s->due, s->due_count);
@@ -510,6 +511,7 @@ EXPORTED Scheduler *scheduler_made(const Given *given) {
         s->tasks[i].jobs.size = s->tasks[i].unwritten.size = sizeof(Job);
         s->tasks[i].started_at = s->tasks[i].sampled_at = NONE;
         if (TASK(i, NOMINAL) != NONE) draw_release(s, i);
+        if (TASK(i, WRITES_AT_DEADLINE) || TASK(i, OVERRUN) == ABORT) s->heeds_deadlines = 1;
     }
     EACH(p, PROCESSORS) s->processors[p].running = NONE;
     EACH(j, LEGS) {
