@@ -134,7 +134,7 @@ class Centred:
 
 def _sign(values: Intervals) -> Intervals:
     """The slope of |x|: also the sign, that of 0 being any number within ±1."""
-    return Intervals(np.where(values.low >= 0.0, 1.0, -1.0), np.where(values.high <= 0.0, -1.0, 1.0))
+    return Intervals(np.where(values.low > 0.0, 1.0, -1.0), np.where(values.high < 0.0, -1.0, 1.0))
 
 
 def _sqrt(x: Any) -> Any:
@@ -171,7 +171,7 @@ def _maximum(x: Any, floor: float) -> Any:
     if not isinstance(x, Centred):
         return FLOAT.maximum(x, floor)
     between = x._hull()
-    share = Intervals(np.where(between.low >= floor, 1.0, 0.0), np.where(between.high <= floor, 0.0, 1.0))
+    share = Intervals(np.where(between.low > floor, 1.0, 0.0), np.where(between.high <= floor, 0.0, 1.0))
     return x.like(Intervals(np.maximum(x.values.low, floor), np.maximum(x.values.high, floor)), x.slopes * share)
 
 

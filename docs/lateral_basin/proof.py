@@ -54,6 +54,8 @@ class Fall:
         self._loop, self._R, self._T = loop, R, np.linalg.inv(R)
         if not np.abs(R @ self._T - np.eye(len(R))).max() < 1e-6:
             raise NotProven("R is not a matrix that can be inverted")
+        if R[:4, 4:].any() or R[4:, :4].any():
+            raise NotProven("R mixes the coordinates that a mirror turns round, the first four, with the others")
         self.edges: Floats = loop.gains.epsilon * np.diag(R)[list(JUMPING)]
 
     def form(self, boxes: Boxes) -> Centred:

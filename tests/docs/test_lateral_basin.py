@@ -9,7 +9,7 @@ import pytest
 from flint import arb, ctx
 
 from controller_fmu.sliding_mode.law import Gains
-from docs.lateral_basin.__main__ import flown, main
+from docs.lateral_basin.__main__ import flown, main, reach
 from docs.lateral_basin.boxes import ALL, Boxes, outside
 from docs.lateral_basin.centred import OPS, Centred
 from docs.lateral_basin.intervals import Intervals, OutOfReachError
@@ -168,6 +168,8 @@ def test_what_is_not_so_is_not_proved() -> None:
         prove(replace(loop, gains=Gains(k_eta=-15.0)), R, 100_000)
     with pytest.raises(NotProven, match="inverted"):
         prove(loop, 1.0 + 1e-13 * R, 1)
+    with pytest.raises(NotProven, match="R mixes the coordinates"):
+        prove(loop, R + 0.01 * np.eye(6, k=-1), 100_000)
 
 
 def test_boxes_cover_the_half_of_the_ellipsoid_but_for_the_inner_box() -> None:
@@ -183,6 +185,14 @@ def test_halves_are_the_whole() -> None:
     below, above = whole.halved(np.array([1]))
     assert (below.centre.ravel().tolist(), above.centre.ravel().tolist()) == ([1.0, 1.5], [1.0, 2.5])
     assert below.radius.ravel().tolist() == above.radius.ravel().tolist() == [0.5, 0.5]
+
+
+def test_the_page_says_how_far_what_is_kept_goes() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "certificates.md").read_text(encoding="utf-8")
+    for period in PERIODS:
+        y, vy, phi, p, z, vz = reach(kept(period))
+        row = f"| {1e3 * period:g} ms | {1e2 * y:.1f} cm | {vy:.2f} m/s | {np.degrees(phi):.1f}° | {p:.1f} rad/s | "
+        assert f"{row}{1e2 * z:.1f} cm | {vz:.2f} m/s |" in page
 
 
 def test_the_command_proves_what_was_kept(
