@@ -25,6 +25,10 @@ _LITERAL = re.compile(r"\((q_\w+|[A-Z]\w+)\)\{")
 _STRAIGHT = re.compile(r"static q_mask (\w+)\([^)]*\)\n\{\n.*?\n\}\n(?=\s*#define STRAIGHT_STEP \1\n)", re.DOTALL)
 _METHOD = re.compile(r"static (?=q_mask (?!model_do_step)\w+\()")
 """That is called; one that NVRTC puts wherever it is called takes it twice as long, and more registers"""
+_FUNCTION = re.compile(r"static q_mask (\w+)\([^)]*\)\n\{\n(.*?)\n\}\n", re.DOTALL)
+_CALLED = re.compile(r"\b(model_\w+)\(")
+_TAKES_PARAMETERS = "model_take_parameters"
+"""The method of all slaves that reads parameters again where one has been set"""
 _READ, _STORED = re.compile(r"v\[(\w+)\]"), re.compile(r"v\[(\w+)\] = ")
 _LINE = """
 extern "C" __global__ void line(q_place *v, q_real t, q_real h, int *through) {
@@ -40,7 +44,7 @@ class Code:
     places: str
     functions: str
     constant: Mapping[str, int] = field(default_factory=dict)
-    """Places that its straight line reads, and neither it nor what other components send changes: by name"""
+    """Places that its straight line reads and that follow from parameters alone, by name"""
 
     @classmethod
     def of(cls, name: str, model: Model) -> "Code":
@@ -56,8 +60,8 @@ class Code:
         if straight is None:
             return cls(places, functions)
         inputs = {variable.reference for variable in model.variables.values() if variable.causality == "input"}
-        read = {*_READ.findall(straight[0])} - {*_STORED.findall(straight[0])}
-        there = {each: place for each, place in constants(places).items() if each in read and place not in inputs}
+        some = {*_READ.findall(straight[0])} - {*_STORED.findall(straight[0])} - _changed(functions)
+        there = {each: place for each, place in constants(places).items() if each in some and place not in inputs}
         return cls(places, functions, there)
 
     def text(self, known: Known) -> str:
@@ -70,6 +74,18 @@ class Code:
         functions = _METHOD.sub("static __noinline__ ", functions)
         same = " & ".join(f"(q_to_bits(v[{each}]) == q_to_bits({value.hex()}))" for each, value in known.items())
         return f"{self.places}{functions}\nstatic int as_known(const q_place *v) {{ return {same or '(void)v, 1'}; }}\n"
+
+
+def _changed(functions: str) -> set[str]:
+    """The places that a general step changes, but where it takes over parameters."""
+    bodies: dict[str, str] = dict(_FUNCTION.findall(functions))
+    reached, waiting = {_TAKES_PARAMETERS}, ["model_do_step"]
+    while waiting:
+        name = waiting.pop()
+        if name not in reached:
+            reached.add(name)
+            waiting += [called for called in _CALLED.findall(bodies[name]) if called in bodies]
+    return {place for name in reached - {_TAKES_PARAMETERS} for place in _STORED.findall(bodies[name])}
 
 
 def program(shape: Shape, codes: Mapping[str, Code], known: Mapping[str, Known]) -> str:

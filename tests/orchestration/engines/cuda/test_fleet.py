@@ -17,7 +17,7 @@ from orchestration.engines.cuda.fleet import Fleet, expect_gpu
 from orchestration.engines.cuda.program import Code
 from orchestration.engines.structures import structures
 from orchestration.fmi.model import Model
-from orchestration.quadrotor.scenario import Scenario
+from orchestration.quadrotor.scenario import FmuChoice, Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.schedule import schedule_cache
 from orchestration.schedule.schedule_cache import ScheduleCache
@@ -63,13 +63,14 @@ def test_flights_of_any_timing_that_end_in_any_way(gpu: Gpu, monkeypatch: pytest
     monkeypatch.setattr(schedule_cache, "INSTANTS", 70)  # of a span
     monkeypatch.setattr(fleet, "_MESSAGES", 1)
     monkeypatch.setattr(fleet, "_VALUES", 1)
-    late = located(Scenario(timing=LATE, stop_time=0.2).as_system())
+    law = FmuChoice(fmu="CascadedController")  # leaves its straight line now and then
+    late = located(Scenario(controller=law, timing=LATE, stop_time=0.2).as_system())
     shape = shape_of(late)
-    ends = [{X: 900.0}, {X: 1e200}, {INERTIA: 1e-300}, {PERIOD: 0.02, MASS: 2.0}, {"stop_time": 0.1}]
+    ends = [{X: 900.0}, {INERTIA: 1e-300}, {PERIOD: 0.02, MASS: 2.0}, {"stop_time": 0.1}]
     crowd = [*(replace(late, seed=seed) for seed in range(shape.lanes)), *(changed(late, each) for each in ends)]
     found = assert_the_same(Fleet(shape, ScheduleCache(), gpu), shape, crowd, count=shape.lanes)
     outcomes = [int(outcome) for each in found for outcome in each.outcome][shape.lanes :]
-    assert outcomes == [c.DIVERGED, c.REFUSED, c.FAILED, c.RUNNING, c.RUNNING]
+    assert outcomes == [c.DIVERGED, c.FAILED, c.RUNNING, c.RUNNING]
 
 
 def test_a_gpu_has_the_bits_of_lanes(monkeypatch: pytest.MonkeyPatch) -> None:
