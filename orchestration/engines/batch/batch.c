@@ -1,8 +1,8 @@
 /* The loop of runs of kernels in lanes: what a run comes to is summed up row by row by expressions.h, which is written
    for the system. What happens at an instant is in instants.h.
 
-   The lanes are those of vector registers, or threads with QUADCOSIM_THREADS: then threads.h says how a component is
-   stepped and how a thread waits for others, and nothing can be allocated. */
+   The lanes are those of vector registers, or threads with QUADCOSIM_THREADS: then this is C++ too, what is declared here
+   alone is in flights.cu, and nothing can be allocated. */
 
 #include "lanes.h"
 #include "mathematics.h"

@@ -23,7 +23,8 @@ from orchestration.system.model import System
 
 _MESSAGES, _VALUES = 16, 1024
 """On their way over a connection, and kept of an expression: what there is room for at first"""
-
+_MORE = 8
+"""times as much, where there is too little: its runs begin again"""
 _MOST = 2**12
 """Groups at once"""
 
@@ -47,15 +48,22 @@ class Fleet:
         self._memory = SharedMemory(gpu)
         self._batches: list[_Threads] = []
 
-    def each(self, groups: Sequence[Group], record: Sequence[str] | None) -> Iterator[tuple[Batch, BatchResult]]:
-        """The same for any number of groups, as many as there is room for at once."""
-        for first in range(0, len(groups), _MOST):
-            yield from self.run(groups[first : first + _MOST], record)
-
     def run(self, groups: Sequence[Group], record: Sequence[str] | None = None) -> list[tuple[Batch, BatchResult]]:
         """The groups in their order, each with the batch that has flown it."""
         while len(self._batches) < len(groups):
             self._batches.append(_Threads(self._shape, self._schedules, self._memory))
+        try:
+            found = self._results(groups, record)
+        finally:
+            self._memory.forget()
+        return [(self._batches[i], found[i]) for i in range(len(groups))]
+
+    def each(self, groups: Sequence[Group], record: Sequence[str] | None) -> Iterator[tuple[Batch, BatchResult]]:
+        """The same of any number of groups, some thousands at once."""
+        for first in range(0, len(groups), _MOST):
+            yield from self.run(groups[first : first + _MOST], record)
+
+    def _results(self, groups: Sequence[Group], record: Sequence[str] | None) -> Mapping[int, BatchResult]:
         found: dict[int, BatchResult] = {}
         going: dict[int, Going] = {}
         begin = [*range(len(groups))]
@@ -74,8 +82,7 @@ class Fleet:
                 except StopIteration as end:
                     found[i] = end.value
                     del going[i]
-        self._memory.forget()
-        return [(self._batches[i], found[i]) for i in range(len(groups))]
+        return found
 
     def _expect_known(self, batches: Sequence["_Threads"]) -> None:
         """Have what flies them know no other numbers than those that are the same in all runs, now and before."""
@@ -138,13 +145,13 @@ class _Threads(Batch):
         return self.memories[component][:, self.flying]
 
     def makes_room(self) -> bool:
-        """Whether there was too little room for some lane: there is twice as much now, to begin again."""
+        """Whether there was too little room for some lane: there is more now, to begin again."""
         if self._c.NO_MEMORY not in self._batch.returned[:]:
             return False
         for i, values in self._values.items():
-            self._make_room_to_keep(i, 2 * len(values))
+            self._make_room_to_keep(i, _MORE * len(values))
         for channel in self._channels:
-            self._make_room(channel, 2 * channel.capacity)
+            self._make_room(channel, _MORE * channel.capacity)
         return True
 
     def _make_room_to_keep(self, i: int, count: int) -> None:
