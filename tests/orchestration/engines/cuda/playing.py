@@ -11,6 +11,12 @@ HERE = Path(__file__).parent
 _CPP = ("-x", "c++", "-std=gnu++20", "-O0", "-ffp-contract=off", "-fPIC", "-shared", "-include", "processor.h")
 
 
+def has_cpp() -> bool:
+    """Whether this machine's compiler takes C++."""
+    tried = subprocess.run(["cc", "-x", "c++", "-fsyntax-only", "-"], input=b"", capture_output=True, check=False)
+    return tried.returncode == 0
+
+
 def make_driver(folder: Path) -> None:
     """Put the library that stands for the driver into a folder."""
     sources = {"gpu.c": (HERE / "gpu.c").read_bytes()}
