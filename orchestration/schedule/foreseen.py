@@ -37,8 +37,10 @@ class Messages:
 
     def known(self, over: bool) -> int:
         """How many there are, up to the first of which it is open when it arrives; at the end nothing is open."""
+        if over:
+            return len(self._rows)
         is_open = (self._rows[:, 1] == _SENT) & (self._rows[:, 2] == _UNKNOWN)
-        return int(is_open.argmax()) if is_open.any() and not over else len(self._rows)
+        return int(is_open.argmax()) if is_open.any() else len(self._rows)
 
     def instants(self) -> Integers:
         """When those are sent that are known and not taken."""
@@ -75,6 +77,10 @@ class Samples:
         """Of how many all is known, the time of the next one too."""
         count = len(self.times) if over else max(len(self.times) - 1, 0)
         return count if over else min([count, *(each.known(over) for each in self._messages)])
+
+    def before(self, end: int) -> int:
+        """How many are before `end` [ns], as far as there are any: a starved task has the scheduler run far ahead."""
+        return int(np.searchsorted(self.times, end))
 
     def take(self, count: int) -> tuple[Integers, Integers]:
         """The times of the next so many, and of those after each, NEVER if that does not come before the end."""

@@ -191,10 +191,11 @@ class ScheduledComponent(TimedComponent):
     def drawn_to(self, end: int) -> None:
         """As in any other."""
         foreseen, samples = self._foreseen, self._samples
-        foreseen.to(end + self._ahead)
+        end += self._ahead
+        foreseen.to(end)
         while True:
-            self._take(samples.known(foreseen.over))
-            if foreseen.over or (len(samples.times) and samples.times[0] >= end + self._ahead):
+            self._take(min(samples.known(foreseen.over), samples.before(end)))
+            if foreseen.over or (len(samples.times) and samples.times[0] >= end):
                 return
             foreseen.further()
 

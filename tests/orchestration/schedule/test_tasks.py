@@ -194,6 +194,22 @@ def test_windows_of_any_length_are_one_schedule(monkeypatch):
         assert instants(what) == found
 
 
+def test_while_a_task_is_starved_others_are_drawn_a_window_at_a_time():
+    """Else each window would go through all that is foreseen, which is up to the end."""
+    busy = Task(component="busy", period=0.01, execution=0.01)
+    starved = Task(component="starved", period=0.01, priority=2)
+    what = system(
+        {"plant": continuous(0.1), "busy": Component(fmu="stub"), "starved": Component(fmu="stub")},
+        [wire("plant.y", "busy.y", "one"), wire("busy.u", "plant.u", "two"), wire("plant.y", "starved.y", "three")],
+        computers={"one": Computer(tasks={"busy": busy, "starved": starved})}, stop_time=50.0,
+    )  # fmt: skip
+    timetable, drawn, seen = Timetable(what, Streams(0)), 0, 0
+    while (found := timetable.following(100)) is not None:
+        drawn, seen = max(drawn, *(len(each.rows) for each in timetable._tasks)), seen + len(found.samples)
+    assert seen == 5000
+    assert drawn < 200
+
+
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [
