@@ -8,6 +8,8 @@
 PYTHON ?= python3
 BIN := .venv/bin
 COFMUPY := .venv-cofmupy/bin/python
+# Processes that test at once: one more than two cores, for tests wait for processes of their own, and for limits of time.
+WORKERS ?= 3
 export CI
 # Tests start many processes: each finds the modules compiled that another has compiled.
 unexport PYTHONDONTWRITEBYTECODE
@@ -33,11 +35,11 @@ check: lint
 	$(BIN)/pytest --numprocesses 2 --dist load --hypothesis-profile quick --ignore-glob '*/test_flight.py' --ignore-glob '*/test_show.py' $(QUICK)
 
 test: lint
-	$(BIN)/pytest --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+	$(BIN)/pytest --numprocesses $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 coverage: .venv/.test
 	$(BIN)/coverage erase
-	$(BIN)/coverage run -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+	$(BIN)/coverage run -m pytest --numprocesses $(WORKERS) --dist loadfile --no-loadscope-reorder
 	$(BIN)/coverage combine --quiet
 	$(BIN)/coverage report
 
