@@ -97,6 +97,15 @@ _said: Words = str
 
 
 @contextmanager
+def at_place(place: str) -> Iterator[None]:
+    """What is wrong inside is told of a part of `place`."""
+    try:
+        yield
+    except UsageError as error:
+        raise UsageError(f"{place}.{error}") from error
+
+
+@contextmanager
 def told_in(words: Words) -> Iterator[None]:
     """Errors are told in these words while the block runs."""
     before = _said

@@ -162,8 +162,8 @@ class FlightFlags:
 
         timing: dict[str, Any] = {} if self.preset is None else preset_timing(self.preset)
         single = (key for key in TIMING_KEYS if key not in _BY_MEASUREMENT)
-        timing |= {key: value for key in single if (value := self._of_timing(key)) is not None}
-        if (loss := self._of_timing("loss")) is not None:
+        timing |= {key: value for key in single if (value := self._timed(key)) is not None}
+        if (loss := self._timed("loss")) is not None:
             timing = {"measurement_loss": loss, "command_loss": loss, **timing}
         for name in _BY_MEASUREMENT:
             given = getattr(self, name)
@@ -188,7 +188,7 @@ class FlightFlags:
             changed = changed.with_fmus(plant=plant, controller=controller)
         return native_twins(changed) if self.native else changed
 
-    def _of_timing(self, key: str) -> Any:
+    def _timed(self, key: str) -> Any:
         """The value of a flag; of one that may be drawn a number, or the text of the table that says how."""
         from orchestration.quadrotor.timing import Timing
         from orchestration.system.distribution import AS_TABLE

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, TypeGuard
 
 from orchestration.basics.documents import toml_of
-from orchestration.basics.errors import UsageError
+from orchestration.basics.errors import at_place
 from orchestration.basics.typed_tables import parsed, table_of
 from orchestration.system.distribution import Distribution, Varying
 
@@ -66,15 +66,11 @@ def _meant(place: str, value: Any) -> Any:
 
 
 def _parsed(place: str, table: Mapping[str, Any]) -> Any:
-    try:
+    with at_place(place):
         return parsed(table, DistributionTable)
-    except UsageError as error:
-        raise UsageError(f"{place}.{error}") from error
 
 
 def _made(place: str, table: Any, folder: Path) -> Distribution:
     keys = table.model_dump() | {"file": None if table.file is None else folder / table.file}
-    try:
+    with at_place(place):
         return Distribution(**keys)
-    except UsageError as error:
-        raise UsageError(f"{place}.{error}") from error

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from orchestration.basics.documents import read_toml
-from orchestration.basics.errors import UsageError
+from orchestration.basics.errors import UsageError, at_place
 from orchestration.basics.typed_tables import fields_of, parsed, table_of
 from orchestration.system.choices import Order
 from orchestration.system.computers import Arrivals, Computer, Message, Network, Task
@@ -172,7 +172,5 @@ def _source(name: str, table: Any, folder: Path) -> Source:
 
 
 def _made(place: str, kind: type[Made], keys: Mapping[str, Any]) -> Made:
-    try:
+    with at_place(place):
         return kind(**keys)
-    except UsageError as error:
-        raise UsageError(f"{place}.{error}") from error

@@ -8,7 +8,6 @@ from orchestration.basics.errors import QuadcosimError, UsageError, expected_nam
 from orchestration.building.fmus import native_twins
 from orchestration.building.inputs import Files, files_of
 from orchestration.engines.batch.shape import expect_lanes
-from orchestration.engines.cuda.fleet import expect_gpu
 from orchestration.engines.engine import Engine
 from orchestration.engines.wiring import checked
 from orchestration.system.model import System
@@ -70,6 +69,8 @@ def chosen(
         if apart is not None:
             raise UsageError(f"--engine {engine}: {apart}")
         if engine == "cuda":
+            from orchestration.engines.cuda.fleet import expect_gpu  # others need not wait for what it loads
+
             expect_gpu()
         _expect_lanes(*first(True))
         return Chosen(native=True, in_lanes=True, engine=None, on_gpu=engine == "cuda")

@@ -19,7 +19,7 @@
 #if defined(__FAST_MATH__)
 #error "quadcosim: compile without -ffast-math, which changes the results"
 #endif
-/* Which types are computed in a wider one: 1 and 32 float, 16 _Float16, 2 and less than 0 perhaps double too. */
+/* 0, 1, 16, 32 and 64 compute double as double, whatever they make of narrower types; 2 and any other may not. */
 #if defined(FLT_EVAL_METHOD) && (FLT_EVAL_METHOD < 0 || FLT_EVAL_METHOD == 2 || FLT_EVAL_METHOD > 64)
 #error "quadcosim: compile for arithmetic in double precision, as with -msse2 -mfpmath=sse"
 #endif
