@@ -128,12 +128,10 @@ class Runner:
         Raises `WorkerEnvironmentError` for what is no run's own failure.
         """
         started = time.perf_counter()
-        from orchestration.engines.batch.batches import Batches
-
         _expect_files(chunk.tasks[0].system)
         try:
             if chunk.on_gpu not in self._batches:
-                self._batches[chunk.on_gpu] = Batches(on_gpu=chunk.on_gpu)
+                self._batches[chunk.on_gpu] = _batches(on_gpu=chunk.on_gpu)
             flown = self._batches[chunk.on_gpu].run([task.system for task in chunk.tasks])
         except (QuadcosimError, OSError, MemoryError) as error:
             raise WorkerEnvironmentError(str(error) or type(error).__name__) from error
@@ -158,6 +156,16 @@ class Runner:
     def close(self) -> None:
         """Free the FMUs."""
         self._instances.close()
+
+
+def _batches(*, on_gpu: bool) -> "Batches":
+    if on_gpu:
+        from orchestration.engines.cuda import fleet
+
+        return fleet.batches()
+    from orchestration.engines.batch.batches import Batches
+
+    return Batches()
 
 
 def _expect_files(system: System) -> None:

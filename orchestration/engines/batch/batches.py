@@ -3,6 +3,7 @@
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -11,8 +12,6 @@ from orchestration.engines.batch.batch import NOTHING, Batch, BatchResult, Colum
 from orchestration.engines.batch.combining import combined
 from orchestration.engines.batch.kernels import lanes_here
 from orchestration.engines.batch.shape import Shape, outline
-from orchestration.engines.cuda.driver import Gpu
-from orchestration.engines.cuda.fleet import Fleet
 from orchestration.engines.structures import structures
 from orchestration.engines.watch import watch
 from orchestration.engines.wiring import checked, source_values
@@ -34,21 +33,26 @@ class RunSummary:
     """what diverged"""
 
 
-Flying = Callable[[Sequence[Group], Sequence[str] | None], Iterator[tuple[Batch, BatchResult]]]
-"""What flies groups one after another, or many at once"""
 Landed = tuple[int, RunSummary | None, Floats]
 """The place of a run among those that were asked for, what it came to, its rows"""
 _NO_ROWS: Floats = np.zeros((0, 0))
 
 
+class Flier(Protocol):
+    """Flies groups of runs of a shape, one after another or many at once."""
+
+    def each(self, groups: Sequence[Group], record: Sequence[str] | None) -> Iterator[tuple[Batch, BatchResult]]:
+        """The groups in their order, each with the batch that has flown it."""
+
+
 class Batches:
     """The batches of this process, by the shape of what they run; their FMUs are files."""
 
-    def __init__(self, *, on_gpu: bool = False) -> None:
+    def __init__(self, flier: Callable[[Shape, ScheduleCache], Flier] = Batch) -> None:
         self._schedules = ScheduleCache()
         self._lanes = lanes_here()
-        self._gpu = Gpu() if on_gpu else None
-        self._shapes: dict[Hashable, tuple[Shape, Flying]] = {}
+        self._flier = flier
+        self._shapes: dict[Hashable, tuple[Shape, Flier]] = {}
 
     def run(self, systems: Sequence[System]) -> list[RunSummary | None]:
         """What runs came to, in their order; None for one that is to be flown alone. Raises as `each`."""
@@ -71,7 +75,7 @@ class Batches:
         for place, system in enumerate(systems):
             shapes.setdefault(known[id(system)][0], []).append(place)
         for key, places in shapes.items():
-            shape, flown = self._flown(key, systems[places[0]])
+            shape, flier = self._flier_of(key, systems[places[0]])
             timings = {place: known[id(systems[place])][1] for place in places}
             several = {id(systems[place]): systems[place] for place in places}
             fed = {key: heard(system, shape.models) for key, system in several.items()}
@@ -83,16 +87,15 @@ class Batches:
                 )
                 for group in groups
             ]  # fmt: skip
-            for group, runs, (batch, result) in zip(groups, given, flown(given, record)):
+            for group, runs, (batch, result) in zip(groups, given, flier.each(given, record)):
                 rows = result.signals or [_NO_ROWS] * len(group)
                 yield from zip(group, [*_told(shape, batch, result, runs.systems)], rows)
 
-    def _flown(self, key: Hashable, system: System) -> tuple[Shape, Flying]:
+    def _flier_of(self, key: Hashable, system: System) -> tuple[Shape, Flier]:
         if key not in self._shapes:
             models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
             shape = Shape(system=checked(system, models).system, models=models, lanes=self._lanes)
-            flies = Batch(shape, self._schedules) if self._gpu is None else Fleet(shape, self._schedules, self._gpu)
-            self._shapes[key] = shape, flies.each
+            self._shapes[key] = shape, self._flier(shape, self._schedules)
         return self._shapes[key]
 
 

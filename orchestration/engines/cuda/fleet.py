@@ -4,6 +4,7 @@ import ctypes
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from orchestration.basics.errors import QuadcosimError
 from orchestration.basics.simulator import Floats
 from orchestration.engines.batch.batch import Batch, BatchResult, Going, Group, Run, Track
+from orchestration.engines.batch.batches import Batches
 from orchestration.engines.batch.shape import Shape
 from orchestration.engines.cuda.compiler import compiled, expect_compiler
 from orchestration.engines.cuda.driver import Gpu
@@ -36,6 +38,11 @@ def expect_gpu() -> None:
         Gpu()
     except QuadcosimError as error:
         raise QuadcosimError(f"--engine cuda: {error}") from error
+
+
+def batches() -> Batches:
+    """Batches that fly on a GPU; raises `QuadcosimError` without one."""
+    return Batches(partial(Fleet, gpu=Gpu()))
 
 
 class Fleet:
