@@ -1,0 +1,127 @@
+"""Between which instants a component samples, and between which its messages arrive, whatever the scheduler is dealt.
+
+It follows from the bounds of theory: a job that is done by its bound R, whatever it takes, began before R less the most
+that it can take.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from orchestration.basics.errors import UsageError
+from orchestration.computers.bounded import Bounds, bounds_of
+from orchestration.system.distribution import highest, lowest
+from orchestration.system.frames import frame_nanoseconds
+from orchestration.system.model import SamplingOnArrival, System
+from orchestration.system.placement import PlacedMessage, PlacedTask, carried, tasks_of
+from orchestration.system.times import NANOSECONDS, exact_nanoseconds, nanoseconds
+
+
+@dataclass(frozen=True, kw_only=True)
+class Window:
+    """Of one component, from each nominal sample [ns]."""
+
+    earliest: int
+    """its samples"""
+    latest: int
+    at_deadline: bool
+    """whether it writes at its deadline"""
+    least: int
+    """what lies at least between a sample and the arrival of its messages; of a task that writes at its deadline,
+    between the nominal sample and that"""
+    most: int
+    """what lies at most between them, likewise"""
+    end: int
+    """the last instant at which messages arrive"""
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether there is one instant for each."""
+        return self.shift == 0 and self.spread == 0
+
+    @property
+    def shift(self) -> int:
+        """By how much samples may differ [ns]."""
+        return self.latest - self.earliest
+
+    @property
+    def spread(self) -> int:
+        """By how much messages may differ of samples that come equally late [ns]."""
+        return self.most - self.least if self.at_deadline else min(self.most, self.end - self.earliest) - self.least
+
+    @property
+    def together(self) -> int:
+        """What both may come to in sum [ns]."""
+        return self.shift + self.spread if self.at_deadline else self.end - self.earliest - self.least
+
+
+def windows_of(system: System) -> dict[str, Window]:
+    """By component: of those that run on a computer or send over a network.
+
+    Raises `UsageError` where theory has no bound, where a job or frame may still be under way when the next one comes,
+    and for what is neither a periodic task nor sent by a sampled component.
+    """
+    tasks, messages, bounds = tasks_of(system), carried(system), bounds_of(system)
+    found = {}
+    for name, component in system.components.items():
+        sent = [x.name for x in system.connections if x.sender == name]
+        over = [messages[each] for each in sent if each in messages]
+        sampling, task = component.sampling, tasks.get(name)
+        if sampling is None and over:
+            raise UsageError(f"{over[0].place}: expected messages of a sampled component, which {name} is not")
+        if isinstance(sampling, SamplingOnArrival) or (task is not None and task.task.on is not None):
+            raise UsageError(f"{name} runs when a message arrives; expected a component with a period")
+        if len(sent) > 1 and over:
+            raise UsageError(f"{over[0].place}: expected all that {name} sends in one connection")
+        if task is not None:
+            found[name] = _of_task(task, bounds)
+        elif over and sampling is not None:
+            found[name] = Window(
+                earliest=0, latest=nanoseconds(highest(sampling.jitter)), at_deadline=False, least=0, most=0,
+                end=nanoseconds(highest(sampling.jitter)),
+            )  # fmt: skip
+        if over:
+            found[name] = _sent(found[name], over[0], bounds)
+    return found
+
+
+def _of_task(of: PlacedTask, bounds: Bounds) -> Window:
+    task, switch = of.task, nanoseconds(of.computer.switch)
+    bound = bounds[f"{of.computer_name}.{of.name}"]
+    if bound is None:
+        raise UsageError(f"{of.place}: theory has no bound of its responses, or the processor has too much to do")
+    assert task.period is not None
+    due = nanoseconds(task.due)
+    in_time = exact_nanoseconds(task.period) / Fraction(repr(float(of.computer.clock_ratio)))
+    if task.overrun == "abort" or task.write == "deadline":
+        in_time = min(in_time, Fraction(due))
+    if bound > in_time:
+        responds = f"{of.place}: may respond after {bound / NANOSECONDS:g} s"
+        raise UsageError(f"{responds}; expected {float(in_time) / NANOSECONDS:g} s at most")
+    least, most = (nanoseconds(end(task.execution)) for end in (lowest, highest))
+    grows = of.computer.scheduling != "earliest-deadline-first"  # whether the bound does with what the job takes
+    earliest, latest = switch, bound - (most if grows else least)
+    if task.read == "release":
+        earliest, latest, least, most = 0, nanoseconds(highest(task.jitter)), least + switch, bound
+    elif not _is_uninterrupted(of):
+        most = bound
+    if task.write == "deadline":
+        return Window(earliest=earliest, latest=latest, at_deadline=True, least=due, most=due, end=due)
+    return Window(earliest=earliest, latest=latest, at_deadline=False, least=least, most=most, end=bound)
+
+
+def _is_uninterrupted(of: PlacedTask) -> bool:
+    """Whether a job that has begun runs to its end."""
+    others = [task for name, task in of.computer.tasks.items() if name != of.name]
+    comes_first = of.computer.scheduling == "fixed-priority" and all(x.priority > of.task.priority for x in others)
+    return comes_first or not of.computer.preemptive
+
+
+def _sent(window: Window, of: PlacedMessage, bounds: Bounds) -> Window:
+    """With a frame between the sample and the arrival."""
+    bound = bounds[f"{of.network_name}.{of.name}"]
+    if bound is None:
+        raise UsageError(f"{of.place}: theory has no bound of its responses, or the network has too much to carry")
+    shortest = frame_nanoseconds(of.network, of.message)
+    return replace(window, least=window.least + shortest, most=window.most + bound, end=window.end + bound)
