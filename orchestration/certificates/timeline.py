@@ -26,6 +26,9 @@ LARGEST = 400
 """numbers in the state of a loop"""
 
 JITTER, DELAY, LOSS = "jitter", "delay_jitter", "loss"
+START, LATENCY = "start", "latency"
+BOXES = 6
+"""that two quantities of which the sum is limited are covered by"""
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,8 @@ class Varying:
     """A quantity that may be another one at each draw."""
 
     kind: str
-    """`jitter` of a sampled component, `delay_jitter` or `loss` of a connection"""
+    """`jitter` of a sampled component, with which its messages are late; its `start`, with which they are not; the
+    `latency` of all that it sends; `delay_jitter` or `loss` of a connection"""
     name: str
     """of that"""
     path: str
@@ -53,24 +57,44 @@ class _Event:
     def later(self, by: Fraction) -> _Event:
         return _Event(self.time + by, self.slopes, self.rank, self.what, self.whom)
 
-    def first(self, most: Sequence[Fraction]) -> Fraction:
-        return self.time + sum((s * J for s, J in zip(self.slopes, most) if s < 0), Fraction(0))
-
-    def last(self, most: Sequence[Fraction]) -> Fraction:
-        return self.time + sum((s * J for s, J in zip(self.slopes, most) if s > 0), Fraction(0))
-
     def at(self, point: Sequence[Fraction]) -> Fraction:
         return self.time + sum((s * x for s, x in zip(self.slopes, point)), Fraction(0))
 
 
+@dataclass(frozen=True)
+class _Draws:
+    """What is drawn at once: each quantity from 0 to its largest, two of them no more than `together` [ns]."""
+
+    most: Sequence[Fraction]
+    together: Fraction
+
+    def corners(self) -> list[tuple[Fraction, ...]]:
+        """Between which all draws lie."""
+        if len(self.most) < 2:
+            return [*itertools.product(*((Fraction(0), J) for J in self.most))]
+        bend = min(max(self.together - self.most[1], Fraction(0)), self.most[0])
+        return [(x, y) for x in (Fraction(0), bend, self.most[0]) for y in (Fraction(0), self._beside(x))]
+
+    def boxes(self) -> list[list[tuple[Fraction, Fraction]]]:
+        """That cover all draws of two quantities."""
+        first, second = self.most
+        count = 1 if self.together >= first + second else BOXES
+        ends = [first * i / count for i in range(count + 1)]
+        return [[(low, high), (Fraction(0), self._beside(low))] for low, high in itertools.pairwise(ends)]
+
+    def _beside(self, first: Fraction) -> Fraction:
+        """The largest value of the second quantity beside one of the first."""
+        return min(self.most[1], self.together - first)
+
+
 class Timeline:
-    """The events of a loop in which one or two quantities vary."""
+    """The events of a loop in which one quantity varies, or two, or none."""
 
     def __init__(self, loop: Loop, varying: Sequence[Varying]) -> None:
         self.loop, self.varying = loop, varying
         self._timed = [each for each in varying if each.kind != LOSS]
         for each in varying:
-            if each.kind == JITTER and each.name in loop.minds:
+            if each.kind in (JITTER, START) and each.name in loop.minds:
                 raise UsageError(f"{each.path}: {each.name} does something else where its next sample comes later")
         self._lossy = next((each.name for each in varying if each.kind == LOSS), None)
         self._events = self._all()
@@ -78,21 +102,22 @@ class Timeline:
 
     def largest(self) -> float:
         """The largest value that one quantity may take, the others at 0: two draws are never open at once [s]."""
-        gap = self._gap()
-        spans = [_last(group, self._zero()) - _first(group, self._zero()) for group in self._groups]
+        gap, nothing = self.loop.period / len(self._groups), [(Fraction(0),) * len(self._timed)]
+        spans = [_last(group, nothing) - _first(group, nothing) for group in self._groups]
         return float(gap - max(spans)) / NANOSECONDS
 
-    def family(self, most: Sequence[float] = (), run: int = 0) -> Family:
-        """With values of what is timed in [0, `most`] [s], and at most `run` losses in a row.
+    def family(self, most: Sequence[float] = (), run: int = 0, together: float | None = None) -> Family:
+        """With values of what is timed in [0, `most`] [s], two of which are no more than `together` in sum.
 
-        Raises `UsageError` where draws would be open at once.
+        At most `run` messages are lost in a row. Raises `UsageError` where draws would be open at once.
         """
         limits = [exact_nanoseconds(J) for J in most]
+        draws = _Draws(limits, sum(limits, Fraction(0)) if together is None else exact_nanoseconds(together))
         run = run if self._lossy else 0
-        begins = sorted((_first(group, limits), i) for i, group in enumerate(self._groups))
+        begins = sorted((_first(group, draws.corners()), i) for i, group in enumerate(self._groups))
         ends = [time for time, _ in begins[1:]] + [begins[0][0] + self.loop.period]
         for (_, i), end in zip(begins, ends):
-            if _last(self._groups[i], limits) > end:
+            if _last(self._groups[i], draws.corners()) > end:
                 raise UsageError(
                     f"{self._said()}: expected less, so that no message is open when the next one is drawn"
                 )
@@ -102,7 +127,7 @@ class Timeline:
             letters: list[Letter] = []
             for piece, ((begin, i), end) in enumerate(zip(begins, ends)):
                 events = [*self._groups[i], *self._fixed(begin, end)]
-                letters += self._letters(built, events, limits, (begin, end), (piece, len(begins)), run)
+                letters += self._letters(built, events, draws, (begin, end), (piece, len(begins)), run)
         return built.family(letters, [begin for begin, _ in begins])
 
     # -- events ----------------------------------------------------------------------------------------------------
@@ -112,16 +137,16 @@ class Timeline:
         loop, found = self.loop, []
         for rank, name in enumerate(loop.order):
             for k, time in enumerate(loop.samples_of(name)):
-                by = self._slopes(JITTER, name)
+                by, sent = self._slopes((JITTER, START), name), self._slopes((JITTER, LATENCY), name)
                 found.append(_Event(time, by, (1, rank, k), "sample", name))
                 for place, x in enumerate(loop.system.connections):
                     delay = exact_nanoseconds(lowest(x.delay))
-                    own = self._slopes(DELAY, x.name)
+                    own = self._slopes((DELAY,), x.name)
                     if x.receiver == name and not loop.is_sampled(x.sender) and self._is_late(x):
                         slopes = tuple(a - b for a, b in zip(by, own))
                         found.append(_Event(time - delay, slopes, (0, rank, place), "measure", x.name))
                     elif x.sender == name and (self._is_late(x) or x.order == "jacobi"):
-                        slopes = tuple(a + b for a, b in zip(by, own))
+                        slopes = tuple(a + b for a, b in zip(sent, own))
                         wait = delay
                         if x.order == "jacobi":
                             wait += loop.period / len(loop.samples_of(name))
@@ -136,16 +161,17 @@ class Timeline:
         return frozenset(event.whom for event in self._events if event.what != "sample")
 
     def _is_late(self, x: Connection) -> bool:
-        return lowest(x.delay) > 0.0 or any(self._slopes(DELAY, x.name))
+        own = (*self._slopes((DELAY,), x.name), *self._slopes((LATENCY,), x.sender))
+        return lowest(x.delay) > 0.0 or any(own)
 
-    def _slopes(self, kind: str, name: str) -> tuple[int, ...]:
-        return tuple(int((each.kind, each.name) == (kind, name)) for each in self._timed)
+    def _slopes(self, kinds: Sequence[str], name: str) -> tuple[int, ...]:
+        return tuple(int(each.kind in kinds and each.name == name) for each in self._timed)
 
     def _owner(self) -> str:
-        """The sampled component at whose samples something is drawn."""
-        owners = set()
+        """The sampled component at whose samples something is drawn; any, where nothing is."""
+        owners = set[str]() if self.varying else {self.loop.order[0]}
         for each in self.varying:
-            if each.kind == JITTER:
+            if each.kind in (JITTER, START, LATENCY):
                 owners.add(each.name)
             else:
                 x = self.loop.connection(each.name)
@@ -187,14 +213,14 @@ class Timeline:
     # -- letters ---------------------------------------------------------------------------------------------------
 
     def _letters(
-        self, built: _Built, events: list[_Event], limits: list[Fraction], span: tuple[Fraction, Fraction],
+        self, built: _Built, events: list[_Event], draws: _Draws, span: tuple[Fraction, Fraction],
         piece: tuple[int, int], run: int,
     ) -> list[Letter]:  # fmt: skip
         """The letters of a piece: one for each order of its events; as many again where a message may be lost."""
         moves, lost_moves = _moves(piece, run)
         number = f" {piece[0] + 1}" if piece[1] > 1 else ""
         found = []
-        for box in self._boxes(events, limits):
+        for box in self._boxes(events, draws):
             middle = [(low + high) / 2 for low, high in box]
             in_order = sorted(events, key=lambda event: (event.at(middle), event.rank))
             ranges = tuple((float(low) / NANOSECONDS, float(high) / NANOSECONDS) for low, high in box)
@@ -203,53 +229,44 @@ class Timeline:
                     product = built.product(in_order, span, lost=lost)
                     name = ("lost" if lost else "arrives" if self._lossy else "late") + number
                     found.append(Letter(name=name, moves=these, product=product, ranges=ranges))
-        names = [letter.name for letter in found]
+        names, word = [letter.name for letter in found], "order" if len(draws.most) < 2 else "part"
         return [
             letter if names.count(letter.name) == 1 else Letter(
-                name=f"{letter.name}, order {names[:i].count(letter.name) + 1}", moves=letter.moves,
+                name=f"{letter.name}, {word} {names[:i].count(letter.name) + 1}", moves=letter.moves,
                 product=letter.product, ranges=letter.ranges,
             )
             for i, letter in enumerate(found)
         ]  # fmt: skip
 
-    def _boxes(self, events: Sequence[_Event], limits: Sequence[Fraction]) -> list[list[tuple[Fraction, Fraction]]]:
-        """The values of what varies, divided where two events change places."""
-        if not limits:
+    def _boxes(self, events: Sequence[_Event], draws: _Draws) -> list[list[tuple[Fraction, Fraction]]]:
+        """The values of what varies, divided where two events change places, and to cover two of a limited sum."""
+        if not draws.most:
             return [[]]
         pairs = [
             (a.time - b.time, tuple(p - q for p, q in zip(a.slopes, b.slopes)))
             for a, b in itertools.combinations(events, 2)
         ]
-        if len(limits) == 1:
-            cuts = {Fraction(0), limits[0]}
-            cuts |= {-apart / slope for apart, (slope,) in pairs if slope and 0 < -apart / slope < limits[0]}
+        if len(draws.most) == 1:
+            (limit,) = draws.most
+            cuts = {Fraction(0), limit}
+            cuts |= {-apart / slope for apart, (slope,) in pairs if slope and 0 < -apart / slope < limit}
             return [[each] for each in itertools.pairwise(sorted(cuts))] or [[(Fraction(0), Fraction(0))]]
         for apart, slopes in pairs:
-            ends = [apart + sum(s * x for s, x in zip(slopes, corner)) for corner in _corners(limits)]
+            ends = [apart + sum(s * x for s, x in zip(slopes, corner)) for corner in draws.corners()]
             if min(ends) < 0 < max(ends):
                 raise UsageError(f"{self._said()}: expected values at which what happens stays in one order")
-        return [[(Fraction(0), J) for J in limits]]
-
-    def _gap(self) -> Fraction:
-        return self.loop.period / len(self._groups)
-
-    def _zero(self) -> list[Fraction]:
-        return [Fraction(0)] * len(self._timed)
+        return draws.boxes()
 
     def _said(self) -> str:
-        return " and ".join(each.path for each in self.varying)
+        return " and ".join(dict.fromkeys(each.path for each in self.varying))
 
 
-def _first(group: Sequence[_Event], most: Sequence[Fraction]) -> Fraction:
-    return min(event.first(most) for event in group)
+def _first(group: Sequence[_Event], corners: Sequence[Sequence[Fraction]]) -> Fraction:
+    return min(event.at(corner) for event in group for corner in corners)
 
 
-def _last(group: Sequence[_Event], most: Sequence[Fraction]) -> Fraction:
-    return max(event.last(most) for event in group)
-
-
-def _corners(limits: Sequence[Fraction]) -> list[tuple[Fraction, ...]]:
-    return list(itertools.product(*((Fraction(0), J) for J in limits)))
+def _last(group: Sequence[_Event], corners: Sequence[Sequence[Fraction]]) -> Fraction:
+    return max(event.at(corner) for event in group for corner in corners)
 
 
 def _moves(piece: tuple[int, int], run: int) -> tuple[tuple[tuple[int, int], ...], tuple[tuple[int, int], ...]]:

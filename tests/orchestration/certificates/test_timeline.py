@@ -12,7 +12,7 @@ import pytest
 from orchestration.basics.errors import UsageError
 from orchestration.certificates.family import Family
 from orchestration.certificates.parts import Loop, loop_of
-from orchestration.certificates.timeline import DELAY, JITTER, LOSS, Timeline, Varying
+from orchestration.certificates.timeline import BOXES, DELAY, JITTER, LATENCY, LOSS, START, Timeline, Varying
 from orchestration.fmi.reuse import Instances
 from orchestration.stability.linear_loop import at_rest
 from orchestration.stability.monodromy import growth_of_loop
@@ -88,6 +88,33 @@ def test_a_delay_that_stays_is_the_masters(
     for value in (0.11, jitter):
         expected = math.exp(seconds * growth_of_loop(changed(as_it_is, {path: delay + value}), instances))
         assert radius_of(family, value) == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_start_moves_the_sample_and_not_the_message(system: System, instances: Instances) -> None:
+    early = loop(changed(system, {"connections.command.delay": 0.3}), instances)
+    family = Timeline(early, [Varying(kind=START, name="controller", path="start")]).family([0.25])
+    for late in (0.11, 0.25):
+        shorter = changed(system, {"connections.command.delay": round(0.3 - late, 6)})
+        expected = math.exp(PERIOD * growth_of_loop(shorter, instances))
+        assert radius_of(family, late) == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_latency_is_of_all_that_a_component_sends(system: System, instances: Instances) -> None:
+    of = loop(changed(system, {"connections.command.delay": 0.1}), instances)
+    latency = Varying(kind=LATENCY, name="controller", path="latency")
+    found, expected = (Timeline(of, [each]).family([0.3]) for each in (latency, COMMAND))
+    assert found.letters == expected.letters
+
+
+def test_two_that_are_limited_in_sum_may_each_be_as_large_as_the_sum(system: System, instances: Instances) -> None:
+    both = Timeline(loop(system, instances), [SAMPLE, COMMAND])
+    with pytest.raises(UsageError, match="expected less, so that no message is open"):
+        both.family([0.4, 0.4])
+    letters = both.family([0.4, 0.4], together=0.4).letters
+    drawn = np.random.default_rng(3).uniform(0.0, 0.4, (200, 2))
+    for point in drawn[drawn.sum(axis=1) <= 0.4]:
+        assert any(all(low <= x <= high for x, (low, high) in zip(point, letter.ranges)) for letter in letters)
+    assert max(sum(high for _, high in letter.ranges) for letter in letters) == pytest.approx(0.4 * (1.0 + 1.0 / BOXES))
 
 
 def test_where_the_order_depends_on_the_draw_there_is_a_letter_for_each(system: System, instances: Instances) -> None:
