@@ -10,11 +10,13 @@ import numpy as np
 from orchestration.basics.errors import UsageError
 from orchestration.basics.extras import needs
 from orchestration.basics.simulator import Floats
+from orchestration.certificates.causes import Caused
 from orchestration.certificates.certificate import Certificate, read_certificate
-from orchestration.certificates.margin import measured, varying_of
-from orchestration.certificates.parts import Loop
+from orchestration.certificates.family import Family
+from orchestration.certificates.margin import cause_in, expect_unshared, measured, varying_of
 from orchestration.certificates.timeline import LOSS, Timeline, Varying
 from orchestration.requests.request import Asked, asked_for
+from orchestration.stability.known_loops import rested
 
 ROUNDING = 1e-12
 """of the largest entry of a row: what may be left of a zero"""
@@ -38,6 +40,8 @@ class Checked:
     """Relative: the proof is for all matrices that are as near as that."""
     of: tuple[str, ...]
     """The paths that vary in the system that it was compared with; none if it was compared with none."""
+    up_to: float | None = None
+    """Of a path of a computer or a network: the largest value [s] that makes the loop no later than these ranges."""
 
 
 @needs("flint")
@@ -50,26 +54,39 @@ def check(path: str | Path, asked: Asked | None = None) -> Checked:
     from orchestration.certificates.checker import proven
 
     certificate = read_certificate(Path(path))
-    found = proven(certificate)
+    found, up_to = proven(certificate), None
     if asked is not None:
         request = asked_for(asked)
-        expect_of(certificate, measured(request), [varying_of(request, of) for of in certificate.of])
+        cause = cause_in(request, certificate.of[0]) if len(certificate.of) == 1 else None
+        if cause is None:
+            expect_unshared(request)
+            varying = [varying_of(request, of) for of in certificate.of]
+            family = _as_long(certificate, Timeline(measured(request), varying), varying)
+        else:
+            caused = Caused(measured(request), rested(request), cause)
+            up_to = caused.value_of(certificate.family)
+            family = caused.family(up_to)
+        expect_of(certificate, family)
     return Checked(
         ranges=found.ranges, runs=found.runs, states=found.states, radius=found.radius,
-        of=() if asked is None else certificate.of,
+        of=() if asked is None else certificate.of, up_to=up_to,
     )  # fmt: skip
 
 
-def expect_of(certificate: Certificate, loop: Loop, varying: list[Varying]) -> None:
-    """Raise `AnotherLoop` where a certificate is not of that loop, within the radius that its proof covers."""
+def _as_long(certificate: Certificate, timeline: Timeline, varying: list[Varying]) -> Family | None:
+    """The family of a system for the ranges and runs of a certificate; None: it has none."""
     own = certificate.family
     timed = sum(each.kind != LOSS for each in varying)
     if any(len(letter.ranges) != timed for letter in own.letters):
         raise AnotherLoop("the certificate varies something else than the paths that it names")
-    most = [max(letter.ranges[i][1] for letter in own.letters) for i in range(timed)]
+    most = own.largest()
     run = max(len(letter.moves) for letter in own.letters) - 1  # what arrives does after any number of losses
-    timeline = Timeline(loop, varying)
-    family = timeline.family(most, run=run) if not most or sum(most) <= timeline.largest() else None
+    return timeline.family(most, run=run) if not most or sum(most) <= timeline.largest() else None
+
+
+def expect_of(certificate: Certificate, family: Family | None) -> None:
+    """Raise `AnotherLoop` where a certificate is not of that family, within the radius that its proof covers."""
+    own = certificate.family
     if family is None or (family.kept, family.letters) != (own.kept, own.letters):
         raise AnotherLoop("what happens in a period of the system is something else than in the certificate")
     if family.matrices.keys() != own.matrices.keys():

@@ -52,6 +52,10 @@ class Family:
     """of the coordinates those that go from one period to the next; nothing depends on what the others were before"""
     letters: tuple[Letter, ...]
 
+    def largest(self) -> list[float]:
+        """Of each parameter, over all letters."""
+        return [max(high for _, high in ends) for ends in zip(*(letter.ranges for letter in self.letters))]
+
     def at(self, letter: Letter, point: Sequence[float] = ()) -> Floats:
         """The map of a letter at values of its parameters, of the coordinates that are kept."""
         from scipy.linalg import expm

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,21 +14,24 @@ from orchestration.basics.progress import ShareHeard, of_share
 from orchestration.basics.terminal import Share
 from orchestration.building.inputs import files_of
 from orchestration.certificates.breaking import LONGEST, Broken, broken_at, least_breaking
+from orchestration.certificates.causes import Cause, Caused, cause_at
 from orchestration.certificates.family import Family
 from orchestration.certificates.parts import Loop, loop_of
+from orchestration.certificates.repeated import least_repeated
 from orchestration.certificates.timeline import DELAY, JITTER, LOSS, Timeline, Varying
+from orchestration.exact.shared import by_itself
 from orchestration.fmi.foreign import computed
 from orchestration.fmi.reuse import Instances
 from orchestration.requests.ranges import paths_in
 from orchestration.requests.request import Asked, asked_for
 from orchestration.stability.delay_bounds import SampledLoop, certain_jitter
-from orchestration.stability.known_loops import LOOPS
+from orchestration.stability.known_loops import rested
 from orchestration.stability.linear_loop import at_rest
 from orchestration.system.distribution import lowest
-from orchestration.system.model import System, variable_of
+from orchestration.system.model import variable_of
 from orchestration.system.placement import carried, tasks_of
 from orchestration.system.request import Request, in_its_own_words, system_meant
-from orchestration.system.times import NANOSECONDS
+from orchestration.system.times import NANOSECONDS, down_to_nanoseconds
 
 MOST_LOST = 8
 """losses in a row that are looked at"""
@@ -47,7 +49,7 @@ class Certified:
     """The path of what varies: each draw is anywhere from 0 to the value."""
     certified: float | None
     """The largest value for which a proof was found that no sequence makes the loop unstable; None: there is none, as
-    the loop is unstable without any."""
+    the loop is unstable without any, or on its computer none was found even for 0."""
     breaking: float | None
     """The least value at which a periodic sequence was found that makes it unstable; None: none that was tried does."""
     breaking_sequence: tuple[tuple[str, tuple[float, ...]], ...]
@@ -76,13 +78,19 @@ def margin(asked: Asked, of: str, *, progress: ShareHeard = None) -> Certified:
     """How far a quantity of a system may vary from draw to draw, the loop linearised about its operating point.
 
     `of` is the path of a sampled component's `sampling.jitter`, of a connection's `delay_jitter`, or of its `loss`,
-    which stands for the longest run of messages that are lost one after the other. All else is punctual. What is found
-    is about the linear loop: nothing is said of large errors.
+    which stands for the longest run of messages that are lost one after the other; all else is punctual. Of a system
+    with computers or networks it is that of a task's `execution`, or of the `jitter` of a task or message; all others
+    are as they may be. What is found is about the linear loop: nothing is said of large errors.
 
     Raises `UsageError` where the loop cannot be made linear or the path is for something else, saying why.
     """
     request = asked_for(asked)
+    cause = cause_in(request, of)
+    if cause is not None:
+        with of_share(progress, "certifying") as heard:
+            return _of_cause(request, cause, heard)
     varying = varying_of(request, of)
+    expect_unshared(request)
     loop = measured(request)
     timeline = Timeline(loop, [varying])
     with of_share(progress, "certifying") as heard:
@@ -90,36 +98,34 @@ def margin(asked: Asked, of: str, *, progress: ShareHeard = None) -> Certified:
 
 
 def measured(request: Request) -> Loop:
-    """The loop of a request about its operating point, from its FMUs."""
+    """The loop of a request about its operating point, from its FMUs; nothing makes it late."""
     return computed(files_of(system_meant(request)).fmus.values(), _measured, request)
 
 
 def _measured(request: Request) -> Loop:
-    known, instances = LOOPS.of(request.kind), Instances()
+    instances = Instances()
     try:
-        with in_its_own_words(request):
-            system = request.as_system() if known is None else known.at_rest(request)
-            _expect_unshared(system)
-            with at_rest(system, instances) as rest:
-                return loop_of(rest)
+        with in_its_own_words(request), at_rest(by_itself(rested(request)), instances) as rest:
+            return loop_of(rest)
     finally:
         instances.close()
 
 
-def _expect_unshared(system: System) -> None:
+def expect_unshared(request: Request) -> None:
     """Raise `UsageError` for what a scheduler decides, saying what to ask for instead."""
-    of_delays = "a certificate is of delays, whoever causes them; expected"
+    system = system_meant(request)
     for name, task in tasks_of(system).items():
-        sent = next((x.name for x in system.connections if x.sender == name), "NAME")
         raise UsageError(
-            f"{task.place}: {of_delays} a sampling of {name} in its place, whose jitter is the start_jitter of "
-            f"quadcosim schedule, and --of connections.{sent}.delay_jitter, which is its latency"
+            f"{task.place}: a scheduler has {name} sampled; expected --of {task.place}.execution, as a cause"
         )
     for name, message in carried(system).items():
-        raise UsageError(
-            f"{message.place}: {of_delays} {name} without it, and --of connections.{name}.delay_jitter, which is the "
-            "response of quadcosim schedule"
-        )
+        raise UsageError(f"{message.place}: {name} waits for other frames; expected --of the jitter of one, as a cause")
+
+
+def cause_in(request: Request, of: str) -> Cause | None:
+    """What a path is of, where it is of a computer or a network."""
+    (path, *others) = paths_in(request, of) or (of,)
+    return None if others else cause_at(system_meant(request), path)
 
 
 def varying_of(request: Request, of: str) -> Varying:
@@ -133,7 +139,8 @@ def varying_of(request: Request, of: str) -> Varying:
         if table == "components" and key == JITTER:
             return Varying(kind=key, name=name.removesuffix(".sampling"), path=path)
     raise UsageError(
-        f"--of {of}: expected connections.NAME.delay_jitter, connections.NAME.loss or components.NAME.sampling.jitter"
+        f"--of {of}: expected connections.NAME.delay_jitter, connections.NAME.loss, components.NAME.sampling.jitter, "
+        "computers.NAME.tasks.NAME.execution or jitter, or networks.NAME.messages.NAME.jitter"
     )
 
 
@@ -179,6 +186,25 @@ def _of_losses(timeline: Timeline, varying: Varying, progress: Share) -> Certifi
         of=varying.path, certified=value, breaking=None if broken is None else broken.value,
         breaking_sequence=() if broken is None else broken.sequence, small_gain=None, largest=MOST_LOST,
         searched=searched, states=len(timeline.family(run=MOST_LOST).kept), certificate=certificate,
+    )  # fmt: skip
+
+
+def _of_cause(request: Request, cause: Cause, progress: Share) -> Certified:
+    system, files = rested(request), files_of(system_meant(request))
+    with in_its_own_words(request):
+        loop = measured(request)
+        caused = Caused(loop, system, cause)
+        tried = computed(files.fmus.values(), least_repeated, system, cause, files.models, loop.period)
+    largest = caused.largest()
+    top = largest if tried.breaking is None else min(largest, tried.breaking)
+    value, certificate = None, None
+    if tried.breaking != 0.0:
+        value, certificate = largest_certified(caused.family, [cause.path], top, progress)
+    return Certified(
+        of=cause.path, certified=value, breaking=tried.breaking,
+        breaking_sequence=tried.sequence,
+        small_gain=None, largest=largest, searched=tried.searched, states=len(caused.family(0.0).kept),
+        certificate=certificate,
     )  # fmt: skip
 
 
@@ -250,8 +276,3 @@ def small_gain(loop: Loop, varying: Varying) -> float | None:
     period = float(loop.period) / NANOSECONDS
     delay = lowest(command.delay)
     return certain_jitter(SampledLoop(A=of.A, B=of.B[:, moved], F=F, period=period, delay=delay))
-
-
-def down_to_nanoseconds(value: float) -> float:
-    """The clock's whole nanoseconds."""
-    return math.floor(value * NANOSECONDS + 1e-6) / NANOSECONDS

@@ -13,11 +13,12 @@ from orchestration.basics.extras import needs
 from orchestration.basics.progress import ShareHeard, of_share
 from orchestration.certificates.breaking import Broken, least_breaking, unstable_sequence
 from orchestration.certificates.family import Family
-from orchestration.certificates.margin import down_to_nanoseconds, largest_certified, measured, varying_of
+from orchestration.certificates.margin import expect_unshared, largest_certified, measured, varying_of
 from orchestration.certificates.timeline import LOSS, Timeline
 from orchestration.figures.palette import BLUE, RED
 from orchestration.figures.style import SCREEN, Style, save
 from orchestration.requests.request import Asked, asked_for
+from orchestration.system.times import down_to_nanoseconds
 
 COLUMNS = 6
 """values of the first quantity, from 0 to what breaks the loop by itself"""
@@ -88,6 +89,7 @@ def region(asked: Asked, of: str, and_of: str, *, columns: int = COLUMNS, progre
     pair = [varying_of(request, each) for each in (of, and_of)]
     if any(each.kind == LOSS for each in pair) or pair[0] == pair[1]:
         raise UsageError(f"--of {of} --and {and_of}: expected two different jitters or delay jitters")
+    expect_unshared(request)
     timeline = Timeline(measured(request), pair)
     if unstable_sequence(timeline.family([0.0, 0.0])) is not None:
         raise UsageError("the loop is unstable where nothing varies, so nothing can be certified")

@@ -31,8 +31,9 @@ def margin(
         str | None,
         typer.Option(
             "--of",
-            help="What varies from draw to draw: the path of a delay_jitter, of a sampling.jitter, or of a loss, which "
-            "stands for the longest run of losses. Default: the delays of the quadrotor's command, by bounds.",
+            help="What varies from draw to draw: the path of a delay_jitter, of a sampling.jitter, of a task's "
+            "execution or jitter, or of a loss, which stands for the longest run of losses. Default: the delays of the "
+            "quadrotor's command, by bounds.",
             metavar="PATH",
             show_default=False,
         ),
@@ -114,6 +115,8 @@ def _checked(path: Path, request: "Request | None") -> Answer:
     lines.append(f"{'proved':<17}  no sequence of these makes the {found.states} numbers of the loop grow")
     lines.append(f"{'radius':<17}  {found.radius:g} of what was measured")
     of = " and ".join(found.of)
+    if found.up_to is not None:
+        lines.append(f"{'so it holds for':<17}  {of} from 0 to {found.up_to:.9g} s")
     lines.append(f"{'loop':<17}  {of + ' of this system' if of else 'the matrices in the file; no system was given'}")
     return Answer(document=found, lines=lines)
 

@@ -25,6 +25,11 @@ def nanoseconds(seconds: float) -> int:
     return round(exact_nanoseconds(seconds))
 
 
+def down_to_nanoseconds(seconds: float) -> float:
+    """The last whole nanosecond that is not after it."""
+    return math.floor(seconds * NANOSECONDS + 1e-6) / NANOSECONDS
+
+
 def is_at_least(seconds: float, nanoseconds: float) -> bool:
     """Whether a time is no shorter than so many nanoseconds, by what the decimal forms of both mean."""
     about = seconds * NANOSECONDS

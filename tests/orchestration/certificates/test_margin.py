@@ -2,7 +2,6 @@
 
 import functools
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,6 @@ from orchestration.certificates.timeline import Timeline
 from orchestration.command.cli import main
 from orchestration.stability import delay_bounds
 from orchestration.stability.delay_bounds import breaking_jitter
-from orchestration.system.computers import Computer, Message, Network, Task
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 from quadcosim import Timing
@@ -47,17 +45,6 @@ def found(system: System) -> Certified:
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(certificates, "SHARES", (0.95,))
         return margin(system, COMMAND)
-
-
-def test_of_a_task_and_of_a_frame_it_is_said_which_delay_to_ask_for_instead(system: System) -> None:
-    controller = replace(system.components["controller"], sampling=None)
-    task = Computer(tasks={"control": Task(component="controller", period=1.0)})
-    by_task = replace(system, components={**system.components, "controller": controller}, computers={"node": task})
-    with pytest.raises(UsageError, match=rf"^computers\.node\.tasks\.control: .*in its place.* of {COMMAND}, which is"):
-        margin(by_task, COMMAND)
-    frame = Network(kind="can", bit_rate=1e6, messages={"u": Message(connection="command", bytes=8, identifier=1)})
-    with pytest.raises(UsageError, match=rf"^networks\.bus\.messages\.u: .*without it, and .*of {COMMAND}, which is"):
-        margin(replace(system, networks={"bus": frame}), COMMAND)
 
 
 def test_nearly_all_that_does_not_break_a_double_integrator_is_certified(found: Certified) -> None:
