@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import Any
 
 from orchestration.basics.bisection import bisected
 from orchestration.basics.errors import UsageError
@@ -123,11 +124,10 @@ def _dealt(system: System, of: PlacedTask, cause: Cause, values: Sequence[float]
             continue
         assert task.period is not None
         for i, value in enumerate(values):
-            one = replace(
-                task, period=len(values) * task.period, offset=task.offset + i * task.period, deadline=task.due
-            )
-            late = replace(one, execution=value) if cause.key == EXECUTION else replace(one, offset=one.offset + value)
-            tasks[f"{name} {i + 1}"] = late
+            offset = task.offset + _times(i, task.period)
+            dealt = {"execution": value} if cause.key == EXECUTION else {"offset": offset + value}
+            every: dict[str, Any] = {"period": _times(len(values), task.period), "offset": offset, "deadline": task.due}
+            tasks[f"{name} {i + 1}"] = replace(task, **{**every, **dealt})
     computers = {**system.computers, of.computer_name: replace(computer, tasks=tasks)}
     return replace(system, computers=computers)
 

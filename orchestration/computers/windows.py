@@ -100,8 +100,7 @@ def _of_task(of: PlacedTask, bounds: Bounds) -> Window:
         responds = f"{of.place}: may respond after {bound / NANOSECONDS:g} s"
         raise UsageError(f"{responds}; expected {float(in_time) / NANOSECONDS:g} s at most")
     least, most = (nanoseconds(end(task.execution)) for end in (lowest, highest))
-    grows = of.computer.scheduling != "earliest-deadline-first"  # whether the bound does with what the job takes
-    earliest, latest = switch, bound - (most if grows else least)
+    earliest, latest = switch, bound - most
     if task.read == "release":
         earliest, latest, least, most = 0, nanoseconds(highest(task.jitter)), least + switch, bound
     elif not _is_uninterrupted(of):
