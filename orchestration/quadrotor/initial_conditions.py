@@ -105,9 +105,10 @@ def _to(highest: float) -> str:
 
 
 def _direction(generator: np.random.Generator) -> Floats:
-    """A unit vector, all directions alike."""
+    """A unit vector, all directions alike; the same to the bit on all machines, as a BLAS is not."""
     vector = generator.standard_normal(3)
-    unit: Floats = vector / np.linalg.norm(vector)
+    x, y, z = vector.tolist()
+    unit: Floats = vector / math.sqrt(x * x + y * y + z * z)
     return unit
 
 
