@@ -18,7 +18,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Other people's masters that need an environment of their own are flown where they are: make interop makes it.
 export QUADCOSIM_COFMUPY ?= $(abspath $(wildcard $(COFMUPY)))
 
-.PHONY: demo newcomer check test coverage lint bench figures findings interop release site clean
+.PHONY: demo newcomer check test tests coverage lint bench figures findings interop release site clean
 
 demo: .venv/.base
 	$(BIN)/quadcosim build
@@ -34,7 +34,11 @@ QUICK := $(addprefix tests/,controller_fmu plant_fmu fmus/test_one_fmu.py fmu_ki
 check: lint
 	$(BIN)/pytest --numprocesses 2 --dist load --hypothesis-profile quick --ignore-glob '*/test_flight.py' --ignore-glob '*/test_show.py' $(QUICK)
 
-test: lint
+# Both at once: each says what is wrong, and waits for the other.
+test: .venv/.test
+	+@$(MAKE) --no-print-directory --jobs 2 lint tests
+
+tests: .venv/.test
 	$(BIN)/pytest --numprocesses $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 coverage: .venv/.test
