@@ -63,6 +63,8 @@ OPTIMISED = """
 #pragma GCC pop_options
 #endif
 """
+_OF_LIBRARY = ("-O1",)
+"""Steps are as fast as with -O2, for what is written is straight and its constants are known; compiling takes less."""
 _NEEDS = FOLDER / "needs.html"
 _PYTHON = "python"
 """Where in the documentation the Python is from which the C was written."""
@@ -106,12 +108,17 @@ def build(
     compiled: dict[str, bytes] = {}
     here = host_platform(version)
     if not systems and here is not None:
-        compile_ = functools.partial(compiled_here, sources, standard.main, mathematics=mathematics)
-        compiled[here] = libraries.content("native", sources, (OPTIONS, standard.main, mathematics), compile_)
+        compiled[here] = library(sources, standard.main, mathematics)
     for system in systems:
         compiled |= compiled_for(system, sources, standard.main, version)
     files |= {library_path(system, target.name): library for system, library in compiled.items()}
     return written(files, target, folder)
+
+
+def library(sources: dict[str, bytes], main: str, mathematics: Mathematics = "own") -> bytes:
+    """The library of a slave for this machine, from the sources of its FMU; compiled only if it is not in the cache."""
+    compile_ = functools.partial(compiled_here, sources, main, mathematics=mathematics, options=_OF_LIBRARY)
+    return libraries.content("native", sources, (OPTIONS, _OF_LIBRARY, main, mathematics), compile_)
 
 
 def c_sources(program: Program, guid: str, standard: Standard) -> dict[str, bytes]:

@@ -1,6 +1,5 @@
 """A slave in Python and the same one compiled, called alike: what they answer, to the last bit."""
 
-import functools
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,11 +9,11 @@ from typing import Any
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
-from fmu_kit import libraries
 from fmu_kit.bundle import Target
 from fmu_kit.compiler.emit.standards import STANDARDS
+from fmu_kit.compiler.pack import building
 from fmu_kit.compiler.pack.building import c_sources, modules_of
-from fmu_kit.compiler.pack.c_compiler import OPTIONS, Mathematics, compiled_here
+from fmu_kit.compiler.pack.c_compiler import Mathematics
 from fmu_kit.compiler.passes.precomputing import precomputed
 from fmu_kit.compiler.trace.tracing import Program, trace
 from fmu_kit.packaging import slave_class
@@ -33,9 +32,7 @@ def library(target: Target, folder: Path) -> Path:
 
 def compiled(program: Program, path: Path, mathematics: Mathematics) -> Path:
     """The library of a traced slave, as FMI 2.0; one of the same sources is not compiled again."""
-    sources, main = c_sources(program, GUID, STANDARDS[2]), STANDARDS[2].main
-    compile_ = functools.partial(compiled_here, sources, main, mathematics=mathematics)
-    path.write_bytes(libraries.content("native", sources, (OPTIONS, main, mathematics), compile_))
+    path.write_bytes(building.library(c_sources(program, GUID, STANDARDS[2]), STANDARDS[2].main, mathematics))
     return path
 
 
