@@ -9,6 +9,7 @@ from typing import Any
 import matplotlib
 from cycler import cycler
 from matplotlib.backend_bases import get_registered_canvas_class
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from orchestration.basics.errors import UsageError
@@ -60,7 +61,9 @@ class Style:
     def figure(self, height: float, *, width: float = 1.0, **more: Any) -> Figure:
         """An empty figure, so many lines of text high unless the style says how high; `width` is a share of its."""
         high = self.height if self.height is not None else height * self.font * POINT
-        return Figure(figsize=(width * self.width / INCH, high / INCH), **more)
+        figure = Figure(figsize=(width * self.width / INCH, high / INCH), **more)
+        FigureCanvasAgg(figure)  # one renderer, which measures each text once, for layout and PNG
+        return figure
 
     @contextmanager
     def applied(self) -> Iterator[None]:
@@ -153,7 +156,9 @@ def save(
                 for ending in style.formats:
                     path = folder / f"{name}.{ending}"
                     # As `Figure.savefig`, which draws twice for the sake of figures whose layout is not done.
-                    canvas = get_registered_canvas_class(ending)(figure)
+                    canvas: Any = figure.canvas
+                    if not hasattr(canvas, f"print_{ending}"):
+                        canvas = get_registered_canvas_class(ending)(figure)
                     getattr(canvas, f"print_{ending}")(path, metadata=_UNDATED[ending])
                     if ending == "png" and style.colors is not None:
                         _reduce(path, style.colors)
