@@ -26,14 +26,14 @@ def expect_flyable(study: Study, files: Files) -> tuple[str, ...]:
     expect_columns(study.judged)
     first, wrong = "", 0
     starts, longest, alike = files.starts_of(study.origin), study.origin, _Alike(files)
-    for index, point in enumerate(study.points):
+    for index in range(len(study.points)):
         try:
             with in_its_own_words(study.base):
                 system = study.system(index, starts)
                 alike.expect(system)
             longest = max(longest, system, key=lambda one: one.stop_time)
         except UsageError as error:
-            first = first or f"{described(index, point)}: {error}"
+            first = first or f"{described(index, study.points[index])}: {error}"
             wrong += 1
     if wrong:
         raise UsageError(first + (f" ({wrong - 1} more runs cannot be)" if wrong > 1 else ""))

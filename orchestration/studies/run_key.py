@@ -3,15 +3,16 @@
 import dataclasses
 import hashlib
 import json
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
-from functools import partial
+from collections.abc import Container, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from orchestration.basics.identity import OfSame
 from orchestration.building.inputs import Files, tables_of
 from orchestration.results.own_metrics import OwnMetric
 from orchestration.studies.study import Study
-from orchestration.system.model import Component, Connection, Source, System
+from orchestration.system.computers import Computer, Network
+from orchestration.system.model import Component, Connection, Criterion, Source, System
 from orchestration.workers.provenance import machine, versions
 
 
@@ -21,76 +22,77 @@ def run_key(system: System, files: Files, metrics: Sequence[OwnMetric] = ()) -> 
     A parameter that has the value with which its FMU starts counts as not given.
     """
     content = {
-        **{key: _text_of(getattr(system, key), dict) for key in ("objectives", "streams")},
+        **_texts_shared(
+            system.connections, system.sources, system.computers, system.networks, system.objectives, system.streams,
+            system.criterion, versions(), files,
+        ),
         **{key: json.dumps(getattr(system, key)) for key in ("stop_time", "seed")},
-        "components": _listed(
-            _text_of(component, partial(_component_of, name, files), name, id(files))
-            for name, component in system.components.items()
-        ),
-        "connections": _listed(_text_of(x, partial(_connection_of, files), id(files)) for x in system.connections),
-        "sources": _listed(
-            _text_of(source, partial(_named_source_of, name, files), name, id(files))
-            for name, source in system.sources.items()
-        ),
-        **{
-            key: _text_of(getattr(system, key), partial(_shared_of, key, files), id(files))
-            for key in ("computers", "networks")
-            if getattr(system, key)
-        },
-        "criterion": _text_of(system.criterion, dataclasses.asdict),
-        "versions": _text_of(versions(), dict),
-    }
+        "components": _listed(_text_of_component(*item, files) for item in system.components.items()),
+    }  # fmt: skip
     if metrics:
         content["metrics"] = json.dumps([(metric.name, metric.source) for metric in metrics])
     text = ", ".join(f'"{key}": {content[key]}' for key in sorted(content))
     return hashlib.sha256(f"{{{text}}}".encode()).hexdigest()
 
 
-_TEXTS: dict[tuple[Any, ...], tuple[Any, str]] = {}
-_MOST_TEXTS = 256
-
-
-def _text_of(part: Any, content: Callable[[Any], Any], *more: Any) -> str:
-    """The JSON of a part of a system; runs of a study have most of them in common, which are written once."""
-    key = (id(part), *more)
-    found = _TEXTS.get(key)
-    if found is None or found[0] is not part:
-        if len(_TEXTS) >= _MOST_TEXTS:
-            _TEXTS.clear()
-        found = _TEXTS[key] = (part, json.dumps(content(part), sort_keys=True))
-    return found[1]
+def _json(content: Any) -> str:
+    return json.dumps(content, sort_keys=True)
 
 
 def _listed(parts: Iterable[str]) -> str:
     return f"[{', '.join(parts)}]"
 
 
-def _component_of(name: str, files: Files, component: Component) -> dict[str, Any]:
+@OfSame
+def _texts_shared(
+    connections: Sequence[Connection],
+    sources: Mapping[str, Source],
+    computers: Mapping[str, Computer],
+    networks: Mapping[str, Network],
+    objectives: Mapping[str, str],
+    streams: Mapping[str, int],
+    criterion: Criterion,
+    software: Mapping[str, str],
+    files: Files,
+) -> dict[str, str]:
+    """The JSON of what runs of a study have in common, mostly."""
+    parts: dict[str, Any] = {
+        "connections": [_content(x, files) for x in connections],
+        "sources": [[name, _source_of(source, files)] for name, source in sources.items()],
+        **{
+            key: dict(value)
+            for key, value in (("objectives", objectives), ("streams", streams), ("versions", software))
+        },
+        "criterion": dataclasses.asdict(criterion),
+    }
+    if computers:
+        parts["computers"] = _shared_of("tasks", computers, files)
+    if networks:
+        parts["networks"] = _shared_of("messages", networks, files)
+    return {key: _json(value) for key, value in parts.items()}
+
+
+@OfSame
+def _text_of_component(name: str, component: Component, files: Files) -> str:
     starts = files.starts[component.fmu]
-    return {
+    content = {
         **_values_of(component),
         "name": name,
         "fmu": files.hashes[component.fmu],
         "parameters": {key: v for key, v in component.parameters.items() if key not in starts or v != starts[key]},
         "sampling": None if component.sampling is None else _content(component.sampling, files),
     }
+    return _json(content)
 
 
-def _connection_of(files: Files, x: Connection) -> dict[str, Any]:
-    return _content(x, files)
-
-
-def _shared_of(key: str, files: Files, shared: Mapping[str, Any]) -> list[Any]:
-    """Computers or networks, which are what they are in their order: it decides ties."""
-    part = "tasks" if key == "computers" else "messages"
+def _shared_of(part: str, shared: Mapping[str, Any], files: Files) -> list[Any]:
+    """Computers with their tasks or networks with their messages, which are what they are in their order: it decides
+    ties.
+    """
     return [
         [name, _content(one, files) | {part: [[each, _content(of, files)] for each, of in getattr(one, part).items()]}]
         for name, one in shared.items()
     ]
-
-
-def _named_source_of(name: str, files: Files, source: Source) -> list[Any]:
-    return [name, _source_of(source, files)]
 
 
 def _source_of(source: Source, files: Files) -> dict[str, Any]:

@@ -94,21 +94,26 @@ class Study:
 
         Raises `UsageError` for a value that cannot be.
         """
+        return self.run(index, starts)[1]
+
+    def run(self, index: int, starts: Mapping[str, float]) -> tuple[Mapping[str, Value], System]:
+        """The value of each axis in one run, and its system; raises as `system` does."""
         made, of = self._made
         if of != starts:
             of.clear()
             made.clear()
             of.update(starts)
-        if index not in made:
-            system = self._system(self.points[index], starts)
-            if len(made) == _KEPT:
-                return system
-            made[index] = system
-        return made[index]
+        if index in made:
+            return made[index]
+        point = self.points[index]
+        run = point, self._system(point, starts)
+        if len(made) < _KEPT:
+            made[index] = run
+        return run
 
     @cached_property
-    def _made(self) -> tuple[dict[int, System], dict[str, float]]:
-        """Systems that are asked for again, to be checked, hashed and flown; and the FMUs' own parameters in them."""
+    def _made(self) -> tuple[dict[int, tuple[Mapping[str, Value], System]], dict[str, float]]:
+        """Runs that are asked for again, to be checked, hashed and flown; and the FMUs' own parameters in them."""
         return {}, {}
 
     def _system(self, point: Mapping[str, Value], starts: Mapping[str, float]) -> System:
@@ -162,7 +167,7 @@ def _traces(values: Iterable[tuple[str, str]]) -> list[str]:
 
 
 _KEPT = 2**14
-"""Systems of a study, some kB each"""
+"""Runs of a study, some kB each"""
 _NAME = re.compile(r"[^\W_][\w .+-]{0,99}")
 
 

@@ -200,8 +200,9 @@ def _task(
     key: str,
     engine: Engine | None,
 ) -> RunTask:
+    settings, system = study.run(index, starts)
     return RunTask(
-        index=index, key=key, settings=dict(study.points[index]), system=study.system(index, starts),
+        index=index, key=key, settings=settings, system=system,
         keep_signals=study.keeps_signals(index), metrics=study.metrics, engine=engine, time_limit=time_limit,
     )  # fmt: skip
 
@@ -284,6 +285,6 @@ def _units(study: Study, files: Files) -> dict[str, str]:
 
 def _places(study: Study, files: Files) -> Iterator[store.DesignPoint]:
     starts = files.starts_of(study.origin)
-    for index, point in enumerate(study.points):
-        key = run_key(study.system(index, starts), files, study.metrics)
-        yield store.DesignPoint(index=index, key=key, settings=point)
+    for index in range(len(study.points)):
+        settings, system = study.run(index, starts)
+        yield store.DesignPoint(index=index, key=run_key(system, files, study.metrics), settings=settings)

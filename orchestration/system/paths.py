@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.basics.errors import UsageError, did_you_mean
+from orchestration.basics.records import like
 from orchestration.system.computers import Arrivals, Computer, Network
 from orchestration.system.model import (
     Component,
@@ -56,12 +57,24 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
             sources[name] = _replaced(
                 place, sources[name], _in_place(sources[name], _by_parameter(sources[name], keys))
             )
+    if _only_numbers(grouped, top):
+        return like(system, components=components, **top)
     result: System = _replaced(
         "",
         system,
         {**top, "components": components, "connections": tuple(connections.values()), "sources": sources, **shared},
     )
     return result
+
+
+def _only_numbers(grouped: Mapping[tuple[str, str], Mapping[str, Any]], top: Mapping[str, Any]) -> bool:
+    """Whether changes are none that a system looks at when it is made: those of most runs of a study."""
+    is_seed = all(key == "seed" and type(value) is int and 0 <= value < 2**63 for key, value in top.items())
+    return is_seed and all(table == "components" and _are_parameters(keys) for (table, _), keys in grouped.items())
+
+
+def _are_parameters(keys: Iterable[str]) -> bool:
+    return all(key.startswith("parameters.") for key in keys)
 
 
 def names_table(path: str) -> bool:
@@ -123,11 +136,13 @@ def _split(system: System, path: str, table: str, rest: str) -> tuple[str, str]:
 
 
 def _expect_key(path: str, table: str, system: System, name: str, key: str) -> None:
+    if table in ("components", "sources") and key.startswith("parameters.") and key != "parameters.":
+        return
     keys: list[str]
     if table == "components":
         keys = _keys_of_stepping(system.components[name])
         keys += ["align", "fmu", "record", "tolerance", "parameters.NAME"]
-        known = key in keys or (key.startswith("parameters.") and key != "parameters.")
+        known = key in keys[:-1]
     elif table == "connections":
         fixed = ("name", "start", "end", "noise", "quantisation", "stated")
         keys = [f.name for f in dataclasses.fields(Connection) if f.name not in fixed]
@@ -138,7 +153,7 @@ def _expect_key(path: str, table: str, system: System, name: str, key: str) -> N
         keys, known = _keys_of_parts(getattr(system, table)[name], key)
     else:
         keys = [f.name for f in dataclasses.fields(Source)] + ["parameters.NAME"]
-        known = key in keys[:-1] or (key.startswith("parameters.") and key != "parameters.")
+        known = key in keys[:-1]
     if not known:
         listed = f"{table}.{name}. and one of {', '.join(keys)}"
         raise UsageError(f"{path}: no such key; expected {listed}{did_you_mean(key, keys)}")
@@ -210,6 +225,8 @@ def _with_parts(place: str, of: Computer | Network, keys: Mapping[str, Any]) -> 
 
 
 def _component(place: str, component: Component, keys: Mapping[str, Any]) -> Component:
+    if _are_parameters(keys) and all(type(value) is float for value in keys.values()):
+        return like(component, **_by_parameter(component, keys))
     sampling = {key.partition(".")[2]: value for key, value in keys.items() if key.startswith("sampling.")}
     rest = {key: value for key, value in _by_parameter(component, keys).items() if "." not in key}
     if sampling:

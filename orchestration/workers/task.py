@@ -2,7 +2,7 @@
 
 import io
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +30,7 @@ class RunTask:
 
     index: int
     key: str
-    settings: dict[str, Any]
+    settings: Mapping[str, Any]
     system: System
     keep_signals: bool
     metrics: tuple[OwnMetric, ...] = ()

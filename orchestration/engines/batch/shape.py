@@ -1,6 +1,6 @@
 """What runs have in common that are flown in lanes of one batch: their components, connections and expressions."""
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from orchestration.basics.identity import OfSame
 from orchestration.engines import initial
 from orchestration.engines.batch.code import Written, written
 from orchestration.engines.batch.kernels import Kernel, batch, component, lanes_here
@@ -24,8 +25,9 @@ from orchestration.fmi.model import Model, Variable
 from orchestration.results.objectives import GOOD
 from orchestration.schedule.plan import is_plain
 from orchestration.system.check import recorded
+from orchestration.system.computers import Network
 from orchestration.system.model import Connection, Source, System, component_of, variable_of
-from orchestration.system.placement import carried
+from orchestration.system.placement import placed_messages
 
 Places = npt.NDArray[np.int64]
 c = structures(1)
@@ -35,11 +37,24 @@ _TAKES = {"Boolean": c.TRUTH, "Integer": c.WHOLE, "Enumeration": c.WHOLE}
 
 def outline(system: System) -> Hashable:
     """What two systems must have in common to be flown in lanes of one batch."""
+    components = tuple(
+        (name, c.fmu, c.record, c.sampling and c.sampling.clock) for name, c in system.components.items()
+    )
+    others = _outline_between(system.connections, system.sources, system.networks, system.objectives)
+    return components, others, system.optional, system.criterion
+
+
+@OfSame
+def _outline_between(
+    connections: Sequence[Connection],
+    sources: Mapping[str, Source],
+    networks: Mapping[str, Network],
+    objectives: Mapping[str, str],
+) -> Hashable:
     return (
-        tuple((name, c.fmu, c.record, c.sampling and c.sampling.clock) for name, c in system.components.items()),
-        tuple(map(_outline_of, system.connections)), frozenset(carried(system)),
-        tuple((name, source.to, _kind(source), source.trajectory) for name, source in system.sources.items()),
-        tuple(system.objectives.items()), system.optional, system.criterion,
+        tuple(map(_outline_of, connections)), frozenset(each.message.connection for each in placed_messages(networks)),
+        tuple((name, source.to, _kind(source), source.trajectory) for name, source in sources.items()),
+        tuple(objectives.items()),
     )  # fmt: skip
 
 

@@ -1,5 +1,7 @@
 """Values of a system by path, as axes, flags and operating points name them."""
 
+import dataclasses
+import pickle
 from pathlib import Path
 
 import pytest
@@ -119,6 +121,25 @@ def test_a_path_that_does_not_exist_is_refused_in_one_line(path: str, line: str)
 def test_a_value_that_cannot_be_is_refused_with_its_path(path: str, value: object) -> None:
     with pytest.raises(UsageError, match=rf"^{path} = .*: expected"):
         changed(quadrotor(), {path: value})
+
+
+@pytest.mark.parametrize("value", [-1, 2**63, True, "7"])
+def test_beside_parameters_alone_a_seed_is_held_to_what_it_can_be_too(value: object) -> None:
+    with pytest.raises(UsageError, match=r"^seed = .*: expected a whole number"):
+        changed(quadrotor(), {"seed": value, "components.plant.parameters.mass": 1.5})
+
+
+@pytest.mark.parametrize("given", [1.5, 2, "1.5", True])
+def test_a_system_with_other_parameters_and_seed_is_that_which_is_made_with_them(given: float | str) -> None:
+    """Of numbers alone it is not checked again, and it is the same, in its types and its order too."""
+    changes = {"components.plant.parameters.mass": given, "components.controller.parameters.gain.eta": 12.0, "seed": 7}
+    found, components = changed(quadrotor(), changes), dict(quadrotor().components)
+    new: dict[str, dict[str, float | str]] = {"plant": {"mass": given}, "controller": {"gain.eta": 12.0}}
+    for name, parameters in new.items():
+        there = components[name].parameters
+        components[name] = dataclasses.replace(components[name], parameters={**there, **parameters})
+    made = dataclasses.replace(quadrotor(), components=components, seed=7)
+    assert (found, pickle.dumps(dataclasses.asdict(found))) == (made, pickle.dumps(dataclasses.asdict(made)))
 
 
 def test_a_range_and_the_command_line_mean_whole_seeds_and_files() -> None:
