@@ -14,7 +14,7 @@ import tarfile
 import tempfile
 from pathlib import Path
 
-from fmu_kit.packaging import write_archive
+from fmu_kit.archive import write_archive
 from fmu_kit.versions import project_version
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -18,8 +18,6 @@ import os
 import posixpath
 import re
 import sys
-import uuid
-import zipfile
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +25,8 @@ from typing import Any
 from xml.dom.minidom import parseString
 from xml.etree.ElementTree import Element, ParseError, fromstring, tostring
 
-from fmu_kit import bundle, documentation, loader
+from fmu_kit import archive, bundle, documentation, loader
+from fmu_kit.archive import ICONS, PAGE, SOURCE_HASH_FILE, VARIANT_FILE, content_guid, write_archive
 from fmu_kit.bundle import PackagingError, Target, bundled_sources, module_path, place, renamed
 from fmu_kit.documentation import Making
 from fmu_kit.errors import FmuError
@@ -35,18 +34,6 @@ from fmu_kit.failure import place_of
 from fmu_kit.model_description import GUID_PLACEHOLDER, PYTHON_REQUIRED, to_xml
 from fmu_kit.variants import Variant
 from fmu_kit.versions import generation_tool, version_of
-
-PAGE = "documentation/index.html"
-"""The documentation of an FMU, by its place in the archive."""
-ICONS = {2: "model.png", 3: "terminalsAndIcons/icon.png"}
-"""The icon of an FMU, by the version of FMI (2.0.4, section 2.3; 3.0, section 2.5)."""
-
-NATIVE_TABLES = "sources/tables.h"
-"""Of an FMU without Python inside: the file of its sources that has the GUID."""
-SOURCE_HASH_FILE = "resources/source_hash.txt"
-VARIANT_FILE = "resources/variant.json"
-"""Of a slave with values that are fixed: that slave, and the values."""
-_STAMP = (1980, 1, 1, 0, 0, 0)
 
 _LICENCES = {
     "quadcosim": "quadcosim, which packed this FMU.",
@@ -81,6 +68,7 @@ def source_hash(target: Target) -> str:
     """The hash of all that decides the content of the FMU: its modules and other files, and the packaging itself."""
     own = (
         Path(__file__),
+        Path(archive.__file__),
         Path(bundle.__file__),
         Path(documentation.__file__),
         documentation.TEMPLATE,
@@ -107,31 +95,12 @@ def _place_in_kit(path: Path) -> str:
     return path.relative_to(Path(__file__).parent).as_posix()
 
 
-def read_source_hash(fmu: Path) -> str | None:
-    """The source hash that an .fmu carries; None if it is not one of ours or not readable."""
-    try:
-        with zipfile.ZipFile(fmu) as archive:
-            return archive.read(SOURCE_HASH_FILE).decode().strip()
-    except (OSError, KeyError, zipfile.BadZipFile):
-        return None
-
-
 def origin(target: Target, digest: str) -> dict[str, bytes]:
     """What an FMU says of where it comes from, by the place there: the hash of its sources; of what it is a variant."""
     files = {SOURCE_HASH_FILE: digest.encode()}
     if target.variant is not None:
         files[VARIANT_FILE] = json.dumps([f"{target.module}:{target.model}", target.variant.text]).encode()
     return files
-
-
-def read_variant(fmu: Path) -> tuple[str, Variant] | None:
-    """Of which slave, as `module:Class`, an .fmu is which variant; None if it is none of ours or not readable."""
-    try:
-        with zipfile.ZipFile(fmu) as archive:
-            slave, text = json.loads(archive.read(VARIANT_FILE))
-            return str(slave), Variant.parse(text)
-    except (OSError, KeyError, TypeError, ValueError, AttributeError, zipfile.BadZipFile):
-        return None
 
 
 def build(target: Target, folder: Path) -> Path:
@@ -192,36 +161,6 @@ def _entry(bundle: str, target: Target) -> str:
     """The module that pythonfmu runs; nothing in it is newer than the oldest Python that could load it."""
     oldest = tuple(map(int, PYTHON_REQUIRED.removeprefix(">=").split(".")))
     return _ENTRY.format(bundle=bundle, module=target.entry, model=target.name, oldest=oldest, required=PYTHON_REQUIRED)
-
-
-def content_guid(files: dict[str, bytes]) -> str:
-    """A GUID from the content of an FMU: all files but that of the GUID, in the description all but it and the date.
-
-    Of an FMU that was written out as C, the libraries do not count: compiled anywhere, it is the same FMU.
-    """
-    compiled = "binaries/" if NATIVE_TABLES in files else "\0"
-    digest = hashlib.sha256()
-    for name in sorted(name for name in files if name != loader.GUID_FILE and not name.startswith(compiled)):
-        content = files[name]
-        if name == "modelDescription.xml":
-            content = re.sub(rb'(guid|instantiationToken|generationDateAndTime)="[^"]*"', rb"", content)
-        elif name == NATIVE_TABLES:
-            content = re.sub(rb'#define GUID "[^"]*"', rb"", content)
-        digest.update(name.encode() + b"\0" + hashlib.sha256(content).digest())
-    return str(uuid.UUID(bytes=digest.digest()[:16]))
-
-
-def write_archive(path: Path, files: dict[str, bytes], *, first: str) -> None:
-    """Write a zip of `files` by name, `first` at its head: the same content, the same bytes.
-
-    Stored, not compressed: the bytes must not depend on a version of zlib.
-    """
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
-        for name in sorted(files, key=lambda name: (name != first, name)):
-            entry = zipfile.ZipInfo(name, _STAMP)
-            entry.create_system = 3
-            entry.external_attr = 0o644 << 16
-            archive.writestr(entry, files[name])
 
 
 def slave_class(target: Target) -> Any:

@@ -1,7 +1,6 @@
 """Folders that a process works in: locked while it lives, so that the next one can clear those of the dead."""
 
 import os
-import secrets
 import shutil
 import sys
 import tempfile
@@ -48,7 +47,7 @@ def temporary() -> Scratch:
         _cleared.add(parent)
         for path in dead(parent.glob(f"{PREFIX}*{SUFFIX}")):
             shutil.rmtree(path, ignore_errors=True)
-    return Scratch(parent / f"{PREFIX}{secrets.token_hex(6)}{SUFFIX}", mode=0o700)
+    return Scratch(parent / f"{PREFIX}{os.urandom(6).hex()}{SUFFIX}", mode=0o700)
 
 
 def dead(folders: Iterator[Path]) -> Iterator[Path]:

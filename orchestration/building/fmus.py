@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import TypeVar
 
 from fmu_kit import packaging
+from fmu_kit.archive import read_source_hash, read_variant
 from fmu_kit.bundle import PackagingError, Target
 from fmu_kit.compiler.pack import freshness
 from fmu_kit.discovery import slave_beside, slaves_in
-from fmu_kit.packaging import read_source_hash, read_variant
 from fmu_kit.variants import Variant
 from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.building import consent

@@ -16,7 +16,7 @@ from typing import Literal
 import fmpy
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from fmu_kit.packaging import read_source_hash
+from fmu_kit.archive import read_source_hash
 from orchestration.basics.errors import UsageError, no_utf8
 from orchestration.basics.units import BASE, BaseUnits, Unit, named
 from orchestration.fmi.archive import expect_honest_size

@@ -11,8 +11,8 @@ import uuid
 import zipfile
 from pathlib import Path
 
+from fmu_kit.archive import write_archive
 from fmu_kit.loader import PLATFORM, compiler
-from fmu_kit.packaging import write_archive
 from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.fmi.model import Kind, Model, read_model
 from orchestration.interop.assignment import Ports

@@ -3,8 +3,8 @@
 import zipfile
 from pathlib import Path
 
+from fmu_kit.archive import write_archive
 from fmu_kit.loader import BESIDE
-from fmu_kit.packaging import write_archive
 
 
 def files_of(fmu: Path) -> dict[str, bytes]:

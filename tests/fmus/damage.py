@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element, fromstring, tostring
 
+from fmu_kit.archive import NATIVE_TABLES, content_guid
 from fmu_kit.loader import GUID_FILE
-from fmu_kit.packaging import NATIVE_TABLES, content_guid
 from tests.fmus.archive import files_of
 
 DESCRIPTION = "modelDescription.xml"

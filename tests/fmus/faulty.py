@@ -8,7 +8,7 @@ from xml.etree.ElementTree import fromstring
 
 import fmpy
 
-from fmu_kit.packaging import NATIVE_TABLES
+from fmu_kit.archive import NATIVE_TABLES
 from orchestration.building import fmus
 from tests.fmus.archive import files_of
 from tests.fmus.damage import DESCRIPTION, Damage, Files, file, with_its_guid, write_fmu

@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 import fmpy
 
-from fmu_kit.packaging import ICONS
+from fmu_kit.archive import ICONS
 from orchestration.building import fmus
 from orchestration.building.models import MODELS
 from tests.fmus.damage import (

@@ -12,6 +12,7 @@ import fmpy
 import pytest
 
 from fmu_kit import bundle, packaging
+from fmu_kit.archive import content_guid
 from fmu_kit.loader import BESIDE, GUID_FILE
 from orchestration.basics.errors import QuadcosimError
 from orchestration.building import fmus
@@ -121,15 +122,15 @@ def test_source_date_epoch_does_not_change_the_guid(
 def test_the_guid_is_that_of_the_content(model: str, built: dict[str, Path]) -> None:
     guid = fmpy.read_model_description(str(built[model])).guid
     assert guid
-    assert guid == packaging.content_guid(files_of(built[model]))
+    assert guid == content_guid(files_of(built[model]))
 
 
 def test_the_guid_changes_with_any_file(built: dict[str, Path]) -> None:
     files = files_of(built["QuadrotorPlant"])
-    guid = packaging.content_guid(files)
+    guid = content_guid(files)
     assert files.pop(GUID_FILE).decode() == guid
     for name in files:
-        assert packaging.content_guid({**files, name: files[name] + b" "}) != guid, name
+        assert content_guid({**files, name: files[name] + b" "}) != guid, name
 
 
 @pytest.mark.parametrize("model", MODELS)

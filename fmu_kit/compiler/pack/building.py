@@ -16,6 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from fmu_kit import libraries, packaging
+from fmu_kit.archive import NATIVE_TABLES
 from fmu_kit.bundle import PackagingError, Target, bundled_sources, place
 from fmu_kit.compiler.emit.c_code import c_code
 from fmu_kit.compiler.emit.lane_code import lane_code
@@ -39,15 +40,7 @@ from fmu_kit.compiler.trace.symbols import TraceError
 from fmu_kit.compiler.trace.tracing import Program, trace
 from fmu_kit.documentation import Making
 from fmu_kit.model_description import GUID_PLACEHOLDER
-from fmu_kit.packaging import (
-    NATIVE_TABLES,
-    described,
-    licences_and_icon,
-    origin,
-    put_guid,
-    slave_class,
-    written,
-)
+from fmu_kit.packaging import described, licences_and_icon, origin, put_guid, slave_class, written
 
 BESIDE = ("instance.h", "integers.h", "lanes.c", "lanes.h", "mathematics.h", "text.h")
 """What lies beside the file to compile, the same for every slave."""

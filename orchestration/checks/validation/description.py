@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Iterator
 
-from fmu_kit.packaging import NATIVE_TABLES
+from fmu_kit.archive import NATIVE_TABLES
 from orchestration.checks.validation.fmu import LIBRARIES, Fmu
 from orchestration.fmi.archive import Archive
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from xml.etree.ElementTree import Element
 
-from fmu_kit.packaging import SOURCE_HASH_FILE
+from fmu_kit.archive import SOURCE_HASH_FILE
 from orchestration.checks.validation.declared import Unknown, Variable
 from orchestration.checks.validation.standards import Standard
 from orchestration.fmi.archive import Archive

@@ -3,8 +3,8 @@
 import datetime
 from collections.abc import Iterator
 
+from fmu_kit.archive import ICONS, NATIVE_TABLES, content_guid
 from fmu_kit.loader import GUID_FILE
-from fmu_kit.packaging import ICONS, NATIVE_TABLES, content_guid
 from orchestration.building.models import MODELS
 from orchestration.checks.validation.declared import Variable
 from orchestration.checks.validation.fmu import Fmu

@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
+from fmu_kit.archive import write_archive
 from fmu_kit.model_description import generation_date
-from fmu_kit.packaging import write_archive
 from fmu_kit.versions import generation_tool
 from orchestration.basics.errors import UsageError
 from orchestration.basics.units import BASE

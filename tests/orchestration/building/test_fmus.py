@@ -8,7 +8,7 @@ from pathlib import Path
 import platformdirs
 import pytest
 
-from fmu_kit.packaging import SOURCE_HASH_FILE, read_source_hash, write_archive
+from fmu_kit.archive import SOURCE_HASH_FILE, read_source_hash, write_archive
 from orchestration.building import fmus
 from orchestration.building.models import MODELS
 from orchestration.fmi.fmi2 import Fmi2Instance

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from fmu_kit.packaging import write_archive
+from fmu_kit.archive import write_archive
 
 UNITS = """<UnitDefinitions>
   <Unit name="m"><BaseUnit m="1"/></Unit>

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fmu_kit.packaging import write_archive
+from fmu_kit.archive import write_archive
 from orchestration.fmi.model import read_model
 from orchestration.requests.request import load_request
 from orchestration.requests.ssp import package, writing

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from fmpy.ssp.ssd import read_ssd, read_ssv
 
-from fmu_kit.packaging import write_archive
+from fmu_kit.archive import write_archive
 from orchestration.requests.ssp import writing
 from orchestration.system.paths import changed
 from quadcosim import FmuChoice, Scenario, Timing, UsageError
