@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 from orchestration.basics.bisection import Range
 from orchestration.basics.errors import UsageError, expected_name
@@ -35,12 +36,12 @@ class Varied:
             if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float, Distribution))):
                 raise UsageError(f"--of {self.of}: expected the path of a number")
 
-    @property
+    @cached_property
     def system(self) -> System:
         """As it is."""
         return system_meant(self.request)
 
-    @property
+    @cached_property
     def paths(self) -> tuple[str, ...]:
         """What is changed; raises `UsageError` for what is not there."""
         known = [name for name in QUANTITIES if self.request.range_of(name) is not None]
