@@ -13,6 +13,7 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +27,8 @@ from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor import wiring
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
-from orchestration.runs.simulation import prepared
+from orchestration.runs.meant import held_to_fmus
+from orchestration.runs.simulation import prepared, set_parameters
 from orchestration.system.following import AT_REST
 from orchestration.system.model import System
 
@@ -169,7 +171,8 @@ class PlantStep:
     """
 
     def __init__(self, hover: Scenario, fleet: Instances, trim: Floats) -> None:
-        self._hover, self._fleet, self._trim = hover, fleet, trim
+        self._fleet, self._trim = fleet, trim
+        self._plant = held_to_fmus(hover).system.components["plant"]
         self.interval = hover.timing.plant_interval
         self._lags = True  # until the differences say otherwise
         self._at_hover = at_hover = self._saved({}, trim)
@@ -217,7 +220,7 @@ class PlantStep:
 
         Raises `NotSmooth` where there is none, as with motors that rise faster than they fall.
         """
-        with self._fleet.load(Path(self._hover.plant.fmu), "plant") as plant:
+        with self._load() as plant:
             after = self._answer(plant, h)
             still = after(self._at_hover, self._trim)
             flown = [[after(*start) - still for start in pair] for pair in self._moved]
@@ -228,11 +231,14 @@ class PlantStep:
 
     def _saved(self, parameters: dict[str, float], command: Floats) -> bytes:
         """The plant's state after initialisation with these parameters and this first command."""
-        changed = {f"plant.{name}": value for name, value in parameters.items()}
-        with prepared(self._hover.with_changes(parameters=changed), load=self._fleet.load) as flight:
-            plant = flight.instances["plant"]
+        component = dataclasses.replace(self._plant, parameters={**self._plant.parameters, **parameters})
+        with self._load() as plant:
+            set_parameters(plant, component)
             _initialise(plant, wiring.COMMAND, command)
             return plant.save()
+
+    def _load(self) -> AbstractContextManager[Instance]:
+        return self._fleet.load(Path(self._plant.fmu), "plant")
 
     def _answer(self, plant: Instance, h: float) -> Callable[[bytes, Floats], Floats]:
         """The vehicle `h` [s] after a state under a command, and if the actuators lag a plant interval later too,
@@ -255,7 +261,7 @@ class PlantStep:
         return after
 
     def _expect_equilibrium(self, at_hover: bytes) -> None:
-        with self._fleet.load(Path(self._hover.plant.fmu), "plant") as plant:
+        with self._load() as plant:
             drift = float(np.abs(self._answer(plant, self.interval)(at_hover, self._trim)).max())
         if drift > 1e-9:
             raise UsageError(

@@ -245,7 +245,7 @@ def prepared(
         with in_its_own_words(asked):
             timetable = Timetable(system, streams, fixed_steps(system, models))
             for name, component in system.components.items():
-                _set_parameters(instances[name], component)
+                set_parameters(instances[name], component)
                 _set_clock(instances[name], component, models[name], timetable.first_samples.get(name, 0))
             recorder.describe({name: one.as_words() for name, one in meant.described.items()})
             sources = meant.sources(streams)
@@ -298,7 +298,8 @@ def _version(package: str) -> str:
         return "not installed"
 
 
-def _set_parameters(instance: Instance, component: Component) -> None:
+def set_parameters(instance: Instance, component: Component) -> None:
+    """Give an instance that has not been initialised what its component says."""
     for name, value in component.parameters.items():
         if not instance.variables[name].is_constant:
             instance.set(name, value)
