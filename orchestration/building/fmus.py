@@ -6,14 +6,14 @@ import logging
 import os
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
-from fmu_kit import packaging
+from fmu_kit import loader, packaging
 from fmu_kit.archive import read_source_hash, read_variant
-from fmu_kit.bundle import PackagingError, Target
+from fmu_kit.bundle import SHARED_PACKAGES, PackagingError, Target, module_path
 from fmu_kit.compiler.pack import freshness
 from fmu_kit.discovery import slave_beside, slaves_in
 from fmu_kit.variants import Variant
@@ -197,8 +197,35 @@ def out_of_date(names: Iterable[str], folder: Path, packing: Packing = IN_PYTHON
     return [
         name
         for name in names
-        if read_source_hash(folder / f"{name}.fmu") != packing.source_hash(Target.parse(MODELS[name]))
+        if read_source_hash(folder / f"{name}.fmu") != _source_hash(packing, Target.parse(MODELS[name]))
     ]
+
+
+def packages_of(target: Target) -> tuple[str, ...]:
+    """All packages that decide what an FMU of this project is made of."""
+    return (*SHARED_PACKAGES, target.module.partition(".")[0])
+
+
+def _source_hash(packing: Packing, target: Target) -> str:
+    """Of a slave of this project: computed once in a process, as long as its packages have the same files."""
+    folders = [str(module_path(package).parent) for package in packages_of(target)]
+    return _computed(packing, target, loader.compiler(), tuple(file for folder in folders for file in _files(folder)))
+
+
+@functools.lru_cache(maxsize=16)
+def _computed(packing: Packing, target: Target, compiler: str | None, files: tuple[tuple[str, int, int], ...]) -> str:
+    return packing.source_hash(target)
+
+
+def _files(folder: str) -> Iterator[tuple[str, int, int]]:
+    """What is in a folder, with when each file was changed [ns] and its size."""
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            if not entry.is_dir():
+                about = entry.stat()
+                yield entry.path, about.st_mtime_ns, about.st_size
+            elif entry.name != "__pycache__":
+                yield from _files(entry.path)
 
 
 def build(

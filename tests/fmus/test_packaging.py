@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 import fmpy
 import pytest
 
-from fmu_kit import bundle, packaging
+from fmu_kit import bundle
 from fmu_kit.archive import content_guid
 from fmu_kit.loader import BESIDE, GUID_FILE
 from orchestration.basics.errors import QuadcosimError

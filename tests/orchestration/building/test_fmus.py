@@ -3,12 +3,14 @@
 import os
 import sys
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import platformdirs
 import pytest
 
 from fmu_kit.archive import SOURCE_HASH_FILE, read_source_hash, write_archive
+from fmu_kit.bundle import Target, bundled_sources
 from orchestration.building import fmus
 from orchestration.building.models import MODELS
 from orchestration.fmi.fmi2 import Fmi2Instance
@@ -113,6 +115,47 @@ def test_modification_times_do_not_matter(project: Path, built: dict[str, Path])
     path.write_bytes(built["QuadrotorPlant"].read_bytes())
     os.utime(path, (0, 0))
     assert fmus.out_of_date(["QuadrotorPlant"], path.parent) == []
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_no_source_of_an_fmu_is_outside_the_packages_whose_files_are_looked_at(model: str) -> None:
+    target = Target.parse(MODELS[model])
+    assert {place.partition("/")[0] for place in bundled_sources(target)} <= {*fmus.packages_of(target)}
+
+
+def test_sources_are_read_again_when_a_file_beside_them_is_another_or_there_is_one_more(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "own_plant"
+    read: list[Target] = []
+    (package / "parts").mkdir(parents=True)
+    (package / "__init__.py").touch()
+    (package / "slave.py").touch()
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setitem(MODELS, "OwnPlant", "own_plant.slave:OwnPlant")
+
+    def source_hash(target: Target) -> str:
+        read.append(target)
+        return "of another FMU than there is"
+
+    packing = replace(fmus.IN_PYTHON, source_hash=source_hash)
+
+    def times() -> int:
+        for _ in range(2):
+            assert fmus.out_of_date(["OwnPlant"], tmp_path, packing) == ["OwnPlant"]
+        return len(read)
+
+    assert times() == 1
+    (package / "slave.py").write_text("x = 1\n")
+    assert times() == 2
+    os.utime(package / "slave.py", (0, 0))
+    assert times() == 3
+    (package / "parts" / "more.py").touch()
+    assert times() == 4
+    (package / "parts" / "more.py").write_text("y = 2\n")
+    assert times() == 5
+    monkeypatch.setenv("PATH", "")
+    assert times() == 6
 
 
 def builds_by(code: str, monkeypatch: pytest.MonkeyPatch) -> None:
