@@ -685,7 +685,7 @@ def test_find_flies_the_scenario_and_its_result_is_json() -> None:
 @pytest.mark.parametrize("workers", [1, 2])
 def test_find_of_a_random_quantity_is_the_same_with_any_number_of_workers(workers: int) -> None:
     base = dataclasses.replace(hover_of(short()), stop_time=0.05)
-    found = find(base, "loss", confidence=0.2, tolerance=0.5, workers=workers)
+    found = find(base, "loss", confidence=0.2, scan=0.25, tolerance=0.5, workers=workers)
     assert (found.seeds, found.large_signal_limit) == (3, None)
     assert found.note.startswith("good throughout the range, to 1;")
 
