@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import fmpy
 from fmpy import fmi2
+from fmpy.model_description import ModelDescription, ModelVariable
 
 gc.freeze()  # scripts that collect garbage after each call do not look through what was imported
 
@@ -20,6 +21,12 @@ def _unpacked(path: Path, changed: int) -> Path:
     folder = Path(fmpy.extract(str(path)))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder
+
+
+@functools.cache
+def _described(path: Path, changed: int) -> ModelDescription:
+    """Read once in a process for each content of a file."""
+    return fmpy.read_model_description(str(path), validate=False)
 
 
 class Message(NamedTuple):
@@ -45,13 +52,17 @@ class Instance:
         logging: bool = True,
     ) -> None:
         """From the folder where it is `unpacked`; else from one that is this process's, or, `anew`, this instance's."""
-        self.description = fmpy.read_model_description(str(path), validate=False)
+        changed = path.stat().st_mtime_ns
+        self.description = _described(path, changed)
         self.variables = {v.name: v for v in self.description.modelVariables}
+        self._by_getter: dict[str, list[ModelVariable]] = {}
+        for variable in self.description.modelVariables:
+            self._by_getter.setdefault(_getter(variable), []).append(variable)
         self.messages: list[Message] = []
         self._own_folder = Path(fmpy.extract(str(path))) if anew else None
         self.fmu = fmi2.FMU2Slave(
             guid=self.description.guid,
-            unzipDirectory=str(unpacked or self._own_folder or _unpacked(path, path.stat().st_mtime_ns)),
+            unzipDirectory=str(unpacked or self._own_folder or _unpacked(path, changed)),
             modelIdentifier=self.description.coSimulation.modelIdentifier,
             instanceName=name,
         )
@@ -94,8 +105,7 @@ class Instance:
     def value(self, name: str) -> Any:
         """The value of a variable of any type."""
         variable = self.variables[name]
-        getter = {"Real": self.fmu.getReal, "Boolean": self.fmu.getBoolean}
-        return getter.get(variable.type, self.fmu.getInteger)([variable.valueReference])[0]
+        return getattr(self.fmu, _getter(variable))([variable.valueReference])[0]
 
     def names(self, *causalities: str) -> list[str]:
         """Real variables of these causalities."""
@@ -103,7 +113,11 @@ class Instance:
 
     def everything(self) -> list[str]:
         """Every variable as `name=value`, the value to the last bit."""
-        return [f"{name}={_exact(self.value(name))}" for name in self.variables]
+        values: dict[str, float | int | bool] = {}
+        for getter, variables in self._by_getter.items():
+            references = [variable.valueReference for variable in variables]
+            values |= zip((variable.name for variable in variables), getattr(self.fmu, getter)(references))
+        return [f"{name}={_exact(values[name])}" for name in self.variables]
 
     def save(self) -> bytes:
         """The serialised state."""
@@ -128,6 +142,10 @@ class Instance:
         callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
         callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
         return callbacks
+
+
+def _getter(variable: ModelVariable) -> str:
+    return {"Real": "getReal", "Boolean": "getBoolean"}.get(variable.type, "getInteger")
 
 
 def _exact(value: float | int | bool) -> str:
