@@ -1,4 +1,4 @@
-/* The life of instances of the controller as FMI 3.0, with refusals and states, for sanitizers: prints the log. */
+/* The life of instances of the plant as FMI 3.0, with refusals and states, for sanitizers: prints the log. */
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -23,7 +23,7 @@ static void expect_that(int is_so, const char *what)
 
 static void *instantiate(Text token)
 {
-    return fmi3InstantiateCoSimulation("controller", token, "", false, true, false, false, NULL, 0, NULL, print_message,
+    return fmi3InstantiateCoSimulation("plant", token, "", false, true, false, false, NULL, 0, NULL, print_message,
                                        NULL);
 }
 
@@ -42,7 +42,7 @@ static void refusals(void *c, const uint8_t *bytes, void **state)
 
 static void live(void)
 {
-    const unsigned known = AT_POSITION_X, unknown = AT_THRUST, with_time[3] = {0, TIME, 1};
+    const unsigned known = AT_INITIAL_POSITION_X, unknown = AT_POSITION_X, with_time[3] = {0, TIME, 1};
     const double x = 1.5;
     void *c = instantiate(GUID), *state = NULL, *copy = NULL;
     uint8_t bytes[sizeof(Serialised)];
@@ -75,7 +75,7 @@ static void live(void)
 int main(void)
 {
     EXPECT(!instantiate("of another FMU"));
-    EXPECT(!fmi3InstantiateModelExchange("controller", GUID, "", false, true, NULL, print_message));
+    EXPECT(!fmi3InstantiateModelExchange("plant", GUID, "", false, true, NULL, print_message));
     live();
     live();
     fmi3FreeInstance(NULL);

@@ -14,6 +14,10 @@ from fmpy.validation import validate_fmu
 from lxml import etree
 
 import quadcosim
+from fmu_kit.bundle import Target
+from fmu_kit.compiler.emit.standards import STANDARDS
+from fmu_kit.compiler.emit.terminals import TERMINALS
+from fmu_kit.packaging import slave_class
 from orchestration.building import fmus
 from orchestration.building.models import MODELS
 from orchestration.quadrotor.scenario import Scenario
@@ -115,9 +119,19 @@ def test_its_icon_is_where_fmi_3_has_icons(name: str) -> None:
     assert "model.png" not in three
 
 
+def terminals_file(name: str) -> bytes:
+    """What a slave's FMU says of terminals."""
+    return STANDARDS[3].beside(slave_class(Target.parse(MODELS[name])), STANDARDS[3].main)[TERMINALS]
+
+
+@pytest.mark.parametrize("name", PAIR)
+def test_its_terminals_are_where_fmi_3_has_them(name: str) -> None:
+    assert files_of(fmus.locate(f"native/fmi3/{name}"))[TERMINALS] == terminals_file(name)
+
+
 def terminals(name: str) -> dict[str, list[str]]:
-    """Members of each terminal of an FMU, which is what the standard asks for."""
-    document = etree.fromstring(files_of(fmus.locate(f"native/fmi3/{name}"))["terminalsAndIcons/terminalsAndIcons.xml"])
+    """Members of each terminal of a slave's FMU, whose file is what the standard asks for."""
+    document = etree.fromstring(terminals_file(name))
     schema = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
     etree.XMLSchema(etree.parse(str(schema))).assertValid(document)
     found = {}
@@ -134,8 +148,7 @@ def test_terminals_of_one_name_fit_together_and_are_the_whole_loop(controller: s
     assert plant == {"command": [*COMMAND], "motion": [*MEASUREMENT]}
     assert law == {**plant, "reference": law["reference"]}
     causalities = [
-        {v.name: v.causality for v in read(f"native/fmi3/{name}").modelVariables}
-        for name in ("QuadrotorPlant", controller)
+        {v.name: v.causality for v in read(f"native/{name}").modelVariables} for name in ("QuadrotorPlant", controller)
     ]
     for name in (*MEASUREMENT, *COMMAND):
         assert {each[name] for each in causalities} == {"input", "output"}
@@ -278,7 +291,7 @@ def test_two_instances_know_nothing_of_each_other(controller: Instance, tmp_path
 
 
 def test_the_whole_life_of_an_instance_is_clean_for_the_sanitizers(tmp_path: Path) -> None:
-    sources = Path(fmpy.extract(str(fmus.locate("native/fmi3/UnifiedController")), str(tmp_path))) / "sources"
+    sources = Path(fmpy.extract(str(fmus.locate("native/fmi3/QuadrotorPlant")), str(tmp_path))) / "sources"
     options = ("-I", str(sources), "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
     done = run(str(compiled("life_of_fmi3.c", tmp_path / "life", *options)))
     assert (done.returncode, done.stderr) == (0, ""), done.stdout

@@ -54,8 +54,7 @@ def test_a_slave_in_c_answers_as_in_python(probe: tuple[Target, Path]) -> None:
     answer_alike()
 
 
-@pytest.mark.parametrize("mode", ["as_it_is", "doubled"])
-@pytest.mark.parametrize("name", PROBES)
+@pytest.mark.parametrize(("name", "mode"), [*((name, "as_it_is") for name in PROBES), ("Choices", "doubled")])
 def test_a_slave_with_values_that_are_fixed_answers_in_c_as_in_python(name: str, mode: str, tmp_path: Path) -> None:
     compiler("cc")
     fixed = Variant.of("Fixed", {"mode": mode, "times": 9, "p": 2.0})
