@@ -27,7 +27,7 @@ def seconds(smallest: float, largest: float) -> st.SearchStrategy[float]:
 @st.composite
 def timings(draw: st.DrawFn, /, **fixed: Any) -> Timing:
     """Timings with everything that can go wrong at once; what is in `fixed` is as given."""
-    period = draw(seconds(1e-4, 0.5))
+    period = fixed.get("period", draw(seconds(1e-4, 0.5)))
     ratio = fixed.get("clock_ratio", draw(st.sampled_from((1.0, 1.0, 0.5, 0.9999, 1.001, 1.7))))
     largest_jitter = 0.99 * period / ratio
     burst = draw(st.none() | st.floats(1.0, 20.0))
