@@ -1,10 +1,11 @@
 """Computers by a few numbers, as the scheduler takes them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from orchestration.computers.compiled import Schedules
 from orchestration.computers.parts import (
     FIXED_PRIORITY,
     LATER,
@@ -111,8 +112,8 @@ class Described:
             links=numbered(self.links),
         )  # fmt: skip
 
-    def timeline(self) -> Timeline:
+    def timeline(self, scheduler: Callable[[Parts], Schedules] = Scheduler) -> Timeline:
         parts = self.parts()
-        scheduler = Scheduler(parts)
-        scheduler.run(LATER)
-        return timeline(parts, self.names(), [LATER] * len(self.messages), scheduler.taken())
+        made = scheduler(parts)
+        made.run(LATER)
+        return timeline(parts, self.names(), [LATER] * len(self.messages), made.taken())

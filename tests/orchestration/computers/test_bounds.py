@@ -1,4 +1,8 @@
-"""Bounds of theory: known ones, those that are reached, and that no job or frame of the scheduler is beyond its own."""
+"""Bounds of theory: known ones, those that are reached, and that no job or frame of the scheduler is beyond its own.
+
+The scheduler is that in C where there is a compiler, of which `test_compiled_scheduler.py` shows that it is that in
+Python.
+"""
 
 import math
 from dataclasses import replace
@@ -8,6 +12,7 @@ import numpy as np
 import pytest
 
 from orchestration.computers.bounds import Periodic, can, earliest_deadline, fixed_priority
+from orchestration.computers.compiled import scheduler
 from orchestration.computers.parts import EARLIEST_DEADLINE, FIXED_PRIORITY
 from orchestration.computers.results import Timeline
 from tests.orchestration.computers.described import Described
@@ -123,7 +128,7 @@ def simulated(tasks, policy, random, *, preemptive: bool, switch: int) -> Timeli
             taking(shortest, task.execution, random), period_of(task), offset=offset,
             priority=task.priority, deadline=task.deadline, late=late(task, random),
         )  # fmt: skip
-    return what.timeline()
+    return what.timeline(scheduler)
 
 
 @pytest.mark.parametrize("switch", [0, 1])
@@ -153,7 +158,7 @@ def test_a_bound_is_reached_where_all_are_released_together_and_take_the_longest
         for task in tasks:
             what.task(task.execution, period_of(task), priority=task.priority)
         bounds = fixed_priority(tasks, preemptive=True, switch=0)
-        assert [int(jobs.responses.max()) for jobs in what.timeline().jobs.values()] == bounds
+        assert [int(jobs.responses.max()) for jobs in what.timeline(scheduler).jobs.values()] == bounds
 
 
 def test_no_frame_on_can_is_beyond_its_bound_over_a_thousand_buses() -> None:
@@ -170,7 +175,7 @@ def test_no_frame_on_can_is_beyond_its_bound_over_a_thousand_buses() -> None:
         what.link()
         for frame in frames:
             what.message(frame.execution, period_of(frame), rank=frame.priority, offset=int(random.integers(0, 100)))
-        found = what.timeline().frames
+        found = what.timeline(scheduler).frames
         for name, bound in enumerate(can(frames, bit=1)):
             responses = found[str(name)].responses
             if bound is not None and len(responses):
