@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from orchestration.basics.errors import UsageError
-from orchestration.interop.assignment import Job, Rows
+from orchestration.interop.job import Job, Rows
 from orchestration.processes import subprocesses
 
 

@@ -13,9 +13,10 @@ from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.foreign import computed
 from orchestration.fmi.instance import Instance
 from orchestration.fmi.instances import open_instance
-from orchestration.interop.assignment import Job, Loop, loop_of
+from orchestration.interop.assignment import Loop, loop_of
 from orchestration.interop.catalogue import Tool
 from orchestration.interop.copies import expect_traceable, traced_copy
+from orchestration.interop.job import Job
 from orchestration.interop.trace import Trace, read_trace
 from orchestration.processes import subprocesses
 from orchestration.processes.child import Child

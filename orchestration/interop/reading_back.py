@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestration.interop.assignment import Job
 from orchestration.interop.catalogue import TOOLS
+from orchestration.interop.job import Job
 from orchestration.processes.child import Child
 from orchestration.requests.ssp.carried import Carried
 

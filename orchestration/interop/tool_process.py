@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestration.interop.assignment import Job
 from orchestration.interop.catalogue import TOOLS
+from orchestration.interop.job import Job
 
 
 def main(tool: str, job: str, rows: str) -> None:

@@ -6,7 +6,7 @@ import shutil
 from fmpy import simulate_fmu
 from fmu_manipulation_toolbox.assembly import Assembly
 
-from orchestration.interop.assignment import Job, Rows
+from orchestration.interop.job import Job, Rows
 
 
 def fly_jacobi(job: Job) -> Rows:

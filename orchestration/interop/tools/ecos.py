@@ -5,8 +5,8 @@ import sys
 from importlib.metadata import files
 from typing import Any
 
-from orchestration.interop.assignment import Job, Rows
-from orchestration.requests.ssp.writing import PARAMETER_SET
+from orchestration.interop.job import Job, Rows
+from orchestration.requests.ssp.names import PARAMETER_SET
 
 
 def _load_tbb() -> None:

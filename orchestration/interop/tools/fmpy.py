@@ -7,8 +7,8 @@ from fmpy import simulate_fmu
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssv
 
-from orchestration.interop.assignment import Job, Rows
-from orchestration.requests.ssp.writing import SYSTEM_PARAMETERS
+from orchestration.interop.job import Job, Rows
+from orchestration.requests.ssp.names import SYSTEM_PARAMETERS
 
 
 def fly_ssp(job: Job) -> Rows:

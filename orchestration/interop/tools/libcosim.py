@@ -5,7 +5,7 @@ from libcosimpy.CosimExecution import CosimExecution
 from libcosimpy.CosimObserver import CosimObserver
 from libcosimpy.CosimSlave import CosimLocalSlave
 
-from orchestration.interop.assignment import Job, Rows
+from orchestration.interop.job import Job, Rows
 from orchestration.system.times import NANOSECONDS
 
 SPARE = 2

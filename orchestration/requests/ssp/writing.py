@@ -20,14 +20,11 @@ from orchestration.fmi.model import Kind, Variable
 from orchestration.requests.ssp import timing
 from orchestration.requests.ssp.carried import Carried, Part, carried
 from orchestration.requests.ssp.document import add, document, element
+from orchestration.requests.ssp.names import PARAMETER_SET, SYSTEM_PARAMETERS
 from orchestration.requests.ssp.refused import refused
 from orchestration.system.model import System, variable_of
 from orchestration.system.request import Request
 
-PARAMETER_SET = "scenario"
-"""Name of each parameter set."""
-SYSTEM_PARAMETERS = "resources/scenario.ssv"
-"""The set with the names of the components before those of the parameters."""
 TYPED: tuple[Kind, ...] = ("Real", "Integer", "Boolean", "String")
 """Types of connectors that need no list of items"""
 

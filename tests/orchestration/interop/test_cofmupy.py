@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from orchestration.interop import tools
-from orchestration.interop.assignment import Job
 from orchestration.interop.catalogue import TOOLS
 from orchestration.interop.flights import parameters_for
+from orchestration.interop.job import Job
 from orchestration.requests.ssp.carried import Part, carried
 from quadcosim import Scenario, UsageError
 from tests.orchestration.interop.common import LOOP

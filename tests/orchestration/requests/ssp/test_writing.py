@@ -14,6 +14,7 @@ from fmpy.ssp.ssd import read_ssd, read_ssv
 
 from fmu_kit.archive import write_archive
 from orchestration.requests.ssp import writing
+from orchestration.requests.ssp.names import PARAMETER_SET
 from orchestration.system.paths import changed
 from quadcosim import FmuChoice, Scenario, Timing, UsageError
 from tests.fmus.interface_table import TABLES
@@ -109,7 +110,7 @@ def test_every_set_is_bound_where_it_belongs(written: Path) -> None:
         "plant": [{"source": "resources/plant.ssv"}],
     }
     names = {document(written, name).attrib["name"] for name in SETS}
-    assert names == {writing.PARAMETER_SET}, "ecos takes its sets by this name"
+    assert names == {PARAMETER_SET}, "ecos takes its sets by this name"
 
 
 def test_a_boolean_is_written_if_it_is_not_what_it_is_anyway(short: Scenario, tmp_path: Path) -> None:
