@@ -1,26 +1,27 @@
 """Why the plant that `simulate_fmu` flies alone is 1e-10 off: its steps, which are not h to the last bit."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from orchestration.basics.simulator import Floats
+from orchestration.building import fmus
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.interop.table import AIM
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT
 from orchestration.system.times import NANOSECONDS
-from quadcosim import Scenario, run
+from quadcosim import run
+from tests.native import NATIVE
 
 H, STEPS = 0.01, 3000
 Point = Callable[[int], tuple[float, float]]
 
 
 @pytest.fixture(scope="module")
-def flight(paper: Scenario) -> tuple[Floats, Floats]:
+def flight() -> tuple[Floats, Floats]:
     """States and commands of the paper's flight in this project's master, a row for each step's start."""
-    signals = run(paper.with_changes(timing={"plant_interval": H, "clock": "fmu"})).signals
+    signals = run(NATIVE.with_changes(timing={"plant_interval": H, "clock": "fmu"})).signals
     plant, command = (
         np.column_stack([signals[f"{side}.{name}"] for name in names])
         for side, names in (("plant", MEASUREMENT), ("controller", COMMAND))
@@ -28,11 +29,11 @@ def flight(paper: Scenario) -> tuple[Floats, Floats]:
     return plant, command
 
 
-def replayed(fmu: Path, flight: tuple[Floats, Floats], point: Point) -> float:
+def replayed(flight: tuple[Floats, Floats], point: Point) -> float:
     """How far the plant alone, given the flight's commands at the steps of `point`, is from the flight."""
     states, commands = flight
     given, found, farthest = np.zeros(len(COMMAND)), np.zeros(len(MEASUREMENT)), 0.0
-    with Fmi2Instance(fmu, "plant") as plant:
+    with Fmi2Instance(fmus.locate(NATIVE.plant.fmu), "plant") as plant:
         write, read = plant.writer(COMMAND, given), plant.reader(MEASUREMENT, found)
         plant.enter_initialization(0.0, H * STEPS)
         given[:] = commands[0]
@@ -47,14 +48,10 @@ def replayed(fmu: Path, flight: tuple[Floats, Floats], point: Point) -> float:
     return farthest
 
 
-def test_stepped_by_exactly_h_the_plant_alone_repeats_the_flight_to_the_last_bit(
-    built: dict[str, Path], flight: tuple[Floats, Floats]
-) -> None:
+def test_stepped_by_exactly_h_the_plant_alone_repeats_the_flight_to_the_last_bit(flight: tuple[Floats, Floats]) -> None:
     nanoseconds = round(H * NANOSECONDS)
-    assert replayed(built["QuadrotorPlant"], flight, lambda k: (k * nanoseconds / NANOSECONDS, H)) == 0.0
+    assert replayed(flight, lambda k: (k * nanoseconds / NANOSECONDS, H)) == 0.0
 
 
-def test_stepped_by_differences_of_times_it_drifts_away_by_less_than_the_aim(
-    built: dict[str, Path], flight: tuple[Floats, Floats]
-) -> None:
-    assert 1e-12 < replayed(built["QuadrotorPlant"], flight, lambda k: (k * H, (k + 1) * H - k * H)) < AIM
+def test_stepped_by_differences_of_times_it_drifts_away_by_less_than_the_aim(flight: tuple[Floats, Floats]) -> None:
+    assert 1e-12 < replayed(flight, lambda k: (k * H, (k + 1) * H - k * H)) < AIM

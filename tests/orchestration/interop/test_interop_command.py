@@ -1,5 +1,6 @@
 """`quadcosim interop` as it is called: what it prints, what fails, and how that is said."""
 
+import functools
 import importlib.metadata
 import json
 import os
@@ -18,11 +19,25 @@ from orchestration.requests.ssp import writing
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 from tests.commands import Main
+from tests.native import NATIVE
 from tests.orchestration.interop.common import LOOP
 from tests.orchestration.studies.common import error_line, quadcosim
 
 SHORT = ("--plant-interval", "0.01", "--stop-time", "0.1")
-INTEROP = ("interop", *SHORT)
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The file of the paper's flight, by the FMUs that other masters load fastest."""
+    path = tmp_path_factory.mktemp("flight") / "flight.toml"
+    path.write_text(NATIVE.to_toml(), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def interop(main: Main, flight: Path) -> Main:
+    """The command for its first steps."""
+    return functools.partial(main, "interop", flight, *SHORT)
 
 
 @pytest.fixture
@@ -58,7 +73,7 @@ def said(done: subprocess.CompletedProcess[str]) -> list[str]:
 def test_a_tool_by_name_is_flown_alone_and_its_row_printed(tmp_path: Path) -> None:
     for model in MODELS:
         fmus.locate(model)  # a build would be announced
-    done = quadcosim(*INTEROP, "--tool", "fmucontainer -sequential", cwd=tmp_path)
+    done = quadcosim("interop", *SHORT, "--tool", "fmucontainer -sequential", cwd=tmp_path)
     rows = done.stdout.splitlines()
     assert len(rows) == 3
     assert rows[2].startswith("| fmucontainer -sequential | gauss-seidel | exchanged")
@@ -66,10 +81,10 @@ def test_a_tool_by_name_is_flown_alone_and_its_row_printed(tmp_path: Path) -> No
     assert list(tmp_path.iterdir()) == []
 
 
-def test_json_has_each_tool_once_and_the_chart_goes_to_out(tmp_path: Path, temporary: Path, main: Main) -> None:
+def test_json_has_each_tool_once_and_the_chart_goes_to_out(tmp_path: Path, temporary: Path, interop: Main) -> None:
     names = ("ecos, SSP", "fmpy, controller alone", "ecos, SSP")
     chosen = [text for name in names for text in ("--tool", name)]
-    done = main(*INTEROP, *chosen, "--json", "--out", tmp_path / "drawn")
+    done = interop(*chosen, "--json", "--out", tmp_path / "drawn")
     found = json.loads(done.stdout)
     assert [row["tool"] for row in found] == ["ecos, SSP", "fmpy, controller alone"]
     assert [row["agrees"] for row in found] == [True, True]
@@ -82,7 +97,7 @@ def test_json_has_each_tool_once_and_the_chart_goes_to_out(tmp_path: Path, tempo
 # -- what is noticed --------------------------------------------------------------------------------------
 
 
-def test_a_tool_that_flies_with_another_gain_is_noticed(main: Main, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_tool_that_flies_with_another_gain_is_noticed(interop: Main, monkeypatch: pytest.MonkeyPatch) -> None:
     write = writing.write
 
     def with_another_gain(system: System, path: Path) -> Path:
@@ -90,7 +105,7 @@ def test_a_tool_that_flies_with_another_gain_is_noticed(main: Main, monkeypatch:
 
     monkeypatch.setattr(writing, "write", with_another_gain)
     chosen = ("--tool", "libcosim", "--tool", "libcosim, SSP", "--tool", "fmpy, SSP")
-    done = main(*INTEROP, *chosen, "--json", code=1)
+    done = interop(*chosen, "--json", code=1)
     assert [row["agrees"] for row in json.loads(done.stdout)] == [True, False, False]
     assert said(done) == ["farther than 1e-09 from this project's master: libcosim, SSP; fmpy, SSP"]
 
@@ -118,14 +133,14 @@ def test_a_scenario_that_others_cannot_fly_is_wrong_usage(main: Main, arguments:
     assert error_line(main("interop", *arguments, code=2)).startswith(said)
 
 
-def test_a_parameter_that_an_fmu_refuses_is_wrong_usage(main: Main) -> None:
-    line = error_line(main(*INTEROP, "--set", "plant.mass=0", code=2))
+def test_a_parameter_that_an_fmu_refuses_is_wrong_usage(interop: Main) -> None:
+    line = error_line(interop("--set", "plant.mass=0", code=2))
     assert line == "plant.mass = 0.0: expected a finite value > 0"
 
 
 @pytest.mark.parametrize("package", ["libcosimpy", "ecospy", "tbb", "fmu-manipulation-toolbox"])
 def test_a_tool_that_is_not_installed_is_named_with_the_way_to_install_it(
-    package: str, main: Main, monkeypatch: pytest.MonkeyPatch
+    package: str, interop: Main, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     version = importlib.metadata.version
 
@@ -135,18 +150,18 @@ def test_a_tool_that_is_not_installed_is_named_with_the_way_to_install_it(
         return version(name)
 
     monkeypatch.setattr(importlib.metadata, "version", without)
-    line = error_line(main(*INTEROP, code=1))
+    line = error_line(interop(code=1))
     assert line == f"{package} is not installed; this command needs: pip install 'quadcosim[interop]'"
 
 
 @pytest.mark.parametrize("python", [None, "", "nowhere/python", sys.executable])
 def test_a_tool_with_an_environment_of_its_own_is_asked_for_by_its_variable(
-    python: str | None, main: Main, monkeypatch: pytest.MonkeyPatch
+    python: str | None, interop: Main, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv(COFMUPY, raising=False)
     if python is not None:
         monkeypatch.setenv(COFMUPY, python)
-    line = error_line(main(*INTEROP, "--tool", "cofmupy", code=2))
+    line = error_line(interop("--tool", "cofmupy", code=2))
     assert line == (
         f"--tool cofmupy: expected in {COFMUPY} the path of a Python of its own environment, "
         "with cofmupy installed there by pip"
@@ -162,23 +177,25 @@ def test_a_tool_with_an_environment_of_its_own_is_left_out_where_there_is_none(m
     assert [tool.name for tool in chosen(None, LOOP.ports)] == list(TOOLS)
 
 
-def test_a_tool_that_raises_is_named_with_its_last_words(main: Main, libcosim_that: Callable[[str], None]) -> None:
+def test_a_tool_that_raises_is_named_with_its_last_words(interop: Main, libcosim_that: Callable[[str], None]) -> None:
     libcosim_that("raise RuntimeError('no licence\\nfor this')")
-    line = error_line(main(*INTEROP, "--tool", "libcosim", code=1))
+    line = error_line(interop("--tool", "libcosim", code=1))
     assert line == "libcosim: for this"
 
 
-def test_a_tool_that_ends_the_process_is_named_with_the_code(main: Main, libcosim_that: Callable[[str], None]) -> None:
+def test_a_tool_that_ends_the_process_is_named_with_the_code(
+    interop: Main, libcosim_that: Callable[[str], None]
+) -> None:
     libcosim_that("import os; os._exit(3)")
-    assert error_line(main(*INTEROP, "--tool", "libcosim, SSP", code=1)) == "libcosim, SSP: exit code 3"
+    assert error_line(interop("--tool", "libcosim, SSP", code=1)) == "libcosim, SSP: exit code 3"
 
 
 def test_a_tool_works_and_unpacks_in_a_folder_of_its_own(
-    main: Main, libcosim_that: Callable[[str], None], temporary: Path
+    interop: Main, libcosim_that: Callable[[str], None], temporary: Path
 ) -> None:
     """Not where this process is: fmpy goes to a folder and removes it while it loads an FMU, in another thread."""
     libcosim_that("import os, tempfile; raise RuntimeError(os.getcwd() + ' ' + tempfile.gettempdir())")
-    line = error_line(main(*INTEROP, "--tool", "libcosim", code=1))
+    line = error_line(interop("--tool", "libcosim", code=1))
     works, unpacks = line.removeprefix("libcosim: RuntimeError: ").split(" ")
     assert works == unpacks
     assert temporary in Path(works).parents
@@ -186,18 +203,18 @@ def test_a_tool_works_and_unpacks_in_a_folder_of_its_own(
 
 
 def test_a_tool_that_stops_early_does_not_pass_for_one_that_agrees(
-    main: Main, libcosim_that: Callable[[str], None]
+    interop: Main, libcosim_that: Callable[[str], None]
 ) -> None:
     libcosim_that(f"""{IS_LIBCOSIM}
 from libcosimpy.CosimExecution import CosimExecution
 simulate_until = CosimExecution.simulate_until
 CosimExecution.simulate_until = lambda self, target_time: simulate_until(self, 60_000_000)
 """)
-    assert error_line(main(*INTEROP, "--tool", "libcosim", code=1)) == "libcosim: ended after 6 steps, expected 10"
+    assert error_line(interop("--tool", "libcosim", code=1)) == "libcosim: ended after 6 steps, expected 10"
 
 
 def test_a_tool_with_one_signal_that_is_no_number_does_not_pass_for_one_that_agrees(
-    main: Main, libcosim_that: Callable[[str], None]
+    interop: Main, libcosim_that: Callable[[str], None]
 ) -> None:
     libcosim_that(f"""{IS_LIBCOSIM}
 from libcosimpy.CosimObserver import CosimObserver
@@ -208,7 +225,7 @@ def wrong(self, slave, reference, *args, **options):
     return times, steps, values if len(seen) != 2 else [float("nan")] * len(values)
 CosimObserver.time_series_real_samples = wrong
 """)
-    done = main(*INTEROP, "--tool", "libcosim", code=1)
+    done = interop("--tool", "libcosim", code=1)
     assert said(done) == ["farther than 1e-09 from this project's master: libcosim"]
 
 
