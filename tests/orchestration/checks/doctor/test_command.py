@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import tempfile
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import pytest
 from orchestration.building.models import MODELS
 from orchestration.checks.doctor import loading
 from orchestration.checks.doctor.as_lines import as_text
-from orchestration.checks.doctor.report import as_tables, examine
+from orchestration.checks.doctor.report import Report, as_tables, examine
 from orchestration.processes.limits import Limits
 from tests.commands import Main
 from tests.fmus.foreign import lag, needs_compiler
@@ -33,11 +34,10 @@ def plant(built: dict[str, Path]) -> Path:
     return built["QuadrotorPlant"]
 
 
-def doctor(*arguments: str | Path, environment: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
-    return run(
-        sys.executable, "-m", "orchestration.command.cli", "doctor", *map(str, arguments),
-        environment={"PYTHONIOENCODING": "utf-8", **(environment or {})},
-    )  # fmt: skip
+@pytest.fixture(scope="module")
+def report(built: dict[str, Path]) -> Report:
+    """What is found of two FMUs that load."""
+    return examine([built["QuadrotorPlant"], built["UnifiedController"]], Limits())
 
 
 def examined(fmu: Path) -> dict[str, Any]:
@@ -45,12 +45,15 @@ def examined(fmu: Path) -> dict[str, Any]:
     return only(as_tables(examine([fmu], Limits())))
 
 
-def examined_with(fmu: Path, environment: dict[str, str]) -> dict[str, Any]:
-    """What the command says as JSON in another environment; the exit code must agree with it."""
-    done = doctor(fmu, "--json", environment=environment)
+def examined_in(folder: Path, fmu: Path, code: int, main: Main, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """What the command says as JSON where temporary files go to a folder; the exit code must agree with it."""
+    folder.mkdir()
+    monkeypatch.setenv("TMPDIR", str(folder))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    done = main("doctor", fmu, "--json", code=code)
     assert done.stderr == ""
     report = json.loads(done.stdout)
-    assert done.returncode == (0 if report["good"] else 1)
+    assert report["good"] == (code == 0)
     return only(report)
 
 
@@ -60,21 +63,24 @@ def only(report: dict[str, Any]) -> dict[str, Any]:
     return {"machine": report["machine"], **table}
 
 
-def test_all_fmus_of_the_project_load_here() -> None:
-    done = doctor("--json")
-    report = json.loads(done.stdout)
-    assert [Path(table["path"]).name for table in report["fmus"]] == [f"{model}.fmu" for model in MODELS]
-    for table in report["fmus"]:
+def code_of(report: Report) -> int:
+    """With which the command ends for an FMU that loads."""
+    return 0 if report.machine.python_libraries else 1
+
+
+def test_all_fmus_of_the_project_load_here(report: Report, main: Main) -> None:
+    told = json.loads(main("doctor", "--json", code=code_of(report)).stdout)
+    assert [Path(table["path"]).name for table in told["fmus"]] == [f"{model}.fmu" for model in MODELS]
+    for table in told["fmus"]:
         assert table["loads"]
         assert table["problems"] == []
         assert table["hosts"]["python"] == {"ready": True, "needs": [], "start": None, "note": None}
-        assert table["hosts"]["other"]["ready"] == bool(report["machine"]["python_libraries"])
-    assert done.returncode == (0 if report["machine"]["python_libraries"] else 1)
+        assert table["hosts"]["other"]["ready"] == bool(told["machine"]["python_libraries"])
 
 
-def test_the_text_has_a_block_for_the_machine_and_one_for_each_fmu(built: dict[str, Path]) -> None:
+def test_the_text_has_a_block_for_the_machine_and_one_for_each_fmu(built: dict[str, Path], report: Report) -> None:
     fmus = [built["QuadrotorPlant"], built["UnifiedController"]]
-    blocks = "\n".join(as_text(examine(fmus, Limits())).splitlines()).split("\n\n")
+    blocks = "\n".join(as_text(report).splitlines()).split("\n\n")
     assert [block.splitlines()[0] for block in blocks] == ["this machine", *map(str, fmus)]
     for block in blocks[1:]:
         assert "Linux, x86-64" in block
@@ -82,8 +88,8 @@ def test_the_text_has_a_block_for_the_machine_and_one_for_each_fmu(built: dict[s
         assert block.splitlines()[-1].split() == ["tried", "here", "loads"]
 
 
-def test_the_machine_is_this_one(plant: Path) -> None:
-    machine = examined(plant)["machine"]
+def test_the_machine_is_this_one(report: Report) -> None:
+    machine = as_tables(report)["machine"]
     assert machine["executable"] == sys.executable
     assert machine["python"] == ".".join(map(str, sys.version_info[:3]))
     # of a process of its own: a test before this one may have loaded a libpython into this one
@@ -132,19 +138,19 @@ def test_a_package_that_is_not_here_is_found_out(plant: Path, tmp_path: Path) ->
     assert table["hosts"]["python"]["needs"] == ["quadcosim_none where this Python can import it"]
 
 
-def test_a_temp_folder_that_is_not_ascii_is_found_out(plant: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "café"
-    folder.mkdir()
-    table = examined_with(plant, {"TMPDIR": str(folder)})
+def test_a_temp_folder_that_is_not_ascii_is_found_out(
+    plant: Path, tmp_path: Path, main: Main, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    table = examined_in(tmp_path / "café", plant, 1, main, monkeypatch)
     for host in table["hosts"].values():
         assert any("a temp folder" in need and "café" in need for need in host["needs"])
     assert not table["loads"]
 
 
-def test_a_temp_folder_with_a_space_is_none_of_pythonfmus_troubles(plant: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "with space"
-    folder.mkdir()
-    table = examined_with(plant, {"TMPDIR": str(folder)})
+def test_a_temp_folder_with_a_space_is_none_of_pythonfmus_troubles(
+    plant: Path, tmp_path: Path, report: Report, main: Main, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    table = examined_in(tmp_path / "with space", plant, code_of(report), main, monkeypatch)
     assert table["loads"]
     assert table["hosts"]["python"]["ready"]
 
@@ -190,16 +196,13 @@ def test_an_fmu_that_takes_too_much_is_stopped(tmp_path: Path) -> None:
 
 
 @needs_compiler
-@pytest.mark.parametrize(
-    "odd",
-    [
-        {'stopTime="1"': 'stopTime="late"'},
-        {'<Real start="1"/>': '<Real start="1" nominal="large"/>'},
-        {'causality="output"><Real/>': 'causality="result"><Real derivative="x"/>'},
-        {'<Unknown index="2"/></Outputs>': '<Unknown index="seven"/></Outputs>'},
-    ],
-)
-def test_what_loading_does_not_need_may_be_odd(odd: dict[str, str], tmp_path: Path) -> None:
+def test_what_loading_does_not_need_may_be_odd(tmp_path: Path) -> None:
+    odd = {
+        'stopTime="1"': 'stopTime="late"',
+        '<Real start="1"/>': '<Real start="1" nominal="large"/>',
+        'causality="output"><Real/>': 'causality="result"><Real derivative="x"/>',
+        '<Unknown index="2"/></Outputs>': '<Unknown index="seven"/></Outputs>',
+    }
     assert failure(lag(tmp_path / "lag.fmu", described=odd)) is None
 
 
