@@ -93,19 +93,20 @@ def error_line(done: Done) -> str:
 # -- help -------------------------------------------------------------------------------------------------
 
 
-def test_help_lists_the_commands() -> None:
+def test_help_lists_the_commands(main: Main) -> None:
     for flag in ("--help", "-h"):
-        text = quadcosim(flag).stdout
+        text = main(flag).stdout
         assert all(command in text for command in ("build", "run", "plot", "validate", "doctor"))
 
 
-def test_without_a_command_the_help_is_shown_as_wrong_usage() -> None:
-    done = quadcosim(code=2)
+def test_without_a_command_the_help_is_shown_as_wrong_usage(main: Main) -> None:
+    done = main(code=2)
     assert "Usage: quadcosim" in done.stdout + done.stderr
 
 
-def test_help_of_run_lists_every_flag() -> None:
-    text = quadcosim("run", "--help").stdout
+def test_help_of_run_lists_every_flag(main: Main, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    text = main("run", "--help").stdout
     flags = (
         "--period --offset --plant-interval --delay --delay-jitter --jitter --jitter-distribution --measurement-loss "
         "--command-loss --loss --burst-length --clock-ratio --noise --quantisation --order --hold --clock --preset "
@@ -263,9 +264,10 @@ def test_plot_shows_that_it_is_at_work_before_it_looks_at_anything(
 
 def test_plot_zooms_on_a_window(main: Main, here: Path) -> None:
     save_run(run(native(stop_time=0.5)), here / "run", figures=False)
-    main("plot", "run", "--format", "png")
+    small = ("--format", "png", "--size", "120x90")
+    main("plot", "run", "--figure", "commands", *small)
     before = (here / "run" / "commands.png").read_bytes()
-    done = main("plot", "run", "--from", "0.1", "--to", "0.2", "--format", "png")
+    done = main("plot", "run", "--from", "0.1", "--to", "0.2", *small)
     assert {Path(line).name for line in done.stdout.splitlines()} == {f"{name}.png" for name in FLIGHT}
     assert (here / "run" / "commands.png").read_bytes() != before
     for start, end in (("0.2", "0.1"), ("50", "60"), ("0.5", "0.6"), ("-1", "0.1"), ("0.1", "inf"), ("nan", "0.1")):
