@@ -159,8 +159,8 @@ def start(*arguments: str | Path, cwd: Path, temporary: Path | None = None) -> "
     )  # fmt: skip
 
 
-def quadcosim(*arguments: str | Path, cwd: Path, code: int = 0) -> Done:
-    with start(*arguments, cwd=cwd) as process:
+def quadcosim(*arguments: str | Path, cwd: Path, code: int = 0, temporary: Path | None = None) -> Done:
+    with start(*arguments, cwd=cwd, temporary=temporary) as process:
         out, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == code, out + err
     return Done(arguments, process.returncode, out, err)

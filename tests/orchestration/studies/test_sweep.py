@@ -2,9 +2,7 @@
 
 import dataclasses
 import json
-import os
 import shutil
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -25,10 +23,8 @@ from quadcosim import QuadcosimError, UsageError, run
 from tests.native import NATIVE
 from tests.orchestration.studies.common import (
     FAILS,
-    GRID,
     PERIODS,
     RUNS,
-    SCRIPT,
     STORE,
     axis,
     bits,
@@ -51,10 +47,16 @@ def test_the_runs_of_the_reference_differ_from_each_other(reference: list[dict[s
     assert {found["status"] for found in reference} == {"done"}
 
 
-def test_two_workers_make_the_same_rows_as_one(folder: Path, reference: list[dict[str, Any]]) -> None:
-    done = quadcosim("sweep", "study.toml", "--engine", "compiled", "--workers", "2", cwd=folder)
+def test_two_workers_make_the_same_rows_as_one_and_leave_no_files_behind(
+    folder: Path, reference: list[dict[str, Any]]
+) -> None:
+    temporary = folder / "temporary"
+    temporary.mkdir()
+    command = ("sweep", "study.toml", "--engine", "compiled", "--workers", "2")
+    done = quadcosim(*command, cwd=folder, temporary=temporary)
     assert done.stdout == f"{STORE}: {RUNS} runs, {RUNS} flown now\n"
     assert bits(folder / STORE) == reference
+    assert list(temporary.iterdir()) == []
 
 
 def test_the_order_of_runs_does_not_change_them(folder: Path, reference: list[dict[str, Any]]) -> None:
@@ -78,17 +80,14 @@ def test_a_row_has_the_metrics_of_a_direct_run(folder: Path, reference: list[dic
 # -- what a store holds -----------------------------------------------------------------------------------
 
 
-def test_a_finished_study_is_not_flown_again(tmp_path: Path) -> None:
-    chosen = study(PERIODS)
-    first, second = sweep(chosen, folder=tmp_path), sweep(chosen, folder=tmp_path)
+def test_a_finished_study_is_not_flown_again_and_progress_counts_from_what_is_there_to_all(tmp_path: Path) -> None:
+    heard: list[tuple[int, int]] = []
+    first, second = (
+        sweep(study(PERIODS), folder=tmp_path, progress=lambda done, total: heard.append((done, total)))
+        for _ in range(2)
+    )
     assert (first.total, first.flown, first.failed) == (2, 2, 0)
     assert (second.total, second.flown, second.failed) == (2, 0, 0)
-
-
-def test_progress_counts_from_what_is_there_to_all(tmp_path: Path) -> None:
-    heard: list[tuple[int, int]] = []
-    sweep(study(PERIODS), folder=tmp_path, progress=lambda done, total: heard.append((done, total)))
-    sweep(study(PERIODS), folder=tmp_path, progress=lambda done, total: heard.append((done, total)))
     assert heard == [(0, 2), (1, 2), (2, 2), (2, 2)]
 
 
@@ -215,13 +214,10 @@ def test_a_run_that_fails_is_a_row_with_its_message_and_is_flown_again_on_reques
     assert bits(path) == rows
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_runs_that_fail_and_diverge_among_others_are_the_same_with_any_number_of_workers(
-    tmp_path: Path, workers: int
-) -> None:
+def test_runs_that_fail_and_diverge_among_others_are_with_two_workers_as_alone(tmp_path: Path) -> None:
     base = short(stop_time=20.0, plant_interval=0.1)
     chosen = study(axis("plant.mass", 1.0, FAILS, 1.1), axis("timing.period", 0.05, 0.2), base=base)
-    rows = bits(swept(chosen, tmp_path, workers=workers))
+    rows = bits(swept(chosen, tmp_path, workers=2))
     assert "diverged" in {row["outcome"] for row in rows}
     assert [row["status"] for row in rows] == ["done"] * 2 + ["failed"] * 2 + ["done"] * 2
     for row, index in zip(rows, range(6), strict=True):
@@ -284,55 +280,29 @@ def test_signals_of_the_chosen_runs_are_kept_and_are_those_of_a_direct_run(tmp_p
         assert np.array_equal(kept_rows, direct.rows)
 
 
-def test_no_signals_are_kept_unless_told(tmp_path: Path) -> None:
-    swept(study(axis("timing.period", 0.01)), tmp_path)
-    assert not (tmp_path / "signals").exists()
-
-
-def test_signals_that_are_asked_for_later_are_flown_for(tmp_path: Path) -> None:
+def test_no_signals_are_kept_unless_told_and_those_that_are_asked_for_later_are_flown_for(tmp_path: Path) -> None:
     chosen = study(axis("timing.period", 0.01, 0.02))
     swept(chosen, tmp_path)
+    assert not (tmp_path / "signals").exists()
     summary = sweep(dataclasses.replace(chosen, keep_signals=(1,)), folder=tmp_path)
     assert summary.flown == 1
     assert len(list((tmp_path / "signals").iterdir())) == 1
 
 
-def test_workers_leave_no_files_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    temporary = tmp_path / "temporary"
-    temporary.mkdir()
-    file = tmp_path / "study.toml"
-    file.write_text(GRID)
-    environment = {**os.environ, "TMPDIR": str(temporary)}
-    subprocess.run(
-        [str(SCRIPT), "sweep", file, "--engine", "compiled", "--workers", "2", "--out", tmp_path / "out"],
-        env=environment,
-        check=True,
-    )
-    assert list(temporary.iterdir()) == []
-
-
 # -- a few runs at a time ---------------------------------------------------------------------------------
 
 
-def test_a_pool_flies_in_order_up_to_the_first_that_stops_it() -> None:
-    periods = (0.01, 0.02, 0.03)
-    scenarios = [short(period=period).as_system() for period in periods]
+def test_a_pool_flies_in_order_up_to_the_first_that_stops_it_and_two_workers_in_some_order() -> None:
+    scenarios = [short(period=period).as_system() for period in (0.01, 0.02, 0.03)]
     with engine.RunEvaluator(files_in(), 1) as pool:
         everything = pool.fly(scenarios, stop=lambda metrics: False)
         first = pool.fly(scenarios, stop=lambda metrics: True)
-    assert [metrics["position_rmse"] for metrics in everything] == [
-        run(scenario).metrics["position_rmse"] for scenario in scenarios
-    ]
-    assert [metrics["position_rmse"] for metrics in first] == [everything[0]["position_rmse"]]
-
-
-def test_a_pool_of_two_workers_has_the_same_results_in_some_order() -> None:
-    scenarios = [short(period=period).as_system() for period in (0.01, 0.02, 0.03)]
-    found = []
-    for workers in (1, 2):
-        with engine.RunEvaluator(files_in(), workers) as pool:
-            found.append(sorted(m["position_rmse"] for m in pool.fly(scenarios, stop=lambda metrics: False)))
-    assert found[0] == found[1]
+    with engine.RunEvaluator(files_in(), 2) as pool:
+        by_two = pool.fly(scenarios, stop=lambda metrics: False)
+    expected = [run(scenario).metrics["position_rmse"] for scenario in scenarios]
+    assert [metrics["position_rmse"] for metrics in everything] == expected
+    assert [metrics["position_rmse"] for metrics in first] == expected[:1]
+    assert sorted(metrics["position_rmse"] for metrics in by_two) == sorted(expected)
 
 
 def test_a_pool_raises_what_a_run_failed_with() -> None:

@@ -1,6 +1,7 @@
 """Sweeps on a dask cluster."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from orchestration.studies.store import open_for_reading
 from orchestration.studies.study import Study
 from orchestration.system.model import Component, System
 from quadcosim import QuadcosimError
+from tests.commands import Main
 from tests.orchestration.fmi.small import needs_compiler, small
 from tests.orchestration.studies.common import (
     PERIODS,
@@ -19,7 +21,6 @@ from tests.orchestration.studies.common import (
     Cluster,
     bits,
     one_line,
-    quadcosim,
     rows_in,
     start,
     study,
@@ -29,54 +30,47 @@ from tests.orchestration.studies.common import (
 from tests.patience import PATIENCE
 
 
-@pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[Callable[[int], Cluster]]:
-    """Starts a dask scheduler with a number of workers."""
-    made: list[Cluster] = []
-
-    def make(workers: int) -> Cluster:
-        made.append(Cluster(tmp_path, workers))
-        return made[-1]
-
-    yield make
-    for each in made:
-        each.close()
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    """A dask scheduler with two workers."""
+    made = Cluster(tmp_path_factory.mktemp("cluster"), workers=2)
+    yield made
+    made.close()
 
 
 def test_a_dask_cluster_makes_the_same_rows(
-    folder: Path, reference: list[dict[str, Any]], cluster: Callable[[int], Cluster]
+    folder: Path, reference: list[dict[str, Any]], cluster: Cluster, main: Main, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    quadcosim("sweep", "study.toml", "--engine", "compiled", "--dask", cluster(1).address, cwd=folder)
-    assert bits(folder / STORE) == reference
-
-
-def test_the_death_of_a_dask_worker_loses_nothing(
-    folder: Path, reference: list[dict[str, Any]], cluster: Callable[[int], Cluster]
-) -> None:
-    made = cluster(2)
-    with start("sweep", "study.toml", "--engine", "compiled", "--dask", made.address, cwd=folder) as coordinator:
-        wait_for_rows(folder / STORE, 1)
-        made.workers[0].kill()
-        assert rows_in(folder / STORE) < RUNS
-        out, err = coordinator.communicate(timeout=PATIENCE)
-    assert coordinator.returncode == 0, out + err
+    monkeypatch.chdir(folder)
+    main("sweep", "study.toml", "--engine", "compiled", "--dask", cluster.address)
     assert bits(folder / STORE) == reference
 
 
 @needs_compiler
-def test_a_run_that_hangs_in_a_dask_worker_is_a_failed_row_that_says_so(
-    tmp_path: Path, cluster: Callable[[int], Cluster]
-) -> None:
-    fmu = small(tmp_path, "ENDS=if (m->s.gain == 3.0) for (;;)")
+def test_a_run_that_hangs_in_a_dask_worker_is_a_failed_row_that_says_so(tmp_path: Path, cluster: Cluster) -> None:
+    fmu = small(tmp_path, "ENDS=if (m->s.gain == 3.0) for (;;) usleep(1000)")
     gain = "components.it.parameters.gain"
     system = System(stop_time=0.1, components={"it": Component(fmu=str(fmu), step=0.01)})
     hangs = Study(name="hangs", base=system, axes=(Axis(name=gain, targets=(gain,), values=(1.0, 3.0)),))
     out = tmp_path / "out"
-    found = sweep(hangs, folder=out, dask=cluster(1).address, time_limit=2.0, progress=None, announce=None)
+    found = sweep(hangs, folder=out, dask=cluster.address, time_limit=2.0, progress=None, announce=None)
     assert (found.total, found.failed) == (2, 1)
     with open_for_reading(found.path) as store:
         rows = {row["design_index"]: row["message"] for row in store.rows()}
     assert rows == {0: None, 1: "it was ended: it takes more than the time limit of 2 s"}
+
+
+def test_the_death_of_a_dask_worker_loses_nothing(
+    folder: Path, reference: list[dict[str, Any]], cluster: Cluster
+) -> None:
+    """The last that flies there: one worker is left."""
+    with start("sweep", "study.toml", "--engine", "compiled", "--dask", cluster.address, cwd=folder) as coordinator:
+        wait_for_rows(folder / STORE, 1)
+        cluster.workers[0].kill()
+        assert rows_in(folder / STORE) < RUNS
+        out, err = coordinator.communicate(timeout=PATIENCE)
+    assert coordinator.returncode == 0, out + err
+    assert bits(folder / STORE) == reference
 
 
 @pytest.fixture
@@ -114,7 +108,8 @@ def test_the_store_is_of_use_after_a_scheduler_that_was_not_there(tmp_path: Path
 
 
 @pytest.mark.usefixtures("impatient")
-def test_a_scheduler_without_workers_is_one_line(tmp_path: Path, cluster: Callable[[int], Cluster]) -> None:
-    with pytest.raises(QuadcosimError, match="expected a dask scheduler with workers there") as caught:
-        sweep(study(PERIODS), folder=tmp_path / "out", dask=cluster(0).address)
+def test_a_scheduler_without_workers_is_one_line(tmp_path: Path) -> None:
+    said = "expected a dask scheduler with workers there"
+    with closing(Cluster(tmp_path, workers=0)) as deserted, pytest.raises(QuadcosimError, match=said) as caught:
+        sweep(study(PERIODS), folder=tmp_path / "out", dask=deserted.address)
     one_line(caught.value)

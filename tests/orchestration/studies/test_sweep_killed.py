@@ -16,6 +16,7 @@ from orchestration.studies.store import open_for_reading, store_path
 from orchestration.workers.pool import Pool
 from orchestration.workers.provenance import versions
 from quadcosim import QuadcosimError
+from tests.commands import Main
 from tests.orchestration.studies.common import (
     NOISY,
     PERIODS,
@@ -27,7 +28,6 @@ from tests.orchestration.studies.common import (
     is_running,
     kill,
     one_line,
-    quadcosim,
     rows_in,
     short,
     start,
@@ -44,17 +44,21 @@ from tests.patience import PATIENCE
 # -- killed -----------------------------------------------------------------------------------------------
 
 
-def test_a_killed_sweep_flies_only_what_is_missing_and_ends_with_the_same_rows(
-    folder: Path, reference: list[dict[str, Any]]
+def test_a_killed_sweep_leaves_no_workers_flies_only_what_is_missing_and_ends_with_the_same_rows(
+    folder: Path, reference: list[dict[str, Any]], main: Main, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with start("sweep", "study.toml", "--engine", "compiled", cwd=folder) as coordinator:
+    with start("sweep", "study.toml", "--engine", "compiled", "--workers", "2", cwd=folder) as coordinator:
         wait_for_rows(folder / STORE, 2)
+        workers = workers_of(coordinator.pid)
         coordinator.kill()
+    assert len(workers) == 2
+    wait_until(lambda: not any(map(is_running, workers)))
     there = rows_in(folder / STORE)
     assert 2 <= there < RUNS
     with open_for_reading(folder / STORE) as store:
         before = {found["design_index"]: found["duration"] for found in store.rows()}
-    done = quadcosim("sweep", "study.toml", "--engine", "compiled", "--workers", "2", cwd=folder)
+    monkeypatch.chdir(folder)
+    done = main("sweep", "study.toml", "--engine", "compiled")
     assert done.stdout == f"{STORE}: {RUNS} runs, {RUNS - there} flown now\n"
     assert bits(folder / STORE) == reference
     with open_for_reading(folder / STORE) as store:
@@ -62,18 +66,16 @@ def test_a_killed_sweep_flies_only_what_is_missing_and_ends_with_the_same_rows(
     assert {index: after[index] for index in before} == before, "expected no run flown twice"
 
 
-def test_workers_end_when_the_coordinator_is_killed(folder: Path) -> None:
+def test_the_death_of_a_worker_loses_nothing_though_the_fmu_is_moved_away_meanwhile(
+    folder: Path, reference: list[dict[str, Any]]
+) -> None:
+    plant = folder / "plant.fmu"
+    shutil.copy(fmus.locate("QuadrotorPlant"), plant)
+    text = NOISY.replace("[base.timing]", '[base.plant]\nfmu = "plant.fmu"\n[base.timing]')
+    (folder / "study.toml").write_text(text)
     with start("sweep", "study.toml", "--engine", "compiled", "--workers", "2", cwd=folder) as coordinator:
         wait_for_rows(folder / STORE, 1)
-        workers = workers_of(coordinator.pid)
-        coordinator.kill()
-    assert len(workers) == 2
-    wait_until(lambda: not any(map(is_running, workers)))
-
-
-def test_the_death_of_a_worker_loses_nothing(folder: Path, reference: list[dict[str, Any]]) -> None:
-    with start("sweep", "study.toml", "--engine", "compiled", "--workers", "2", cwd=folder) as coordinator:
-        wait_for_rows(folder / STORE, 1)
+        plant.unlink()
         kill(workers_of(coordinator.pid)[0])
         assert rows_in(folder / STORE) < RUNS
         out, err = coordinator.communicate(timeout=PATIENCE)
@@ -81,7 +83,9 @@ def test_the_death_of_a_worker_loses_nothing(folder: Path, reference: list[dict[
     assert bits(folder / STORE) == reference
 
 
-def test_a_run_whose_worker_is_killed_from_outside_stops_the_sweep_and_has_no_row(tmp_path: Path) -> None:
+def test_a_run_whose_worker_is_killed_from_outside_stops_the_sweep_and_has_no_row(
+    tmp_path: Path, main: Main, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "study.toml").write_text('[base]\nstop_time = 0.2\n[[axes]]\nname = "seed"\nvalues = [1]\n')
     with start("sweep", "study.toml", "--engine", "compiled", cwd=tmp_path) as coordinator:
         while coordinator.poll() is None:
@@ -92,10 +96,8 @@ def test_a_run_whose_worker_is_killed_from_outside_stops_the_sweep_and_has_no_ro
     assert coordinator.returncode == 1
     assert len(err.splitlines()) == 1, err
     assert rows_in(tmp_path / STORE) == 0
-    assert (
-        quadcosim("sweep", "study.toml", "--engine", "compiled", cwd=tmp_path).stdout
-        == f"{STORE}: 1 runs, 1 flown now\n"
-    )
+    monkeypatch.chdir(tmp_path)
+    assert main("sweep", "study.toml", "--engine", "compiled").stdout == f"{STORE}: 1 runs, 1 flown now\n"
 
 
 @pytest.mark.parametrize(("workers", "kills"), [(1, 1), (2, 3)])
@@ -143,20 +145,6 @@ def test_a_run_that_is_killed_over_and_over_stops_the_sweep_without_a_row(tmp_pa
 
 
 # -- the place, not the run -------------------------------------------------------------------------------
-
-
-def test_an_fmu_that_is_moved_away_meanwhile_changes_nothing(folder: Path, reference: list[dict[str, Any]]) -> None:
-    plant = folder / "plant.fmu"
-    shutil.copy(fmus.locate("QuadrotorPlant"), plant)
-    text = NOISY.replace("[base.timing]", '[base.plant]\nfmu = "plant.fmu"\n[base.timing]')
-    (folder / "study.toml").write_text(text)
-    with start("sweep", "study.toml", "--engine", "compiled", cwd=folder) as coordinator:
-        wait_for_rows(folder / STORE, 1)
-        plant.unlink()
-        kill(workers_of(coordinator.pid)[0])
-        out, err = coordinator.communicate(timeout=PATIENCE)
-    assert coordinator.returncode == 0, out + err
-    assert bits(folder / STORE) == reference
 
 
 @pytest.mark.parametrize("what", ["no space", "no file"])
