@@ -6,7 +6,7 @@ import subprocess
 import sys
 import time
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -168,20 +168,32 @@ def test_an_fmu_that_takes_too_much_memory_is_ended(lost: Callable[..., RunLost]
     )
 
 
+HABITS = ("fesetround(FE_UPWARD)", "fesetround(FE_TOWARDZERO)", '__asm__("ldmxcsr %0" : : "m"((unsigned){0x9fc0}))')
+
+
+def pairs(first: Sequence[Path], second: Path) -> System:
+    """Behind each of these FMUs another one."""
+    numbers = range(len(first))
+    fmus = {f"a{i}": path for i, path in enumerate(first)} | {f"b{i}": second for i in numbers}
+    return System(
+        stop_time=0.1,
+        components={name: Component(fmu=str(path), step=0.01) for name, path in fmus.items()},
+        connections=tuple(Connection(name=f"{i}", start=(f"a{i}.y",), end=(f"b{i}.u",)) for i in numbers),
+        sources={"one": Source(constant=1.0, to=tuple(f"a{i}.u" for i in numbers))},
+    )
+
+
 @pytest.mark.parametrize("engine", ["compiled", "python"])
-@pytest.mark.parametrize(
-    "habit",
-    ["fesetround(FE_UPWARD)", "fesetround(FE_TOWARDZERO)", '__asm__("ldmxcsr %0" : : "m"((unsigned){0x9fc0}))'],
-)
-def test_an_fmu_that_rounds_otherwise_is_named_and_moves_no_other(habit: str, engine: Any, tmp_path: Path) -> None:
-    sound, other = small(tmp_path / "sound", "THIRDS"), small(tmp_path / "rounds", "THIRDS", f"ENDS={habit}")
-    system, expected = beside(other, sound), run(beside(sound, sound), in_process=True, engine=engine)
+def test_an_fmu_that_rounds_otherwise_is_named_and_moves_no_other(engine: Any, tmp_path: Path) -> None:
+    sound = small(tmp_path / "sound", "THIRDS")
+    others = [small(tmp_path / f"{i}", "THIRDS", f"ENDS={habit}") for i, habit in enumerate(HABITS)]
+    expected = run(pairs([sound] * len(others), sound), in_process=True, engine=engine)
     for in_process in (False, True):
-        result = run(system, engine=engine, in_process=in_process)
-        assert result.signals["b.y"].tobytes() == expected.signals["b.y"].tobytes()
-        assert result.warnings == (
-            "a (Small): the FMU has changed how numbers are rounded of the whole process, which was put back",
-        )
+        result = run(pairs(others, sound), engine=engine, in_process=in_process)
+        said = "the FMU has changed how numbers are rounded of the whole process, which was put back"
+        assert result.warnings == tuple(f"a{i} (Small): {said}" for i in range(len(HABITS)))
+        for i in range(len(HABITS)):
+            assert result.signals[f"b{i}.y"].tobytes() == expected.signals[f"b{i}.y"].tobytes()
 
 
 def test_an_fmu_that_changes_the_folder_is_named_and_the_folder_put_back(tmp_path: Path) -> None:
@@ -226,7 +238,7 @@ def test_ctrl_c_ends_the_run_at_an_instant_and_keeps_its_rows(tmp_path: Path) ->
 
 def test_a_run_is_paused_and_resumed_in_processes_of_their_own(tmp_path: Path) -> None:
     system = beside(small(tmp_path), small(tmp_path))
-    whole = run(system)
+    whole = run(system, in_process=True)
     assert fly_until(system, 0.05, tmp_path / "paused", figures=False) is None
     result = resume(tmp_path / "paused")
     assert np.array_equal(result.rows, whole.rows)

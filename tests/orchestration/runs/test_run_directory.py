@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -18,7 +19,7 @@ import pytest
 
 import quadcosim
 from orchestration.figures.names import WRITTEN
-from orchestration.figures.style import save
+from orchestration.figures.style import SCREEN, save
 from orchestration.figures.views import VIEWS
 from orchestration.flight.names import FIGURES as FLIGHT
 from orchestration.recording.recording import Chunk, Events, InMemory, Recorder
@@ -53,6 +54,12 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path / "results" / "run"
 
 
+@pytest.fixture(scope="module")
+def drawn(result: Result, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The directory of the run with its figures, alone in its folder."""
+    return save_run(result, tmp_path_factory.mktemp("results") / "run")
+
+
 def looks_whole(folder: Path) -> bool:
     """Whether someone who looks for results would take `folder` for a run."""
     return not folder.name.startswith(".") and any((folder / name).exists() for name in FILES)
@@ -65,10 +72,10 @@ def contents(folder: Path) -> dict[str, bytes]:
 # -- writing and reading ----------------------------------------------------------------------------------
 
 
-def test_a_directory_has_all_files(result: Result, folder: Path) -> None:
-    assert save_run(result, folder) == folder
-    assert {path.name for path in folder.iterdir()} >= FILES | FIGURES
-    assert list(folder.parent.iterdir()) == [folder]
+def test_a_directory_has_all_files(drawn: Path) -> None:
+    assert drawn.name == "run"
+    assert {path.name for path in drawn.iterdir()} >= FILES | FIGURES
+    assert list(drawn.parent.iterdir()) == [drawn]
 
 
 def test_figures_can_be_left_out(result: Result, folder: Path) -> None:
@@ -125,12 +132,10 @@ def test_the_scenario_in_the_directory_flies_to_the_same_bits(result: Result, fo
     assert quadcosim.run(scenario).rows.tobytes() == result.rows.tobytes()
 
 
-def test_figures_are_pictures_with_something_on_them(result: Result, tmp_path: Path) -> None:
-    written = save(drawing.draw(result, FIRST, window=(0.1, 0.2)), tmp_path)
-    assert {path.name for path in written} == FIGURES
-    for path in written[::2]:
-        expect_picture(path)
-        assert b"<svg" in path.with_suffix(".svg").read_bytes()
+def test_figures_are_pictures_with_something_on_them(drawn: Path) -> None:
+    for name in FIRST:
+        expect_picture(drawn / f"{name}.png")
+        assert b"<svg" in (drawn / f"{name}.svg").read_bytes()
 
 
 @pytest.mark.parametrize("window", [(0.1, 0.2), (5.0, 6.0)])
@@ -142,7 +147,7 @@ def test_the_commands_are_zoomed_on_the_window(result: Result, window: tuple[flo
 
 def test_a_run_without_samples_can_be_drawn(tmp_path: Path) -> None:
     without = quadcosim.run(native(stop_time=0.05, timing=Timing(offset=1.0)))
-    drawn = {path.stem for path in save(drawing.draw(without), tmp_path)}
+    drawn = {path.stem for path in save(drawing.draw(without), tmp_path, dataclasses.replace(SCREEN, formats=("png",)))}
     assert drawn == {*FLIGHT} - {"energy", "spectrum"}
 
 
@@ -158,8 +163,8 @@ def test_no_energy_is_drawn_of_a_controller_that_has_none() -> None:
 # -- replacing --------------------------------------------------------------------------------------------
 
 
-def test_an_earlier_run_is_replaced_whole(result: Result, folder: Path) -> None:
-    save_run(result, folder)
+def test_an_earlier_run_is_replaced_whole(drawn: Path, folder: Path) -> None:
+    shutil.copytree(drawn, folder)
     other = quadcosim.run(native(stop_time=0.1))
     save_run(other, folder, figures=False)
     assert load_run(folder).rows.tobytes() == other.rows.tobytes()
@@ -249,7 +254,8 @@ def wait(*_):
     time.sleep(6000)
 
 draw.draw = wait
-quadcosim.save_run(quadcosim.run(quadcosim.Scenario(stop_time=0.05)), sys.argv[1])
+native = {"plant": "native/QuadrotorPlant", "controller": "native/UnifiedController"}
+quadcosim.save_run(quadcosim.run(quadcosim.Scenario(stop_time=0.05).with_fmus(**native)), sys.argv[1])
 """
 
 
@@ -269,14 +275,6 @@ def kill_while_writing(folder: Path) -> None:
     assert process.returncode == (-signal.SIGKILL if sys.platform != "win32" else 1)
 
 
-def test_a_killed_process_leaves_no_directory_that_looks_whole(folder: Path) -> None:
-    kill_while_writing(folder)
-    assert not folder.exists()
-    left = list(folder.parent.iterdir())
-    assert left  # it was in the middle of writing
-    assert not any(looks_whole(path) for path in left)
-
-
 def test_a_killed_process_leaves_the_earlier_run_as_it_was(result: Result, folder: Path) -> None:
     before = contents(save_run(result, folder, figures=False))
     kill_while_writing(folder)
@@ -287,8 +285,14 @@ def test_a_killed_process_leaves_the_earlier_run_as_it_was(result: Result, folde
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="folders have no locks there")
-def test_what_a_killed_process_leaves_is_gone_after_the_next_start(result: Result, folder: Path) -> None:
+def test_what_a_killed_process_leaves_does_not_look_whole_and_is_gone_after_the_next_start(
+    result: Result, folder: Path
+) -> None:
     kill_while_writing(folder)
+    assert not folder.exists()
+    left = list(folder.parent.iterdir())
+    assert left  # it was in the middle of writing
+    assert not any(looks_whole(path) for path in left)
     other = folder.with_name("other")
     with writing(folder) as living:
         save_run(result, other, figures=False)

@@ -302,7 +302,7 @@ def test_a_pool_flies_in_order_up_to_the_first_that_stops_it_and_two_workers_in_
     expected = [run(scenario).metrics["position_rmse"] for scenario in scenarios]
     assert [metrics["position_rmse"] for metrics in everything] == expected
     assert [metrics["position_rmse"] for metrics in first] == expected[:1]
-    assert sorted(metrics["position_rmse"] for metrics in by_two) == sorted(expected)
+    assert sorted(repr(metrics["position_rmse"]) for metrics in by_two) == sorted(map(repr, expected))
 
 
 def test_a_pool_raises_what_a_run_failed_with() -> None:
