@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import quadcosim
+from orchestration.building import fmus
 from orchestration.quadrotor.wiring import REFERENCE
 from orchestration.runs.pause import fly_until, resume
 from orchestration.runs.result import Result
@@ -32,9 +33,9 @@ SIDES = {"plant": "QuadrotorPlant", "controller": "UnifiedController"}
 LAGGING = {"plant.actuator_time_constant": 0.02}
 
 
-def own(built: dict[str, Path], folder: Path) -> dict[str, Path]:
+def own(folder: Path) -> dict[str, Path]:
     """Copies of both FMUs in `folder`, by side."""
-    return {side: Path(shutil.copy(built[model], folder)) for side, model in SIDES.items()}
+    return {side: Path(shutil.copy(fmus.locate(f"native/{model}"), folder)) for side, model in SIDES.items()}
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -69,14 +70,15 @@ def test_it_goes_on_in_another_process(tmp_path: Path) -> None:
 
 
 def test_a_run_that_diverges_before_the_pause_is_over(tmp_path: Path) -> None:
-    result = fly_until(native(stop_time=5.0, timing=Timing(period=0.3)), 4.0, tmp_path / "paused")
+    diverging = native(stop_time=5.0, timing=Timing(period=0.3))
+    result = fly_until(diverging, 4.0, tmp_path / "paused", figures=False)
     assert result is not None
     assert result.metrics["diverged"] is True
     assert quadcosim.load_run(tmp_path / "paused").rows.tobytes() == result.rows.tobytes()
 
 
-def test_other_fmus_than_those_of_the_pause_are_refused(built: dict[str, Path], tmp_path: Path) -> None:
-    fly_until(native(stop_time=0.1).with_fmus(**own(built, tmp_path)), 0.05, tmp_path / "paused")
+def test_other_fmus_than_those_of_the_pause_are_refused(tmp_path: Path) -> None:
+    fly_until(native(stop_time=0.1).with_fmus(**own(tmp_path)), 0.05, tmp_path / "paused")
     with zipfile.ZipFile(tmp_path / "UnifiedController.fmu", "a") as fmu:
         fmu.writestr("resources/more.txt", "more")  # its GUID stays
     with pytest.raises(UsageError, match=r"the FMU of controller is not as when the run was paused"):
