@@ -1,9 +1,10 @@
 """What commands cost from a cold start, as a user types them: `python -m benchmarks.cold`.
 
 CPU time, user and system, of a new process and of all that it starts, the smallest of several in turns; under other
-load it grows. FMUs are built before. The sweep is typed without a flag, into an empty store: flights of 20 s at 50 Hz,
-the plant at 1 ms, each with jitter of its own. With an empty cache what it needs is compiled too. What a run costs and
-what a sweep costs once follow from two sizes, and so does the coordinator's part of both.
+load it grows. FMUs are built before, but for `build` itself. The sweep is typed without a flag, into an empty
+store: flights of 20 s at 50 Hz, the plant at 1 ms, each with jitter of its own. With an empty cache what it needs
+is compiled too. What a run costs and what a sweep costs once follow from two sizes, and so does the coordinator's
+part of both.
 """
 
 import os
@@ -78,6 +79,8 @@ def main() -> None:
             commands[name].append(cost(*arguments)[0])
     with tempfile.TemporaryDirectory() as cache:
         compiling = cost("sweep", f"{RUNS}.toml", XDG_CACHE_HOME=cache)[0]
+    with tempfile.TemporaryDirectory() as cache:
+        building = cost("build", "--native", "--out", "fmus", XDG_CACHE_HOME=cache)[0]
     print(f"load {os.getloadavg()[0]:.1f}; the smallest of {REPETITIONS}, in turns")
     (many, own), (few, own_few) = (tuple(map(min, zip(*costs))) for costs in (sweeps[RUNS], sweeps[FEW]))
     print(f"sweep of {RUNS} runs: {many:.2f} s, {RUNS / many:.0f} runs/s; with an empty cache {RUNS / compiling:.0f}")
@@ -86,6 +89,7 @@ def main() -> None:
         print(f"  {what}: {1e3 * each:.2f} ms, and once {few_runs - FEW * each:.2f} s")
     for name, taken in commands.items():
         print(f"{name}: {min(taken):.2f} s")
+    print(f"build --native with an empty cache: {building:.1f} s")
 
 
 if __name__ == "__main__":
