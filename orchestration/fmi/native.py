@@ -34,6 +34,9 @@ DIVERGENCE_CATEGORY = b"divergence"
 _AT_END = 1e-9
 """Relative and in seconds: what an FMU that adds up its steps may miss the end of one by"""
 
+_FOR_READERS = ("documentation/", "sources/")
+"""What an FMU of this project's kit never opens"""
+
 Numbers = npt.NDArray[Any]
 
 
@@ -89,7 +92,7 @@ class NativeInstance(Instance):
             raise QuadcosimError(f"{path}: {error}") from None
         try:
             self._folder = scratch.temporary()
-            fmpy.extract(str(path), str(self._folder.path))
+            fmpy.extract(str(path), str(self._folder.path), include=_is_run if self.model.is_of_this_kit else None)
             pythonfmu.expect_readable_place(self._folder.path)
             self._fmu = self._instantiated(self._folder.path)
             self.put_back()
@@ -476,3 +479,8 @@ def bounds_of(dtype: np.dtype[Any]) -> tuple[float, float]:
     of = np.iinfo(dtype)
     high = float(of.max)
     return float(of.min), high if int(high) <= of.max else math.nextafter(high, 0.0)
+
+
+def _is_run(file: str) -> bool:
+    """Whether an FMU of this project's kit needs a file of its archive to run."""
+    return not file.startswith(_FOR_READERS)
