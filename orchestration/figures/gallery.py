@@ -8,7 +8,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from orchestration.figures.style import Style, save
+from orchestration.figures.style import Style, laid_out_once, save, write
 
 
 class Figures(Mapping[str, Figure]):
@@ -38,8 +38,8 @@ class Figures(Mapping[str, Figure]):
 
     def _png(self, figure: Figure) -> str:
         file = io.BytesIO()
-        with self._style.applied():
-            figure.savefig(file, format="png")
+        with self._style.applied(), laid_out_once(figure):
+            write(figure, file, "png")
         return base64.b64encode(file.getvalue()).decode()
 
     def save(self, folder: str | Path) -> list[Path]:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import matplotlib
 from cycler import cycler
@@ -152,14 +152,10 @@ def save(
     written = []
     with style.applied():
         for name, figure in figures.items():
-            with _laid_out_once(figure):
+            with laid_out_once(figure):
                 for ending in style.formats:
                     path = folder / f"{name}.{ending}"
-                    # As `Figure.savefig`, which draws twice for the sake of figures whose layout is not done.
-                    canvas: Any = figure.canvas
-                    if not hasattr(canvas, f"print_{ending}"):
-                        canvas = get_registered_canvas_class(ending)(figure)
-                    getattr(canvas, f"print_{ending}")(path, metadata=_UNDATED[ending])
+                    write(figure, path, ending)
                     if ending == "png" and style.colors is not None:
                         _reduce(path, style.colors)
                     written.append(path)
@@ -167,8 +163,16 @@ def save(
     return written
 
 
+def write(figure: Figure, file: Path | BinaryIO, ending: str) -> None:
+    """As `Figure.savefig`, which draws twice for the sake of figures whose layout is not done."""
+    canvas: Any = figure.canvas
+    if not hasattr(canvas, f"print_{ending}"):
+        canvas = get_registered_canvas_class(ending)(figure)
+    getattr(canvas, f"print_{ending}")(file, metadata=_UNDATED[ending])
+
+
 @contextmanager
-def _laid_out_once(figure: Figure) -> Iterator[None]:
+def laid_out_once(figure: Figure) -> Iterator[None]:
     """Inside, things stay where they are: to lay out a figure takes as long as to write it."""
     engine = figure.get_layout_engine()
     if engine is not None:
