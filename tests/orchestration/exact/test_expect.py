@@ -153,8 +153,9 @@ def test_where_noise_alone_is_random_the_mean_square_limit_is_the_local_one() ->
         system, operating_point={"components.controller.parameters.gain": 3.0 - math.sqrt(3.0)}
     )
     found = limit(
-        system, "connections.command.delay", first=0.0, last=0.9, tolerance=1e-4, progress=None, announce=None
-    )
+        system, "connections.command.delay", first=0.0, last=0.9, tolerance=1e-4, confidence=0.2, progress=None,
+        announce=None,
+    )  # fmt: skip
     assert found.mean_square_limit is not None
     assert found.mean_square_limit == found.local_limit
     below, above = (

@@ -16,9 +16,10 @@ from orchestration.stability.state_space import reduced
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.system_file import load_system
-from quadcosim import Linearised, QuadcosimError, Scenario, StateSpace, Timing, UsageError, linearise
+from quadcosim import Linearised, QuadcosimError, StateSpace, Timing, UsageError, linearise
 from tests.commands import Main
 from tests.examples.common import EXAMPLES, example
+from tests.native import native
 from tests.orchestration.studies.test_systems import DELAY, PERIOD
 
 
@@ -85,7 +86,7 @@ def test_the_servo_closed_again_has_the_spectral_radius_of_theory() -> None:
 
 def test_a_vehicle_that_hovers_has_twelve_states_however_fast_it_is_sampled() -> None:
     """A torque about y tilts, and so accelerates by g: x is -g h t³/(6 J) long after a sample of it."""
-    rest = linearise(Scenario(timing=Timing(period=0.002))).rest
+    rest = linearise(native(timing=Timing(period=0.002))).rest
     moved = responses(rest, 500)[-1, rest.outputs.index("position.x"), rest.inputs.index("torque.y")]
     middle = 1.0 - 0.001  # of the push
     inertia = quadcosim.read_model("fmus/QuadrotorPlant.fmu").variables["inertia.yy"].start

@@ -23,6 +23,7 @@ from orchestration.system.model import Component, Connection, Sampling, System
 from orchestration.system.paths import changed
 from quadcosim import Scenario, Timing, UsageError
 from tests.examples.common import example
+from tests.native import native
 from tests.orchestration.fmi.small import needs_compiler, small
 from tests.orchestration.studies.common import one_line
 from tests.orchestration.studies.test_systems import DELAY, PERIOD, theory
@@ -130,7 +131,7 @@ def test_the_growth_is_that_of_twin_runs_under_any_timing(
 
 
 def test_the_quadrotor_s_loop_is_that_of_its_own_linearisation(instances: Instances) -> None:
-    scenario = Scenario(timing=Timing(period=0.04, delay=0.013, plant_interval=0.02))
+    scenario = native(timing=Timing(period=0.04, delay=0.013, plant_interval=0.02))
     scenario = scenario.with_changes(parameters={"plant.actuator_time_constant": 0.05})
     expected = math.log(HoverLoop.of(scenario).spectral_radius(0.04, 0.013)) / 0.04
     assert growth_of_loop(at_hover(scenario), instances) == pytest.approx(expected, abs=1e-6)
