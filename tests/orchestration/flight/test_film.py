@@ -11,13 +11,14 @@ import quadcosim
 from orchestration.figures.style import SCREEN
 from orchestration.flight import film as filming
 from orchestration.runs.draw import runs_of
-from quadcosim import Result, Scenario, UsageError
+from quadcosim import Result, UsageError
 from tests.commands import Main
+from tests.native import native
 
 
 @pytest.fixture(scope="module")
 def flight() -> Result:
-    return quadcosim.run(Scenario(stop_time=0.5))
+    return quadcosim.run(native(stop_time=0.4))
 
 
 def test_a_film_has_twenty_pictures_a_second_in_which_the_vehicle_moves(flight: Result, tmp_path: Path) -> None:
