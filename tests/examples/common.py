@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from orchestration.building import fmus
 from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.system_file import load_system
@@ -15,3 +16,8 @@ NAMES = sorted(path.parent.name for path in EXAMPLES.glob("*/system.toml"))
 def example(name: str, changes: Mapping[str, Any] | None = None) -> System:
     """The system of an example, changed by path; its FMUs are built when it is run."""
     return changed(load_system(EXAMPLES / name / "system.toml"), changes or {})
+
+
+def native_example(name: str, changes: Mapping[str, Any] | None = None) -> System:
+    """The same by native FMUs, which `test_native` shows to make the runs that those with Python inside make."""
+    return fmus.native_twins(example(name, changes))

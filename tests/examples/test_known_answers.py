@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from examples.lqg import design as lqg
-from orchestration.building import fmus
 from orchestration.building.inputs import files_of
 from orchestration.exact.expect import expect, expected_of
 from orchestration.exact.loops import Loops
@@ -20,15 +19,10 @@ from orchestration.runs.simulation import run
 from orchestration.system.distribution import Distribution
 from orchestration.system.model import System
 from orchestration.system.paths import changed
-from tests.examples import common
+from tests.examples.common import native_example as example
 
 PERIOD = "components.controller.sampling.period"
 COMMAND_DELAY = "connections.command.delay"
-
-
-def example(name: str, changes: Mapping[str, Any]) -> System:
-    """The system of an example, changed by path, by native FMUs."""
-    return fmus.native_twins(common.example(name, changes))
 
 
 def limits(system: System, of: str, near: float, **options: Any) -> tuple[float, float]:
@@ -121,7 +115,7 @@ SHORT, LONG = (tuple(0.00015 * k for k in range(count)) for count in (11, 21))
 def test_the_servo_over_two_networks_costs_what_jitterbug_says(delays: tuple[float, ...], expected: float) -> None:
     """Each delay on its own, to nine digits; both are drawn, one on top of the other."""
     each = Distribution(values=delays)
-    system = common.example("distributed_servo", {COMMAND_DELAY: each, f"{COMMAND_DELAY}_jitter": each})
+    system = example("distributed_servo", {COMMAND_DELAY: each, f"{COMMAND_DELAY}_jitter": each})
     found = expect(system).objectives["J"]
     assert found == pytest.approx(expected, rel=1e-9)
 

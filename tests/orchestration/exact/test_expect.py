@@ -20,7 +20,8 @@ from orchestration.quadrotor.timing import Timing
 from orchestration.system.model import Source
 from quadcosim import UsageError, limit
 from tests.commands import Main
-from tests.examples.common import EXAMPLES, example
+from tests.examples.common import EXAMPLES
+from tests.examples.common import native_example as example
 from tests.orchestration.fmi.small import needs_compiler
 
 

@@ -19,7 +19,8 @@ from orchestration.system.model import Criterion, SamplingOnArrival, System
 from orchestration.system.paths import changed
 from orchestration.system.system_file import load_system
 from quadcosim import run
-from tests.examples.common import EXAMPLES, example
+from tests.examples.common import EXAMPLES
+from tests.examples.common import native_example as example
 
 DELAY, DELAY_JITTER, LOSS = (f"connections.command.{key}" for key in ("delay", "delay_jitter", "loss"))
 

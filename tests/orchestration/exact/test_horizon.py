@@ -13,7 +13,8 @@ from orchestration.exact.expect import expect
 from orchestration.system.model import Criterion
 from quadcosim import UsageError, run
 from tests.commands import Main
-from tests.examples.common import EXAMPLES, example
+from tests.examples.common import EXAMPLES
+from tests.examples.common import native_example as example
 from tests.orchestration.exact.common import GAIN
 
 START, LOSS, BURST = (
