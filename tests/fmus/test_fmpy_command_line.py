@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from orchestration.basics.simulator import Floats
-from orchestration.building.models import MODELS
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
+from tests.fmus.making import PAIR
 from tests.fmus.process import run
 
 LEVEL = {"initial.quaternion.x": 0.0, "initial.quaternion.y": 0.0, "initial.quaternion.z": 0.0}
@@ -36,7 +36,7 @@ def simulate(
     return dict(zip(names, np.loadtxt(table, delimiter=",", skiprows=1).T, strict=True))
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", PAIR)
 def test_fmpy_validate_accepts_the_fmu(model: str, built: dict[str, Path]) -> None:
     done = run(sys.executable, "-m", "fmpy", "validate", str(built[model]))
     assert done.returncode == 0, done.stdout + done.stderr

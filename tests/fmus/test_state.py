@@ -1,5 +1,6 @@
 """Saved states: going on from one is the same flight, to the last bit."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from orchestration.basics.errors import SimulatorError
 from orchestration.fmi.fmi2 import Fmi2Instance
 from tests.fmus.flights import FLIGHTS, Flight
 from tests.fmus.instance import Instance
-from tests.fmus.making import Making
+from tests.fmus.making import PAIR, Making
 from tests.fmus.process import run_script
 
 SAVED, END = 7, 20  # step at which the state is taken, and the end of the flight
@@ -92,13 +93,24 @@ def test_an_instance_in_another_flight_goes_on_from_the_state(instance: Instance
         assert flight.fly(other, SAVED, END) == first
 
 
+@pytest.fixture(scope="module")
+def elsewhere(built: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[list[str]]]:
+    """How each flight goes on from its state in a process that has flown nothing before."""
+    folder, asked = tmp_path_factory.mktemp("states"), []
+    for name, flight in FLIGHTS.items():
+        with Instance(built[flight.model]) as instance:
+            flight.begin(instance)
+            flight.fly(instance, 0, SAVED)
+            (folder / name).write_bytes(instance.save())
+        asked.append((str(built[flight.model]), name, str(folder / name)))
+    flown: dict[str, list[list[str]]] = run_script("continue_flight", json.dumps(asked), str(SAVED), str(END))
+    return flown
+
+
 def test_another_process_goes_on_from_the_state(
-    instance: Instance, name: str, flight: Flight, fmu: Path, tmp_path: Path
+    instance: Instance, name: str, flight: Flight, elsewhere: dict[str, list[list[str]]]
 ) -> None:
-    file = tmp_path / "state"
-    file.write_bytes(instance.save())
-    first = flight.fly(instance, SAVED, END)
-    assert run_script("continue_flight", fmu, name, file, str(SAVED), str(END)) == first
+    assert elsewhere[name] == flight.fly(instance, SAVED, END)
 
 
 def test_the_hidden_lag_of_the_actuators_is_in_the_state(built: dict[str, Path]) -> None:
@@ -153,8 +165,8 @@ def test_a_parameter_that_waits_to_be_refused_is_refused_after_a_restore(built: 
 
 
 def test_bytes_that_are_no_state_are_refused_and_leave_an_fmu_that_can_be_freed(built: dict[str, Path]) -> None:
-    for fmu in built.values():
-        assert run_script("restore_garbage", fmu) == {"refused": 20, "revived": 10}
+    for model in PAIR:
+        assert run_script("restore_garbage", built[model]) == {"refused": 20, "revived": 10}
 
 
 def test_a_changed_tunable_parameter_is_in_the_state(built: dict[str, Path]) -> None:
