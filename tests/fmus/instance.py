@@ -111,13 +111,17 @@ class Instance:
         """Real variables of these causalities."""
         return [v.name for v in self.variables.values() if v.type == "Real" and v.causality in causalities]
 
-    def everything(self) -> list[str]:
-        """Every variable as `name=value`, the value to the last bit."""
+    def values(self) -> dict[str, float | int | bool]:
+        """Every variable, read in one call for each type."""
         values: dict[str, float | int | bool] = {}
         for getter, variables in self._by_getter.items():
             references = [variable.valueReference for variable in variables]
             values |= zip((variable.name for variable in variables), getattr(self.fmu, getter)(references))
-        return [f"{name}={_exact(values[name])}" for name in self.variables]
+        return {name: values[name] for name in self.variables}
+
+    def everything(self) -> list[str]:
+        """Every variable as `name=value`, the value to the last bit."""
+        return [f"{name}={_exact(value)}" for name, value in self.values().items()]
 
     def save(self) -> bytes:
         """The serialised state."""

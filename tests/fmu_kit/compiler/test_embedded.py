@@ -73,8 +73,9 @@ def flown() -> dict[str, list[float]]:
             controller.step(k * H, H)
             loop.command()
             plant.step(k * H, H)
-            for name, column in rows.items():
-                column.append(float(sides[name[0]].value(name[2:])))
+            for side, instance in sides.items():
+                for name, value in instance.values().items():
+                    rows[f"{side}.{name}"].append(float(value))
     return rows
 
 
