@@ -207,8 +207,14 @@ def test_limit_takes_the_flags_of_a_flight(main: Main) -> None:
     assert len(done.stderr.splitlines()) == 22  # what flies, and 21 values
 
 
-def test_limit_prints_both_figures_and_says_that_they_differ(main: Main) -> None:
-    lines = main(*LIMIT).stdout.splitlines()
+def test_limit_prints_both_figures_says_that_they_differ_and_draws_them_on_request(tmp_path: Path, main: Main) -> None:
+    done = main(*LIMIT, "--out", "drawn")
+    names = ("limit_period.png", "limit_period.svg", "spectral_radius_period.png", "spectral_radius_period.svg")
+    pictures = [Path("drawn") / name for name in names]
+    assert done.stderr.splitlines()[-4:] == [*map(str, pictures)]
+    for picture in pictures:
+        assert (tmp_path / picture).read_bytes().startswith((b"\x89PNG", b"<?xml"))
+    lines = done.stdout.splitlines()
     found = {line.split()[0]: line.split(maxsplit=1)[1] for line in lines}
     assert float(found["local_limit"]) == pytest.approx(0.080, abs=0.0005)
     assert found["large_signal_limit"] == "-"
@@ -216,15 +222,6 @@ def test_limit_prints_both_figures_and_says_that_they_differ(main: Main) -> None
     assert (float(found["horizon"]), float(found["scan"]), found["tried"]) == (0.05, 0.005, "5 values")
     assert "the first value of the range (fails, bounded: ultimate_bound = " in found["note"]
     assert found["note"].endswith(f"; the local limit is {float(found['local_limit']):.6g} s")
-
-
-def test_limit_draws_what_it_measured_and_the_spectral_radius_on_request(tmp_path: Path, main: Main) -> None:
-    done = main(*LIMIT, "--of", "delay", "--out", "drawn")
-    names = ("limit_delay.png", "limit_delay.svg", "spectral_radius_delay.png", "spectral_radius_delay.svg")
-    pictures = [Path("drawn") / name for name in names]
-    assert done.stderr.splitlines()[-4:] == [*map(str, pictures)]
-    for picture in pictures:
-        assert (tmp_path / picture).read_bytes().startswith((b"\x89PNG", b"<?xml"))
 
 
 @pytest.mark.parametrize(

@@ -52,7 +52,7 @@ def test_a_run_that_hangs_is_a_failed_row_that_says_so(waits: str, tmp_path: Pat
 
 
 def test_the_command_limits_each_run(tmp_path: Path, main: Main) -> None:
-    small(tmp_path, "ENDS=if (m->s.gain == 3.0) for (;;)")
+    small(tmp_path, "ENDS=if (m->s.gain == 3.0) for (;;) usleep(1000)")
     (tmp_path / "system.toml").write_text(SYSTEM)
     (tmp_path / "study.toml").write_text(STUDY)
     done = main(

@@ -17,7 +17,7 @@ from orchestration.workers.pool import Inputs, Supervisor
 from orchestration.workers.task import Chunk, RunTask
 from tests.commands import Main
 from tests.orchestration.fmi.small import needs_compiler, small
-from tests.orchestration.studies.common import NOISY, RUNS, axis, bits, short, study, sweep, swept
+from tests.orchestration.studies.common import NOISY, RUNS, STORE, axis, bits, short, study, sweep, swept
 
 pytestmark = needs_compiler
 OWN = ("duration", "machine")
@@ -45,13 +45,19 @@ def _is_hex(value: Any) -> bool:
     return isinstance(value, str) and value.lstrip("-").startswith("0x")
 
 
-def test_rows_are_those_of_the_fmus_in_a_store_of_the_same_runs(tmp_path: Path) -> None:
+def test_rows_are_those_of_the_fmus_in_a_store_of_the_same_runs_and_the_command_says_how_far_they_agree(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, main: Main
+) -> None:
     chosen = noisy(tmp_path)
     alone = bits(swept(dataclasses.replace(chosen, native=True), tmp_path / "alone"))
-    lanes = bits(swept(chosen, tmp_path / "lanes", engine="batch"))
+    monkeypatch.chdir(tmp_path)
+    done = main("sweep", "study.toml", "--engine", "batch")
+    assert "8 runs flown by FMUs too: largest relative difference" in done.stdout
+    assert done.stdout.splitlines()[-1] in main("status", "study.toml").stdout
+    lanes = bits(tmp_path / STORE)
     assert len(lanes) == RUNS
     assert_alike(lanes, alone)
-    with open_for_reading(tmp_path / "lanes" / "study.sqlite") as opened:
+    with open_for_reading(tmp_path / STORE) as opened:
         agreement = Agreement.from_text(opened.about()[AGREEMENT])
     assert agreement.runs == SAMPLE
     assert agreement.difference < 1e-12
@@ -90,14 +96,6 @@ def test_a_system_without_lanes_is_refused_before_anything_is_flown(tmp_path: Pa
     with pytest.raises(UsageError, match=r"components.one: small.fmu: expected a native FMU"):
         sweep(load_study(tmp_path / "study.toml"), folder=tmp_path / "out", engine="batch")
     assert not (tmp_path / "out" / "study.sqlite").exists()
-
-
-def test_the_command_says_how_far_they_agree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, main: Main) -> None:
-    monkeypatch.chdir(tmp_path)
-    noisy(tmp_path)
-    done = main("sweep", "study.toml", "--engine", "batch")
-    assert "8 runs flown by FMUs too: largest relative difference" in done.stdout
-    assert done.stdout.splitlines()[-1] in main("status", "study.toml").stdout
 
 
 def test_a_difference_names_run_and_metric() -> None:

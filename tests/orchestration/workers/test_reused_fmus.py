@@ -44,7 +44,7 @@ def test_rows_and_signals_of_a_sweep_are_those_of_a_run_of_each(
         small(tmp_path / name, *habits)
     (tmp_path / "system.toml").write_text(SYSTEM, encoding="utf-8")
     (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
-    main("sweep", tmp_path / "study.toml", "--workers", "2", "--out", tmp_path / "swept")
+    main("sweep", tmp_path / "study.toml", "--workers", "1", "--out", tmp_path / "swept")
     table = frame(store_path("study", tmp_path / "swept"))
     assert len(table) == len(GAINS)
     for gain, (_, swept) in zip(GAINS, table.iterrows(), strict=True):
