@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from orchestration.basics.errors import QuadcosimError, SimulatorError, UsageError
+from orchestration.building.fmus import locate
 from orchestration.fmi import instances, slaves
 from orchestration.fmi.isolated import IsolatedInstance
 from orchestration.fmi.native import NativeInstance
@@ -416,6 +417,21 @@ def test_a_banner_does_not_spoil_the_json_of_a_command(tmp_path: Path) -> None:
     )  # fmt: skip
     assert json.loads(done.stdout)["peak"] == 0.0
     assert "SMALL FMU, version 1" in done.stderr
+
+
+def test_an_fmu_finds_all_of_its_archive_but_for_one_of_this_kit_what_is_for_people(tmp_path: Path) -> None:
+    path = small(tmp_path)
+    write_fmu(path, {**files_of(path), "documentation/index.html": b"", "sources/small.c": b"", "extra/a": b""})
+    plants = [locate("QuadrotorPlant"), locate("native/QuadrotorPlant")]
+    found = []
+    for fmu in (path, *plants):
+        with instances.open_here(fmu, "it") as it:
+            assert it._folder is not None
+            found.append({each.name for each in it._folder.path.iterdir()})
+    assert found[0] == {"modelDescription.xml", "binaries", "documentation", "sources", "extra"}
+    for plant, of_kit in zip(plants, found[1:]):
+        assert of_kit == {name.partition("/")[0] for name in files_of(plant)} - {"documentation", "sources"}
+        assert of_kit >= {"modelDescription.xml", "binaries", "resources"}
 
 
 def test_on_other_processors_an_fmu_of_fmi_2_is_found_by_the_name_of_fmi_3(
