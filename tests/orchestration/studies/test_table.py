@@ -1,5 +1,6 @@
 """The rows of a study as a pandas DataFrame, an xarray Dataset, and files."""
 
+import functools
 import json
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import pytest
 
 import quadcosim
 from orchestration.studies.axes import Axis
-from orchestration.studies.store import open_for_reading, open_for_writing
+from orchestration.studies.store import Store, open_for_reading, open_for_writing
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
 from orchestration.studies.table import dataset, export, frame
@@ -188,8 +189,9 @@ def test_a_failed_run_is_exported_with_its_message(tmp_path: Path) -> None:
     assert read["status"].tolist() == ["done", "failed"]
 
 
-def test_more_rows_than_are_read_at_once_open_count_and_export(tmp_path: Path) -> None:
-    number = 45_000  # two blocks and a half of them
+def test_more_rows_than_are_read_at_once_open_count_and_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Store, "blocks", functools.partialmethod(Store.blocks, most=2000))
+    number = 4500  # two blocks and a half of them
     measured = dict.fromkeys(METRICS, 0.1 + 0.2) | {"good": True, "diverged": False, "steps": 30000}
     rows = [row(i, metrics={**measured, "position_rmse": 0.001 * i}) for i in reversed(range(number))]
     path = stored(tmp_path / "study.sqlite", rows, {"timing.period": [0.001 * i for i in range(number)]})
