@@ -1,6 +1,9 @@
 """What processes say to each other can be said."""
 
+import copyreg
 import threading
+
+import pytest
 
 from orchestration.basics.errors import SimulatorError
 from orchestration.processes.channel import sayable
@@ -13,7 +16,8 @@ class _NeedsTwoError(Exception):
         super().__init__(f"{what} in {where}")
 
 
-def test_an_error_that_no_frame_can_have_is_said_by_its_name_and_words() -> None:
+def test_an_error_that_no_frame_can_have_is_said_by_its_name_and_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(copyreg.dispatch_table, _NeedsTwoError, raising=False)  # by dask, once it is loaded
     known = SimulatorError("plant: refused", details="where")
     assert sayable(known) is known
     assert str(sayable(OSError(threading.Lock()))).startswith("OSError: <unlocked _thread.lock")
