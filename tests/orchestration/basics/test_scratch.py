@@ -71,7 +71,7 @@ def test_others_cannot_enter_it(temporary: Path) -> None:
 def test_no_room_to_unpack_is_told_with_the_place(
     built: dict[str, Path], temporary: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def full(*_: object) -> None:
+    def full(*_: object, **__: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(fmpy, "extract", full)
