@@ -3,18 +3,12 @@
 import math
 import random
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from docs import comparisons
-from orchestration.building.inputs import all_with_files
-from orchestration.comparison.cells import CellSummary, frame_of, results
-from orchestration.comparison.design import Comparison
-from orchestration.workers.task import Chunk, Runner, RunTask
+from orchestration.comparison.run import cells_again
 
 PAGES = sorted((Path(comparisons.__file__).parent / "findings").glob("*.md"))
 FLOWN = sorted(path.stem for path in comparisons.DATA.glob("*.json"))
@@ -42,39 +36,14 @@ def test_every_cell_of_a_map_is_one_of_its_file(name: str) -> None:
     assert [tuple(cell[key] for key in keys) for cell in kept] == expected
 
 
-@pytest.fixture(scope="module")
-def runner() -> Iterator[Runner]:
-    """Flies all maps in this process, as a worker does."""
-    with closing(Runner()) as runner:
-        yield runner
-
-
-def flown_again(runner: Runner, comparisons: Sequence[Comparison], indices: Sequence[int]) -> list[list[CellSummary]]:
-    """What `quadcosim compare studies/comparisons/NAME.toml --cell K` flies of each, all of it in lanes at once."""
-    comparisons = [replace(one, native=True) for one in comparisons]
-    runs = [[i for index in indices for i in one.runs_of(one.cell(index))] for one in comparisons]
-    systems = []
-    for one, some in zip(comparisons, runs, strict=True):
-        study, files = one.study, one.study.files()
-        starts = files.starts_of(study.origin)
-        systems += all_with_files([study.system(i, starts) for i in some], {**files.fmus, **files.tables})
-    tasks = [
-        RunTask(index=i, key="", settings={}, system=system, keep_signals=False) for i, system in enumerate(systems)
-    ]
-    flown = iter(runner.fly_chunk(Chunk(tasks=tuple(tasks))))
-    return [
-        results(one, frame_of(one, [(i, dict(next(flown).row.metrics or {})) for i in some]))
-        for one, some in zip(comparisons, runs, strict=True)
-    ]
-
-
 @pytest.mark.parametrize("name", FLOWN)
-def test_one_cell_in_a_hundred_is_what_is_flown_again(name: str, runner: Runner) -> None:
+def test_one_cell_in_a_hundred_is_what_is_flown_again(name: str) -> None:
+    """What `quadcosim compare studies/comparisons/NAME.toml --cell K` flies, here in lanes."""
     kept = comparisons.kept(name)["cells"]
     chosen = sorted(random.Random(name).sample(kept, math.ceil(len(kept) / 100)), key=lambda cell: cell["cell"])
-    comparison = comparisons.loaded(name)
-    flown, steady = flown_again(
-        runner, [comparison, comparisons.on_path(comparison)], [cell["cell"] for cell in chosen]
+    flown = cells_again(comparisons.loaded(name), [cell["cell"] for cell in chosen], engine="batch")
+    steady = cells_again(
+        comparisons.on_path(comparisons.loaded(name)), [cell["cell"] for cell in chosen], engine="batch"
     )
     for cell, summary, alone in zip(chosen, flown, steady, strict=True):
         row = summary.row("value")
