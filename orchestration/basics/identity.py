@@ -11,7 +11,8 @@ MOST = 256
 class OfSame(Generic[Found]):
     """What a function says of objects, kept for as long as they are the same ones: runs of a study share most parts.
 
-    Objects are told by what they are, not by what they hold: they have no hash, and comparing them takes as long.
+    Objects are told by what they are, not by what they hold: they have no hash, and comparing them takes as long. They
+    are held, so they should be small.
     """
 
     def __init__(self, find: Callable[..., Found]) -> None:

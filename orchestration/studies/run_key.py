@@ -24,10 +24,13 @@ def run_key(system: System, files: Files, metrics: Sequence[OwnMetric] = ()) -> 
     content = {
         **_texts_shared(
             system.connections, system.sources, system.computers, system.networks, system.objectives, system.streams,
-            system.criterion, versions(), files,
+            system.criterion, versions(), files.hashes,
         ),
         **{key: json.dumps(getattr(system, key)) for key in ("stop_time", "seed")},
-        "components": _listed(_text_of_component(*item, files) for item in system.components.items()),
+        "components": _listed(
+            _text_of_component(name, component, files.hashes, files.starts[component.fmu])
+            for name, component in system.components.items()
+        ),
     }  # fmt: skip
     if metrics:
         content["metrics"] = json.dumps([(metric.name, metric.source) for metric in metrics])
@@ -53,12 +56,12 @@ def _texts_shared(
     streams: Mapping[str, int],
     criterion: Criterion,
     software: Mapping[str, str],
-    files: Files,
+    hashes: Mapping[str, str],
 ) -> dict[str, str]:
     """The JSON of what runs of a study have in common, mostly."""
     parts: dict[str, Any] = {
-        "connections": [_content(x, files) for x in connections],
-        "sources": [[name, _source_of(source, files)] for name, source in sources.items()],
+        "connections": [_content(x, hashes) for x in connections],
+        "sources": [[name, _source_of(source, hashes)] for name, source in sources.items()],
         **{
             key: dict(value)
             for key, value in (("objectives", objectives), ("streams", streams), ("versions", software))
@@ -66,58 +69,60 @@ def _texts_shared(
         "criterion": dataclasses.asdict(criterion),
     }
     if computers:
-        parts["computers"] = _shared_of("tasks", computers, files)
+        parts["computers"] = _shared_of("tasks", computers, hashes)
     if networks:
-        parts["networks"] = _shared_of("messages", networks, files)
+        parts["networks"] = _shared_of("messages", networks, hashes)
     return {key: _json(value) for key, value in parts.items()}
 
 
 @OfSame
-def _text_of_component(name: str, component: Component, files: Files) -> str:
-    starts = files.starts[component.fmu]
+def _text_of_component(name: str, component: Component, hashes: Mapping[str, str], starts: Mapping[str, float]) -> str:
     content = {
         **_values_of(component),
         "name": name,
-        "fmu": files.hashes[component.fmu],
+        "fmu": hashes[component.fmu],
         "parameters": {key: v for key, v in component.parameters.items() if key not in starts or v != starts[key]},
-        "sampling": None if component.sampling is None else _content(component.sampling, files),
+        "sampling": None if component.sampling is None else _content(component.sampling, hashes),
     }
     return _json(content)
 
 
-def _shared_of(part: str, shared: Mapping[str, Any], files: Files) -> list[Any]:
+def _shared_of(part: str, shared: Mapping[str, Any], hashes: Mapping[str, str]) -> list[Any]:
     """Computers with their tasks or networks with their messages, which are what they are in their order: it decides
     ties.
     """
     return [
-        [name, _content(one, files) | {part: [[each, _content(of, files)] for each, of in getattr(one, part).items()]}]
+        [
+            name,
+            _content(one, hashes) | {part: [[each, _content(of, hashes)] for each, of in getattr(one, part).items()]},
+        ]
         for name, one in shared.items()
     ]
 
 
-def _source_of(source: Source, files: Files) -> dict[str, Any]:
-    return _content(source, files)
+def _source_of(source: Source, hashes: Mapping[str, str]) -> dict[str, Any]:
+    return _content(source, hashes)
 
 
 def _values_of(of: Any) -> dict[str, Any]:
     return {field.name: getattr(of, field.name) for field in dataclasses.fields(of)}
 
 
-def _content(of: Any, files: Files) -> dict[str, Any]:
+def _content(of: Any, hashes: Mapping[str, str]) -> dict[str, Any]:
     """The values of a part of a system, with what is drawn as its own values, and files as what is in them."""
-    return {name: _told(value, files) for name, value in _values_of(of).items()}
+    return {name: _told(value, hashes) for name, value in _values_of(of).items()}
 
 
-def _told(value: Any, files: Files) -> Any:
+def _told(value: Any, hashes: Mapping[str, str]) -> Any:
     if isinstance(value, Path):
-        return files.hashes[str(value)]
-    return _content(value, files) if dataclasses.is_dataclass(value) else value
+        return hashes[str(value)]
+    return _content(value, hashes) if dataclasses.is_dataclass(value) else value
 
 
 def study_parts(study: Study) -> dict[str, str]:
     """What a study file says of the runs, part by part, so that a difference can be named."""
     system = study.origin
-    tables = Files(fmus={}, tables=tables_of(system))
+    tables = Files(fmus={}, tables=tables_of(system)).hashes
     parts: dict[str, Any] = {key: getattr(system, key) for key in ("stop_time", "seed")}
     for name, component in system.components.items():
         parts |= _parts(f"components.{name}", component, tables, without=("fmu",))
@@ -140,17 +145,17 @@ def study_parts(study: Study) -> dict[str, str]:
     return said
 
 
-def _parts(place: str, of: Any, files: Files, without: Container[str] = ()) -> dict[str, Any]:
+def _parts(place: str, of: Any, hashes: Mapping[str, str], without: Container[str] = ()) -> dict[str, Any]:
     """Every value of `of`, by path; what is `None` is not there."""
     found: dict[str, Any] = {}
     for field in dataclasses.fields(of):
         value, path = getattr(of, field.name), f"{place}.{field.name}"
         if dataclasses.is_dataclass(value):
-            found |= _parts(path, value, files)
+            found |= _parts(path, value, hashes)
         elif field.name == "parameters":
             found |= {f"{path}.{name}": given for name, given in value.items()}
         elif value is not None and field.name not in without:
-            found[path] = _told(value, files)
+            found[path] = _told(value, hashes)
     return found
 
 

@@ -94,9 +94,9 @@ class Study:
 
         Raises `UsageError` for a value that cannot be.
         """
-        return self.run(index, starts)[1]
+        return self.settings_and_system(index, starts)[1]
 
-    def run(self, index: int, starts: Mapping[str, float]) -> tuple[Mapping[str, Value], System]:
+    def settings_and_system(self, index: int, starts: Mapping[str, float]) -> tuple[Mapping[str, Value], System]:
         """The value of each axis in one run, and its system; raises as `system` does."""
         made, of = self._made
         if of != starts:

@@ -200,7 +200,7 @@ def _task(
     key: str,
     engine: Engine | None,
 ) -> RunTask:
-    settings, system = study.run(index, starts)
+    settings, system = study.settings_and_system(index, starts)
     return RunTask(
         index=index, key=key, settings=settings, system=system,
         keep_signals=study.keeps_signals(index), metrics=study.metrics, engine=engine, time_limit=time_limit,
@@ -286,5 +286,5 @@ def _units(study: Study, files: Files) -> dict[str, str]:
 def _places(study: Study, files: Files) -> Iterator[store.DesignPoint]:
     starts = files.starts_of(study.origin)
     for index in range(len(study.points)):
-        settings, system = study.run(index, starts)
+        settings, system = study.settings_and_system(index, starts)
         yield store.DesignPoint(index=index, key=run_key(system, files, study.metrics), settings=settings)
