@@ -18,7 +18,11 @@ from orchestration.basics.errors import UsageError
 from orchestration.building import fmus
 from orchestration.exact.expect import Expected, expect
 from orchestration.runs.in_lanes import fly
-from orchestration.system.model import Component, Connection, Sampling, Source, System
+from orchestration.system.component import Component
+from orchestration.system.connection import Connection
+from orchestration.system.model import System
+from orchestration.system.sampling import Sampling
+from orchestration.system.source import Source
 from orchestration.system.system_file import load_system
 
 EXAMPLES = Path(__file__).parents[1] / "examples"

@@ -18,7 +18,10 @@ from orchestration.figures.palette import GREY
 from orchestration.recording.recording import InMemory
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
-from orchestration.system.model import Component, Connection, Sampling, System
+from orchestration.system.component import Component
+from orchestration.system.connection import Connection
+from orchestration.system.model import System
+from orchestration.system.sampling import Sampling
 
 SIZES = (2, 4, 10, 20, 50, 100, 200)
 INSTANTS = 200

@@ -19,7 +19,9 @@ from orchestration.quadrotor.scenario import FmuChoice, Scenario
 from orchestration.studies.axes import Axis
 from orchestration.studies.linked_settings import LinkedSettings
 from orchestration.studies.study import Study
-from orchestration.system.model import Parameter, Source, System
+from orchestration.system.component import Parameter
+from orchestration.system.model import System
+from orchestration.system.source import Source
 
 Array = Any
 

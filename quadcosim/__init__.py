@@ -74,10 +74,15 @@ if TYPE_CHECKING:
     from orchestration.studies.study_file import load_study
     from orchestration.studies.sweep import sweep
     from orchestration.studies.swept import Swept
+    from orchestration.system.component import Component
     from orchestration.system.computers import Arrivals, Computer, Message, Network, Task
+    from orchestration.system.connection import Connection
+    from orchestration.system.criterion import Criterion
     from orchestration.system.distribution import Distribution
-    from orchestration.system.model import Component, Connection, Criterion, Sampling, SamplingOnArrival, Source, System
+    from orchestration.system.model import System
     from orchestration.system.paths import changed
+    from orchestration.system.sampling import Sampling, SamplingOnArrival
+    from orchestration.system.source import Source
     from orchestration.system.system_file import load_system
     from orchestration.tuning.exact import ExactTuning
     from orchestration.tuning.tune import Tuned, tune
@@ -106,13 +111,13 @@ _HOMES = {
     "load_scenario": "orchestration.quadrotor.scenario_file",
     # any system
     "System": "orchestration.system.model",
-    "Component": "orchestration.system.model",
-    "Sampling": "orchestration.system.model",
-    "SamplingOnArrival": "orchestration.system.model",
-    "Connection": "orchestration.system.model",
-    "Source": "orchestration.system.model",
+    "Component": "orchestration.system.component",
+    "Sampling": "orchestration.system.sampling",
+    "SamplingOnArrival": "orchestration.system.sampling",
+    "Connection": "orchestration.system.connection",
+    "Source": "orchestration.system.source",
     "Distribution": "orchestration.system.distribution",
-    "Criterion": "orchestration.system.model",
+    "Criterion": "orchestration.system.criterion",
     "Computer": "orchestration.system.computers",
     "Task": "orchestration.system.computers",
     "Network": "orchestration.system.computers",

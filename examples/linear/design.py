@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 import quadcosim
 from orchestration.figures.palette import BLUE, GREEN, GREY, ORANGE
 from orchestration.figures.style import DOCS, save
-from orchestration.system.model import Parameter
+from orchestration.system.component import Parameter
 from quadcosim import FmuChoice, Linearised, Scenario, StateSpace, Timing
 
 HERE = Path(__file__).resolve().parent

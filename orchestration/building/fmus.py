@@ -21,7 +21,7 @@ from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.building import consent
 from orchestration.building.models import MODELS
 from orchestration.processes import subprocesses
-from orchestration.system.model import Parameter
+from orchestration.system.component import Parameter
 from orchestration.system.request import Twin
 
 _NOTES = logging.getLogger("quadcosim")

@@ -11,10 +11,13 @@ from orchestration.basics.errors import QuadcosimError
 from orchestration.basics.records import like
 from orchestration.building import fmus
 from orchestration.fmi.model import Model, read_model
+from orchestration.system.component import Component
 from orchestration.system.computers import Computer, Network
+from orchestration.system.connection import Connection
 from orchestration.system.distribution import with_traces_at
 from orchestration.system.files_read import files_read
-from orchestration.system.model import Component, Connection, Source, System
+from orchestration.system.model import System
+from orchestration.system.source import Source
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -28,10 +28,10 @@ from orchestration.stability.delay_bounds import SampledLoop, certain_jitter
 from orchestration.stability.known_loops import rested
 from orchestration.stability.linear_loop import at_rest
 from orchestration.system.distribution import lowest
-from orchestration.system.model import variable_of
 from orchestration.system.placement import carried, tasks_of
 from orchestration.system.request import Request, in_its_own_words, system_meant
 from orchestration.system.times import NANOSECONDS, down_to_nanoseconds
+from orchestration.system.variable_names import variable_of
 
 MOST_LOST = 8
 """losses in a row that are looked at"""

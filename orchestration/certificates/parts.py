@@ -14,8 +14,10 @@ from orchestration.schedule.plan import Plan
 from orchestration.stability.linear_loop import AtRest
 from orchestration.stability.matrices import Matrices, in_continuous_time, minds_its_step, of_samples, told_by_outputs
 from orchestration.stability.operating_point import true_period
-from orchestration.system.model import Connection, System, variable_of
+from orchestration.system.connection import Connection
+from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
+from orchestration.system.variable_names import variable_of
 
 Place = tuple[str, ...]
 """Of the state: what it is, of whom, and which"""

@@ -18,9 +18,10 @@ from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
 from orchestration.certificates.family import Factor, Family, Letter
 from orchestration.certificates.parts import Assigned, Layout, Loop
+from orchestration.system.connection import Connection
 from orchestration.system.distribution import lowest
-from orchestration.system.model import Connection, variable_of
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
+from orchestration.system.variable_names import variable_of
 
 LARGEST = 400
 """numbers in the state of a loop"""

@@ -9,7 +9,8 @@ from orchestration.computers.bounds import Periodic, can, earliest_deadline, fix
 from orchestration.system.computers import Computer, Message, Network, Task
 from orchestration.system.distribution import highest, lowest
 from orchestration.system.frames import frame_nanoseconds
-from orchestration.system.model import SamplingOnArrival, System
+from orchestration.system.model import System
+from orchestration.system.sampling import SamplingOnArrival
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds, nanoseconds
 
 Bounds = dict[str, int | None]

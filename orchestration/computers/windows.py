@@ -13,8 +13,9 @@ from orchestration.basics.errors import UsageError
 from orchestration.computers.bounded import Bounds, bounds_of
 from orchestration.system.distribution import highest, lowest
 from orchestration.system.frames import frame_nanoseconds
-from orchestration.system.model import SamplingOnArrival, System
+from orchestration.system.model import System
 from orchestration.system.placement import PlacedMessage, PlacedTask, carried, tasks_of
+from orchestration.system.sampling import SamplingOnArrival
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds, nanoseconds
 
 

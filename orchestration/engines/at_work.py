@@ -22,7 +22,8 @@ from orchestration.schedule.cursor import Cursor
 from orchestration.schedule.schedule import Schedule
 from orchestration.schedule.streams import NOISE, Streams
 from orchestration.schedule.timetable import Timetable
-from orchestration.system.model import System, variable_of
+from orchestration.system.model import System
+from orchestration.system.variable_names import variable_of
 
 Sources = Sequence[tuple[Sequence[str], Values]]
 """Signals, and what they are"""

@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from orchestration.basics.simulator import Floats
-from orchestration.system.model import System, component_of, variable_of
+from orchestration.system.model import System
+from orchestration.system.variable_names import component_of, variable_of
 
 
 class Board:

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orchestration.basics.simulator import Floats, Transfer
-from orchestration.system.model import Connection
+from orchestration.system.connection import Connection
 
 Indices: TypeAlias = npt.NDArray[np.intp]
 

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from orchestration.basics.simulator import Booleans, Floats
-from orchestration.system.model import Connection, variable_of
+from orchestration.system.connection import Connection
+from orchestration.system.variable_names import variable_of
 
 ITERATIONS, CONVERGED = 100, 1e-12
 """How often values go around a loop, until they change by less, relative to what they are"""

@@ -11,7 +11,7 @@ from orchestration.engines.channel import Channel, of_each
 from orchestration.engines.feeds import Feed
 from orchestration.engines.structures import address, structures
 from orchestration.fmi.native import Call, NativeInstance, bounds_of
-from orchestration.system.model import Connection
+from orchestration.system.connection import Connection
 
 c = structures(1)
 """What C has of one run"""

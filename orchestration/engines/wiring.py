@@ -32,9 +32,12 @@ from orchestration.signals.library import made
 from orchestration.signals.table_file import read_table
 from orchestration.signals.waypoints import read_waypoints
 from orchestration.system.check import check, recorded
+from orchestration.system.component import Component
 from orchestration.system.following import followed, heard
-from orchestration.system.model import MOTION, Component, Source, System, variable_of
+from orchestration.system.model import System
+from orchestration.system.source import MOTION, Source
 from orchestration.system.times import Grid, exact_nanoseconds
+from orchestration.system.variable_names import variable_of
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,8 +16,9 @@ from orchestration.exact.linear import Components, Continuous
 from orchestration.exact.objectives import Mean
 from orchestration.exact.pieces import Piece
 from orchestration.schedule.plan import Plan
-from orchestration.system.model import System, component_of
+from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
+from orchestration.system.variable_names import component_of
 
 
 class SimulatedEffects(LoopEffects):

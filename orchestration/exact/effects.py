@@ -23,7 +23,9 @@ from orchestration.exact.objectives import Mean
 from orchestration.exact.pieces import Piece
 from orchestration.exact.start import Start
 from orchestration.schedule.plan import Plan
-from orchestration.system.model import Connection, System, component_of, variable_of
+from orchestration.system.connection import Connection
+from orchestration.system.model import System
+from orchestration.system.variable_names import component_of, variable_of
 
 
 class Places:

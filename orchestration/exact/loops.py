@@ -32,9 +32,11 @@ from orchestration.fmi.reuse import Instances
 from orchestration.schedule.plan import Plan
 from orchestration.stability.linear_loop import Beside, at_rest
 from orchestration.stability.operating_point import true_period
-from orchestration.system.model import Sampling, System, component_of, is_foreseen
+from orchestration.system.model import System
 from orchestration.system.paths import changed
+from orchestration.system.sampling import Sampling, is_foreseen
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
+from orchestration.system.variable_names import component_of
 from orchestration.system.written import tables_of
 
 T = TypeVar("T")

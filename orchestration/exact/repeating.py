@@ -38,8 +38,9 @@ from orchestration.exact.clockwork import together
 from orchestration.exact.foretold import NOTHING, Course, Foretold
 from orchestration.exact.shared import expect_certain, is_shared
 from orchestration.system.distribution import highest
-from orchestration.system.model import System, is_foreseen
+from orchestration.system.model import System
 from orchestration.system.placement import carried, placed_messages, placed_tasks, released_by
+from orchestration.system.sampling import is_foreseen
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds, nanoseconds
 
 MOST_JOBS = 200_000

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 from orchestration.basics.errors import UsageError
 from orchestration.system.distribution import Distribution, Varying
-from orchestration.system.model import Sampling, System, is_foreseen
+from orchestration.system.model import System
 from orchestration.system.placement import carried, placed_messages, placed_tasks, released_by
+from orchestration.system.sampling import Sampling, is_foreseen
 
 
 def is_shared(system: System) -> bool:

@@ -10,8 +10,9 @@ from orchestration.exact.chances import CERTAIN, Chance, normal, table, uniform
 from orchestration.exact.clockwork import ATTOSECONDS, Link, Task
 from orchestration.exact.foretold import NOTHING, Foretold
 from orchestration.schedule.plan import Plan
+from orchestration.system.connection import Connection
 from orchestration.system.distribution import Distribution, Varying
-from orchestration.system.model import Connection, System
+from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
 
 

@@ -10,7 +10,9 @@ from orchestration.expressions.syntax import Call, names
 from orchestration.fmi.model import Model
 from orchestration.stability.linear_loop import AtRest
 from orchestration.system.following import AT_REST
-from orchestration.system.model import Source, System, component_of, variable_of
+from orchestration.system.model import System
+from orchestration.system.source import Source
+from orchestration.system.variable_names import component_of, variable_of
 
 
 class Wanted:

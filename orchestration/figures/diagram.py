@@ -13,7 +13,8 @@ from orchestration.basics.errors import UsageError
 from orchestration.figures.names import FORMATS
 from orchestration.figures.style import SCREEN, save
 from orchestration.system.description import rate, timing, what
-from orchestration.system.model import System, component_of, variable_of
+from orchestration.system.model import System
+from orchestration.system.variable_names import component_of, variable_of
 
 MOST = 40
 """Boxes in a row that can still be read"""

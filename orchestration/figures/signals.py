@@ -10,7 +10,7 @@ from orchestration.figures.palette import CYCLE
 from orchestration.figures.run import Run, title
 from orchestration.figures.style import Style
 from orchestration.results import display_names as labels
-from orchestration.system.model import component_of
+from orchestration.system.variable_names import component_of
 
 MOST_LINES = 8
 """In one panel; what is more gets panels of its own"""

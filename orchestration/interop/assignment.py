@@ -7,7 +7,7 @@ from orchestration.basics.errors import UsageError
 from orchestration.fmi.model import Kind
 from orchestration.interop.job import End
 from orchestration.requests.ssp.carried import Carried
-from orchestration.system.model import variable_of
+from orchestration.system.variable_names import variable_of
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,8 +16,8 @@ from orchestration.basics.simulator import Floats
 from orchestration.interop.catalogue import Tool
 from orchestration.interop.flights import Flights
 from orchestration.interop.trace import Trace
-from orchestration.system.model import component_of
 from orchestration.system.request import Request
+from orchestration.system.variable_names import component_of
 
 MISSING = 1
 """Steps before the end that a tool may leave out: some stop where the next step would end beyond it."""

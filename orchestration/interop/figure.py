@@ -10,7 +10,7 @@ from orchestration.figures.palette import BLUE, GREEN, GREY, ORANGE, RED
 from orchestration.figures.style import SCREEN, save
 from orchestration.interop.compare import Agreement
 from orchestration.interop.table import AIM
-from orchestration.system.model import component_of
+from orchestration.system.variable_names import component_of
 
 SMALLEST = 1e-17
 """Where a difference of zero is drawn."""

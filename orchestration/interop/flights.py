@@ -23,7 +23,8 @@ from orchestration.processes.child import Child
 from orchestration.requests.ssp import writing
 from orchestration.requests.ssp.carried import Part, carried, wholly_carried
 from orchestration.runs.simulation import prepared
-from orchestration.system.model import Parameter, System
+from orchestration.system.component import Parameter
+from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.request import Request, in_its_own_words
 from orchestration.system.times import exact_nanoseconds

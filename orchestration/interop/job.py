@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:
-    from orchestration.system.model import Parameter
+    from orchestration.system.component import Parameter
 
 End: TypeAlias = tuple[str, str]
 """Component and variable"""

@@ -34,10 +34,11 @@ from orchestration.quadrotor.wiring import (
     RIGID_BODY,
 )
 from orchestration.results.quantities import setting
+from orchestration.system.component import Parameter
 from orchestration.system.description import varying
 from orchestration.system.distribution import Distribution
 from orchestration.system.distribution_table import meant_in
-from orchestration.system.model import Parameter, System
+from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.requirements import is_finite
 from orchestration.system.written import in_toml

@@ -11,8 +11,9 @@ from orchestration.quadrotor.timing import TIMING_KEYS
 from orchestration.quadrotor.wiring import EXTERNAL_FORCE, POSITION_REFERENCE
 from orchestration.signals.limits import AXES
 from orchestration.signals.table_file import header_of
-from orchestration.system.model import Source, System
+from orchestration.system.model import System
 from orchestration.system.paths import TOP
+from orchestration.system.source import Source
 from orchestration.system.system_file import load_system
 
 SYSTEM = Path(__file__).with_name("system.toml")

@@ -10,7 +10,7 @@ from orchestration.basics.errors import UsageError, did_you_mean, expected_name
 from orchestration.basics.records import record
 from orchestration.building.models import MODELS
 from orchestration.quadrotor.wiring import DEFAULT_PLANT
-from orchestration.system.model import Parameter
+from orchestration.system.component import Parameter
 from orchestration.system.parameters import parameters_in
 
 SHIPPED = Path(__file__).with_name("vehicles")

@@ -27,7 +27,7 @@ from orchestration.studies.shown_first import shown_first
 from orchestration.studies.store import FIXED, TEXTS, UNITS, open_for_reading
 from orchestration.studies.study import Study
 from orchestration.studies.sweep import AGREEMENT, expect_current
-from orchestration.system.model import DIVERGED, TERMINATED
+from orchestration.system.criterion import DIVERGED, TERMINATED
 from orchestration.workers.batching import Agreement
 
 AGREES = 1e-6

@@ -11,9 +11,10 @@ from orchestration.basics.units import after
 from orchestration.fmi.model import Model
 from orchestration.results.quantities import is_in_seconds
 from orchestration.system.distribution import Distribution
-from orchestration.system.model import System, TaskSampling
+from orchestration.system.model import System
 from orchestration.system.paths import TOP, changed, value_at
 from orchestration.system.request import Request, in_its_own_words, system_meant
+from orchestration.system.sampling import TaskSampling
 
 PERIOD = "period"
 QUANTITIES = (PERIOD, "delay", "jitter", "loss")

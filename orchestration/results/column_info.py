@@ -4,7 +4,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from orchestration.fmi.model import Model
-from orchestration.system.model import System, component_of, variable_of
+from orchestration.system.model import System
+from orchestration.system.variable_names import component_of, variable_of
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 
 from orchestration.results.column_info import Described
-from orchestration.system.model import component_of, variable_of
+from orchestration.system.variable_names import component_of, variable_of
 
 METRICS: Mapping[str, tuple[str, str | None]] = {
     "outcome": ("outcome", None),

@@ -11,7 +11,8 @@ from orchestration.expressions.over_run import evaluate, expect_names
 from orchestration.expressions.recorded import Recorded, Spans, vectors
 from orchestration.expressions.syntax import names, parse
 from orchestration.recording.recording import Events, Recording
-from orchestration.system.model import DIVERGED, TERMINATED, System, expressions
+from orchestration.system.criterion import DIVERGED, TERMINATED
+from orchestration.system.model import System, expressions
 from orchestration.system.times import NANOSECONDS
 
 Metrics = dict[str, float | int | bool | str | None]

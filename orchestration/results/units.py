@@ -8,7 +8,8 @@ from orchestration.basics.units import METRE, SECOND, Unit
 from orchestration.expressions.syntax import names, parse
 from orchestration.expressions.units import unit_of
 from orchestration.fmi.model import Model
-from orchestration.system.model import System, component_of, variable_of
+from orchestration.system.model import System
+from orchestration.system.variable_names import component_of, variable_of
 
 OF_EVERY_RUN = dict.fromkeys(("horizon", "divergence_time"), str(SECOND))
 """Units of what every run comes to beside its objectives"""

@@ -11,9 +11,10 @@ from orchestration.basics.errors import UsageError, shown
 from orchestration.basics.simulator import Floats
 from orchestration.fmi.model import Model
 from orchestration.system.check import check_parameter
-from orchestration.system.model import System, component_of, variable_of
+from orchestration.system.model import System
 from orchestration.system.paths import changed, value_at
 from orchestration.system.request import Request
+from orchestration.system.variable_names import component_of, variable_of
 
 _COMPONENTS, _PARAMETERS = "components.", ".parameters."
 

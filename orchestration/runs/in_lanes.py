@@ -22,8 +22,9 @@ from orchestration.runs.columns import Columns, columns
 from orchestration.runs.simulation import run
 from orchestration.system.check import check, recorded
 from orchestration.system.following import heard
-from orchestration.system.model import System, component_of, variable_of
+from orchestration.system.model import System
 from orchestration.system.request import in_its_own_words
+from orchestration.system.variable_names import component_of, variable_of
 
 BATCH = "batch"
 _NOTES = logging.getLogger("quadcosim")

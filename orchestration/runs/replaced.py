@@ -10,9 +10,10 @@ from orchestration.building import fmus
 from orchestration.engines.wiring import checked
 from orchestration.fmi.model import Model, read_model
 from orchestration.runs.meant import Meant
-from orchestration.system.model import System, component_of, variable_of
+from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.request import Request, in_its_own_words
+from orchestration.system.variable_names import component_of, variable_of
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -46,9 +46,11 @@ from orchestration.runs.result import Provenance, Result
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
 from orchestration.system.check import recorded
-from orchestration.system.model import Component, System, component_of, variable_of
+from orchestration.system.component import Component
+from orchestration.system.model import System
 from orchestration.system.request import Request, in_its_own_words
 from orchestration.system.times import NANOSECONDS
+from orchestration.system.variable_names import component_of, variable_of
 
 if TYPE_CHECKING:
     from orchestration.requests.request import Asked

@@ -14,8 +14,9 @@ from orchestration.schedule.plan import Plan
 from orchestration.schedule.resources import Resources
 from orchestration.schedule.spans import Collected, Instants
 from orchestration.system.distribution import highest
-from orchestration.system.model import System, is_foreseen
+from orchestration.system.model import System
 from orchestration.system.placement import carried, placed_tasks, tasks_of
+from orchestration.system.sampling import is_foreseen
 from orchestration.system.times import Grid, exact_nanoseconds, nanoseconds
 
 _KEPT = 8

@@ -4,8 +4,9 @@ from orchestration.basics.errors import UsageError
 from orchestration.system.computers import require_less
 from orchestration.system.distribution import highest
 from orchestration.system.frames import ERROR_BITS, frame_nanoseconds
-from orchestration.system.model import Sampling, System
+from orchestration.system.model import System
 from orchestration.system.placement import carried, placed_messages, placed_tasks
+from orchestration.system.sampling import Sampling
 from orchestration.system.times import NANOSECONDS
 
 LONGEST = 2**60

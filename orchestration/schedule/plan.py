@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from orchestration.schedule.order import ranked
-from orchestration.system.model import Connection, System
+from orchestration.system.connection import Connection
+from orchestration.system.model import System
 from orchestration.system.placement import carried
 
 

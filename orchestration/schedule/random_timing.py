@@ -13,8 +13,8 @@ from orchestration.schedule.foreseen import NEVER, Foreseen
 from orchestration.schedule.message_times import lateness, losses
 from orchestration.schedule.plan import Plan
 from orchestration.schedule.streams import DELAY, DELAY_JITTER, JITTER, LOSS, Streams
+from orchestration.system.connection import Connection
 from orchestration.system.distribution import highest
-from orchestration.system.model import Connection
 from orchestration.system.times import Grid, exact_nanoseconds, nanoseconds
 
 

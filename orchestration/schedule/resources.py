@@ -43,7 +43,7 @@ from orchestration.schedule.streams import ARRIVALS, DELAY, DELAY_JITTER, ERROR,
 from orchestration.system.computers import Arrivals
 from orchestration.system.distribution import Distribution, Varying, spreads
 from orchestration.system.frames import ERROR_BITS, frame_nanoseconds
-from orchestration.system.model import SamplingOnArrival, System, TaskSampling
+from orchestration.system.model import System
 from orchestration.system.placement import (
     PlacedMessage,
     PlacedTask,
@@ -53,6 +53,7 @@ from orchestration.system.placement import (
     placed_tasks,
     released_by,
 )
+from orchestration.system.sampling import SamplingOnArrival, TaskSampling
 from orchestration.system.times import Grid, exact_nanoseconds, nanoseconds
 
 _POLICIES = {

@@ -31,10 +31,13 @@ from orchestration.schedule.timetable import Timetable
 from orchestration.stability.linear_simulator import Linear, Opened
 from orchestration.stability.linearised_component import PULSE, Rest, Tangent
 from orchestration.stability.operating_point import common_period, deterministic, exchanged, expect_rest, latest_offset
+from orchestration.system.component import Component
+from orchestration.system.criterion import Criterion
 from orchestration.system.distribution import highest
-from orchestration.system.model import Component, Criterion, System, component_of, variable_of
+from orchestration.system.model import System
 from orchestration.system.placement import expect_none
 from orchestration.system.times import NANOSECONDS, exact_nanoseconds
+from orchestration.system.variable_names import component_of, variable_of
 
 SETTLED = 6
 """periods of the run that comes to rest, after what is on its way has arrived"""

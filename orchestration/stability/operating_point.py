@@ -9,10 +9,13 @@ import numpy as np
 
 from orchestration.basics.errors import UsageError
 from orchestration.basics.simulator import Floats
+from orchestration.system.component import Component
+from orchestration.system.criterion import Criterion
 from orchestration.system.distribution import lowest
-from orchestration.system.model import Component, Criterion, Sampling, System
+from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.placement import punctual
+from orchestration.system.sampling import Sampling
 from orchestration.system.times import exact_nanoseconds
 
 AT_REST = 1e-6

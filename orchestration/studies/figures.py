@@ -22,7 +22,7 @@ from orchestration.results import display_names as labels
 from orchestration.results.quantities import setting
 from orchestration.studies.axes import Axis
 from orchestration.studies.axis_labels import SCALES, quantity_of
-from orchestration.system.model import DIVERGED, TERMINATED
+from orchestration.system.criterion import DIVERGED, TERMINATED
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -18,7 +18,7 @@ from orchestration.results import display_names as labels
 from orchestration.studies.axes import Axis
 from orchestration.studies.axis_labels import SCALES, edges, quantity_of
 from orchestration.studies.figures import by_horizon, flew
-from orchestration.system.model import DIVERGED, TERMINATED
+from orchestration.system.criterion import DIVERGED, TERMINATED
 
 if TYPE_CHECKING:
     import pandas as pd

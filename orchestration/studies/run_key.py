@@ -11,8 +11,12 @@ from orchestration.basics.identity import OfSame
 from orchestration.building.inputs import Files, tables_of
 from orchestration.results.own_metrics import OwnMetric
 from orchestration.studies.study import Study
+from orchestration.system.component import Component
 from orchestration.system.computers import Computer, Network
-from orchestration.system.model import Component, Connection, Criterion, Source, System
+from orchestration.system.connection import Connection
+from orchestration.system.criterion import Criterion
+from orchestration.system.model import System
+from orchestration.system.source import Source
 from orchestration.workers.provenance import machine, versions
 
 

@@ -15,7 +15,8 @@ from typing import Any
 from orchestration.building.fmus import looked_up, python_twin, python_twins
 from orchestration.building.inputs import Files
 from orchestration.fmi.model import Model, Variable
-from orchestration.system.model import Component, System
+from orchestration.system.component import Component
+from orchestration.system.model import System
 from orchestration.workers.batching import TOLERATED, Agreement, Pair, sample
 from orchestration.workers.executors import Fly
 from orchestration.workers.row import Row

@@ -7,9 +7,12 @@ from orchestration.basics.errors import UsageError, expected_name
 from orchestration.expressions.syntax import Name, names, parse, parts
 from orchestration.fmi.model import NUMERIC, Model, Variable
 from orchestration.fmi.values import taken
+from orchestration.system.component import Parameter
+from orchestration.system.connection import Connection
 from orchestration.system.conversion import BECOMES, OtherQuantity, conversion
-from orchestration.system.model import Connection, Parameter, System, component_of, expressions, variable_of
+from orchestration.system.model import System, expressions
 from orchestration.system.requirements import is_finite
+from orchestration.system.variable_names import component_of, variable_of
 
 
 def check(system: System, models: Mapping[str, Model]) -> None:

@@ -4,19 +4,15 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from orchestration.basics.units import in_brackets
+from orchestration.system.component import Component
 from orchestration.system.computers import Message, Task
+from orchestration.system.connection import Connection
 from orchestration.system.distribution import Distribution, Varying
-from orchestration.system.model import (
-    Component,
-    Connection,
-    Sampling,
-    SamplingOnArrival,
-    Source,
-    System,
-    TaskSampling,
-    variable_of,
-)
+from orchestration.system.model import System
 from orchestration.system.placement import PlacedMessage, PlacedTask, placed_messages, placed_tasks
+from orchestration.system.sampling import Sampling, SamplingOnArrival, TaskSampling
+from orchestration.system.source import Source
+from orchestration.system.variable_names import variable_of
 
 
 def as_text(system: System, units: Mapping[str, str] = {}, follows: str = "") -> str:

@@ -6,7 +6,8 @@ from dataclasses import replace
 from orchestration.basics.errors import UsageError
 from orchestration.fmi.kit import TRAJECTORY, USE_REFERENCE_INPUTS
 from orchestration.fmi.model import Model
-from orchestration.system.model import MOTION, Source, System
+from orchestration.system.model import System
+from orchestration.system.source import MOTION, Source
 
 BUILT_IN, AT_REST = "paper", "hover"
 """Signals: what controllers of this project have built in, and the only one that needs nobody to hear it"""

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from orchestration.basics.errors import UsageError, shown
-from orchestration.system.model import Parameter
+from orchestration.system.component import Parameter
 
 
 def parameters_in(table: Mapping[str, Any], place: str) -> dict[str, Parameter]:

@@ -7,17 +7,13 @@ from typing import Any
 
 from orchestration.basics.errors import UsageError, did_you_mean
 from orchestration.basics.records import like
+from orchestration.system.component import Component
 from orchestration.system.computers import Arrivals, Computer, Network
-from orchestration.system.model import (
-    Component,
-    Connection,
-    Sampling,
-    SamplingOnArrival,
-    Source,
-    System,
-    TaskSampling,
-)
+from orchestration.system.connection import Connection
+from orchestration.system.model import System
 from orchestration.system.placement import SHARED
+from orchestration.system.sampling import Sampling, SamplingOnArrival, TaskSampling
+from orchestration.system.source import Source
 
 TOP = ("stop_time", "seed")
 

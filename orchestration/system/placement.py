@@ -5,12 +5,15 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from orchestration.basics.errors import UsageError
+from orchestration.system.component import Component
 from orchestration.system.computers import Computer, Message, Network, Task
+from orchestration.system.connection import Connection
 from orchestration.system.distribution import content, lowest
 from orchestration.system.requirements import require
+from orchestration.system.sampling import Sampling, SamplingOnArrival, TaskSampling
 
 if TYPE_CHECKING:
-    from orchestration.system.model import Component, Connection, System
+    from orchestration.system.model import System
 
 
 Shared = TypeVar("Shared", Task, Message)
@@ -95,8 +98,6 @@ def expect_none(system: "System", why: str) -> None:
 
 def _by_arrivals(system: "System") -> dict[str, str]:
     """Components that are sampled whenever a message arrives, with its connection."""
-    from orchestration.system.model import SamplingOnArrival
-
     samplings = {name: one.sampling for name, one in system.components.items()}
     return {name: each.on for name, each in samplings.items() if isinstance(each, SamplingOnArrival)}
 
@@ -145,9 +146,9 @@ def _punctual(of: Shared, **changes: Any) -> Shared:
 
 
 def with_tasks(
-    components: Mapping[str, "Component"], connections: tuple["Connection", ...], computers: Mapping[str, Computer],
+    components: Mapping[str, Component], connections: tuple[Connection, ...], computers: Mapping[str, Computer],
     networks: Mapping[str, Network],
-) -> dict[str, "Component"]:  # fmt: skip
+) -> dict[str, Component]:  # fmt: skip
     """The components, those of tasks with a sampling that says what is known of their instants beforehand."""
     tasks: dict[str, PlacedTask] = {}
     for each in placed_tasks(computers):
@@ -163,9 +164,7 @@ def with_tasks(
     return {name: _with_task(name, one, tasks.get(name), periods) for name, one in components.items()}
 
 
-def _with_task(name: str, component: "Component", of: PlacedTask | None, periods: "_Periods") -> "Component":
-    from orchestration.system.model import Sampling, SamplingOnArrival, TaskSampling
-
+def _with_task(name: str, component: Component, of: PlacedTask | None, periods: "_Periods") -> Component:
     given = component.sampling
     if of is not None:
         for key, value in (("sampling", given), ("step", component.step)):
@@ -187,7 +186,7 @@ class _Periods:
     """From one sample of a component to the next [s] of true time, about: of what arrivals release, that of these."""
 
     def __init__(
-        self, components: Mapping[str, "Component"], connections: tuple["Connection", ...],
+        self, components: Mapping[str, Component], connections: tuple[Connection, ...],
         tasks: Mapping[str, PlacedTask], networks: Mapping[str, Network],
     ) -> None:  # fmt: skip
         self._components, self._tasks = components, tasks
@@ -196,8 +195,6 @@ class _Periods:
 
     def of(self, name: str, after: tuple[str, ...] = ()) -> float:
         """Of a component."""
-        from orchestration.system.model import SamplingOnArrival
-
         task, sampling = self._tasks.get(name), self._components[name].sampling
         if task is not None and task.task.on is None:
             return self._of_task(task)

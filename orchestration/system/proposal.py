@@ -12,7 +12,7 @@ from typing import Any
 from orchestration.basics.errors import UsageError
 from orchestration.fmi.model import Model
 from orchestration.system.matching import Match, match
-from orchestration.system.model import component_of
+from orchestration.system.variable_names import component_of
 
 STEP, PERIOD, STOP = 0.001, 0.01, 10.0
 """[s], where no FMU says how it is meant to be run"""

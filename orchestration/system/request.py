@@ -9,7 +9,8 @@ from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 from orchestration.basics.bisection import Range
 from orchestration.basics.errors import UsageError
 from orchestration.basics.records import called
-from orchestration.system.model import Parameter, System
+from orchestration.system.component import Parameter
+from orchestration.system.model import System
 
 Self = TypeVar("Self", bound="ControlLoop")
 Twin = TypeVar("Twin", bound="Request")

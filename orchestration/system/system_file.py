@@ -8,20 +8,17 @@ from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError, at_place
 from orchestration.basics.typed_tables import fields_of, parsed, table_of
 from orchestration.system.choices import Order
+from orchestration.system.component import Component
 from orchestration.system.computers import Arrivals, Computer, Message, Network, Task
+from orchestration.system.connection import Connection
+from orchestration.system.criterion import Criterion
 from orchestration.system.distribution_table import DistributionTable, with_distributions
-from orchestration.system.model import (
-    Component,
-    Connection,
-    Criterion,
-    Sampling,
-    SamplingOnArrival,
-    Source,
-    System,
-)
+from orchestration.system.model import System
 from orchestration.system.parameters import flattened, parameters_in
 from orchestration.system.paths import changed, for_each
 from orchestration.system.requirements import require
+from orchestration.system.sampling import Sampling, SamplingOnArrival
+from orchestration.system.source import Source
 
 Made = TypeVar("Made")
 

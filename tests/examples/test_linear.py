@@ -12,7 +12,7 @@ from orchestration.flight.hover_loop import at_hover
 from orchestration.fmi.reuse import Instances
 from orchestration.quadrotor.scenario import FmuChoice
 from orchestration.stability.monodromy import growth_of_loop
-from orchestration.system.model import Parameter
+from orchestration.system.component import Parameter
 from quadcosim import Scenario, Timing
 from tests.examples.common import EXAMPLES
 from tests.native import native

@@ -26,8 +26,9 @@ from orchestration.fmi.values import number_of, taken
 from orchestration.schedule.schedule_cache import Course, ScheduleCache, Timing
 from orchestration.schedule.spans import Instants, Span
 from orchestration.schedule.streams import NOISE, Streams
-from orchestration.system.model import System, component_of, variable_of
+from orchestration.system.model import System
 from orchestration.system.times import NANOSECONDS, nanoseconds
+from orchestration.system.variable_names import component_of, variable_of
 
 MOST_ROWS = 2**20
 """of a run that are kept"""

@@ -26,8 +26,11 @@ from orchestration.results.objectives import GOOD
 from orchestration.schedule.plan import is_plain
 from orchestration.system.check import recorded
 from orchestration.system.computers import Network
-from orchestration.system.model import Connection, Source, System, component_of, variable_of
+from orchestration.system.connection import Connection
+from orchestration.system.model import System
 from orchestration.system.placement import placed_messages
+from orchestration.system.source import Source
+from orchestration.system.variable_names import component_of, variable_of
 
 Places = npt.NDArray[np.int64]
 c = structures(1)

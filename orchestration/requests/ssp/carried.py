@@ -12,18 +12,14 @@ from orchestration.fmi.model import Model, Variable, read_model
 from orchestration.schedule.plan import Plan
 from orchestration.schedule.streams import Streams
 from orchestration.system.check import check
+from orchestration.system.component import Component, Parameter
+from orchestration.system.connection import Connection
 from orchestration.system.following import AT_REST, heard
-from orchestration.system.model import (
-    Component,
-    Connection,
-    Parameter,
-    Sampling,
-    Source,
-    System,
-    component_of,
-    variable_of,
-)
+from orchestration.system.model import System
 from orchestration.system.request import Request, in_its_own_words
+from orchestration.system.sampling import Sampling
+from orchestration.system.source import Source
+from orchestration.system.variable_names import component_of, variable_of
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,8 +9,8 @@ from orchestration.basics.errors import UsageError
 from orchestration.basics.units import BASE, BaseUnits
 from orchestration.requests.ssp.document import Read, all_of, read
 from orchestration.requests.ssp.package import Package
+from orchestration.system.component import Parameter
 from orchestration.system.conversion import Conversion
-from orchestration.system.model import Parameter
 
 
 @dataclass(frozen=True, kw_only=True)

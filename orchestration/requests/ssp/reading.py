@@ -15,8 +15,9 @@ from orchestration.requests.ssp.package import opened
 from orchestration.requests.ssp.parameters import Value
 from orchestration.requests.ssp.structure import Node, Path_, Structure, Wire, said, structure_of
 from orchestration.requests.ssp.timing import expect_tables, from_text
+from orchestration.system.component import Parameter
 from orchestration.system.conversion import Conversion, OtherQuantity, between
-from orchestration.system.model import Parameter, component_of
+from orchestration.system.variable_names import component_of
 
 TAKEN = frozenset(("rows", "time", "stop_time", "sampled"))
 """Names that no component can have"""

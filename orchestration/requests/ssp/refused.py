@@ -4,7 +4,8 @@ from collections.abc import Iterator
 
 from fmu_kit.variables import INDEX
 from orchestration.requests.ssp.carried import Carried, Part
-from orchestration.system.model import Parameter, variable_of
+from orchestration.system.component import Parameter
+from orchestration.system.variable_names import variable_of
 
 
 def refused(given: Carried) -> Iterator[str]:

@@ -22,8 +22,9 @@ from orchestration.requests.ssp.carried import Carried, Part, carried
 from orchestration.requests.ssp.document import add, document, element
 from orchestration.requests.ssp.names import PARAMETER_SET, SYSTEM_PARAMETERS
 from orchestration.requests.ssp.refused import refused
-from orchestration.system.model import System, variable_of
+from orchestration.system.model import System
 from orchestration.system.request import Request
+from orchestration.system.variable_names import variable_of
 
 TYPED: tuple[Kind, ...] = ("Real", "Integer", "Boolean", "String")
 """Types of connectors that need no list of items"""

@@ -12,7 +12,9 @@ from orchestration.basics.typed_tables import docs_of_keys, fields_of, parsed
 from orchestration.quadrotor.timing import TIMING_KEYS
 from orchestration.studies.axes import Axis
 from orchestration.studies.study_file import DesignTable
-from orchestration.system.model import Component, Sampling, System
+from orchestration.system.component import Component
+from orchestration.system.model import System
+from orchestration.system.sampling import Sampling
 from orchestration.system.system_file import ConnectionTable, SamplingTable, schema
 from orchestration.system.times import exact_nanoseconds, is_at_least
 from tests.commands import Main
@@ -34,19 +36,19 @@ def test_a_whole_number_beyond_64_bits_is_no_parameter(value: int) -> None:
 
 
 def test_what_stands_below_a_field_is_read_without_importing_it() -> None:
-    said = attribute_docs("orchestration.system.model", "Sampling")
+    said = attribute_docs("orchestration.system.sampling", "Sampling")
     assert said["offset"] == ("The time of the first instant [s], in its own time.", "0.0")
     assert said["period"].default == ""
-    assert attribute_docs("orchestration.system.model", "Nobody") == {}
+    assert attribute_docs("orchestration.system.sampling", "Nobody") == {}
 
 
 def test_a_table_has_the_keys_of_its_record_and_says_of_them_what_the_record_does() -> None:
-    assert [*fields_of(SamplingTable)] == [*attribute_docs("orchestration.system.model", "Sampling"), "on"]
+    assert [*fields_of(SamplingTable)] == [*attribute_docs("orchestration.system.sampling", "Sampling"), "on"]
     assert {"from", "to", "name"} <= fields_of(ConnectionTable).keys()
     assert not {"start", "end", "stated"} & fields_of(ConnectionTable).keys()
     assert docs_of_keys(DesignTable)["seed"] == "The seed of the sampling."
     period = schema()["$defs"]["SamplingTable"]["properties"]["period"]
-    assert period["description"] == attribute_docs("orchestration.system.model", "Sampling")["period"].text
+    assert period["description"] == attribute_docs("orchestration.system.sampling", "Sampling")["period"].text
 
 
 def test_the_flags_of_a_flight_say_what_the_record_of_its_timing_says(main: Main) -> None:

@@ -26,8 +26,9 @@ from orchestration.limits.evaluation import is_good
 from orchestration.requests.request import asked_for
 from orchestration.system.computers import Computer, Message, Network, Task
 from orchestration.system.distribution import Distribution
-from orchestration.system.model import Sampling, System
+from orchestration.system.model import System
 from orchestration.system.paths import changed
+from orchestration.system.sampling import Sampling
 from tests.examples.common import example
 
 LOGGER = "computers.node.tasks.logger.execution"

@@ -9,9 +9,12 @@ import pytest
 from orchestration.basics.errors import UsageError
 from orchestration.computers.windows import Window, windows_of
 from orchestration.schedule.resources import timeline_of
+from orchestration.system.component import Component
 from orchestration.system.computers import Arrivals, Computer, Message, Network, Task
+from orchestration.system.connection import Connection
 from orchestration.system.distribution import Distribution
-from orchestration.system.model import Component, Connection, Sampling, System
+from orchestration.system.model import System
+from orchestration.system.sampling import Sampling
 
 MS = 1e-3
 FRAME = 0.27

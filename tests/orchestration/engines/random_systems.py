@@ -12,8 +12,11 @@ from typing import Any
 from hypothesis import strategies as st
 
 from orchestration.system.choices import TraceOrder
+from orchestration.system.component import Component
+from orchestration.system.connection import Connection
 from orchestration.system.distribution import Distribution
-from orchestration.system.model import Component, Connection, Sampling, System
+from orchestration.system.model import System
+from orchestration.system.sampling import Sampling
 
 OUTPUTS = ("y", "z")
 TIMES = (0.01, 0.02, 0.025, 0.03, 0.05, 0.1)

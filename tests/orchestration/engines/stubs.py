@@ -2,7 +2,10 @@
 
 import numpy as np
 
-from orchestration.system.model import Component, Connection, Sampling, System
+from orchestration.system.component import Component
+from orchestration.system.connection import Connection
+from orchestration.system.model import System
+from orchestration.system.sampling import Sampling
 
 
 class Stub:

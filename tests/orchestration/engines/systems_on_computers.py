@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from orchestration.system.choices import NetworkKind
 from orchestration.system.computers import Arrivals, Computer, Message, Network, Task
-from orchestration.system.model import Connection, System
+from orchestration.system.connection import Connection
+from orchestration.system.model import System
 from tests.orchestration.engines.random_systems import (
     BOOLEANS,
     TIMES,

@@ -34,7 +34,12 @@ from orchestration.runs.pause import fly_until, resume
 from orchestration.runs.result import Result
 from orchestration.runs.simulation import prepared
 from orchestration.schedule import cursor
-from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
+from orchestration.system.component import Component
+from orchestration.system.connection import Connection
+from orchestration.system.criterion import Criterion
+from orchestration.system.model import System
+from orchestration.system.sampling import Sampling
+from orchestration.system.source import Source
 from orchestration.system.system_file import load_system
 from orchestration.system.times import Grid, exact_nanoseconds
 from tests.native import assert_the_same

@@ -17,10 +17,14 @@ from orchestration.runs.pause import fly_until, resume
 from orchestration.runs.run_directory import load_run
 from orchestration.schedule import cursor
 from orchestration.schedule.resources import timeline_of
+from orchestration.system.component import Component
 from orchestration.system.computers import Computer, Message, Network, Task
+from orchestration.system.connection import Connection
+from orchestration.system.criterion import Criterion
 from orchestration.system.distribution import Distribution
-from orchestration.system.model import Component, Connection, Criterion, Sampling, System
+from orchestration.system.model import System
 from orchestration.system.paths import changed
+from orchestration.system.sampling import Sampling
 from orchestration.system.times import nanoseconds
 from tests.native import assert_the_same
 from tests.orchestration.engines.batch.lanes import assert_the_same_signals, in_lanes, shape_of

@@ -11,7 +11,10 @@ from orchestration.exact.linear import Components, Continuous, Sampled
 from orchestration.exact.moments import JumpLinear
 from orchestration.exact.objectives import Mean
 from orchestration.exact.timing import links_of, tasks_of
-from orchestration.system.model import Component, Connection, Sampling, System
+from orchestration.system.component import Component
+from orchestration.system.connection import Connection
+from orchestration.system.model import System
+from orchestration.system.sampling import Sampling
 
 GAIN = 3.0 - math.sqrt(3.0)
 

@@ -17,7 +17,7 @@ from orchestration.exact.timing import tasks_of
 from orchestration.flight.hover_loop import HoverLoop
 from orchestration.quadrotor.scenario import FmuChoice, Scenario
 from orchestration.quadrotor.timing import Timing
-from orchestration.system.model import Source
+from orchestration.system.source import Source
 from quadcosim import UsageError, limit
 from tests.commands import Main
 from tests.examples.common import EXAMPLES

@@ -14,9 +14,11 @@ from orchestration.exact.loops import expect_same_steps
 from orchestration.exact.repeating import foretold
 from orchestration.exact.timing import tasks_of
 from orchestration.system.computers import Arrivals, Computer, Message, Network, Task
+from orchestration.system.criterion import Criterion
 from orchestration.system.distribution import Distribution
-from orchestration.system.model import Criterion, SamplingOnArrival, System
+from orchestration.system.model import System
 from orchestration.system.paths import changed
+from orchestration.system.sampling import SamplingOnArrival
 from orchestration.system.system_file import load_system
 from quadcosim import run
 from tests.examples.common import EXAMPLES

@@ -10,7 +10,7 @@ import pytest
 
 from orchestration.basics.simulator import Floats
 from orchestration.exact.expect import expect
-from orchestration.system.model import Criterion
+from orchestration.system.criterion import Criterion
 from quadcosim import UsageError, run
 from tests.commands import Main
 from tests.examples.common import EXAMPLES

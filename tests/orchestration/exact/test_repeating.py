@@ -10,8 +10,10 @@ from orchestration.basics.errors import UsageError
 from orchestration.exact.foretold import Course
 from orchestration.exact.repeating import foretold
 from orchestration.system.choices import NetworkKind
+from orchestration.system.component import Component
 from orchestration.system.computers import Computer, Message, Network, Task
-from orchestration.system.model import Component, Connection, System
+from orchestration.system.connection import Connection
+from orchestration.system.model import System
 from tests.orchestration.engines.random_systems import some
 
 PERIODS = (0.002, 0.003, 0.004, 0.006, 0.012)

@@ -22,7 +22,7 @@ from orchestration.flight.phase import surface
 from orchestration.flight.spectrum import welch
 from orchestration.runs.draw import draw
 from orchestration.runs.run_labels import labels_of_runs
-from orchestration.system.model import Criterion
+from orchestration.system.criterion import Criterion
 from quadcosim import Result, UsageError
 from tests.native import native
 

@@ -8,7 +8,11 @@ import pytest
 from orchestration.basics.errors import QuadcosimError, UsageError
 from orchestration.fmi.foreign import LostError, computed
 from orchestration.limits.limit import find
-from orchestration.system.model import Component, Connection, Criterion, Sampling, System
+from orchestration.system.component import Component
+from orchestration.system.connection import Connection
+from orchestration.system.criterion import Criterion
+from orchestration.system.model import System
+from orchestration.system.sampling import Sampling
 from tests.orchestration.fmi.small import needs_compiler, small
 
 pytestmark = needs_compiler

@@ -21,7 +21,11 @@ from orchestration.fmi.native import NativeInstance
 from orchestration.processes import subprocesses
 from orchestration.runs.result import Result
 from orchestration.runs.simulation import prepared
-from orchestration.system.model import Component, Connection, Sampling, Source, System
+from orchestration.system.component import Component
+from orchestration.system.connection import Connection
+from orchestration.system.model import System
+from orchestration.system.sampling import Sampling
+from orchestration.system.source import Source
 from tests.fmus.archive import files_of
 from tests.fmus.damage import write_fmu
 from tests.orchestration.fmi.small import BINARY, CLOCK, SIZE, needs_compiler, nothing_known, small
@@ -386,7 +390,8 @@ def test_what_an_fmu_prints_is_not_among_what_the_command_prints(load: str, tmp_
         from orchestration.fmi.instances import open_here
         from orchestration.fmi.isolated import IsolatedInstance
         from orchestration.runs.simulation import prepared
-        from orchestration.system.model import Component, System
+        from orchestration.system.component import Component
+        from orchestration.system.model import System
 
         system = System(stop_time=0.1, components={{"it": Component(fmu=sys.argv[1], step=0.01)}})
         print("before")

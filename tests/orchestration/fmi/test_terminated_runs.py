@@ -17,7 +17,11 @@ from orchestration.fmi.reuse import Instances
 from orchestration.runs.result import Result
 from orchestration.runs.run_directory import load_run, save_run
 from orchestration.runs.simulation import prepared
-from orchestration.system.model import Component, Connection, Criterion, Sampling, System
+from orchestration.system.component import Component
+from orchestration.system.connection import Connection
+from orchestration.system.criterion import Criterion
+from orchestration.system.model import System
+from orchestration.system.sampling import Sampling
 from tests.commands import Main
 from tests.native import assert_the_same
 from tests.orchestration.fmi.small import needs_compiler, small

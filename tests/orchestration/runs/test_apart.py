@@ -19,7 +19,10 @@ from orchestration.runs.meant import RunLost
 from orchestration.runs.pause import fly_until, resume
 from orchestration.runs.run_directory import load_run
 from orchestration.runs.simulation import run
-from orchestration.system.model import Component, Connection, Source, System
+from orchestration.system.component import Component
+from orchestration.system.connection import Connection
+from orchestration.system.model import System
+from orchestration.system.source import Source
 from tests.commands import Main
 from tests.orchestration.fmi.small import needs_compiler, small
 

@@ -12,7 +12,8 @@ from orchestration.engines.batch import shape
 from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.runs.in_lanes import located
-from orchestration.system.model import Component, System
+from orchestration.system.component import Component
+from orchestration.system.model import System
 from tests.native import NATIVE
 from tests.orchestration.fmi.small import needs_compiler, small
 

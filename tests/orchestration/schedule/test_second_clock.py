@@ -24,8 +24,9 @@ from orchestration.schedule import cursor as position
 from orchestration.schedule.fixed_step import FixedStep
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
-from orchestration.system.model import System, variable_of
+from orchestration.system.model import System
 from orchestration.system.times import Grid, exact_nanoseconds
+from orchestration.system.variable_names import variable_of
 from tests.orchestration.engines.random_systems import systems, systems_of_fixed_steps
 from tests.orchestration.engines.stubs import Stub, continuous, events, sampled, system, wire
 from tests.orchestration.quadrotor.strategies import Case, cases

@@ -12,8 +12,9 @@ from orchestration.schedule import cursor
 from orchestration.schedule.cursor import Cursor
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
+from orchestration.system.component import Component
 from orchestration.system.computers import Computer, Message, Network, Task
-from orchestration.system.model import Component, SamplingOnArrival
+from orchestration.system.sampling import SamplingOnArrival
 from tests.orchestration.engines.stubs import continuous, sampled, system, wire
 
 MS = 1_000_000

@@ -11,8 +11,8 @@ from orchestration.schedule.fixed_step import FixedStep
 from orchestration.schedule.longest import LONGEST
 from orchestration.schedule.streams import Streams
 from orchestration.schedule.timetable import Timetable
-from orchestration.system.model import Source
 from orchestration.system.paths import changed
+from orchestration.system.source import Source
 from orchestration.system.times import Grid, exact_nanoseconds
 from tests.orchestration.engines.stubs import continuous, sampled, system, wire
 

@@ -11,7 +11,7 @@ from fmu_kit.trajectory import Reference, Trajectory
 from orchestration.engines.sources import EXACT, by_name
 from orchestration.signals.library import KINDS, SIGNALS, made
 from orchestration.signals.motions import MOTIONS, Circle, Helix, Lemniscate, Motion, Paper, Step
-from orchestration.system.model import MOTION
+from orchestration.system.source import MOTION
 from quadcosim import UsageError
 from tests.scalars import PRECISE
 

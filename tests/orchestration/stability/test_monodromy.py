@@ -19,8 +19,11 @@ from orchestration.stability import local_limit as local
 from orchestration.stability.local_limit import LOOP, TWINS, local_limits
 from orchestration.stability.monodromy import growth_of_loop
 from orchestration.stability.perturbed_runs import Growth, growth_of
-from orchestration.system.model import Component, Connection, Sampling, System
+from orchestration.system.component import Component
+from orchestration.system.connection import Connection
+from orchestration.system.model import System
 from orchestration.system.paths import changed
+from orchestration.system.sampling import Sampling
 from quadcosim import Scenario, Timing, UsageError
 from tests.examples.common import example
 from tests.native import native

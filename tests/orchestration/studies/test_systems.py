@@ -21,7 +21,8 @@ from orchestration.studies.store import expect_columns, is_column, open_for_read
 from orchestration.studies.study import Study
 from orchestration.studies.study_file import load_study
 from orchestration.studies.table import frame
-from orchestration.system.model import Criterion, System
+from orchestration.system.criterion import Criterion
+from orchestration.system.model import System
 from orchestration.system.paths import changed
 from quadcosim import Scenario, Timing, UsageError, run
 from tests.commands import Main

@@ -8,7 +8,8 @@ import pytest
 from orchestration.studies.axes import Axis
 from orchestration.studies.store import open_for_reading
 from orchestration.studies.study import Study
-from orchestration.system.model import Component, System
+from orchestration.system.component import Component
+from orchestration.system.model import System
 from tests.commands import Main
 from tests.orchestration.fmi.small import needs_compiler, small
 from tests.orchestration.studies.common import sweep

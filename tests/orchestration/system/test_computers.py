@@ -13,9 +13,9 @@ from orchestration.studies.run_key import run_key
 from orchestration.system.chance import is_random
 from orchestration.system.computers import Message, Network
 from orchestration.system.frames import frame_nanoseconds
-from orchestration.system.model import SamplingOnArrival, TaskSampling
 from orchestration.system.paths import changed, value_at
 from orchestration.system.placement import SHARED, punctual
+from orchestration.system.sampling import SamplingOnArrival, TaskSampling
 from orchestration.system.system_file import is_system, load_system
 
 FILE = """

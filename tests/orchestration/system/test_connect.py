@@ -9,8 +9,10 @@ import pytest
 
 from orchestration.fmi.model import read_model
 from orchestration.system.check import check
-from orchestration.system.model import Connection, Sampling, System
+from orchestration.system.connection import Connection
+from orchestration.system.model import System
 from orchestration.system.proposal import PERIOD, STEP, STOP, propose
+from orchestration.system.sampling import Sampling
 from orchestration.system.system_file import load_system
 from tests.commands import Main
 from tests.orchestration.system.described import described

@@ -10,10 +10,11 @@ import pytest
 
 from orchestration.basics.errors import UsageError
 from orchestration.schedule.drawing import times_from
+from orchestration.system.connection import Connection
 from orchestration.system.description import timing, varying
 from orchestration.system.distribution import Distribution, content, highest, is_random, lowest, mean
 from orchestration.system.files_read import files_read
-from orchestration.system.model import Connection, Sampling
+from orchestration.system.sampling import Sampling
 from orchestration.system.system_file import load_system
 from orchestration.system.times import NANOSECONDS
 

@@ -9,7 +9,8 @@ from orchestration.building.fmus import native_twins
 from orchestration.building.inputs import Files, files_of
 from orchestration.engines.batch import shape
 from orchestration.studies.store import open_for_reading
-from orchestration.system.model import Component, System
+from orchestration.system.component import Component
+from orchestration.system.model import System
 from orchestration.workers.choice import Chosen, EngineChoice, alone, choice_named, chosen
 from tests.orchestration.fmi.small import needs_compiler, small
 from tests.orchestration.studies.common import axis, short, study, sweep

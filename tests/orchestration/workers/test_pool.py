@@ -9,7 +9,8 @@ import pytest
 
 from orchestration.studies.axes import Axis
 from orchestration.studies.study import Study
-from orchestration.system.model import Component, System
+from orchestration.system.component import Component
+from orchestration.system.model import System
 from orchestration.workers import pool
 from orchestration.workers.executors import _local_submit
 from orchestration.workers.pool import Inputs, Pool

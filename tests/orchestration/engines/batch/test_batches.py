@@ -14,8 +14,13 @@ from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.runs.in_lanes import located as with_files
 from orchestration.schedule import schedule_cache
-from orchestration.system.model import Component, Connection, Criterion, Sampling, Source, System
+from orchestration.system.component import Component
+from orchestration.system.connection import Connection
+from orchestration.system.criterion import Criterion
+from orchestration.system.model import System
 from orchestration.system.paths import changed
+from orchestration.system.sampling import Sampling
+from orchestration.system.source import Source
 from tests.orchestration.engines.batch.lanes import in_lanes, shape_of
 from tests.orchestration.engines.test_compiled import Kept, of, ran
 from tests.orchestration.fmi.small import needs_compiler, small

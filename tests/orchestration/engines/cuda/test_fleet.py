@@ -21,7 +21,8 @@ from orchestration.quadrotor.scenario import FmuChoice, Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.schedule import schedule_cache
 from orchestration.schedule.schedule_cache import ScheduleCache
-from orchestration.system.model import Criterion, System
+from orchestration.system.criterion import Criterion
+from orchestration.system.model import System
 from orchestration.system.paths import changed
 from orchestration.system.system_file import load_system
 from tests.orchestration.engines.batch.lanes import group_of, located, shape_of

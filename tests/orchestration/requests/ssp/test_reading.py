@@ -11,7 +11,8 @@ from orchestration.fmi.model import read_model
 from orchestration.requests.request import load_request
 from orchestration.requests.ssp import package, writing
 from orchestration.system.check import check
-from orchestration.system.model import Sampling, System
+from orchestration.system.model import System
+from orchestration.system.sampling import Sampling
 from quadcosim import Scenario, UsageError
 from tests.commands import Main
 from tests.orchestration.studies.common import one_line

@@ -10,7 +10,9 @@ from orchestration.requests.request import load_request
 from orchestration.requests.ssp import package, writing
 from orchestration.runs.result import Result
 from orchestration.runs.simulation import run
-from orchestration.system.model import Criterion, Source, System
+from orchestration.system.criterion import Criterion
+from orchestration.system.model import System
+from orchestration.system.source import Source
 from quadcosim import Scenario, UsageError
 from tests.commands import Main
 from tests.orchestration.interop.test_systems import CARRIED, carried

@@ -1,0 +1,80 @@
+"""When a digital task runs: at every period of its own clock, as a task of a computer, or when a message arrives."""
+
+from orchestration.basics.records import record
+from orchestration.system.choices import Clock, Spread
+from orchestration.system.distribution import Varying, highest, reads_file, require_spread, require_varying, spreads
+from orchestration.system.requirements import require, require_not_negative, require_own_clock, require_positive
+from orchestration.system.times import is_at_least
+
+
+@record()
+class Sampling:
+    """When a digital task runs; times in seconds of the true clock, but for `period` and `offset` (its own)."""
+
+    period: float
+    """The period T of the task [s], in its own time: instant k is offset + kT."""
+    offset: float = 0.0
+    """The time of the first instant [s], in its own time."""
+    jitter: Varying = 0.0
+    """The largest lateness J of an instant [s], drawn for each, or how the lateness itself is distributed; it is less
+    than the period."""
+    jitter_distribution: Spread = "uniform"
+    """How a lateness of which the largest is given is drawn over [0, J]; normal is centred at J/2 with standard
+    deviation J/6, cut to the range."""
+    clock_ratio: float = 1.0
+    """The seconds r that the component believes pass per true second."""
+    clock: Clock = "master"
+    """Who decides when it samples: the master, or the FMU by its parameters sample_period and sample_offset."""
+
+    def __post_init__(self) -> None:
+        require_positive(self, "period", "clock_ratio")
+        require_not_negative(self, "offset")
+        require_varying(self, "jitter")
+        require_spread(self.jitter_distribution, self.jitter)
+        require(is_at_least(self.period, self.clock_ratio), "period", self.period, "at least a nanosecond")
+        if not reads_file(self.jitter):
+            self.expect_jitter_within_period()
+        if self.clock == "fmu":
+            require_own_clock(self)
+
+    @property
+    def is_random(self) -> bool:
+        """Whether seeds make a difference to its instants."""
+        return spreads(self.jitter)
+
+    def expect_jitter_within_period(self) -> None:
+        """Raise `UsageError` for a lateness of a period or more; of a trace that is known when it is read."""
+        longest, most = self.period / self.clock_ratio, highest(self.jitter)
+        require(most < longest, "jitter", most, f"less than the period of {longest:g} s")
+
+
+@record()
+class TaskSampling(Sampling):
+    """What is known beforehand of the instants of a task: its period, or that of what releases it, about.
+
+    A system makes it of what it says of the task; when the task runs is found by the scheduler.
+    """
+
+    task: str
+    """The path of the task."""
+
+
+@record()
+class SamplingOnArrival(Sampling):
+    """When a digital task runs that is released by messages: whenever one arrives."""
+
+    on: str
+    """The connection whose arriving messages it runs on, in place of a period."""
+    period: float = 0.0
+    """About; a system knows it."""
+
+    def __post_init__(self) -> None:
+        require_positive(self, "clock_ratio")
+        for key in ("offset", "jitter"):
+            require(getattr(self, key) == 0.0, key, getattr(self, key), "0 beside on: messages say when it runs")
+        require(self.clock == "master", "clock", self.clock, "master beside on: messages say when it runs")
+
+
+def is_foreseen(sampling: Sampling) -> bool:
+    """Whether the scheduler finds its instants."""
+    return isinstance(sampling, (TaskSampling, SamplingOnArrival))
