@@ -24,7 +24,8 @@ from orchestration.engines.board import Board
 from orchestration.fmi.fmi2 import Fmi2Instance
 from orchestration.fmi.model import read_model
 from orchestration.quadrotor import wiring
-from orchestration.quadrotor.scenario import FmuChoice, Scenario
+from orchestration.quadrotor.fmu_choice import FmuChoice
+from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.runs.simulation import prepared
 from orchestration.schedule.cursor import Cursor

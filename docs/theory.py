@@ -15,7 +15,8 @@ from orchestration.exact.loops import Loops
 from orchestration.flight.hover_loop import HoverLoop, at_hover
 from orchestration.flight.local_limit import local_limit
 from orchestration.quadrotor import wiring
-from orchestration.quadrotor.scenario import FmuChoice, Scenario
+from orchestration.quadrotor.fmu_choice import FmuChoice
+from orchestration.quadrotor.scenario import Scenario
 from orchestration.studies.axes import Axis
 from orchestration.studies.linked_settings import LinkedSettings
 from orchestration.studies.study import Study

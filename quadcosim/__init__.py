@@ -53,7 +53,8 @@ if TYPE_CHECKING:
     from orchestration.fmi.model import Model, read_model
     from orchestration.limits.limit import Limit
     from orchestration.limits.limit import find as limit
-    from orchestration.quadrotor.scenario import FmuChoice, Record, Scenario
+    from orchestration.quadrotor.fmu_choice import FmuChoice, Record
+    from orchestration.quadrotor.scenario import Scenario
     from orchestration.quadrotor.scenario_file import load_scenario
     from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
     from orchestration.quadrotor.timing import Timing
@@ -102,10 +103,10 @@ _HOMES = {
     # a flight of the quadrotor
     "Scenario": "orchestration.quadrotor.scenario",
     "Timing": "orchestration.quadrotor.timing",
-    "FmuChoice": "orchestration.quadrotor.scenario",
+    "FmuChoice": "orchestration.quadrotor.fmu_choice",
     "ReferenceChoice": "orchestration.quadrotor.signals",
     "DisturbanceChoice": "orchestration.quadrotor.signals",
-    "Record": "orchestration.quadrotor.scenario",
+    "Record": "orchestration.quadrotor.fmu_choice",
     "Vehicle": "orchestration.quadrotor.vehicle",
     "load_vehicle": "orchestration.quadrotor.vehicle",
     "load_scenario": "orchestration.quadrotor.scenario_file",

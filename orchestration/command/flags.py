@@ -156,7 +156,7 @@ class FlightFlags:
         """`scenario` with what was given; raises `UsageError` for what cannot be."""
         from orchestration.building.fmus import native_twins
         from orchestration.quadrotor.presets import preset_timing
-        from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice, chosen
+        from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice, choice_of
         from orchestration.quadrotor.timing import TIMING_KEYS
         from orchestration.quadrotor.vehicle import load_vehicle
 
@@ -178,9 +178,9 @@ class FlightFlags:
         if self.vehicle is not None:
             top["vehicle"] = load_vehicle(self.vehicle, Path())
         if self.reference is not None:
-            top["reference"] = ReferenceChoice(**chosen(self.reference))
+            top["reference"] = ReferenceChoice(**choice_of(self.reference))
         if self.disturbance is not None:
-            top["disturbance"] = DisturbanceChoice(**chosen(self.disturbance))
+            top["disturbance"] = DisturbanceChoice(**choice_of(self.disturbance))
         parameters = assigned("set", self.set)
         changed = scenario.with_changes(timing=timing, parameters=parameters, **top)
         if self.controller or self.plant:

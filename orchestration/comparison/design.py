@@ -155,7 +155,7 @@ class Comparison:
 
     def told(self, craft: Craft, controller: Controller) -> dict[str, Value]:
         """What the plant is made of on a vehicle, and what this controller is told of it."""
-        return {} if craft.vehicle is None else dict(craft.vehicle.told(self.fmu_of(controller)))
+        return {} if craft.vehicle is None else dict(craft.vehicle.parameters_for(self.fmu_of(controller)))
 
     def _told(self) -> dict[Key, Values]:
         return {(v.name, one.name): self.told(v, one) for v in self.vehicles for one in self.controllers}

@@ -1,4 +1,4 @@
-"""An ensemble of initial states of the quadrotor: errors of evenly spread size around the start of its reference."""
+"""An ensemble of initial conditions of the quadrotor: errors of evenly spread size about the start of its reference."""
 
 import dataclasses
 import math
@@ -20,21 +20,21 @@ from orchestration.system.request import Start
 
 @record("starts.")
 class Starts:
-    """Initial errors in position, velocity, attitude and angular velocity, each in a direction of its own.
+    """Initial errors in position, velocity, attitude and angular velocity, each in its own random direction.
 
-    A start of size r has r times the largest error of each kind. Sizes are those of van der Corput's sequence, so that
-    they are spread evenly and more starts leave the first ones as they are; so do directions, each start having a
-    stream of random numbers of its own. Raises `UsageError` for values that cannot be.
+    An initial condition of size r has r times the largest error of each kind. Sizes follow van der Corput's sequence:
+    they are spread evenly, and a larger ensemble begins with the same members as a smaller one. Directions do too, as
+    each index has its own random stream. Raises `UsageError` for invalid values.
     """
 
     count: int = 200
-    """How many starts there are."""
+    """The number of initial conditions."""
     first: int = 0
-    """The index of the first start. A start is the same in every ensemble that has its index."""
+    """The index of the first initial condition. The same index gives the same one in every ensemble."""
     seed: int = 0
-    """The seed of their directions."""
+    """The seed of the random directions."""
     position: float = 4.0
-    """The largest distance from the beginning of the reference, ‖P(0) - P_d(0)‖ [m]."""
+    """The largest distance from the start of the reference, ‖P(0) - P_d(0)‖ [m]."""
     velocity: float = 2.0
     """The largest difference from the velocity of the reference, ‖V(0) - V_d(0)‖ [m/s]."""
     angle: float = 2.0
@@ -53,12 +53,12 @@ class Starts:
                 raise UsageError(f"starts.{name} = {value}: expected a number from 0{_to(highest)}")
 
     def some(self, first: int, count: int) -> "Starts":
-        """Others of the same kind: so many, from this index on."""
+        """The same ensemble with `count` members from index `first` on."""
         return dataclasses.replace(self, first=first, count=count)
 
     def starts_of(self, request: Any) -> tuple[Start, ...]:
-        """The starts around the beginning of what a `Scenario` follows, in the order of their indices."""
-        position, velocity = _beginning(request)
+        """The initial conditions about the start of the reference of a `Scenario`, in the order of their indices."""
+        position, velocity = _start_of_reference(request)
         return tuple(self._start(i, position, velocity) for i in range(self.first, self.first + self.count))
 
     def _start(self, index: int, position: Floats, velocity: Floats) -> Start:
@@ -66,18 +66,18 @@ class Starts:
         generator = Streams(self.seed).of(f"starts.{index}", "direction")
         place, motion, axis, spin = (_direction(generator) for _ in range(4))
         half = 0.5 * size * self.angle
-        found = {
+        vectors = {
             "plant.initial.position": position + size * self.position * place,
             "plant.initial.velocity": velocity + size * self.velocity * motion,
             "plant.initial.quaternion": np.array([*(math.sin(half) * axis), math.cos(half)]),
             "plant.initial.angular_velocity": size * self.rate * spin,
         }
-        values = {f"{name}.{letter}": float(x) for name, vector in found.items() for letter, x in zip("xyzw", vector)}
+        values = {f"{name}.{letter}": float(x) for name, vector in vectors.items() for letter, x in zip("xyzw", vector)}
         return Start(size=size, values=values)
 
 
 def starts_in(table: Mapping[str, Any], beside: Sequence[str] = ()) -> Starts:
-    """The ensemble that a table of a file says; keys `beside` are known too. Raises `UsageError`."""
+    """The ensemble that a table of a file describes; keys `beside` are accepted too. Raises `UsageError`."""
     names = [field.name for field in dataclasses.fields(Starts)]
     for key in table:
         if key not in names:
@@ -85,18 +85,20 @@ def starts_in(table: Mapping[str, Any], beside: Sequence[str] = ()) -> Starts:
     return Starts(**table)
 
 
-def _beginning(request: Any) -> tuple[Floats, Floats]:
-    """P_d(0) [m] and V_d(0) [m/s] of the reference of a `Scenario`, be it built in, a motion or a file."""
+def _start_of_reference(request: Any) -> tuple[Floats, Floats]:
+    """P_d(0) [m] and V_d(0) [m/s] of the reference of a `Scenario`: built in, a motion or a file."""
     scenario = request.resolved()
     system = scenario.as_system()
     source = system.sources["reference"]
     if not source.is_built_in:
-        fed = dataclasses.replace(source, trajectory=None, to=tuple(f"controller.{name}" for name in REFERENCE[:6]))
-        told = dataclasses.replace(system, sources={"reference": fed})
-        values = np.array(source_values(told, "reference", {}, Streams(scenario.seed)).at(0.0))
+        to_controller = tuple(f"controller.{name}" for name in REFERENCE[:6])
+        fed = dataclasses.replace(source, trajectory=None, to=to_controller)
+        with_inputs = dataclasses.replace(system, sources={"reference": fed})
+        values = np.array(source_values(with_inputs, "reference", {}, Streams(scenario.seed)).at(0.0))
         return values[:3], values[3:]
-    given = scenario.controller.parameters
-    reference = Trajectory(**{field: given[name] for name, field in TRAJECTORY.items() if name in given}).at(0.0)
+    values_set = scenario.controller.parameters
+    fields = {field: values_set[name] for name, field in TRAJECTORY.items() if name in values_set}
+    reference = Trajectory(**fields).at(0.0)
     return np.array([*reference.position]), np.array([*reference.velocity])
 
 
@@ -105,7 +107,7 @@ def _to(highest: float) -> str:
 
 
 def _direction(generator: np.random.Generator) -> Floats:
-    """A unit vector, all directions alike; the same to the bit on all machines, as a BLAS is not."""
+    """A unit vector, uniform over the sphere; bit-identical on all machines, unlike a norm computed by BLAS."""
     vector = generator.standard_normal(3)
     x, y, z = vector.tolist()
     unit: Floats = vector / math.sqrt(x * x + y * y + z * z)
@@ -113,9 +115,9 @@ def _direction(generator: np.random.Generator) -> Floats:
 
 
 def _van_der_corput(index: int) -> float:
-    """The place of an index in [0, 1), its binary digits mirrored at the point."""
-    found, share = 0.0, 0.5
+    """Element `index` of the sequence, in [0, 1): its binary digits mirrored at the point."""
+    element, weight = 0.0, 0.5
     while index:
-        found += share * (index & 1)
-        index, share = index >> 1, 0.5 * share
-    return found
+        element += weight * (index & 1)
+        index, weight = index >> 1, 0.5 * weight
+    return element

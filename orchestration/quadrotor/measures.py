@@ -9,10 +9,10 @@ from orchestration.basics.simulator import Booleans, Floats
 from orchestration.quadrotor.wiring import COMMAND, POSITION, POSITION_REFERENCE
 
 SETTLED = 0.05
-"""[m] of position error in the last third of a flight, below which it counts as settled; as in system.toml"""
+"""[m] of position error in the last third of a flight, below which the flight counts as settled; as in system.toml"""
 
 Outcome = Literal["settled", "bounded", "diverged"]
-"""What became of a flight by its horizon: settled is what counts as flying"""
+"""Outcome of a flight at its horizon; only `settled` meets the criterion"""
 OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
 
 
@@ -29,19 +29,19 @@ def position_error(signals: Mapping[str, Floats]) -> Floats:
 
 
 def saturated(signals: Mapping[str, Floats], parameters: Mapping[str, float]) -> dict[str, Booleans]:
-    """By command as the plant gets it, where a limit of the plant changes it, shape (n,) each.
+    """For each command as the plant receives it, where a limit of the plant alters it, shape (n,) each.
 
-    A limit of a motor changes all of them. Of a plant that does not tell its limits, nowhere.
+    A limit of a motor alters all of them. A plant without parameters for limits has none.
     """
     thrust, *torques = (signals[f"plant.{name}"] for name in COMMAND)
     most_thrust, most_torque = (parameters.get(f"plant.{name}", np.inf) for name in ("thrust_max", "torque_max"))
     motors = _motors_saturated(thrust, torques, parameters)
-    found = {COMMAND[0]: (thrust < parameters.get("plant.thrust_min", 0.0)) | (thrust > most_thrust) | motors}
-    return found | {name: (np.abs(t) > most_torque) | motors for name, t in zip(COMMAND[1:], torques, strict=True)}
+    of_thrust = {COMMAND[0]: (thrust < parameters.get("plant.thrust_min", 0.0)) | (thrust > most_thrust) | motors}
+    return of_thrust | {name: (np.abs(t) > most_torque) | motors for name, t in zip(COMMAND[1:], torques, strict=True)}
 
 
 def _motors_saturated(thrust: Floats, torques: Sequence[Floats], parameters: Mapping[str, float]) -> Booleans:
-    """Where any of four motors on an X frame would have to give more or less than it can."""
+    """Where any of four motors on an X frame would need a thrust outside its range."""
     most = parameters.get("plant.motor.thrust_max", 0.0)
     if most <= 0.0:
         return np.zeros(len(thrust), dtype=np.bool_)
@@ -50,5 +50,5 @@ def _motors_saturated(thrust: Floats, torques: Sequence[Floats], parameters: Map
     motors = [
         thrust + turn * z / drag + way * (x / arm_y - turn * y / arm_x) for turn in (1.0, -1.0) for way in (1.0, -1.0)
     ]
-    found: Booleans = np.any([(one > 4.0 * most) | (one < 4.0 * least) for one in motors], axis=0)
-    return found
+    any_of_them: Booleans = np.any([(one > 4.0 * most) | (one < 4.0 * least) for one in motors], axis=0)
+    return any_of_them

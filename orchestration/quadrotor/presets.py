@@ -1,7 +1,7 @@
-"""Timings of real flight stacks by name, for a controller that runs whole at one rate.
+"""Timings of real flight stacks by name, for a controller that runs at a single rate.
 
-A unified law needs the full state and gives torques, so it runs at the fastest rate at which the stack
-runs a controller with the full state estimate; `loops_hz` says what the stack's own cascade does.
+A unified law needs the full state and outputs torques, so it runs at the fastest rate at which the stack
+runs a controller with the full state estimate; `loops_hz` has the rates of the stack's own cascade.
 """
 
 from collections.abc import Mapping
@@ -48,7 +48,7 @@ PRESETS = {
 
 
 def preset_timing(name: str) -> dict[str, Any]:
-    """The timing keys of a preset; raises `UsageError` naming the presets there are."""
+    """The timing keys of a preset; raises `UsageError` that lists the presets for an unknown name."""
     if name not in PRESETS:
         raise UsageError(f"preset {name}: {expected_name(name, list(PRESETS))}")
     return dict(PRESETS[name].timing)

@@ -1,4 +1,4 @@
-"""Where the quantities that go by a name are looked for."""
+"""Search ranges of the quantities of `limit` that have names."""
 
 import math
 
@@ -8,7 +8,7 @@ from orchestration.system.distribution import highest
 
 
 def range_of(timing: Timing, of: str) -> Range | None:
-    """The range of `period`, `delay`, `jitter` or `loss`, all else of `timing` as it is; None for another name."""
+    """The search range of `period`, `delay`, `jitter` or `loss` with the rest of `timing` fixed; None: other names."""
     if of == "period":
         shortest = highest(timing.jitter) * timing.clock_ratio
         before = tuple(value for value in (0.001, 0.002, 0.003, 0.004) if value > shortest)

@@ -1,4 +1,4 @@
-"""Reads scenario files: keys and types are checked here, values where they mean something."""
+"""Reads scenario files: checks keys and types; the constructors check values."""
 
 import dataclasses
 from pathlib import Path
@@ -7,8 +7,9 @@ from typing import Any, TypeVar
 from orchestration.basics.documents import read_toml
 from orchestration.basics.errors import UsageError, no_such_key, shown
 from orchestration.basics.typed_tables import parsed, table_of
+from orchestration.quadrotor.fmu_choice import FmuChoice
 from orchestration.quadrotor.presets import preset_timing
-from orchestration.quadrotor.scenario import FmuChoice, Scenario
+from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.signals import DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.timing import Timing
 from orchestration.quadrotor.vehicle import load_vehicle
@@ -26,14 +27,14 @@ ScenarioFile = table_of(
     reference=(dict[str, Any], {}),
     disturbance=(dict[str, Any], {}),
 )
-"""The tables of a scenario file; parameters of the FMUs are still as the file nests them"""
+"""The tables of a scenario file; parameters of the FMUs are still nested as in the file"""
 
 
 def load_scenario(path: str | Path) -> Scenario:
     """Read a scenario file; paths in it are relative to its folder.
 
-    Raises `UsageError` for a file that cannot be read, a key that does not exist (naming those that do)
-    or a value of the wrong kind.
+    Raises `UsageError` for a file that cannot be read, an unknown key (with the known ones) or a value of the wrong
+    type.
     """
     path = Path(path)
     tables = read_toml(path, "scenario file")
@@ -44,7 +45,7 @@ def load_scenario(path: str | Path) -> Scenario:
 
 
 def scenario_from_tables(tables: dict[str, Any], folder: Path) -> Scenario:
-    """The scenario of a TOML document whose relative paths start at `folder`; raises `UsageError`."""
+    """The scenario of a TOML document whose paths are relative to `folder`; raises `UsageError`."""
     file = parsed(_expanded(tables), ScenarioFile)
     return Scenario(
         stop_time=file.stop_time,
@@ -61,7 +62,7 @@ def scenario_from_tables(tables: dict[str, Any], folder: Path) -> Scenario:
 
 
 def _expanded(tables: dict[str, Any]) -> dict[str, Any]:
-    """The tables with `timing.preset` and `timing.loss` written out, below what the file says itself."""
+    """The tables with `timing.preset` and `timing.loss` expanded; keys of the file take precedence."""
     timing = tables.get("timing")
     if not isinstance(timing, dict):
         return tables
@@ -89,16 +90,16 @@ Signal = TypeVar("Signal", ReferenceChoice, DisturbanceChoice)
 def _signal(place: str, table: dict[str, Any], kind: type[Signal], folder: Path) -> Signal:
     """A table with the fields of its kind, and parameters beside them."""
     own = [f.name for f in dataclasses.fields(kind) if f.name != "parameters"]
-    given: dict[str, Any] = {key: value for key, value in table.items() if key in own}
+    fields: dict[str, Any] = {key: value for key, value in table.items() if key in own}
     parameters = {key: value for key, value in table.items() if key not in own}
-    if parameters and not {"name", "file"} & {*given}:
+    if parameters and not {"name", "file"} & {*fields}:
         beside = "; parameters beside name or file only"
         raise UsageError(no_such_key(f"{place}.", next(iter(parameters)), own, beside))
-    for key, value in given.items():
+    for key, value in fields.items():
         if key == "drag":
             continue
         if not isinstance(value, str):
             raise UsageError(f"{place}.{key} = {shown(repr(value))}: expected a text")
-    if "file" in given:
-        given["file"] = folder / given["file"]
-    return kind(**given, parameters=parameters)
+    if "file" in fields:
+        fields["file"] = folder / fields["file"]
+    return kind(**fields, parameters=parameters)

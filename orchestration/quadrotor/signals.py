@@ -1,4 +1,4 @@
-"""What a flight is told from outside: the reference that it follows, and what disturbs it."""
+"""External signals of a flight: its reference and its disturbance."""
 
 from collections.abc import Mapping
 from dataclasses import field
@@ -11,22 +11,21 @@ from orchestration.system.requirements import is_finite, require
 
 Between = Literal["linear", "previous"]
 DRAG = 0.1
-"""[N·s/m] by which a wind becomes a force where nobody says another: an assumption, not a measured figure"""
+"""[N·s/m] by which a wind becomes a force by default: an assumption, not a measured figure"""
 
 
 @record("reference.")
 class ReferenceChoice:
-    """What the vehicle is to follow: the controller's built-in trajectory unless a motion or a file is named.
+    """What the vehicle follows: a motion or a file; default: the trajectory built into the controller.
 
-    Raises `UsageError` for a name, a parameter or a value that cannot be.
+    Raises `UsageError` for an invalid name, parameter or value.
     """
 
     name: str | None = None
     """The name of a motion: hover, step, circle, lemniscate, helix or paper."""
     file: Path | None = None
     """A CSV file of `time` [s] and reference.position.x … reference.snap.z, linear between rows; or of way-points,
-    columns x, y, z [m] with `time`, or with `hold` [s] and `speed` [m/s] where they are told, and a smooth curve
-    through them."""
+    columns x, y, z [m] with `time`, or with optional `hold` [s] and `speed` [m/s], joined by a smooth curve."""
     parameters: Mapping[str, float] = field(default_factory=dict)
     """Parameters of the motion, as radius = 2.0; of way-points without times, `speed` [m/s] and `acceleration`
     [m/s²]."""
@@ -41,9 +40,9 @@ class ReferenceChoice:
 
 @record("disturbance.")
 class DisturbanceChoice:
-    """What pushes the vehicle beside the built-in wind: nothing unless gusts or a file are named.
+    """Forces on the vehicle beside the built-in wind: gusts or a file; default: none.
 
-    Raises `UsageError` for a name, a parameter or a value that cannot be.
+    Raises `UsageError` for an invalid name, parameter or value.
     """
 
     name: str | None = None
@@ -51,10 +50,10 @@ class DisturbanceChoice:
     file: Path | None = None
     """A CSV file of `time` [s] and external_force.x, .y, .z [N], or wind.x, .y, .z [m/s], in the inertial frame."""
     interpolation: Between = "linear"
-    """What holds between the rows of a file: the line (linear), or the row before (previous)."""
+    """The value between the rows of a file: on the line (linear), or of the row before (previous)."""
     drag: float | None = None
-    """The force by wind [N·s/m], in the direction of the wind, 0.1 unless told; the vehicle's own motion is left
-    out."""
+    """The force by wind [N·s/m], in the direction of the wind, by default 0.1; the vehicle's own motion is
+    neglected."""
     parameters: Mapping[str, float] = field(default_factory=dict)
     """Parameters of the gusts, as wind_speed = 8.0 [m/s]."""
 
@@ -70,8 +69,8 @@ class DisturbanceChoice:
             raise UsageError(f"disturbance.{next(iter(self.parameters))}: expected none without a name")
 
 
-def chosen(text: str) -> dict[str, Any]:
-    """What somebody means who says one word of a reference or a disturbance: a file if it ends in .csv, else a name."""
+def choice_of(text: str) -> dict[str, Any]:
+    """The fields of a reference or a disturbance given as one word: a file if it ends in .csv, else a name."""
     return {"file": Path(text)} if text.lower().endswith(".csv") else {"name": text}
 
 

@@ -1,4 +1,4 @@
-"""How the digital loop is clocked: the timing of a run as one frozen value, and time in integer nanoseconds."""
+"""The timing of the digital loop of a run as one frozen value."""
 
 from dataclasses import field, fields
 from typing import ClassVar
@@ -29,17 +29,16 @@ _PLACE = "timing."
 
 @record("timing.")
 class Timing:
-    """How the digital loop is clocked; times in seconds.
+    """The timing of the digital loop; times in seconds.
 
-    Raises `UsageError` for a value that cannot be: negative times, jitter not below the period,
-    probabilities outside [0, 1].
+    Raises `UsageError` for invalid values: negative times, jitter not below the period, probabilities outside [0, 1].
     """
 
     SHORTHANDS: ClassVar[tuple[str, ...]] = ("loss", "preset")
-    """Keys of `[timing]` in a file that stand for others"""
+    """Keys of `[timing]` in a file that expand to others"""
 
     period: float = 0.01
-    """The sampling period T of the controller [s], in its own time: sample k is at offset + kT."""
+    """The sampling period T of the controller [s], by its own clock: sample k is at offset + kT."""
     offset: float = 0.0
     """The time of the first sample [s]."""
     plant_interval: float = 0.001
@@ -49,7 +48,7 @@ class Timing:
     hold: Hold = "zero"
     """What the plant gets between arrivals: the last command (zero), or the line through the last two (first)."""
     clock: Clock = "master"
-    """Who decides when the controller samples: the master, or the FMU by its own sample_period."""
+    """What decides when the controller samples: the master, or the FMU by its own sample_period."""
     delay: Varying = 0.0
     """The time d from a sample to the application of its command [s], or how it is distributed; it may exceed the
     period."""
@@ -94,7 +93,7 @@ class Timing:
             require_own_clock(self, _PLACE)
 
     def warnings(self, stop_time: float) -> tuple[str, ...]:
-        """What a run of this length [s] hardly shows of this timing."""
+        """Warnings where a run of this length [s] is too short to show this timing."""
         end = f"the run ends at {shown(stop_time)} s"
         if self.offset / self.clock_ratio >= stop_time:
             return (f"timing.offset = {shown(self.offset)}: {end}, so the controller never samples",)

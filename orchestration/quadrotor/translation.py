@@ -1,4 +1,4 @@
-"""What a scenario of the quadrotor calls the parts of its system, and what its reference and disturbance are there."""
+"""Translates a scenario of the quadrotor into its system: names of parts, reference and disturbance."""
 
 import functools
 from dataclasses import replace
@@ -17,24 +17,24 @@ from orchestration.system.source import Source
 from orchestration.system.system_file import load_system
 
 SYSTEM = Path(__file__).with_name("system.toml")
-"""The paper's flight, of which every scenario is a change"""
+"""The paper's flight; every scenario is this system with changes"""
 
 
 @functools.cache
 def quadrotor() -> System:
-    """The system that is shipped: the paper's flight."""
+    """The system of the paper's flight."""
     return load_system(SYSTEM)
 
 
-def in_words_of_a_scenario(text: str) -> str:
-    """`text` with the paths of a system as a scenario calls them."""
-    for place, meant in PLACES.items():
-        text = text.replace(place, meant)
+def in_scenario_terms(text: str) -> str:
+    """`text` with the paths of the system replaced by the names of a scenario."""
+    for path, name in SCENARIO_NAMES.items():
+        text = text.replace(path, name)
     return text
 
 
 def reference_source(choice: ReferenceChoice) -> dict[str, Any]:
-    """What the source of the reference says; empty for what the controller has built in."""
+    """The keys of the source of the reference; empty for the trajectory built into the controller."""
     if choice.name is None and choice.file is None:
         return {}
     keys: dict[str, Any] = {"parameters": dict(choice.parameters)}
@@ -46,7 +46,7 @@ def reference_source(choice: ReferenceChoice) -> dict[str, Any]:
 
 
 def disturbed(system: System, choice: DisturbanceChoice) -> System:
-    """`system` with what pushes the plant."""
+    """`system` with the source of a disturbance of the plant."""
     if choice.name is None and choice.file is None:
         return system
     keys: dict[str, Any] = {"to": tuple(f"plant.{name}" for name in EXTERNAL_FORCE)}
@@ -67,9 +67,9 @@ def disturbed(system: System, choice: DisturbanceChoice) -> System:
 
 
 def paths_of(target: str) -> tuple[str, ...]:
-    """The paths of what a scenario calls `timing.KEY`, `controller.NAME` or `plant.NAME`; a path is one by itself.
+    """The paths in the system of `timing.KEY`, `controller.NAME` or `plant.NAME`; a path is returned as it is.
 
-    Raises `UsageError` for a name that is none of them.
+    Raises `UsageError` for any other name.
     """
     table, _, key = target.partition(".")
     kind, _, measurement = key.partition(".")
@@ -91,7 +91,7 @@ def paths_of(target: str) -> tuple[str, ...]:
     )
 
 
-PLACES = {
+SCENARIO_NAMES = {
     "components.controller.parameters.": "controller.",
     "components.plant.parameters.": "plant.",
     "components.controller.record": "record.controller",
@@ -119,15 +119,15 @@ PLACES = {
     "sources.disturbance.parameters.": "disturbance.",
     "sources.disturbance.": "disturbance.",
 }
-"""Where a scenario says what its system says elsewhere."""
+"""Names in a scenario by the beginnings of paths in its system"""
 
 SIGNAL_KEYS = {
     "reference": {"name": "signal", "file": "file"},
     "disturbance": {"name": "signal", "file": "file", "interpolation": "interpolation", "drag": "scale"},
 }
-"""What is no parameter in `[reference]` and `[disturbance]`, and what their sources call it"""
+"""Keys of `[reference]` and `[disturbance]` that are not parameters, and the keys of their sources"""
 WIND = ("wind.x", "wind.y", "wind.z")
-"""Columns of a file with a wind in place of a force"""
+"""Columns of a file that has a wind instead of a force"""
 
 _SAMPLING, _COMMAND = "components.controller.sampling", "connections.command"
 TIMING: dict[str, tuple[str, ...]] = {
@@ -146,7 +146,7 @@ TIMING: dict[str, tuple[str, ...]] = {
     "hold": (f"{_COMMAND}.hold",),
     "clock": (f"{_SAMPLING}.clock",),
 }
-"""Keys of `[timing]`, and the paths that they are"""
+"""Paths by key of `[timing]`"""
 BY_MEASUREMENT = ("noise", "quantisation")
 """Keys of `[timing]` that are tables by measurement"""
 _SINGLE = tuple(key for key in TIMING_KEYS if key not in BY_MEASUREMENT)

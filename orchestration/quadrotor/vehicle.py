@@ -1,4 +1,4 @@
-"""Vehicles: what a plant is made of and what its controllers are told of it, from files of their own."""
+"""Vehicles: parameters of a plant and of its controllers, from vehicle files."""
 
 from collections.abc import Mapping
 from dataclasses import field
@@ -14,10 +14,10 @@ from orchestration.system.component import Parameter
 from orchestration.system.parameters import parameters_in
 
 SHIPPED = Path(__file__).with_name("vehicles")
-"""Where the vehicles are that go by a name"""
+"""The folder of the vehicles that have names"""
 ENDING = ".toml"
 CONTROLLERS = tuple(name for name in MODELS if name != DEFAULT_PLANT)
-"""The FMUs of this project that fly a vehicle"""
+"""The FMUs of this project that control a vehicle"""
 TABLES = ("plant", "controller", "controllers")
 """of a vehicle file"""
 
@@ -26,17 +26,17 @@ TABLES = ("plant", "controller", "controllers")
 class Vehicle:
     """Parameters of the plant, of every controller, and of single controllers by the names of their FMUs.
 
-    Raises `UsageError` for a controller that is none.
+    Raises `UsageError` for an unknown controller.
     """
 
     name: str
-    """What the vehicle is called."""
+    """The name of the vehicle."""
     plant: Mapping[str, Parameter] = field(default_factory=dict)
-    """What the plant is made of: parameters by their names in the FMU, in its units."""
+    """Parameters of the plant by their names in the FMU, in its units."""
     controller: Mapping[str, Parameter] = field(default_factory=dict)
-    """What every controller is told of it, likewise."""
+    """Parameters of every controller, likewise."""
     controllers: Mapping[str, Mapping[str, Parameter]] = field(default_factory=dict)
-    """What single controllers are told beside, by the name of an FMU of this project or the path of an .fmu file."""
+    """Further parameters of single controllers, by the name of an FMU of this project or the path of an .fmu file."""
 
     def __post_init__(self) -> None:
         for fmu in self.controllers:
@@ -45,7 +45,7 @@ class Vehicle:
                 raise UsageError(f"controllers.{fmu}: no controller of this project; {expected}")
 
     def with_parameters(self, *, plant: Mapping[str, Parameter], controller: Mapping[str, Parameter]) -> "Vehicle":
-        """The same with other values of the plant, and of what every controller is told."""
+        """The same with other values for the plant and for every controller."""
         return Vehicle(
             name=self.name,
             plant={**self.plant, **plant},
@@ -53,40 +53,40 @@ class Vehicle:
             controllers={fmu: {**parameters, **controller} for fmu, parameters in self.controllers.items()},
         )
 
-    def told(self, controller: str) -> dict[str, Parameter]:
-        """What the plant is made of, and what a controller whose FMU has this name or path is told of it, by target."""
+    def parameters_for(self, controller: str) -> dict[str, Parameter]:
+        """The parameters of the plant and of the controller whose FMU has this name or path, by target."""
         sides = {"plant": self.plant, "controller": self.for_controller(controller)}
         return {f"{side}.{name}": value for side, table in sides.items() for name, value in table.items()}
 
     def for_controller(self, fmu: str) -> dict[str, Parameter]:
-        """The parameters of a controller whose FMU has this name or path, however it is packed."""
-        found = dict(self.controller)
+        """The parameters of the controller whose FMU has this name or path, packed in any way."""
+        values = dict(self.controller)
         for name, parameters in self.controllers.items():
             if PurePath(name).stem == PurePath(fmu).stem:
-                found |= parameters
-        return found
+                values |= parameters
+        return values
 
 
 def names() -> list[str]:
-    """The vehicles that are shipped."""
+    """The names of the vehicles that are shipped."""
     return sorted(path.stem for path in SHIPPED.glob(f"*{ENDING}"))
 
 
-def load_vehicle(given: str, folder: Path) -> Vehicle:
-    """The vehicle of a name, or of a path that ends in .toml and starts at `folder`.
+def load_vehicle(name: str, folder: Path) -> Vehicle:
+    """The vehicle of a name, or of a path that ends in .toml and is relative to `folder`.
 
-    Every controller that it names is held to what its FMU has, which is built if need be. Raises `UsageError` for a
-    name that none has, a file that cannot be read, or what does not belong in it.
+    Parameters of single controllers are checked against their FMUs, which are built if need be. Raises `UsageError`
+    for an unknown name, a file that cannot be read, or an unknown key in it.
     """
-    path = folder / given if given.endswith(ENDING) else SHIPPED / f"{given}{ENDING}"
-    if not given.endswith(ENDING) and given not in names():
-        raise UsageError(f"vehicle {given}: {expected_name(given, names())}, or a path that ends in {ENDING}")
+    path = folder / name if name.endswith(ENDING) else SHIPPED / f"{name}{ENDING}"
+    if not name.endswith(ENDING) and name not in names():
+        raise UsageError(f"vehicle {name}: {expected_name(name, names())}, or a path that ends in {ENDING}")
     tables = read_toml(path, "vehicle file")
     try:
-        found = _vehicle(path.stem, tables)
-        for fmu, parameters in found.controllers.items():
+        vehicle = _vehicle(path.stem, tables)
+        for fmu, parameters in vehicle.controllers.items():
             _expect_parameters(fmu, parameters, path.parent)
-        return found
+        return vehicle
     except UsageError as error:
         raise UsageError(f"{path}: {error}") from error
 
@@ -110,8 +110,8 @@ def _vehicle(name: str, tables: dict[str, Any]) -> Vehicle:
 
 
 def _expect_parameters(fmu: str, parameters: Mapping[str, Parameter], folder: Path) -> None:
-    """Raise `UsageError` for what a controller cannot be told, which another flight than this one would find."""
-    from orchestration.building.fmus import locate  # not before: a vehicle is also made where no FMU is looked at
+    """Raise `UsageError` for an invalid parameter of a controller, also of one that this flight does not use."""
+    from orchestration.building.fmus import locate  # not before: a vehicle is also made where no FMU is read
     from orchestration.fmi.model import read_model
     from orchestration.system.check import expect_parameter
 

@@ -1,4 +1,4 @@
-"""The names of both FMUs and what is connected to what; no other file of this package knows them."""
+"""Names of both FMUs and of their variables, and their connections; no other file of this package has them."""
 
 from collections.abc import Iterable, Mapping
 
@@ -36,15 +36,15 @@ ATTITUDE_ERROR_SCALAR = "attitude_error.w"
 ENERGY = "energy"
 EXTERNAL_FORCE = components("external_force")
 DISTURBANCE = components("wind.amplitude") + EXTERNAL_FORCE
-"""What moves the plant beside its commands."""
+"""Parameters that move the plant beside its commands."""
 PAYLOAD = "payload.mass"
-"""What it carries beside its own mass, which its controller is not told of."""
+"""Mass of the plant beyond its own that its controller does not know."""
 
 BOUNDARY_LAYER = "boundary_layer"
 SURFACE_GAIN, SURFACE_EXPONENT = "gain.surface", "surface_exponent"
 """Parameters of the controller: its gain is constant for position errors below ε, a power of them beyond."""
 UNREDESIGNED: Mapping[str, tuple[object, ...]] = {"discretisation": ("explicit", 1), "prediction": (0.0,)}
-"""Parameters of the controller, and the values with which it holds what its law says at the sample."""
+"""Parameters of the controller, and their values without a redesign: the law is evaluated at the sample and held."""
 
 RIGID_BODY = ("mass", *components("inertia", ("xx", "yy", "zz", "xy", "xz", "yz")))
 """Parameters of the plant and, by the same names, of the controller's nominal model."""
@@ -60,4 +60,4 @@ UNITS = {
     **dict(zip(TRAJECTORY, ("m", "m", "rad/s", "m", "m/s"))),
     **dict.fromkeys((SAMPLE_PERIOD, SAMPLE_OFFSET), "s"),
 }
-"""Of what is connected, or set by the master."""
+"""Units of the variables that are connected or set by the master."""

@@ -118,8 +118,8 @@ class Craft(Protocol):
     def name(self) -> str:
         """What it is called."""
 
-    def told(self, controller: str) -> Mapping[str, Parameter]:
-        """Values by target, with a controller of this name or path."""
+    def parameters_for(self, controller: str) -> Mapping[str, Parameter]:
+        """The parameters of the plant and of the controller of this name or path, by target."""
 
 
 @called("a Scenario")

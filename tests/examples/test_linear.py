@@ -10,7 +10,7 @@ import quadcosim
 from orchestration.basics.documents import read_toml
 from orchestration.flight.hover_loop import at_hover
 from orchestration.fmi.reuse import Instances
-from orchestration.quadrotor.scenario import FmuChoice
+from orchestration.quadrotor.fmu_choice import FmuChoice
 from orchestration.stability.monodromy import growth_of_loop
 from orchestration.system.component import Parameter
 from quadcosim import Scenario, Timing

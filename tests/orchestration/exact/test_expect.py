@@ -15,7 +15,8 @@ from orchestration.exact.linear import Sampled
 from orchestration.exact.loops import Loops, expect_same_steps
 from orchestration.exact.timing import tasks_of
 from orchestration.flight.hover_loop import HoverLoop
-from orchestration.quadrotor.scenario import FmuChoice, Scenario
+from orchestration.quadrotor.fmu_choice import FmuChoice
+from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.system.source import Source
 from quadcosim import UsageError, limit

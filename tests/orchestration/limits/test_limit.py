@@ -27,7 +27,7 @@ from orchestration.limits import limit as limits
 from orchestration.limits.evaluation import is_good
 from orchestration.limits.found import Continuous
 from orchestration.limits.limit import find
-from orchestration.quadrotor.scenario import FmuChoice, Record
+from orchestration.quadrotor.fmu_choice import FmuChoice, Record
 from orchestration.quadrotor.wiring import COMMAND
 from orchestration.requests.ranges import Varied
 from orchestration.runs.simulation import prepared

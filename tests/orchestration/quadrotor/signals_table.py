@@ -42,7 +42,7 @@ def scenario_of(tables: dict[str, Any]) -> Scenario:
     return scenario_from_tables(tables, Path())
 
 
-def flown(tables: dict[str, Any]) -> Result:
+def simulated(tables: dict[str, Any]) -> Result:
     """Its flight."""
     return quadcosim.run(scenario_of(tables))
 
@@ -70,9 +70,9 @@ def flights() -> list[tuple[str, dict[str, Any]]]:
 
 
 def main() -> None:
-    """Write the table of what is flown now."""
+    """Write the table of what is simulated now."""
     found = {
-        name: {"scenario": old["scenario"], **entry(flown(old["scenario"]), old["last"])} for name, old in flights()
+        name: {"scenario": old["scenario"], **entry(simulated(old["scenario"]), old["last"])} for name, old in flights()
     }
     table = {"fingerprint": fingerprint(), "flights": found}
     TABLE.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")

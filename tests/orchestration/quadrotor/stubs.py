@@ -111,13 +111,13 @@ class Straying(Plant):
 
 
 class Counting(Stub):
-    """A controller whose thrust is the number of its steps, and that remembers what it was told at each."""
+    """A controller whose thrust is the number of its steps, and that remembers its inputs at each."""
 
     name = "controller"
 
     def __init__(self, log: list[Call] | None = None) -> None:
         super().__init__(dict.fromkeys((*MEASUREMENT, *COMMAND), math.nan), log)
-        self.told: list[dict[str, float]] = []
+        self.received: list[dict[str, float]] = []
         self.initialising = False
 
     def reader(self, names: Sequence[str], into: Floats) -> Transfer:
@@ -137,14 +137,14 @@ class Counting(Stub):
     def exit_initialization(self) -> None:
         super().exit_initialization()
         self.initialising = False
-        self.told.append({name: self.values[name] for name in MEASUREMENT})
+        self.received.append({name: self.values[name] for name in MEASUREMENT})
 
     def begin(self) -> None:
         """What follows from its inputs while it is initialised, however often it is asked for."""
         self.values.update(dict.fromkeys(COMMAND, 0.0))
 
     def advance(self, t: float, h: float) -> None:
-        self.told.append({name: self.values[name] for name in MEASUREMENT})
+        self.received.append({name: self.values[name] for name in MEASUREMENT})
         self.values["thrust"] += 1.0
 
 
@@ -206,8 +206,8 @@ def instants_of(cursor: Cursor) -> Iterator[Instant]:
         yield Instant(instant.time, sample, tuple(arrivals))
 
 
-class Flown:
-    """A master that has flown, or has been made to."""
+class StubRun:
+    """A master over stubs, which has run unless `start` is False."""
 
     def __init__(
         self,

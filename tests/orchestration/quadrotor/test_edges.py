@@ -11,14 +11,14 @@ from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.scenario_file import load_scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.runs.run_directory import run_folder
-from tests.orchestration.quadrotor.stubs import Counting, Flown, Plant, Straying, cursor_of, instants_of
+from tests.orchestration.quadrotor.stubs import Counting, Plant, Straying, StubRun, cursor_of, instants_of
 
 
 @pytest.mark.parametrize("name", ["velocity__x", "quaternion__w"])
 def test_a_measurement_that_is_not_finite_ends_the_run_before_it_is_passed_on(name: str) -> None:
     sudden: dict[str, Any] = {name: math.nan}
-    flown = Flown(Timing(), 0.05, Straying(time=0.012, **sudden))
-    assert flown.master.divergence_time == 12_000_000
+    run = StubRun(Timing(), 0.05, Straying(time=0.012, **sudden))
+    assert run.master.divergence_time == 12_000_000
 
 
 def test_a_command_that_is_not_finite_never_reaches_the_plant() -> None:
@@ -27,23 +27,23 @@ def test_a_command_that_is_not_finite_never_reaches_the_plant() -> None:
             super().advance(t, h)
             self.values["thrust"] = math.nan if t >= 0.01 else 1.0
 
-    flown = Flown(Timing(), 0.05, controller=Failing())
-    assert flown.master.divergence_time == 10_000_000
-    assert all(map(math.isfinite, flown.plant.thrusts))
+    run = StubRun(Timing(), 0.05, controller=Failing())
+    assert run.master.divergence_time == 10_000_000
+    assert all(map(math.isfinite, run.plant.thrusts))
 
 
 def test_a_start_too_far_away_is_divergence_at_zero() -> None:
-    flown = Flown(Timing(), 0.05, Plant({"position.x": 200.0}))
-    assert flown.master.divergence_time == 0
+    run = StubRun(Timing(), 0.05, Plant({"position.x": 200.0}))
+    assert run.master.divergence_time == 0
 
 
 def test_losing_measurements_does_not_change_the_noise_of_the_others() -> None:
-    all_there = Flown(Timing(noise={"position": 0.1}), 0.2)
-    some_lost = Flown(Timing(noise={"position": 0.1}, measurement_loss=0.3), 0.2)
+    all_there = StubRun(Timing(noise={"position": 0.1}), 0.2)
+    some_lost = StubRun(Timing(noise={"position": 0.1}, measurement_loss=0.3), 0.2)
     lost = {event.sample for event in some_lost.events("lost", "measurement")}
     assert lost
-    told = zip(all_there.controller.told[1:], some_lost.controller.told[1:], strict=True)
-    assert all(a["position.x"] == b["position.x"] for k, (a, b) in enumerate(told) if k not in lost)
+    received = zip(all_there.controller.received[1:], some_lost.controller.received[1:], strict=True)
+    assert all(a["position.x"] == b["position.x"] for k, (a, b) in enumerate(received) if k not in lost)
 
 
 @pytest.mark.parametrize(
@@ -80,17 +80,17 @@ def test_changing_a_key_that_does_not_exist_says_which_do() -> None:
 
 
 def test_no_command_is_sent_after_the_end() -> None:
-    flown = Flown(Timing(period=0.01, order="jacobi"), 0.025)
-    assert max(event[0] for event in flown.all_events()) <= 25_000_000
+    run = StubRun(Timing(period=0.01, order="jacobi"), 0.025)
+    assert max(event[0] for event in run.all_events()) <= 25_000_000
 
 
 def test_a_state_that_was_taken_does_not_change_while_the_run_goes_on() -> None:
-    first = Flown(Timing(), 0.05, start=False)
+    first = StubRun(Timing(), 0.05, start=False)
     first.master.initialise()
     first.master.run(pause_at=20_000_000)
     state, saved = first.state()
     first.master.run()
-    second = Flown(Timing(), 0.05, start=False)
+    second = StubRun(Timing(), 0.05, start=False)
     second.master.restore(state, saved)
     second.master.run()
     assert second.bits() == first.bits()

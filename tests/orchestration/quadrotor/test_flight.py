@@ -19,8 +19,8 @@ import quadcosim
 from fmu_kit.trajectory import Trajectory
 from orchestration.building import fmus
 from orchestration.fmi.fmi2 import Fmi2Instance
+from orchestration.quadrotor.fmu_choice import FmuChoice, Record
 from orchestration.quadrotor.measures import desired
-from orchestration.quadrotor.scenario import FmuChoice, Record
 from orchestration.quadrotor.signals import ReferenceChoice
 from orchestration.quadrotor.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE, REFERENCE
 from orchestration.runs.simulation import prepared
@@ -338,7 +338,7 @@ def test_what_is_recorded_can_be_chosen() -> None:
     assert None not in (flight.metrics["attitude_error_rmse"], flight.metrics["energy_growth_share"])
 
 
-def test_every_output_and_local_is_recorded_unless_told() -> None:
+def test_every_output_and_local_is_recorded_by_default() -> None:
     names = {"plant.tilt", "plant.wind.force.x", "controller.energy", "controller.attitude_error.w", "plant.thrust"}
     assert names <= set(plain().columns)
 

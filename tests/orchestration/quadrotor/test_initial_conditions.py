@@ -89,7 +89,7 @@ def test_another_seed_gives_other_directions():
         ({"rate": math.nan}, "starts.rate = nan: expected a number from 0"),
     ],
 )
-def test_what_cannot_be_is_said(given, named):
+def test_invalid_values_are_refused_by_name(given, named):
     with pytest.raises(UsageError) as error:
         Starts(**given)
     assert str(error.value) == named

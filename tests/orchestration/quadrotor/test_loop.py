@@ -17,7 +17,7 @@ from orchestration.quadrotor.wiring import MEASUREMENT
 from orchestration.system.choices import Hold
 from orchestration.system.times import nanoseconds
 from tests.orchestration.quadrotor.strategies import timings
-from tests.orchestration.quadrotor.stubs import Call, Counting, Feedback, Flown, Plant, Still, Straying
+from tests.orchestration.quadrotor.stubs import Call, Counting, Feedback, Plant, Still, Straying, StubRun
 
 MS = 1_000_000
 FARTHEST, FASTEST = 100.0, 1000.0
@@ -27,7 +27,7 @@ FARTHEST, FASTEST = 100.0, 1000.0
 def logged(timing: Timing, stop_time: float) -> list[Call]:
     """All calls of a short run, in order."""
     log: list[Call] = []
-    Flown(timing, stop_time, Plant(log=log), Counting(log))
+    StubRun(timing, stop_time, Plant(log=log), Counting(log))
     return log
 
 
@@ -70,137 +70,135 @@ def test_at_time_zero_the_controller_samples_without_a_plant_step() -> None:
 
 
 def test_a_row_is_the_value_just_after_its_instant() -> None:
-    flown = Flown(Timing(period=0.002), 0.006)
-    assert flown.column("plant.thrust").tolist() == [1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 3.0]
-    assert flown.column("controller.thrust").tolist() == [1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 3.0]
-    assert flown.column("plant.position.y").tolist() == flown.column("time").tolist()
-    assert flown.plant.thrusts == [1.0, 1.0, 2.0, 2.0, 3.0, 3.0]
+    run = StubRun(Timing(period=0.002), 0.006)
+    assert run.column("plant.thrust").tolist() == [1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 3.0]
+    assert run.column("controller.thrust").tolist() == [1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 3.0]
+    assert run.column("plant.position.y").tolist() == run.column("time").tolist()
+    assert run.plant.thrusts == [1.0, 1.0, 2.0, 2.0, 3.0, 3.0]
 
 
 def test_the_first_exchange_is_held_until_the_first_arrival() -> None:
-    flown = Flown(Timing(period=0.01, delay=0.0025), 0.01, controller=Feedback())
-    before = flown.column("plant.thrust")[:3]
+    run = StubRun(Timing(period=0.01, delay=0.0025), 0.01, controller=Feedback())
+    before = run.column("plant.thrust")[:3]
     assert before.tolist() == [-4.0 - 0.1] * 3
-    assert flown.events("arrived")[0].time == 2_500_000
+    assert run.events("arrived")[0].time == 2_500_000
 
 
 def test_the_first_exchange_is_neither_lost_nor_late_nor_noisy() -> None:
     timing = Timing(
         measurement_loss=1.0, command_loss=1.0, delay=0.05, noise={"position": 1.0}, quantisation={"position": 7.0}
     )
-    flown = Flown(timing, 0.02)
-    assert flown.controller.told[0]["position.x"] == 1.0
-    assert flown.column("plant.thrust").tolist() == [0.0] * len(flown.nanoseconds())
+    run = StubRun(timing, 0.02)
+    assert run.controller.received[0]["position.x"] == 1.0
+    assert run.column("plant.thrust").tolist() == [0.0] * len(run.nanoseconds())
 
 
 def test_the_first_exchange_is_no_sample() -> None:
-    flown = Flown(Timing(offset=0.5), 0.1)
-    assert flown.all_events() == []
-    assert flown.controller.steps() == []
+    run = StubRun(Timing(offset=0.5), 0.1)
+    assert run.all_events() == []
+    assert run.controller.steps() == []
 
 
 # -- holds, arrivals and losses ---------------------------------------------------------------------------
 
 
 def test_zero_order_hold_keeps_a_command_from_its_arrival_to_the_next() -> None:
-    flown = Flown(Timing(period=0.004, delay=0.0025), 0.012)
+    run = StubRun(Timing(period=0.004, delay=0.0025), 0.012)
     expected = {0: 0.0, 2_500_000: 1.0, 6_500_000: 2.0, 10_500_000: 3.0}
-    for time, thrust in zip(flown.nanoseconds(), flown.column("plant.thrust"), strict=True):
+    for time, thrust in zip(run.nanoseconds(), run.column("plant.thrust"), strict=True):
         assert thrust == expected[max(start for start in expected if start <= time)]
 
 
 def test_the_controller_computes_at_its_sample_what_arrives_later() -> None:
-    flown = Flown(Timing(period=0.004, delay=0.0025), 0.008)
-    at_sample = flown.nanoseconds().index(4 * MS)
-    assert (flown.column("controller.thrust")[at_sample], flown.column("plant.thrust")[at_sample]) == (2.0, 1.0)
+    run = StubRun(Timing(period=0.004, delay=0.0025), 0.008)
+    at_sample = run.nanoseconds().index(4 * MS)
+    assert (run.column("controller.thrust")[at_sample], run.column("plant.thrust")[at_sample]) == (2.0, 1.0)
 
 
 def test_of_several_arrivals_at_one_instant_the_last_sent_wins() -> None:
-    flown = Flown(Timing(period=0.001, plant_interval=0.01, delay_jitter=0.02), 0.2, seed=3)
-    together = [list(group) for _, group in itertools.groupby(flown.events("arrived"), key=lambda event: event.time)]
+    run = StubRun(Timing(period=0.001, plant_interval=0.01, delay_jitter=0.02), 0.2, seed=3)
+    together = [list(group) for _, group in itertools.groupby(run.events("arrived"), key=lambda event: event.time)]
     assert max(map(len, together)) > 2
-    times, thrust = flown.nanoseconds(), flown.column("plant.thrust")
+    times, thrust = run.nanoseconds(), run.column("plant.thrust")
     for group in together:
         assert thrust[times.index(group[0].time)] == 1 + max(event.sample for event in group)
 
 
 def test_a_lost_command_leaves_the_one_before_in_place() -> None:
-    flown = Flown(Timing(period=0.002, command_loss=0.5), 0.2, seed=1)
-    lost = {event.sample for event in flown.events("lost", "command")}
+    run = StubRun(Timing(period=0.002, command_loss=0.5), 0.2, seed=1)
+    lost = {event.sample for event in run.events("lost", "command")}
     assert 20 < len(lost) < 80
     applied = 0.0
-    for event in flown.events("sampled"):
+    for event in run.events("sampled"):
         applied = applied if event.sample in lost else 1.0 + event.sample
-        assert flown.column("plant.thrust")[flown.nanoseconds().index(event.time)] == applied
+        assert run.column("plant.thrust")[run.nanoseconds().index(event.time)] == applied
 
 
 def test_the_controller_still_runs_when_its_command_is_lost() -> None:
-    flown = Flown(Timing(command_loss=1.0), 0.1)
-    assert flown.column("controller.thrust")[-1] == 10.0
-    assert not flown.column("plant.thrust").any()
-    assert len(flown.events("lost", "command")) == len(flown.events("sent", "command")) == 10
-    assert flown.events("arrived") == []
+    run = StubRun(Timing(command_loss=1.0), 0.1)
+    assert run.column("controller.thrust")[-1] == 10.0
+    assert not run.column("plant.thrust").any()
+    assert len(run.events("lost", "command")) == len(run.events("sent", "command")) == 10
+    assert run.events("arrived") == []
 
 
 def test_a_lost_measurement_leaves_the_controller_with_the_last_it_received() -> None:
-    flown = Flown(Timing(period=0.002, measurement_loss=0.5), 0.2, seed=1)
-    lost = {event.sample for event in flown.events("lost", "measurement")}
+    run = StubRun(Timing(period=0.002, measurement_loss=0.5), 0.2, seed=1)
+    lost = {event.sample for event in run.events("lost", "measurement")}
     assert 20 < len(lost) < 80
-    known = flown.controller.told[0]["position.y"]
-    for k, told in enumerate(flown.controller.told[1:]):
+    known = run.controller.received[0]["position.y"]
+    for k, received in enumerate(run.controller.received[1:]):
         known = known if k in lost else k * 0.002
-        assert told["position.y"] == pytest.approx(known, abs=1e-15)
-    assert len(flown.controller.told) == 101  # it ran at every sample
+        assert received["position.y"] == pytest.approx(known, abs=1e-15)
+    assert len(run.controller.received) == 101  # it ran at every sample
 
 
 def test_first_order_hold_follows_the_line_through_the_last_two_commands() -> None:
-    flown = Flown(Timing(period=0.004, hold="first"), 0.012)
+    run = StubRun(Timing(period=0.004, hold="first"), 0.012)
     # thrust 1 at 0 ms, 2 at 4 ms, 3 at 8 ms: a slope of 1 per 4 ms from the second arrival on
-    assert flown.column("plant.thrust").tolist() == pytest.approx(
-        [1, 1, 1, 1, 2, 2.25, 2.5, 2.75, 3, 3.25, 3.5, 3.75, 4]
-    )
+    assert run.column("plant.thrust").tolist() == pytest.approx([1, 1, 1, 1, 2, 2.25, 2.5, 2.75, 3, 3.25, 3.5, 3.75, 4])
 
 
 def test_first_order_hold_spans_lost_commands() -> None:
-    flown = Flown(Timing(period=0.002, hold="first", command_loss=0.5), 0.1, seed=4)
-    times = np.array(flown.nanoseconds())
-    arrived = [(event.time, 1.0 + event.sample) for event in flown.events("arrived")]
+    run = StubRun(Timing(period=0.002, hold="first", command_loss=0.5), 0.1, seed=4)
+    times = np.array(run.nanoseconds())
+    arrived = [(event.time, 1.0 + event.sample) for event in run.events("arrived")]
     for (t0, a), (t1, b), (end, _) in zip(arrived, arrived[1:], arrived[2:], strict=False):
         between = (times >= t1) & (times < end)
         line = b + (times[between] - t1) / (t1 - t0) * (b - a)
-        assert flown.column("plant.thrust")[between] == pytest.approx(line)
+        assert run.column("plant.thrust")[between] == pytest.approx(line)
 
 
 def test_first_order_hold_is_held_over_each_plant_step() -> None:
-    flown = Flown(Timing(period=0.004, plant_interval=0.0015, hold="first"), 0.05)
-    assert flown.plant.thrusts == flown.column("plant.thrust")[:-1].tolist()
+    run = StubRun(Timing(period=0.004, plant_interval=0.0015, hold="first"), 0.05)
+    assert run.plant.thrusts == run.column("plant.thrust")[:-1].tolist()
 
 
 @pytest.mark.parametrize("hold", ["zero", "first"])
 def test_a_row_holds_what_acts_until_the_next(hold: Hold) -> None:
     timing = Timing(period=0.003, delay=0.001, delay_jitter=0.004, jitter=0.001, command_loss=0.2, hold=hold)
-    flown = Flown(timing, 0.2, controller=Feedback())
-    assert flown.plant.thrusts == flown.column("plant.thrust")[:-1].tolist()
+    run = StubRun(timing, 0.2, controller=Feedback())
+    assert run.plant.thrusts == run.column("plant.thrust")[:-1].tolist()
 
 
 @pytest.mark.parametrize("period", [0.01, 0.016, 0.0375])
 def test_a_delay_of_one_period_is_jacobi_order_to_the_bit(period: float) -> None:
-    delayed = Flown(Timing(period=period, plant_interval=period, delay=period), 1.0, controller=Feedback())
-    jacobi = Flown(Timing(period=period, plant_interval=period, order="jacobi"), 1.0, controller=Feedback())
+    delayed = StubRun(Timing(period=period, plant_interval=period, delay=period), 1.0, controller=Feedback())
+    jacobi = StubRun(Timing(period=period, plant_interval=period, order="jacobi"), 1.0, controller=Feedback())
     assert delayed.bits()[0] == jacobi.bits()[0]
     assert delayed.events("arrived") == jacobi.events("arrived")
 
 
 def test_jacobi_order_differs_from_gauss_seidel() -> None:
     jacobi, gauss_seidel = (
-        Flown(Timing(order=order), 0.1, controller=Feedback()) for order in ("jacobi", "gauss-seidel")
+        StubRun(Timing(order=order), 0.1, controller=Feedback()) for order in ("jacobi", "gauss-seidel")
     )
     assert jacobi.bits()[0] != gauss_seidel.bits()[0]
 
 
 def test_a_jacobi_command_is_applied_at_the_next_sample_plus_the_delay() -> None:
-    flown = Flown(Timing(period=0.004, order="jacobi", delay=0.001), 0.02)
-    assert [(e.time, e.sample) for e in flown.events("arrived")] == [((4 * k + 5) * MS, k) for k in range(4)]
+    run = StubRun(Timing(period=0.004, order="jacobi", delay=0.001), 0.02)
+    assert [(e.time, e.sample) for e in run.events("arrived")] == [((4 * k + 5) * MS, k) for k in range(4)]
 
 
 # -- steps ------------------------------------------------------------------------------------------------
@@ -208,56 +206,56 @@ def test_a_jacobi_command_is_applied_at_the_next_sample_plus_the_delay() -> None
 
 @given(timings(), st.integers(1, 20))
 def test_the_plant_is_stepped_from_row_to_row_over_exactly_the_horizon(timing: Timing, periods: int) -> None:
-    flown = Flown(timing, periods * timing.period, Still())
-    times = flown.nanoseconds()
-    assert flown.plant.steps() == [(a / 1e9, (b - a) / 1e9) for a, b in itertools.pairwise(times)]
-    assert sum(round(h * 1e9) for _, h in flown.plant.steps()) == times[-1] - times[0]
+    run = StubRun(timing, periods * timing.period, Still())
+    times = run.nanoseconds()
+    assert run.plant.steps() == [(a / 1e9, (b - a) / 1e9) for a, b in itertools.pairwise(times)]
+    assert sum(round(h * 1e9) for _, h in run.plant.steps()) == times[-1] - times[0]
     assert (times[0], times[-1]) == (0, nanoseconds(periods * timing.period))
-    assert flown.master.steps == len(times) - 1
+    assert run.master.steps == len(times) - 1
 
 
 @given(timings(clock_ratio=1.0), st.integers(1, 20))
 def test_the_controller_is_stepped_from_its_first_sample_to_exactly_the_end(timing: Timing, periods: int) -> None:
-    flown = Flown(timing, periods * timing.period, Still())
-    stop = flown.nanoseconds()[-1]
-    sampled = [event.time for event in flown.events("sampled")]
+    run = StubRun(timing, periods * timing.period, Still())
+    stop = run.nanoseconds()[-1]
+    sampled = [event.time for event in run.events("sampled")]
     ends = [*sampled[1:], stop]
-    assert flown.controller.steps() == [(a / 1e9, (b - a) / 1e9) for a, b in zip(sampled, ends, strict=bool(sampled))]
+    assert run.controller.steps() == [(a / 1e9, (b - a) / 1e9) for a, b in zip(sampled, ends, strict=bool(sampled))]
 
 
 def test_the_controller_is_not_stepped_at_stop() -> None:
-    flown = Flown(Timing(period=0.01), 0.05)
-    assert [t for t, _ in flown.controller.steps()] == [0.0, 0.01, 0.02, 0.03, 0.04]
-    assert flown.column("controller.thrust")[-1] == 5.0
+    run = StubRun(Timing(period=0.01), 0.05)
+    assert [t for t, _ in run.controller.steps()] == [0.0, 0.01, 0.02, 0.03, 0.04]
+    assert run.column("controller.thrust")[-1] == 5.0
 
 
 def test_a_command_that_arrives_at_stop_is_applied_and_recorded() -> None:
-    flown = Flown(Timing(period=0.01, delay=0.01), 0.05)
-    assert flown.column("plant.thrust")[-1] == 5.0
-    assert flown.events("arrived")[-1].time == 50 * MS
+    run = StubRun(Timing(period=0.01, delay=0.01), 0.05)
+    assert run.column("plant.thrust")[-1] == 5.0
+    assert run.events("arrived")[-1].time == 50 * MS
 
 
 @pytest.mark.parametrize("ratio", [0.5, 1.25, 0.99])
 def test_the_clock_ratio_scales_the_times_of_the_controllers_steps(ratio: float) -> None:
-    flown = Flown(Timing(period=0.01, clock_ratio=ratio), 0.1)
-    samples = [event.time for event in flown.events("sampled")]
+    run = StubRun(Timing(period=0.01, clock_ratio=ratio), 0.1)
+    samples = [event.time for event in run.events("sampled")]
     assert len(samples) == math.ceil(0.1 * ratio / 0.01 - 1e-9)
-    for k, (t, h) in enumerate(flown.controller.steps()):
+    for k, (t, h) in enumerate(run.controller.steps()):
         assert t == pytest.approx(k * 0.01, abs=2e-9)
         assert h == pytest.approx(min(0.01, 0.1 * ratio - t), abs=2e-9)
-    assert sum(h for _, h in flown.plant.steps()) == pytest.approx(0.1, abs=1e-15)
+    assert sum(h for _, h in run.plant.steps()) == pytest.approx(0.1, abs=1e-15)
 
 
 def test_with_the_fmus_clock_the_controller_is_stepped_at_every_plant_point() -> None:
-    flown = Flown(Timing(period=0.01, clock="fmu"), 0.03)
-    assert flown.controller.steps() == flown.plant.steps()
-    assert len(flown.events("sampled")) == 3
+    run = StubRun(Timing(period=0.01, clock="fmu"), 0.03)
+    assert run.controller.steps() == run.plant.steps()
+    assert len(run.events("sampled")) == 3
 
 
 def test_times_are_nanoseconds_divided_once() -> None:
-    flown = Flown(Timing(period=1 / 30, plant_interval=1 / 700), 0.5)
-    assert all(t == ns / 1e9 for t, ns in zip(flown.column("time"), flown.nanoseconds(), strict=True))
-    assert flown.nanoseconds() == sorted(
+    run = StubRun(Timing(period=1 / 30, plant_interval=1 / 700), 0.5)
+    assert all(t == ns / 1e9 for t, ns in zip(run.column("time"), run.nanoseconds(), strict=True))
+    assert run.nanoseconds() == sorted(
         {*(round(k * 1e9 / 700) for k in range(351)), *(round(k * 1e9 / 30) for k in range(16))}
     )
 
@@ -267,13 +265,13 @@ def test_times_are_nanoseconds_divided_once() -> None:
 
 @given(timings(), st.integers(1, 20))
 def test_every_sample_is_sent_and_then_arrives_or_is_lost_or_is_still_on_its_way(timing: Timing, periods: int) -> None:
-    flown = Flown(timing, periods * timing.period, Still())
-    stop = flown.nanoseconds()[-1]
-    sampled = {event.sample for event in flown.events("sampled")}
-    sent = {event.sample: event.time for event in flown.events("sent")}
+    run = StubRun(timing, periods * timing.period, Still())
+    stop = run.nanoseconds()[-1]
+    sampled = {event.sample for event in run.events("sampled")}
+    sent = {event.sample: event.time for event in run.events("sent")}
     assert sampled - sent.keys() <= {max(sampled, default=0)}  # in Jacobi order the last may go out after the end
-    lost = {event.sample for event in flown.events("lost", "command")}
-    arrived = {event.sample for event in flown.events("arrived")}
+    lost = {event.sample for event in run.events("lost", "command")}
+    arrived = {event.sample for event in run.events("arrived")}
     assert not lost & arrived
     assert lost | arrived <= sampled
     late = timing.delay + timing.delay_jitter + 2 * timing.period / timing.clock_ratio + timing.jitter
@@ -281,8 +279,8 @@ def test_every_sample_is_sent_and_then_arrives_or_is_lost_or_is_still_on_its_way
 
 
 def test_events_name_what_they_are_about() -> None:
-    flown = Flown(Timing(period=0.01, delay=0.002), 0.005)
-    assert [tuple(event) for event in flown.all_events()] == [
+    run = StubRun(Timing(period=0.01, delay=0.002), 0.005)
+    assert [tuple(event) for event in run.all_events()] == [
         (0, "sampled", "measurement", 0),
         (0, "sent", "command", 0),
         (2 * MS, "arrived", "command", 0),
@@ -308,52 +306,52 @@ def test_events_name_what_they_are_about() -> None:
 )
 def test_leaving_the_region_ends_the_run_with_its_time(sudden: dict[str, Any]) -> None:
     plant = Straying(time=0.012, **sudden)
-    flown = Flown(Timing(period=0.01), 0.1, plant)
-    assert flown.over is True
-    assert flown.master.divergence_time == 12 * MS
-    assert "expected a" in str(flown.master.divergence)
-    assert flown.nanoseconds() == [k * MS for k in range(12)]  # what diverged is not recorded
-    assert np.isfinite(flown.rows()).all()
-    assert flown.plant.steps()[-1] == (0.011, 0.001)
+    run = StubRun(Timing(period=0.01), 0.1, plant)
+    assert run.over is True
+    assert run.master.divergence_time == 12 * MS
+    assert "expected a" in str(run.master.divergence)
+    assert run.nanoseconds() == [k * MS for k in range(12)]  # what diverged is not recorded
+    assert np.isfinite(run.rows()).all()
+    assert run.plant.steps()[-1] == (0.011, 0.001)
 
 
 def test_divergence_at_a_sampling_instant_is_noticed_before_the_controller_hears_of_it() -> None:
     plant = Straying(time=0.01, position__x=math.nan)
-    flown = Flown(Timing(period=0.01), 0.1, plant)
-    assert flown.master.divergence_time == 10 * MS
-    assert len(flown.controller.steps()) == 1
+    run = StubRun(Timing(period=0.01), 0.1, plant)
+    assert run.master.divergence_time == 10 * MS
+    assert len(run.controller.steps()) == 1
 
 
 @pytest.mark.parametrize("loss", [0.0, 1.0])
 def test_in_jacobi_order_nothing_is_sent_or_lost_after_a_run_has_diverged(loss: float) -> None:
-    flown = Flown(Timing(order="jacobi", command_loss=loss), 0.1, Straying(time=0.012, position__x=math.nan))
-    assert flown.events("sampled")[-1].time == 10 * MS
-    assert max(event[0] for event in flown.all_events()) == 10 * MS < (flown.master.divergence_time or 0)
+    run = StubRun(Timing(order="jacobi", command_loss=loss), 0.1, Straying(time=0.012, position__x=math.nan))
+    assert run.events("sampled")[-1].time == 10 * MS
+    assert max(event[0] for event in run.all_events()) == 10 * MS < (run.master.divergence_time or 0)
 
 
 def test_what_is_just_inside_the_region_flies_on() -> None:
     plant = Straying(time=0.012, position__x=60.0, position__y=79.9, position__z=0.0, angular_velocity__z=FASTEST)
-    flown = Flown(Timing(period=0.01), 0.05, plant)
-    assert flown.master.divergence is None
-    assert flown.nanoseconds()[-1] == 50 * MS
+    run = StubRun(Timing(period=0.01), 0.05, plant)
+    assert run.master.divergence is None
+    assert run.nanoseconds()[-1] == 50 * MS
 
 
 def test_the_distance_is_that_to_the_reference() -> None:
     far = Constant([300.0, 0.0, 0.0])
     plant = Straying(**{})
     plant.values["position.x"] = 250.0
-    assert Flown(Timing(), 0.05, plant, reference=far).master.divergence is None
-    assert Flown(Timing(), 0.05, Plant(), reference=far).master.divergence is not None
+    assert StubRun(Timing(), 0.05, plant, reference=far).master.divergence is None
+    assert StubRun(Timing(), 0.05, Plant(), reference=far).master.divergence is not None
 
 
 @pytest.mark.parametrize("side", ["plant", "controller"])
 def test_a_simulator_that_says_it_diverged_ends_the_run_with_its_time(side: str) -> None:
     error = SimulatorError("state not finite", divergence=True)
-    flown = Flown(Timing(), 0.1, Straying(time=0.012, error=error) if side == "plant" else None, failing(side, error))
-    assert flown.over is True
-    assert flown.master.divergence == "state not finite"
-    assert flown.master.divergence_time == (12 if side == "plant" else 10) * MS
-    assert len(flown.nanoseconds()) == (12 if side == "plant" else 10)
+    run = StubRun(Timing(), 0.1, Straying(time=0.012, error=error) if side == "plant" else None, failing(side, error))
+    assert run.over is True
+    assert run.master.divergence == "state not finite"
+    assert run.master.divergence_time == (12 if side == "plant" else 10) * MS
+    assert len(run.nanoseconds()) == (12 if side == "plant" else 10)
 
 
 def failing(side: str, error: SimulatorError) -> Counting:
@@ -371,7 +369,7 @@ def test_any_other_failure_of_a_simulator_is_an_error(side: str) -> None:
     error = SimulatorError("mass = -1: expected more")
     plant = Straying(time=0.012, error=error) if side == "plant" else None
     with pytest.raises(SimulatorError, match="expected more"):
-        Flown(Timing(), 0.1, plant, failing(side, error))
+        StubRun(Timing(), 0.1, plant, failing(side, error))
 
 
 def test_divergence_at_initialisation_is_a_run_of_one_row() -> None:
@@ -379,11 +377,11 @@ def test_divergence_at_initialisation_is_a_run_of_one_row() -> None:
         def exit_initialization(self) -> None:
             raise SimulatorError("no desired attitude", divergence=True)
 
-    flown = Flown(Timing(), 0.1, controller=Hopeless())
-    assert flown.over is True
-    assert (flown.master.divergence, flown.master.divergence_time) == ("no desired attitude", 0)
-    assert flown.nanoseconds() == [0]
-    assert flown.plant.steps() == []
+    run = StubRun(Timing(), 0.1, controller=Hopeless())
+    assert run.over is True
+    assert (run.master.divergence, run.master.divergence_time) == ("no desired attitude", 0)
+    assert run.nanoseconds() == [0]
+    assert run.plant.steps() == []
 
 
 def test_any_other_failure_at_initialisation_is_an_error() -> None:
@@ -392,7 +390,7 @@ def test_any_other_failure_at_initialisation_is_an_error() -> None:
             raise SimulatorError("wrong phase")
 
     with pytest.raises(SimulatorError, match="wrong phase"):
-        Flown(Timing(), 0.1, controller=Refusing())
+        StubRun(Timing(), 0.1, controller=Refusing())
 
 
 # -- pause and restore ------------------------------------------------------------------------------------
@@ -410,8 +408,8 @@ EVERYTHING: dict[str, Any] = {
 }
 
 
-def everything(**changes: Any) -> Flown:
-    return Flown(Timing(**{**EVERYTHING, **changes}), 0.05, controller=Feedback(), seed=11, start=False)
+def everything(**changes: Any) -> StubRun:
+    return StubRun(Timing(**{**EVERYTHING, **changes}), 0.05, controller=Feedback(), seed=11, start=False)
 
 
 @pytest.mark.parametrize("hold", ["zero", "first"])
@@ -432,8 +430,8 @@ def test_a_run_restored_at_any_pause_goes_on_to_the_same_bits(hold: str, order: 
 
 def test_a_run_paused_again_and_again_is_the_same_run() -> None:
     whole, hopping = everything(), everything()
-    for flown in (whole, hopping):
-        flown.master.initialise()
+    for run in (whole, hopping):
+        run.master.initialise()
     whole.master.run()
     while not hopping.master.run(pause_at=hopping.master.now + 2 * MS):
         state = hopping.state()
@@ -444,8 +442,8 @@ def test_a_run_paused_again_and_again_is_the_same_run() -> None:
 
 def test_a_paused_master_itself_goes_on_to_the_same_bits() -> None:
     whole, paused = everything(), everything()
-    for flown in (whole, paused):
-        flown.master.initialise()
+    for run in (whole, paused):
+        run.master.initialise()
     whole.master.run()
     assert not paused.master.run(pause_at=20 * MS)
     assert paused.master.run()
@@ -453,37 +451,37 @@ def test_a_paused_master_itself_goes_on_to_the_same_bits() -> None:
 
 
 def test_a_pause_is_at_the_first_instant_from_the_time_given() -> None:
-    flown = everything(jitter=0.0, delay_jitter=0.0)
-    flown.master.initialise()
-    assert not flown.master.run(pause_at=10_500_000)
-    assert flown.master.now == 11 * MS
-    assert flown.nanoseconds()[-1] == 11 * MS
+    run = everything(jitter=0.0, delay_jitter=0.0)
+    run.master.initialise()
+    assert not run.master.run(pause_at=10_500_000)
+    assert run.master.now == 11 * MS
+    assert run.nanoseconds()[-1] == 11 * MS
 
 
 def test_a_pause_at_or_beyond_the_end_is_none() -> None:
     for pause_at in (50 * MS, 90 * MS):
-        flown = everything()
-        flown.master.initialise()
-        assert flown.master.run(pause_at=pause_at)
+        run = everything()
+        run.master.initialise()
+        assert run.master.run(pause_at=pause_at)
 
 
 def test_the_state_beside_what_is_saved_as_bytes_is_json() -> None:
-    flown = everything()
-    flown.master.initialise()
-    flown.master.run(pause_at=20 * MS)
-    state, saved = flown.state()
+    run = everything()
+    run.master.initialise()
+    run.master.run(pause_at=20 * MS)
+    state, saved = run.state()
     resumed = everything()
     resumed.master.restore(json.loads(json.dumps(state)), saved)
     resumed.master.run()
-    flown.master.run()
-    assert resumed.bits() == flown.bits()
+    run.master.run()
+    assert resumed.bits() == run.bits()
 
 
 def test_progress_ends_at_one_and_never_falls() -> None:
     heard: list[float] = []
-    flown = Flown(Timing(), 2.0, start=False)
-    flown.master.initialise()
-    flown.master.run(progress=heard.append)
+    run = StubRun(Timing(), 2.0, start=False)
+    run.master.initialise()
+    run.master.run(progress=heard.append)
     assert heard == sorted(heard)
     assert len(heard) > 2
     assert heard[-1] == 1.0
@@ -496,49 +494,49 @@ DISTURBANCES = [{"noise": {"position.x": 0.1}}, {"quantisation": {"position.x": 
 
 @pytest.mark.parametrize("disturbance", DISTURBANCES, ids=str)
 def test_noise_and_quantisation_leave_the_plant_untouched(disturbance: dict[str, Any]) -> None:
-    plain, disturbed = Flown(Timing(), 0.2), Flown(Timing(**disturbance), 0.2)
-    assert disturbed.bits() == plain.bits()  # this controller does not look at what it is told
-    told = [[told["position.x"] for told in flown.controller.told[1:]] for flown in (plain, disturbed)]
-    assert sum(a != b for a, b in zip(*told, strict=True)) > 15
+    plain, disturbed = StubRun(Timing(), 0.2), StubRun(Timing(**disturbance), 0.2)
+    assert disturbed.bits() == plain.bits()  # this controller ignores what it receives
+    received = [[received["position.x"] for received in run.controller.received[1:]] for run in (plain, disturbed)]
+    assert sum(a != b for a, b in zip(*received, strict=True)) > 15
 
 
 @pytest.mark.parametrize("disturbance", DISTURBANCES, ids=str)
 def test_noise_and_quantisation_touch_only_the_measurements_named(disturbance: dict[str, Any]) -> None:
-    plain, disturbed = Flown(Timing(), 0.2), Flown(Timing(**disturbance), 0.2)
-    for one, other in zip(plain.controller.told, disturbed.controller.told, strict=True):
+    plain, disturbed = StubRun(Timing(), 0.2), StubRun(Timing(**disturbance), 0.2)
+    for one, other in zip(plain.controller.received, disturbed.controller.received, strict=True):
         assert {n: v for n, v in one.items() if n != "position.x"} == {
             n: v for n, v in other.items() if n != "position.x"
         }
 
 
 def test_quantised_measurements_are_the_nearest_multiples_of_the_quantum() -> None:
-    flown = Flown(Timing(quantisation={"position": 0.3}), 2.0)
-    true = flown.column("plant.position.x")[::10]
-    for told, x in zip(flown.controller.told[1:], true, strict=False):
-        assert told["position.x"] == pytest.approx(round(told["position.x"] / 0.3) * 0.3)
-        assert abs(told["position.x"] - x) <= 0.15 + 1e-12
+    run = StubRun(Timing(quantisation={"position": 0.3}), 2.0)
+    true = run.column("plant.position.x")[::10]
+    for received, x in zip(run.controller.received[1:], true, strict=False):
+        assert received["position.x"] == pytest.approx(round(received["position.x"] / 0.3) * 0.3)
+        assert abs(received["position.x"] - x) <= 0.15 + 1e-12
 
 
 def test_noise_has_its_standard_deviation_and_no_mean() -> None:
-    flown = Flown(Timing(period=0.001, noise={"position": 0.2}), 4.0, Still())
-    true = np.column_stack([flown.column(f"plant.{name}") for name in MEASUREMENT[:3]])[:-1]
-    told = np.array([[told[name] for name in MEASUREMENT[:3]] for told in flown.controller.told[1:]])
-    error = (told - true).ravel()
+    run = StubRun(Timing(period=0.001, noise={"position": 0.2}), 4.0, Still())
+    true = np.column_stack([run.column(f"plant.{name}") for name in MEASUREMENT[:3]])[:-1]
+    received = np.array([[received[name] for name in MEASUREMENT[:3]] for received in run.controller.received[1:]])
+    error = (received - true).ravel()
     assert abs(error.mean()) < 5 * 0.2 / math.sqrt(len(error))
     assert error.std() == pytest.approx(0.2, rel=0.03)
-    correlation = np.corrcoef((told - true).T) - np.eye(3)
+    correlation = np.corrcoef((received - true).T) - np.eye(3)
     assert np.abs(correlation).max() < 0.08
 
 
 def test_noise_on_one_measurement_is_the_same_with_or_without_noise_on_another() -> None:
-    one = Flown(Timing(noise={"position": 0.1}), 0.2)
-    both = Flown(Timing(noise={"position": 0.1, "velocity": 3.0}), 0.2)
-    for a, b in zip(one.controller.told, both.controller.told, strict=True):
+    one = StubRun(Timing(noise={"position": 0.1}), 0.2)
+    both = StubRun(Timing(noise={"position": 0.1, "velocity": 3.0}), 0.2)
+    for a, b in zip(one.controller.received, both.controller.received, strict=True):
         assert a["position.x"] == b["position.x"]
 
 
 def test_a_measurement_that_is_rounded_is_noisy_first() -> None:
-    flown = Flown(Timing(noise={"position": 0.5}, quantisation={"position": 0.25}), 0.5)
-    told = [told["position.z"] for told in flown.controller.told[1:]]
-    assert all(value == round(value / 0.25) * 0.25 for value in told)
-    assert len(set(told)) > 4
+    run = StubRun(Timing(noise={"position": 0.5}, quantisation={"position": 0.25}), 0.5)
+    received = [received["position.z"] for received in run.controller.received[1:]]
+    assert all(value == round(value / 0.25) * 0.25 for value in received)
+    assert len(set(received)) > 4

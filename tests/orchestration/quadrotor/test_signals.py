@@ -9,7 +9,7 @@ import pytest
 
 import quadcosim
 from orchestration.flight.hover_loop import hover_of
-from orchestration.quadrotor.signals import DRAG, chosen
+from orchestration.quadrotor.signals import DRAG, choice_of
 from orchestration.quadrotor.translation import paths_of
 from orchestration.runs.result import Result
 from orchestration.signals.dryden import DRAWS, Dryden
@@ -39,16 +39,16 @@ def written(path: Path, text: str) -> Path:
     return path
 
 
-def flown(**fields: object) -> Result:
+def simulated(**fields: object) -> Result:
     scenario = dataclasses.replace(Scenario(stop_time=0.6, seed=3), **fields)  # type: ignore[arg-type]
     return quadcosim.run(located(scenario.as_system()))
 
 
-# -- what is flown --------------------------------------------------------------------------------------------
+# -- what is simulated --------------------------------------------------------------------------------------------
 
 
 def test_the_controller_is_fed_the_motion_at_its_samples_and_its_error_is_recorded() -> None:
-    flight = flown(reference=ReferenceChoice(name="lemniscate", parameters={"radius": 1.5}), stop_time=1.0)
+    flight = simulated(reference=ReferenceChoice(name="lemniscate", parameters={"radius": 1.5}), stop_time=1.0)
     motion = made("lemniscate", {"radius": 1.5})
     for i in (0, 10, 990):
         expected = motion.at(flight.signals["time"][i])
@@ -60,25 +60,27 @@ def test_the_controller_is_fed_the_motion_at_its_samples_and_its_error_is_record
 
 
 def test_way_points_are_flown_through(points: Path) -> None:
-    flight, curve = flown(reference=ReferenceChoice(file=points)), read_waypoints(points, {})
+    flight, curve = simulated(reference=ReferenceChoice(file=points)), read_waypoints(points, {})
     found = [flight.signals[f"reference.position.{axis}"][500] for axis in "xyz"]
     assert found == curve.at(np.array([0.5]))[0, 0].tolist()
 
 
 def test_a_wind_from_a_file_pushes_by_the_drag_and_a_force_as_it_is(tmp_path: Path) -> None:
     wind, force = written(tmp_path / "wind.csv", WIND), written(tmp_path / "force.csv", FORCE)
-    blown = flown(disturbance=DisturbanceChoice(file=wind, drag=0.25))
-    pushed = flown(disturbance=DisturbanceChoice(file=force))
+    blown = simulated(disturbance=DisturbanceChoice(file=wind, drag=0.25))
+    pushed = simulated(disturbance=DisturbanceChoice(file=force))
     assert blown.signals["disturbance.external_force.x"][500] == 1.0
     assert blown.signals["disturbance.external_force.x"][250] == pytest.approx(0.5)
     assert pushed.signals["disturbance.external_force.x"][500] == 1.0
-    assert flown(disturbance=DisturbanceChoice(file=wind)).signals["disturbance.external_force.x"][500] == 4.0 * DRAG
+    assert (
+        simulated(disturbance=DisturbanceChoice(file=wind)).signals["disturbance.external_force.x"][500] == 4.0 * DRAG
+    )
 
 
 def test_a_force_acts_on_the_vehicle_over_the_interval_that_begins_with_it(tmp_path: Path) -> None:
     text = "time,external_force.x,external_force.y,external_force.z\n0,0,0,0\n0.3,2,0,0\n9,2,0,0\n"
     with_, without = (
-        flown(disturbance=choice)
+        simulated(disturbance=choice)
         for choice in (
             DisturbanceChoice(file=written(tmp_path / "f.csv", text), interpolation="previous"),
             DisturbanceChoice(),
@@ -92,7 +94,7 @@ def test_a_force_acts_on_the_vehicle_over_the_interval_that_begins_with_it(tmp_p
 
 def test_gusts_are_those_of_the_seed_at_their_steps() -> None:
     choice = DisturbanceChoice(name="dryden", drag=0.5, parameters={"wind_speed": 8.0, "step": 0.02})
-    one, same, other = (flown(disturbance=choice, seed=seed) for seed in (3, 3, 4))
+    one, same, other = (simulated(disturbance=choice, seed=seed) for seed in (3, 3, 4))
     name = "disturbance.external_force.y"
     assert one.rows.tobytes() == same.rows.tobytes()
     assert not (one.signals[name] == other.signals[name]).any()
@@ -123,7 +125,7 @@ def test_about_hover_there_is_neither_reference_nor_disturbance() -> None:
     assert hover_of(windy) == hover_of(Scenario())
 
 
-# -- how it is said -------------------------------------------------------------------------------------------
+# -- how it is written -------------------------------------------------------------------------------------------
 
 
 def test_a_scenario_file_says_it_and_comes_back(tmp_path: Path, points: Path) -> None:
@@ -159,7 +161,7 @@ def test_axes_and_flags_reach_the_parameters(main: Main) -> None:
         assert quadcosim.changed(system, {path: value}) != system
     changed_ = Scenario(reference=ReferenceChoice(name="circle")).with_changes(parameters={"reference.radius": 3.0})
     assert changed_.reference.parameters == {"radius": 3.0}
-    assert chosen("way.CSV") == {"file": Path("way.CSV")}
+    assert choice_of("way.CSV") == {"file": Path("way.CSV")}
     flags = ("--reference", "circle", "--set", "reference.radius=0", "--disturbance", "dryden")
     assert "reference.radius = 0.0: expected a positive number" in main("run", *flags, code=2).stderr
 

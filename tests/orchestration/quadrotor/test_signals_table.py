@@ -13,7 +13,7 @@ from orchestration.building.models import MODELS
 from quadcosim import Result
 from tests.fmus.making import PAIR
 from tests.native import assert_near, assert_the_same, natives
-from tests.orchestration.quadrotor.signals_table import TABLE, entry, fingerprint, flights, flown, scenario_of
+from tests.orchestration.quadrotor.signals_table import TABLE, entry, fingerprint, flights, scenario_of, simulated
 
 SAME_MATHEMATICS = json.loads(TABLE.read_text(encoding="utf-8"))["fingerprint"] == fingerprint()
 FLIGHTS = dict(flights())
@@ -28,7 +28,7 @@ SEMI_IMPLICIT = {"discretisation": "semi_implicit"}
 @functools.cache
 def in_python(name: str) -> Result:
     """The flight of a scenario of the table, by the slaves in Python."""
-    return flown(FLIGHTS[name]["scenario"])
+    return simulated(FLIGHTS[name]["scenario"])
 
 
 @pytest.mark.parametrize("name", FLIGHTS)
@@ -73,12 +73,12 @@ def test_motors_written_out_as_c_are_those_in_python(on_libm: dict[str, Path]) -
     motors = {"thrust_max": 20.0, "thrust_min": -20.0, "arm": {"x": 1.2, "y": 1.0}, "drag_to_thrust": 1.0}
     motors |= {"time_constant": {"up": 0.0125, "down": 0.025}}
     scenario = scenario_of({"stop_time": 1.0, "plant": {"motor": motors}})
-    flown = [
+    results = [
         quadcosim.run(scenario.with_fmus(plant=fmus["QuadrotorPlant"], controller=fmus["UnifiedController"]))
         for fmus in (on_libm, {model: model for model in PAIR})
     ]
-    assert_the_same(*flown)
-    assert 0.01 < flown[0].metrics["saturation_share"] < 0.9
+    assert_the_same(*results)
+    assert 0.01 < results[0].metrics["saturation_share"] < 0.9
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -86,12 +86,12 @@ def test_a_flight_that_turns_in_other_axes_is_in_c_what_it_is_in_python(law: str
     turning = {"frame": "enu", "discretisation": "mean", "trajectory": {"yaw": 0.3, "yaw_rate": 0.5}}
     tables = {"plant": {"frame": "enu"}, "controller": turning}
     scenario = scenario_of({"stop_time": 2.0, "timing": {"period": 0.04}, **tables})
-    flown = [
+    results = [
         quadcosim.run(scenario.with_fmus(plant=fmus["QuadrotorPlant"], controller=fmus[law]))
         for fmus in (on_libm, {"QuadrotorPlant": "QuadrotorPlant", law: law})
     ]
-    assert_the_same(*flown)
-    assert flown[0].divergence is None
+    assert_the_same(*results)
+    assert results[0].divergence is None
 
 
 @pytest.mark.parametrize(
@@ -104,8 +104,8 @@ def test_redesigns_written_out_as_c_are_those_in_python(
     """With samples and commands that come late, and measurements that are lost."""
     timing = {"period": 0.04, "delay": 0.05, "jitter": 0.01, "measurement_loss": 0.05, "plant_interval": 0.005}
     scenario = scenario_of({"stop_time": 0.6, "timing": timing, "controller": redesign})
-    flown = [
+    results = [
         quadcosim.run(scenario.with_fmus(plant="native/QuadrotorPlant", controller=fmu)) for fmu in (on_libm[law], law)
     ]
-    assert_the_same(*flown)
-    assert flown[0].divergence is None
+    assert_the_same(*results)
+    assert results[0].divergence is None

@@ -1,4 +1,4 @@
-"""Vehicles: what their files may say, whose word counts, and that one law flies them all alike."""
+"""Vehicles: what their files may contain, which value takes precedence, and that one law controls them all alike."""
 
 import dataclasses
 import shutil
@@ -89,14 +89,14 @@ def test_vehicles_by_name_are_those_that_are_shipped() -> None:
 @pytest.mark.parametrize("name", names())
 def test_a_controller_is_told_the_body_that_its_plant_is(name: str) -> None:
     plant, controller = parameters(Scenario(vehicle=load_vehicle(name, Path())))
-    told = {
+    values_by_target = {
         f"{side}.{key}": values[key]
         for side, values in (("plant", plant), ("controller", controller))
         for key in RIGID_BODY
         if key in values
     }
-    assert len(told) == 8
-    assert Scenario().warnings(told) == ()
+    assert len(values_by_target) == 8
+    assert Scenario().warnings(values_by_target) == ()
 
 
 def ideal(vehicle: Vehicle) -> Vehicle:

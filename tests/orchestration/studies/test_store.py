@@ -24,7 +24,7 @@ from hypothesis import strategies as st
 
 from orchestration.building import fmus
 from orchestration.building.inputs import Files, files_of
-from orchestration.quadrotor.scenario import FmuChoice
+from orchestration.quadrotor.fmu_choice import FmuChoice
 from orchestration.quadrotor.signals import ReferenceChoice
 from orchestration.quadrotor.wiring import DEFAULT_PLANT
 from orchestration.studies import store as stores

@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from orchestration.building.inputs import Files, files_of, with_files
-from orchestration.quadrotor.scenario import Record
+from orchestration.quadrotor.fmu_choice import Record
 from orchestration.studies.axes import Axis
 from orchestration.studies.store import open_for_reading, store_path
 from orchestration.studies.study import Study

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from orchestration.building import fmus
-from orchestration.quadrotor.scenario import FmuChoice
+from orchestration.quadrotor.fmu_choice import FmuChoice
 from orchestration.studies.store import open_for_reading, store_path
 from orchestration.workers.pool import Pool
 from orchestration.workers.provenance import versions

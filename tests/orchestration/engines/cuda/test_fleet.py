@@ -17,7 +17,8 @@ from orchestration.engines.cuda.fleet import Fleet, expect_gpu
 from orchestration.engines.cuda.program import Code
 from orchestration.engines.structures import structures
 from orchestration.fmi.model import Model
-from orchestration.quadrotor.scenario import FmuChoice, Scenario
+from orchestration.quadrotor.fmu_choice import FmuChoice
+from orchestration.quadrotor.scenario import Scenario
 from orchestration.quadrotor.timing import Timing
 from orchestration.schedule import schedule_cache
 from orchestration.schedule.schedule_cache import ScheduleCache
