@@ -3,7 +3,7 @@
 from dataclasses import field
 
 from orchestration.basics.records import record
-from orchestration.system.model import Parameter
+from orchestration.system.component import Parameter
 
 
 @record()
